@@ -1,0 +1,54 @@
+# Compiler flags and the three functions that every folder's CMakeLists.txt uses.
+
+add_library(touchstone_flags INTERFACE)
+target_include_directories(touchstone_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+target_compile_options(touchstone_flags INTERFACE -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64" AND TOUCHSTONE_ARCH)
+  target_compile_options(touchstone_flags INTERFACE -march=${TOUCHSTONE_ARCH})
+endif()
+
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+set(CMAKE_C_FLAGS_RELEASE "-O3 -DNDEBUG")
+set(CMAKE_CXX_FLAGS_SANITIZE "-O1 -g1 -fno-omit-frame-pointer")
+set(CMAKE_C_FLAGS_SANITIZE "-O1 -g1 -fno-omit-frame-pointer")
+if(TOUCHSTONE_SANITIZE)
+  add_compile_options(-fsanitize=${TOUCHSTONE_SANITIZE} -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TOUCHSTONE_SANITIZE})
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+# touchstone_library(NAME SOURCES a.cpp ... LINKS base geometry absl::status ...)
+# makes the static library touchstone_NAME; a plain word in LINKS is a folder of this project.
+function(touchstone_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(touchstone_${name} STATIC ${ARG_SOURCES})
+  touchstone_link(touchstone_${name} PUBLIC ${ARG_LINKS})
+endfunction()
+
+# touchstone_test(NAME SOURCES a_test.cpp ... LINKS ...): one test binary a folder, NAME_test.
+function(touchstone_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name}_test ${ARG_SOURCES})
+  touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name}_test PRIVATE
+    TOUCHSTONE_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+    TOUCHSTONE_SHARED_DATA="${CMAKE_SOURCE_DIR}/../shared/data")
+  add_test(NAME ${name} COMMAND ${name}_test)
+  set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+endfunction()
+
+# touchstone_link(TARGET PUBLIC|PRIVATE links...)
+function(touchstone_link target visibility)
+  target_link_libraries(${target} ${visibility} touchstone_flags)
+  foreach(link ${ARGN})
+    if(link MATCHES "^[a-z_]+$" AND NOT link MATCHES "^touchstone_")
+      set(link touchstone_${link})
+    endif()
+    target_link_libraries(${target} ${visibility} ${link})
+  endforeach()
+endfunction()

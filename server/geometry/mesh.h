@@ -1,0 +1,52 @@
+// A triangle mesh in the object frame (right-handed, z up), in metres.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace touchstone {
+
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> vertices_m;
+  std::vector<std::array<uint32_t, 3>> triangles;  // counter-clockwise seen from outside, indices into vertices_m
+
+  // Corner c (0, 1, 2) of a triangle, exactly as stored, in double precision.
+  Eigen::Vector3d Corner(uint32_t triangle, int c) const {
+    return vertices_m[triangles[triangle][c]].cast<double>();
+  }
+};
+
+// The axis-aligned box around a mesh. Empty mesh: min > max.
+struct Bounds {
+  Eigen::Vector3d min_m = Eigen::Vector3d::Constant(1e300);
+  Eigen::Vector3d max_m = Eigen::Vector3d::Constant(-1e300);
+  Eigen::Vector3d Centre() const { return 0.5 * (min_m + max_m); }
+  double DiagonalM() const { return (max_m - min_m).norm(); }
+};
+
+Bounds ComputeBounds(const TriangleMesh& mesh);
+
+// What a mesh is like, for `mesh info` and for refusing what cannot be touched.
+struct MeshReport {
+  uint64_t vertices = 0;
+  uint64_t triangles = 0;
+  uint64_t boundary_edges = 0;      // edges with one triangle: the surface is open there
+  uint64_t nonmanifold_edges = 0;   // edges with three triangles or more
+  uint64_t inconsistent_edges = 0;  // edges that both triangles run through in the same direction
+  uint64_t degenerate_triangles = 0;
+  uint64_t duplicate_triangles = 0;
+  uint64_t unused_vertices = 0;
+  double signed_volume_m3 = 0;      // negative: inside out
+  bool closed() const { return boundary_edges == 0 && nonmanifold_edges == 0; }
+};
+
+MeshReport InspectMesh(const TriangleMesh& mesh);
+
+// SHA-256 of the vertex and index bytes: the identity of a mesh in datasets, sessions and reports.
+std::string MeshHash(const TriangleMesh& mesh);
+
+}  // namespace touchstone

@@ -1,0 +1,19 @@
+// PNG and JPEG. The same pixels always give the same bytes.
+#pragma once
+
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "server/image/image.h"
+
+namespace touchstone {
+
+// `channels` 1 or 3, rows from the top. Fast rather than small: libspng, compression level 1, filter SUB.
+absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int height, int channels);
+absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels, int quality);
+
+// For tests and clients; refuses more than kMostImageSide a side.
+absl::StatusOr<Image> DecodePng(const std::string& png);
+
+}  // namespace touchstone
