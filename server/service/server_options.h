@@ -1,0 +1,49 @@
+// Everything that can be set about a virtual source. Each field is a key of the TOML file and a flag of
+// touchstone-server with the same name (underscores become dashes in flags).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/image/renderer.h"
+
+namespace touchstone {
+
+// A mesh file to serve under a name, with what the file does not say.
+struct MeshSource {
+  std::string name;              // [A-Za-z0-9_.-]{1,64}
+  std::string path;
+  std::string unit = "mm";       // "mm", "cm", "m", "inch"
+  std::string up = "z";          // which axis of the file points up: "x", "y", "z"
+  double scale = 1;              // further factor on the coordinates
+  double fit_mm = 0;             // > 0: scale so that the longest side of the bounding box is this long
+};
+
+// "lat10=lat10.off", or with what the file does not say "cup=cup.off,fit_mm=150,up=y,unit=m,scale=2".
+// Errors say what was found and what would be right.
+absl::StatusOr<MeshSource> ParseMeshSource(const std::string& text);
+
+// Every readable mesh file of a folder, sorted, named by its stem.
+absl::StatusOr<std::vector<MeshSource>> MeshSourcesOfFolder(const std::string& folder);
+
+struct ServerOptions {
+  std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
+  std::vector<MeshSource> meshes;          // besides the five built-in supershapes
+  int supershape_triangles = 20000;        // about; of each built-in
+  std::string models_dir;                  // where models are kept; empty: in memory
+  std::string default_model = "nominal";
+  int threads = 0;                         // that simulate; 0: one a core
+  RendererOptions renderer;
+  // Limits: every one in this place.
+  int most_batch_size = 65536;
+  int most_touches_per_request = 100000;
+  int most_images_per_request = 1000;
+  int most_streams = 64;                   // dataset streams at once; one more is RESOURCE_EXHAUSTED
+  int most_message_mib = 256;
+  double lease_window_s = 2;
+  double drain_s = 10;                     // what running calls get after SIGTERM
+};
+
+}  // namespace touchstone
