@@ -21,7 +21,10 @@ class Surface;
 
 class TouchBatch {
  public:
-  // Makes room; every array gets its neutral value. Capacity is kept between calls.
+  // Makes room. Fields that effects change and what is given get their neutral value (zero offsets and noise,
+  // no formula error, `lateral` and `approach` unset); arrays that a stage fills whole (travel_m, normal,
+  // contact_m, cos_incidence, contact_time_s, time_per_travel_s_m, press_m, reported_time_s) are only sized.
+  // The surface, seed, spacing and stroke stay. Capacity is kept between calls.
   void Reset(int size, int fingers);
 
   int size() const { return size_; }
@@ -74,12 +77,18 @@ class TouchBatch {
   // --- Sensor ----------------------------------------------------------------------------------------------
   // Effects change these; the stage then makes reported = ceil_to_tick((time + noise) * clock_factor).
   std::vector<double> reported_time_s;        // a finger: starts as contact_time_s, effects shift it
+  // The noise of a finger has the scale noise_sigma_s * noise_growth, in whatever order the effects stand.
   std::vector<double> noise_sigma_s;          // a finger: standard deviation (scale) of the noise
+  std::vector<double> noise_growth;           // a finger: factor on noise_sigma_s; empty: 1 everywhere
   bool any_noise = false;                     // set by the effects that fill noise_sigma_s
   double degrees_of_freedom = 0;              // of Student's t; 0: Gaussian
   double clock_factor = 1;
   double poll_interval_s = 0;                 // 0: no polling
   double missed_probability = 0;
+
+  // The first formula that had no finite value, with the touch and the inputs; empty: none. A stage that finds
+  // it set after its effects gives up the batch with this text (INVALID_ARGUMENT): nothing was added there.
+  std::string formula_error;
 
  private:
   int size_ = 0;

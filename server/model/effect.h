@@ -63,6 +63,7 @@ struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
   bool always_per_object = false;  // scope: object without being told (surface_error)
+  bool before_cast = false;        // contact stage only: sets up the cast instead of changing its result (tip_radius)
   std::string meaning;       // what it is
   std::string signature;     // how it shows in the data, and what is told apart from it
   std::string check_on_rig;  // how to check it

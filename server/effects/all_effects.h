@@ -1,0 +1,12 @@
+// The list of every built-in touch effect. A new effect is one file, its test, and one line in all_effects.cpp.
+#pragma once
+
+#include "server/model/effect.h"
+
+namespace touchstone {
+
+// The catalogue that model files are read with: the built-in effects, and formulas. Made at the first call,
+// never changed; any thread may use it.
+const EffectCatalogue& Catalogue();
+
+}  // namespace touchstone

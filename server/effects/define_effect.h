@@ -1,0 +1,113 @@
+// The shape of an effect's file: a struct of SI parameters, a row for each (what files call it, its unit,
+// bounds and meaning), the texts for people, and a function that changes the batch in the effect's stage.
+// DefineEffect turns them into the table that the catalogue, files, forms and fits read. See README.md.
+#pragma once
+
+#include <array>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+#include <absl/types/span.h>
+
+#include "server/base/check.h"
+#include "server/effects/touch_batch.h"
+#include "server/model/effect.h"
+#include "server/model/model.h"
+
+namespace touchstone {
+
+// A parameter with one value a finger; entries from the batch's number of fingers on are zero.
+using PerFinger = std::array<double, kMostFingers>;
+
+// One parameter of an effect whose values live in the struct P. Numbers here are in the unit of files;
+// the field gets SI. The kind of field (one number, a vector, one number a finger) follows from its type.
+template <typename P>
+struct ParameterRow {
+  std::variant<double P::*, Eigen::Vector3d P::*, PerFinger P::*> field;
+  const char* name;     // with the unit's suffix
+  Unit unit;
+  double lower;
+  double upper;
+  double neutral;       // changes nothing; the default
+  double typical;       // the size that rigs show
+  const char* meaning;
+  bool sum_zero = false;  // per finger: only differences can be seen, so the values sum to 0
+};
+
+template <typename P>
+struct EffectDefinition {
+  const char* name;
+  Stage stage;
+  bool always_per_object = false;
+  bool before_cast = false;
+  const char* meaning;
+  const char* signature;
+  const char* check_on_rig;
+  const char* remedy;
+  absl::Span<const ParameterRow<P>> rows;
+  EffectNeeds needs = {};
+  void (*apply)(const P& parameters, TouchBatch& touches);
+};
+
+namespace define_effect_internal {
+
+// Copies a flat array of SI values into the fields of P, in the order of the rows.
+template <typename P>
+P Unpack(absl::Span<const ParameterRow<P>> rows, absl::Span<const double> values, int fingers) {
+  P parameters{};
+  size_t next = 0;
+  for (const ParameterRow<P>& row : rows) {
+    if (const auto* scalar = std::get_if<double P::*>(&row.field)) {
+      parameters.*(*scalar) = values.at(next++);
+    } else if (const auto* vector = std::get_if<Eigen::Vector3d P::*>(&row.field)) {
+      for (int axis = 0; axis < 3; ++axis) (parameters.*(*vector))[axis] = values.at(next++);
+    } else {
+      PerFinger& fingers_values = parameters.*(std::get<PerFinger P::*>(row.field));
+      fingers_values.fill(0.0);
+      for (int finger = 0; finger < fingers; ++finger) fingers_values[finger] = values.at(next++);
+    }
+  }
+  TOUCHSTONE_CHECK(next == values.size());
+  return parameters;
+}
+
+}  // namespace define_effect_internal
+
+template <typename P>
+Effect DefineEffect(const EffectDefinition<P>& definition) {
+  Effect effect;
+  effect.name = definition.name;
+  effect.stage = definition.stage;
+  effect.always_per_object = definition.always_per_object;
+  effect.before_cast = definition.before_cast;
+  effect.meaning = definition.meaning;
+  effect.signature = definition.signature;
+  effect.check_on_rig = definition.check_on_rig;
+  effect.remedy = definition.remedy;
+  effect.needs = definition.needs;
+  for (const ParameterRow<P>& row : definition.rows) {
+    ParameterInfo info;
+    info.name = row.name;
+    info.unit = row.unit;
+    info.arity = std::holds_alternative<double P::*>(row.field)            ? Arity::kScalar
+                 : std::holds_alternative<Eigen::Vector3d P::*>(row.field) ? Arity::kVector3
+                                                                           : Arity::kPerFinger;
+    info.lower = row.lower;
+    info.upper = row.upper;
+    info.neutral = row.neutral;
+    info.typical = row.typical;
+    info.sum_zero = row.sum_zero;
+    info.meaning = row.meaning;
+    effect.parameters.push_back(std::move(info));
+  }
+  // The rows are static arrays in the effect's file; the copy of the span outlives nothing.
+  effect.apply = [rows = definition.rows, apply = definition.apply](absl::Span<const double> values,
+                                                                    TouchBatch& touches) {
+    apply(define_effect_internal::Unpack<P>(rows, values, touches.fingers()), touches);
+  };
+  return effect;
+}
+
+}  // namespace touchstone
