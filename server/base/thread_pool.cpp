@@ -1,0 +1,72 @@
+#include "server/base/thread_pool.h"
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+
+namespace touchstone {
+
+ThreadPool::ThreadPool(int threads) {
+  if (threads <= 0) threads = std::max(1u, std::thread::hardware_concurrency());
+  for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { Work(); });
+}
+
+ThreadPool::~ThreadPool() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void ThreadPool::Submit(std::function<void()> task) {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    tasks_.push_back(std::move(task));
+  }
+  wake_.notify_one();
+}
+
+void ThreadPool::Work() {
+  for (;;) {
+    std::function<void()> task;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      wake_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
+      if (tasks_.empty()) return;
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+    }
+    task();
+  }
+}
+
+void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int, int)>& body) {
+  grain = std::max(1, grain);
+  const int pieces = (count + grain - 1) / grain;
+  // Shared with tasks that may start only after all work is done and this call has returned.
+  struct Shared {
+    std::atomic<int> next{0};
+    std::mutex mutex;
+    std::condition_variable done;
+    int finished = 0;
+  };
+  auto shared = std::make_shared<Shared>();
+  const std::function<void(int, int)>* call = &body;  // used only while a piece is left, that is, before we return
+  const auto work = [shared, call, pieces, grain, count] {
+    for (;;) {
+      const int piece = shared->next++;
+      if (piece >= pieces) return;
+      (*call)(piece * grain, std::min(count, (piece + 1) * grain));
+      std::lock_guard<std::mutex> lock(shared->mutex);
+      if (++shared->finished == pieces) shared->done.notify_all();
+    }
+  };
+  for (int k = 1; k < std::min(pieces, size() + 1); ++k) Submit(work);
+  work();
+  std::unique_lock<std::mutex> lock(shared->mutex);
+  shared->done.wait(lock, [&] { return shared->finished == pieces; });
+}
+
+}  // namespace touchstone

@@ -1,0 +1,214 @@
+#include "server/dataset/sampler.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/dataset/coherence.h"
+
+namespace touchstone {
+namespace {
+
+// Touches that go through the stages together: their arrays stay in the second-level cache.
+constexpr size_t kBlock = 1024;
+// After this many rounds of misses one index is followed to its end, so that a hopeless object fails at once.
+constexpr uint32_t kProbeAfter = 16;
+
+}  // namespace
+
+struct TouchSampler::Workspace {
+  std::vector<uint32_t> slots, missed, block_slots, order;
+  std::vector<uint64_t> numbers;
+  std::vector<TouchPose> poses;
+  std::vector<uint8_t> accepted;
+  CoherenceScratch coherence;
+  TouchBatch batch;
+  TouchWorkspace touch;
+  std::vector<uint64_t> previous_indices;
+  std::vector<double> previous_press_m;
+};
+
+std::unique_ptr<TouchSampler::Workspace> TouchSampler::NewWorkspace() { return std::make_unique<Workspace>(); }
+
+TouchSampler::TouchSampler(const DatasetSpecification& specification)
+    : specification_(specification), simulator_(specification.model) {
+  for (const auto& object : specification.objects)
+    generators_.push_back(MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+}
+
+TouchSampler::~TouchSampler() = default;
+
+// A plan that ends goes through its touches for each object; a random one numbers its draws by the sample.
+uint64_t TouchSampler::NumberOf(uint64_t index) const {
+  return generators_[0]->Count() == 0 ? index : index / specification_.objects.size();
+}
+
+absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled,
+                                  Workspace* workspace, const Sink& sink) const {
+  if (!simulator_.needs_previous_press()) return Run(indices, Until::kSensor, {}, cancelled, workspace, sink);
+
+  // The touch before is the sample before: its motion is simulated first. Its own history does not reach its press,
+  // but through a formula, where it counts as none.
+  const int fingers = specification_.model->fingers;
+  std::vector<uint64_t>& previous = workspace->previous_indices;
+  std::vector<uint32_t> slot_of_previous;
+  previous.clear();
+  for (size_t slot = 0; slot < indices.size(); ++slot) {
+    if (indices[slot] == 0) continue;
+    previous.push_back(indices[slot] - 1);
+    slot_of_previous.push_back(slot);
+  }
+  std::vector<double>& press_m = workspace->previous_press_m;
+  press_m.assign(indices.size() * fingers, 0.0);
+  TOUCHSTONE_RETURN_IF_ERROR(Run(previous, Until::kMotion, {}, cancelled, workspace,
+                                 [&](const TouchBatch& batch, absl::Span<const uint32_t> slots, absl::Span<const uint8_t> accepted) {
+                                   for (int touch = 0; touch < batch.size(); ++touch)
+                                     for (int finger = 0; accepted[touch] && finger < fingers; ++finger)
+                                       press_m[slot_of_previous[slots[touch]] * fingers + finger] =
+                                           batch.press_m[batch.At(finger, touch)];
+                                 }));
+  return Run(indices, Until::kSensor, press_m, cancelled, workspace, sink);
+}
+
+absl::Status TouchSampler::Run(absl::Span<const uint64_t> indices, Until until, absl::Span<const double> previous_press_m,
+                               const std::atomic<bool>& cancelled, Workspace* workspace, const Sink& sink) const {
+  const size_t objects = specification_.objects.size();
+  workspace->poses.resize(indices.size());
+  for (size_t object = 0; object < objects; ++object) {
+    workspace->slots.clear();
+    for (size_t slot = 0; slot < indices.size(); ++slot)
+      if (indices[slot] % objects == object) workspace->slots.push_back(slot);
+    TOUCHSTONE_RETURN_IF_ERROR(RunObject(object, indices, until, previous_press_m, cancelled, workspace, sink));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> indices, Until until,
+                                     absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
+                                     Workspace* workspace, const Sink& sink) const {
+  const PoseGenerator& generator = *generators_[object];
+  for (uint32_t attempt = 0; !workspace->slots.empty(); ++attempt) {
+    const size_t pending = workspace->slots.size();
+    if (attempt == specification_.most_draws) return Hopeless(object, indices[workspace->slots[0]]);
+    if (attempt == kProbeAfter)
+      TOUCHSTONE_RETURN_IF_ERROR(ProbeDraws(object, indices[workspace->slots[0]], attempt, workspace));
+
+    // Draw, and put neighbours together.
+    workspace->numbers.resize(pending);
+    workspace->poses.resize(std::max(workspace->poses.size(), pending));
+    for (size_t k = 0; k < pending; ++k) workspace->numbers[k] = NumberOf(indices[workspace->slots[k]]);
+    generator.Draw(workspace->numbers, attempt, workspace->poses.data());
+    CoherentOrder({workspace->poses.data(), pending}, &workspace->coherence, &workspace->order);
+
+    // Simulate block by block; what missed is drawn again.
+    workspace->missed.clear();
+    for (size_t begin = 0; begin < pending; begin += kBlock) {
+      if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
+      const absl::Span<const uint32_t> block(&workspace->order[begin], std::min(kBlock, pending - begin));
+      TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, block, until, previous_press_m, workspace));
+      sink(workspace->batch, workspace->block_slots, workspace->accepted);
+      for (size_t k = 0; k < block.size(); ++k)
+        if (!workspace->accepted[k]) workspace->missed.push_back(workspace->block_slots[k]);
+    }
+    // In the order of the slots, so that the probe and the error name the lowest index.
+    std::sort(workspace->missed.begin(), workspace->missed.end());
+    workspace->slots.swap(workspace->missed);
+  }
+  return absl::OkStatus();
+}
+
+// Simulates the drawn poses `block` (places in workspace->slots and ->poses).
+absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> block,
+                                    Until until, absl::Span<const double> previous_press_m, Workspace* workspace) const {
+  FillBatch(object, indices, block, previous_press_m, workspace);
+  TouchBatch& batch = workspace->batch;
+  TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
+  const bool can_redraw = generators_[object]->CanRedraw();
+  workspace->accepted.assign(block.size(), 1);
+  if (can_redraw)
+    for (int finger = 0; finger < batch.fingers(); ++finger)
+      for (int touch = 0; touch < batch.size(); ++touch)
+        workspace->accepted[touch] &= !std::isnan(batch.travel_m[batch.At(finger, touch)]);
+  if (until == Until::kMotion) return absl::OkStatus();
+  return simulator_.RunSensor(&batch, &workspace->touch);
+}
+
+void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> block,
+                             absl::Span<const double> previous_press_m, Workspace* workspace) const {
+  const Plan& plan = specification_.plan;
+  TouchBatch& batch = workspace->batch;
+  simulator_.Prepare(static_cast<int>(block.size()), &batch);
+  batch.surface = specification_.objects[object];
+  batch.seed = specification_.seed;
+  workspace->block_slots.resize(block.size());
+  for (size_t k = 0; k < block.size(); ++k) {
+    const TouchPose& pose = workspace->poses[block[k]];
+    const uint32_t slot = workspace->slots[block[k]];
+    workspace->block_slots[k] = slot;
+    batch.index[k] = indices[slot];
+    batch.target_m[k] = pose.target_m;
+    batch.approach[k] = pose.approach;
+    batch.lateral[k] = pose.lateral;
+    batch.standoff_m[k] = pose.standoff_m;
+    batch.speed_m_s[k] = plan.speed_m_s;
+    batch.session_time_s[k] = plan.touch_interval_s * indices[slot];
+  }
+  if (plan.kind == Plan::Kind::kList) {
+    for (const std::string& name : simulator_.needed_covariates()) {
+      const bool everywhere = std::all_of(plan.list.begin(), plan.list.end(),
+                                          [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; });
+      if (everywhere) batch.covariates[name].resize(block.size());
+    }
+    for (size_t k = 0; k < block.size(); ++k) {
+      const CommandedTouch& touch = plan.list[NumberOf(batch.index[k]) % plan.list.size()];
+      batch.speed_m_s[k] = touch.speed_m_s;
+      batch.session_time_s[k] = touch.session_time_s;
+      for (auto& [name, values] : batch.covariates) values[k] = touch.covariates.at(name);
+    }
+  }
+  if (!previous_press_m.empty())
+    for (int finger = 0; finger < batch.fingers(); ++finger)
+      for (size_t k = 0; k < block.size(); ++k)
+        batch.previous_press_m[batch.At(finger, k)] = previous_press_m[workspace->block_slots[k] * batch.fingers() + finger];
+}
+
+absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
+  const Surface& surface = *specification_.objects[object];
+  const Eigen::Vector3d size_mm = (surface.bounds().max_m - surface.bounds().min_m) / kMetresPerMillimetre;
+  const Model& model = *specification_.model;
+  return absl::FailedPreconditionError(absl::StrCat(
+      "object '", surface.name(), "', sample ", index, ": in ", specification_.most_draws, " draws no touch met it with all ",
+      model.fingers, " fingers; they span ", ShortestNumber((model.fingers - 1) * model.spacing_m / kMetresPerMillimetre),
+      " mm and the object measures ", static_cast<int>(size_mm.x()), " x ", static_cast<int>(size_mm.y()), " x ",
+      static_cast<int>(size_mm.z()), " mm: use a larger object (scale at import), a narrower end effector, or a higher most_draws"));
+}
+
+// All further draws of one index at once.
+absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt, Workspace* workspace) const {
+  TouchBatch batch;
+  TouchWorkspace touch_workspace;
+  const uint64_t number = NumberOf(index);
+  for (uint32_t attempt = first_attempt; attempt < specification_.most_draws; ++attempt) {
+    TouchPose pose;
+    generators_[object]->Draw({&number, 1}, attempt, &pose);
+    simulator_.Prepare(1, &batch);
+    batch.surface = specification_.objects[object];
+    batch.target_m[0] = pose.target_m;
+    batch.approach[0] = pose.approach;
+    batch.lateral[0] = pose.lateral;
+    batch.standoff_m[0] = pose.standoff_m;
+    batch.speed_m_s[0] = specification_.plan.speed_m_s;
+    TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &touch_workspace));
+    bool complete = true;
+    for (double travel_m : batch.travel_m) complete &= !std::isnan(travel_m);
+    if (complete) return absl::OkStatus();
+  }
+  return Hopeless(object, index);
+}
+
+}  // namespace touchstone

@@ -1,0 +1,55 @@
+// Draws and simulates the touches of a dataset, many at once: sorted so that neighbouring lines travel together,
+// drawn again where a finger misses, each a pure function of its index.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/types/span.h>
+
+#include "server/dataset/specification.h"
+#include "server/touch/simulate.h"
+
+namespace touchstone {
+
+class TouchSampler {
+ public:
+  // `specification` must be valid and outlive the sampler.
+  explicit TouchSampler(const DatasetSpecification& specification);
+  ~TouchSampler();
+
+  // Memory that one thread keeps between calls.
+  struct Workspace;
+  static std::unique_ptr<Workspace> NewWorkspace();
+
+  // Called for every accepted touch, in no particular order: indices[slot] is touch `touch` of `batch`.
+  using Sink = std::function<void(const TouchBatch& batch, absl::Span<const uint32_t> slots, absl::Span<const uint8_t> accepted)>;
+
+  // Simulates the samples `indices`. Returns CANCELLED soon after `cancelled` becomes true. Thread-safe.
+  absl::Status Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled, Workspace* workspace,
+                      const Sink& sink) const;
+
+ private:
+  enum class Until { kMotion, kSensor };
+  absl::Status Run(absl::Span<const uint64_t> indices, Until until, absl::Span<const double> previous_press_m,
+                   const std::atomic<bool>& cancelled, Workspace* workspace, const Sink& sink) const;
+  absl::Status RunObject(size_t object, absl::Span<const uint64_t> indices, Until until,
+                         absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
+                         Workspace* workspace, const Sink& sink) const;
+  absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots, Until until,
+                        absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots,
+                 absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  absl::Status Hopeless(size_t object, uint64_t index) const;
+  absl::Status ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt, Workspace* workspace) const;
+  uint64_t NumberOf(uint64_t index) const;
+
+  const DatasetSpecification& specification_;
+  const TouchSimulator simulator_;
+  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one an object
+};
+
+}  // namespace touchstone

@@ -1,0 +1,71 @@
+// What a dataset contains: everything that decides its samples. With the model's and the meshes' hashes it makes
+// sample i, bit for bit, whatever the number of threads, the batch size, the part or the replica.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+
+#include "server/geometry/surface.h"
+#include "server/image/renderer.h"
+#include "server/model/model.h"
+#include "server/touch/plan.h"
+
+namespace touchstone {
+
+enum class ImageEncoding { kRaw, kPng, kJpeg };
+
+// How the column "image" is made.
+struct DatasetImage {
+  ImageOptions options;
+  ImageEncoding encoding = ImageEncoding::kRaw;
+  int jpeg_quality = 90;
+  double vertical_fov_rad = 0.78539816339744831;
+  std::shared_ptr<Renderer> renderer;
+};
+
+// Which groups of columns a batch carries.
+struct ColumnChoice {
+  bool index = false;
+  bool object = false;
+  bool descriptor = false;
+  bool contact_time = false;
+  bool pose = false;      // target_m, approach, lateral, standoff_m, speed_m_s
+  bool contact = false;   // contact_point_m, normal
+  bool image = false;     // and depth_m, mask where the options ask for them
+
+  // Names as on the wire; an unknown name is an error that lists the known ones.
+  static absl::StatusOr<ColumnChoice> FromNames(const std::vector<std::string>& names);
+};
+
+struct DatasetSpecification {
+  std::vector<std::shared_ptr<const Surface>> objects;  // sample i shows objects[i mod count]
+  Plan plan;
+  std::shared_ptr<const Model> model;
+  uint64_t seed = 0;
+  uint64_t samples = 0;  // 0 with a plan that ends: all of its touches, for every object
+  ColumnChoice columns;
+  DatasetImage image;
+  uint32_t most_draws = 1000;  // for one index, before the stream fails
+};
+
+// Checks every field and fills in `samples`; errors name the field and what would be right.
+absl::Status ValidateDataset(DatasetSpecification* specification);
+
+// One column of a batch: little endian, packed, C order; the first dimension is the sample.
+enum class ColumnType { kFloat32, kUint8, kInt32, kUint64, kBytes };
+struct ColumnInfo {
+  std::string name;  // the unit is the end of the name: "descriptor_s"
+  ColumnType type = ColumnType::kFloat32;
+  std::vector<uint32_t> shape;  // of one sample
+
+  size_t BytesPerSample() const;  // 0 for kBytes
+};
+
+// The columns of every batch, in their order.
+std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification);
+
+}  // namespace touchstone

@@ -1,0 +1,77 @@
+// Motion: travel -> time of contact.
+//   t(d) = d / v                      at full speed from the start
+//   t(d) = sqrt(2 d / a), then v / (2 a) + d / v    with a ramp from rest at acceleration a, after v^2 / (2 a)
+//   after the first contact, at t1: t1 + (t(d) - t1) / (1 - slowdown)
+#include <algorithm>
+#include <cmath>
+
+#include "server/touch/simulate.h"
+
+namespace touchstone {
+
+void FindFirstFingers(TouchBatch* batch) {
+  // Ties go to the lower finger. Comparisons with NaN are false, so a finger without contact is never first.
+  for (int touch = 0; touch < batch->size(); ++touch) {
+    int first = -1;
+    double least_m = INFINITY;
+    for (int finger = 0; finger < batch->fingers(); ++finger) {
+      const double travel_m = batch->travel_m[batch->At(finger, touch)];
+      if (travel_m < least_m) first = finger, least_m = travel_m;
+    }
+    batch->first_finger[touch] = first;
+  }
+}
+
+void TravelToTime(TouchBatch* batch) {
+  const double acceleration = batch->acceleration_m_s2;
+  for (int finger = 0; finger < batch->fingers(); ++finger) {
+    const int begin = batch->At(finger, 0);
+    for (int touch = 0; touch < batch->size(); ++touch) {
+      const double speed_m_s = batch->speed_m_s[touch] * batch->speed_factor;
+      const double travel_m = batch->travel_m[begin + touch];
+      double time_s = travel_m / speed_m_s;
+      double slope_s_m = 1 / speed_m_s;
+      if (acceleration > 0 && travel_m > 0) {
+        const double ramp_m = speed_m_s * speed_m_s / (2 * acceleration);
+        if (travel_m < ramp_m) {
+          time_s = std::sqrt(2 * travel_m / acceleration);
+          slope_s_m = 1 / std::sqrt(2 * travel_m * acceleration);
+        } else {
+          time_s += speed_m_s / (2 * acceleration);
+        }
+      }
+      batch->contact_time_s[begin + touch] = time_s;
+      batch->time_per_travel_s_m[begin + touch] = slope_s_m;
+    }
+  }
+
+  // The slowdown stretches what comes after the first contact.
+  if (batch->slowdown_fraction > 0) {
+    const double stretch = 1 / (1 - batch->slowdown_fraction);
+    for (int touch = 0; touch < batch->size(); ++touch) {
+      const int first = batch->first_finger[touch];
+      if (first < 0) continue;
+      const double first_time_s = batch->contact_time_s[batch->At(first, touch)];
+      for (int finger = 0; finger < batch->fingers(); ++finger) {
+        if (finger == first) continue;
+        const int k = batch->At(finger, touch);
+        batch->contact_time_s[k] = first_time_s + (batch->contact_time_s[k] - first_time_s) * stretch;
+        batch->time_per_travel_s_m[k] *= stretch;
+      }
+    }
+  }
+
+  // How far each finger is pressed in when the last one touches.
+  for (int touch = 0; touch < batch->size(); ++touch) {
+    double last_s = -INFINITY;
+    for (int finger = 0; finger < batch->fingers(); ++finger)
+      last_s = std::max(last_s, batch->contact_time_s[batch->At(finger, touch)]);  // max(x, NaN) is x
+    for (int finger = 0; finger < batch->fingers(); ++finger) {
+      const int k = batch->At(finger, touch);
+      const double press_m = (last_s - batch->contact_time_s[k]) * batch->speed_m_s[touch];
+      batch->press_m[k] = std::isnan(press_m) ? 0 : press_m;
+    }
+  }
+}
+
+}  // namespace touchstone

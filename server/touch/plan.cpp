@@ -1,0 +1,187 @@
+#include "server/touch/plan.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+#include "server/base/random.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+
+namespace touchstone {
+namespace {
+
+// A word of random bits to 0 .. bound - 1.
+uint64_t Below(uint64_t word, uint64_t bound) {
+  return static_cast<uint64_t>((static_cast<unsigned __int128>(word) * bound) >> 64);
+}
+
+// Cosines and sines of the multiples of a step, from `first` steps on.
+struct AngleTable {
+  std::vector<double> cosine, sine;
+  AngleTable(int64_t first, int64_t count, double step_rad) {
+    for (int64_t k = first; k < first + count; ++k) {
+      cosine.push_back(std::cos(k * step_rad));
+      sine.push_back(std::sin(k * step_rad));
+    }
+  }
+};
+
+class SphereGenerator : public PoseGenerator {
+ public:
+  SphereGenerator(const SpherePlan& plan, const Bounds& bounds, uint64_t seed)
+      : seed_(seed),
+        centre_m_(bounds.Centre()),
+        radius_m_(plan.radius_ratio * 0.5 * bounds.DiagonalM()),
+        quarter_steps_(std::max<int64_t>(1, std::llround(kPi / 2 / plan.step_angle_rad))),
+        roll_steps_(plan.roll_step_rad > 0 ? std::max<int64_t>(1, std::llround(2 * kPi / plan.roll_step_rad)) : 1),
+        theta_(0, 4 * quarter_steps_, kPi / 2 / quarter_steps_),
+        phi_(-quarter_steps_, 2 * quarter_steps_ + 1, kPi / 2 / quarter_steps_),
+        roll_(0, roll_steps_, 2 * kPi / roll_steps_) {}
+
+  void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
+    for (size_t k = 0; k < numbers.size(); ++k) {
+      const auto words = RandomBlock(seed_, RandomDomain::kPose, numbers[k], attempt, 0);
+      const uint64_t theta = Below(words[0], theta_.cosine.size());
+      const uint64_t phi = Below(words[1], phi_.cosine.size());
+      const double ct = theta_.cosine[theta], st = theta_.sine[theta];
+      const double cp = phi_.cosine[phi], sp = phi_.sine[phi];
+      TouchPose& pose = poses[k];
+      pose.target_m = centre_m_;
+      pose.standoff_m = radius_m_;
+      pose.approach = Eigen::Vector3d(-cp * ct, -cp * st, -sp);
+      pose.lateral = Eigen::Vector3d(-st, ct, 0);
+      if (roll_steps_ > 1) {
+        const uint64_t roll = Below(words[2], roll_steps_);
+        const Eigen::Vector3d perpendicular = pose.approach.cross(pose.lateral);
+        pose.lateral = roll_.cosine[roll] * pose.lateral + roll_.sine[roll] * perpendicular;
+      }
+    }
+  }
+  uint64_t Count() const override { return 0; }
+  bool CanRedraw() const override { return true; }
+
+ private:
+  const uint64_t seed_;
+  const Eigen::Vector3d centre_m_;
+  const double radius_m_;
+  const int64_t quarter_steps_;
+  const int64_t roll_steps_;
+  const AngleTable theta_, phi_, roll_;
+};
+
+class FacesGenerator : public PoseGenerator {
+ public:
+  FacesGenerator(const FacesPlan& plan, const Bounds& bounds, uint64_t seed)
+      : plan_(plan), bounds_(bounds), seed_(seed) {}
+
+  void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
+    const uint64_t poses_a_round = 6ull * plan_.samples_per_face;
+    for (size_t k = 0; k < numbers.size(); ++k) {
+      const uint64_t number = numbers[k] % poses_a_round;
+      const int face = static_cast<int>(number / plan_.samples_per_face);
+      RandomStream random(seed_, RandomDomain::kPose, number, attempt);
+      const int axis = face / 2;
+      const double side = face % 2 == 0 ? 1 : -1;
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+
+      // The target on the face of the box.
+      Eigen::Vector3d target = bounds_.Centre();
+      const Eigen::Vector3d half = 0.5 * (bounds_.max_m - bounds_.min_m);
+      target[axis] += side * half[axis];
+      target[u] += plan_.spread * half[u] * random.Uniform(-1, 1);
+      target[v] += plan_.spread * half[v] * random.Uniform(-1, 1);
+
+      // The approach within a cone around the inward normal (uniform over its solid angle), any roll.
+      const double cos_tilt = random.Uniform(std::cos(plan_.most_tilt_rad), 1);
+      const double sin_tilt = std::sqrt(std::max(0.0, 1 - cos_tilt * cos_tilt));
+      const double around = random.Uniform(0, 2 * kPi), roll = random.Uniform(0, 2 * kPi);
+      Eigen::Vector3d inward = Eigen::Vector3d::Zero(), e1 = Eigen::Vector3d::Zero();
+      inward[axis] = -side;
+      e1[u] = 1;
+      const Eigen::Vector3d e2 = inward.cross(e1);
+      const Eigen::Vector3d approach =
+          (cos_tilt * inward + sin_tilt * (std::cos(around) * e1 + std::sin(around) * e2)).normalized();
+      const Eigen::Vector3d p = (e1 - approach.dot(e1) * approach).normalized();
+      poses[k].target_m = target;
+      poses[k].approach = approach;
+      poses[k].lateral = std::cos(roll) * p + std::sin(roll) * approach.cross(p);
+      poses[k].standoff_m = plan_.standoff_m;
+    }
+  }
+  uint64_t Count() const override { return 6ull * plan_.samples_per_face * plan_.rounds; }
+  bool CanRedraw() const override { return true; }
+
+ private:
+  const FacesPlan plan_;
+  const Bounds bounds_;
+  const uint64_t seed_;
+};
+
+class ListGenerator : public PoseGenerator {
+ public:
+  explicit ListGenerator(const std::vector<CommandedTouch>& touches) : touches_(touches) {}
+
+  void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
+    for (size_t k = 0; k < numbers.size(); ++k) poses[k] = touches_[numbers[k] % touches_.size()];
+  }
+  uint64_t Count() const override { return touches_.size(); }
+  bool CanRedraw() const override { return false; }
+
+ private:
+  const std::vector<CommandedTouch>& touches_;
+};
+
+absl::Status CheckBetween(double value, double lower, double upper, const char* field) {
+  if (value >= lower && value <= upper) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("plan.", field, " = ", ShortestNumber(value), ": must be from ",
+                                                 ShortestNumber(lower), " to ", ShortestNumber(upper)));
+}
+
+}  // namespace
+
+absl::Status ValidatePlan(Plan* plan) {
+  if (plan->kind == Plan::Kind::kList) {
+    if (plan->list.empty())
+      return absl::InvalidArgumentError("plan.list.touches is empty: give at least one touch");
+    for (size_t k = 0; k < plan->list.size(); ++k)
+      TOUCHSTONE_RETURN_IF_ERROR(MakeExact(&plan->list[k], absl::StrCat("plan.list.touches[", k, "]")));
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(plan->speed_m_s, 1e-6, 10, "speed_m_s"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(plan->touch_interval_s, 0, 1e6, "touch_interval_s"));
+  if (plan->kind == Plan::Kind::kSphere) {
+    const SpherePlan& sphere = plan->sphere;
+    TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(sphere.step_angle_rad, 1e-5, kPi / 2, "sphere.step_angle_rad"));
+    if (sphere.roll_step_rad != 0)
+      TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(sphere.roll_step_rad, 1e-5, 2 * kPi, "sphere.roll_step_rad"));
+    return CheckBetween(sphere.radius_ratio, 1, 100, "sphere.radius_ratio");
+  }
+  const FacesPlan& faces = plan->faces;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.samples_per_face, 1, 1e6, "faces.samples_per_face"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.rounds, 1, 1e6, "faces.rounds"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.most_tilt_rad, 0, kPi / 3, "faces.most_tilt_rad"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.spread, 0, 1, "faces.spread"));
+  return CheckBetween(faces.standoff_m, 1e-6, 10, "faces.standoff_m");
+}
+
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const Bounds& bounds, uint64_t seed) {
+  switch (plan.kind) {
+    case Plan::Kind::kFaces: return std::make_unique<FacesGenerator>(plan.faces, bounds, seed);
+    case Plan::Kind::kList: return std::make_unique<ListGenerator>(plan.list);
+    case Plan::Kind::kSphere: break;
+  }
+  return std::make_unique<SphereGenerator>(plan.sphere, bounds, seed);
+}
+
+CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number, uint32_t attempt) {
+  if (plan.kind == Plan::Kind::kList) return plan.list[number % plan.list.size()];
+  CommandedTouch touch;
+  generator.Draw({&number, 1}, attempt, &touch);
+  touch.speed_m_s = plan.speed_m_s;
+  touch.session_time_s = number * plan.touch_interval_s;
+  return touch;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,88 @@
+#include "server/touch/simulate.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/base/status.h"
+
+namespace touchstone {
+namespace {
+
+absl::Status FormulaStatus(const TouchBatch& batch) {
+  return batch.formula_error.empty() ? absl::OkStatus() : absl::InvalidArgumentError(batch.formula_error);
+}
+
+}  // namespace
+
+TouchSimulator::TouchSimulator(std::shared_ptr<const Model> model) : model_(std::move(model)) {
+  for (const EffectInstance& instance : model_->effects) {
+    const EffectNeeds& needs = instance.effect->needs;
+    needs_previous_press_ |= needs.previous_press;
+    needs_curvature_ |= needs.curvature;
+    for (const std::string& name : needs.covariates)
+      if (std::find(needed_covariates_.begin(), needed_covariates_.end(), name) == needed_covariates_.end())
+        needed_covariates_.push_back(name);
+  }
+}
+
+void TouchSimulator::Prepare(int size, TouchBatch* batch) const {
+  batch->Reset(size, model_->fingers);
+  batch->spacing_m = model_->spacing_m;
+}
+
+void TouchSimulator::ApplyStage(Stage stage, bool before_cast, TouchBatch* batch) const {
+  for (const EffectInstance& instance : model_->effects) {
+    if (instance.effect->stage != stage || instance.effect->before_cast != before_cast) continue;
+    instance.effect->apply(instance.ValuesFor(batch->surface->name()), *batch);
+  }
+}
+
+absl::Status TouchSimulator::RunToMotion(TouchBatch* batch, TouchWorkspace* workspace) const {
+  TOUCHSTONE_CHECK(batch->surface != nullptr);
+  for (const std::string& name : needed_covariates_) {
+    const auto found = batch->covariates.find(name);
+    if (found == batch->covariates.end() || static_cast<int>(found->second.size()) != batch->size())
+      return absl::InvalidArgumentError(
+          absl::StrCat("the model's formula uses ", name, ", which the touches do not carry: give covariates['", name,
+                       "'] with every touch (a column ", name, " in the plan), or use another model"));
+  }
+  ApplyStage(Stage::kPose, false, batch);
+  ApplyStage(Stage::kContact, true, batch);
+  PoseLines(*batch, workspace);
+  FindContacts(needs_curvature_, batch, workspace);
+  ApplyStage(Stage::kContact, false, batch);
+  FindFirstFingers(batch);
+  ApplyStage(Stage::kMotion, false, batch);
+  TravelToTime(batch);
+  return FormulaStatus(*batch);
+}
+
+absl::Status TouchSimulator::RunSensor(TouchBatch* batch, TouchWorkspace* workspace) const {
+  batch->reported_time_s = batch->contact_time_s;
+  ApplyStage(Stage::kSensor, false, batch);
+  ReportTimes(batch, workspace);
+  return FormulaStatus(*batch);
+}
+
+absl::Status TouchSimulator::Run(TouchBatch* batch, TouchWorkspace* workspace) const {
+  TOUCHSTONE_RETURN_IF_ERROR(RunToMotion(batch, workspace));
+  return RunSensor(batch, workspace);
+}
+
+bool Descriptor(const TouchBatch& batch, int touch, double* descriptor_s) {
+  double first = INFINITY;
+  bool complete = true;
+  for (int finger = 0; finger < batch.fingers(); ++finger) {
+    const double time = batch.reported_time_s[batch.At(finger, touch)];
+    descriptor_s[finger] = time;
+    if (time < first) first = time;
+    complete &= !std::isnan(time);
+  }
+  for (int finger = 0; finger < batch.fingers(); ++finger) descriptor_s[finger] -= first;
+  return complete;
+}
+
+}  // namespace touchstone
