@@ -1,4 +1,5 @@
-// The list of every built-in touch effect. A new effect is one file, its test, and one line in all_effects.cpp.
+// The list of every built-in touch effect. A new effect is one file, its test, and one line in
+// all_effects.cpp.
 #pragma once
 
 #include "server/model/effect.h"

@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
-#include <Eigen/Core>
 #include <absl/types/span.h>
+#include <Eigen/Core>
 
 #include "server/base/check.h"
 #include "server/effects/touch_batch.h"
@@ -26,12 +26,12 @@ using PerFinger = std::array<double, kMostFingers>;
 template <typename P>
 struct ParameterRow {
   std::variant<double P::*, Eigen::Vector3d P::*, PerFinger P::*> field;
-  const char* name;     // with the unit's suffix
+  const char* name;  // with the unit's suffix
   Unit unit;
   double lower;
   double upper;
-  double neutral;       // changes nothing; the default
-  double typical;       // the size that rigs show
+  double neutral;  // changes nothing; the default
+  double typical;  // the size that rigs show
   const char* meaning;
   bool sum_zero = false;  // per finger: only differences can be seen, so the values sum to 0
 };
@@ -53,24 +53,24 @@ struct EffectDefinition {
 
 namespace define_effect_internal {
 
-// Copies a flat array of SI values into the fields of P, in the order of the rows.
+// Copies a flat array of SI values into the fields of P, in the order of the rows. Not inlined: there GCC 12
+// warns of branches that the type of the field rules out.
 template <typename P>
-P Unpack(absl::Span<const ParameterRow<P>> rows, absl::Span<const double> values, int fingers) {
-  P parameters{};
+[[gnu::noinline]] void Unpack(absl::Span<const ParameterRow<P>> rows, absl::Span<const double> values,
+                              int fingers, P* parameters) {
   size_t next = 0;
   for (const ParameterRow<P>& row : rows) {
     if (const auto* scalar = std::get_if<double P::*>(&row.field)) {
-      parameters.*(*scalar) = values.at(next++);
+      parameters->*(*scalar) = values.at(next++);
     } else if (const auto* vector = std::get_if<Eigen::Vector3d P::*>(&row.field)) {
-      for (int axis = 0; axis < 3; ++axis) (parameters.*(*vector))[axis] = values.at(next++);
+      for (int axis = 0; axis < 3; ++axis) (parameters->*(*vector))[axis] = values.at(next++);
     } else {
-      PerFinger& fingers_values = parameters.*(std::get<PerFinger P::*>(row.field));
-      fingers_values.fill(0.0);
-      for (int finger = 0; finger < fingers; ++finger) fingers_values[finger] = values.at(next++);
+      PerFinger& entries = parameters->*(std::get<PerFinger P::*>(row.field));
+      for (int finger = 0; finger < kMostFingers; ++finger)
+        entries[finger] = finger < fingers ? values.at(next++) : 0.0;
     }
   }
   TOUCHSTONE_CHECK(next == values.size());
-  return parameters;
 }
 
 }  // namespace define_effect_internal
@@ -102,10 +102,12 @@ Effect DefineEffect(const EffectDefinition<P>& definition) {
     info.meaning = row.meaning;
     effect.parameters.push_back(std::move(info));
   }
-  // The rows are static arrays in the effect's file; the copy of the span outlives nothing.
+  // The span points to the static rows of the effect's file.
   effect.apply = [rows = definition.rows, apply = definition.apply](absl::Span<const double> values,
                                                                     TouchBatch& touches) {
-    apply(define_effect_internal::Unpack<P>(rows, values, touches.fingers()), touches);
+    P parameters{};
+    define_effect_internal::Unpack<P>(rows, values, touches.fingers(), &parameters);
+    apply(parameters, touches);
   };
   return effect;
 }

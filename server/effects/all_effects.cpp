@@ -1,0 +1,79 @@
+#include "server/effects/all_effects.h"
+
+#include "server/effects/formula.h"
+
+// The built-in touch effects in the order of DESIGN 5: one line each, the name of the function that its file
+// exports. Registration by static objects is not used: the linker drops them from a static library.
+#define TOUCHSTONE_TOUCH_EFFECTS(EFFECT) \
+  /* pose */                             \
+  EFFECT(ToolYaw)                        \
+  EFFECT(ToolTilt)                       \
+  EFFECT(FingerSpacing)                  \
+  EFFECT(FingerLength)                   \
+  EFFECT(GravitySag)                     \
+  EFFECT(ObjectScale)                    \
+  EFFECT(ObjectPose)                     \
+  /* contact */                          \
+  EFFECT(TipRadius)                      \
+  EFFECT(SurfaceError)                   \
+  /* motion */                           \
+  EFFECT(SpeedError)                     \
+  EFFECT(AccelerationRamp)               \
+  EFFECT(ContactSlowdown)                \
+  EFFECT(ObjectPush)                     \
+  /* sensor */                           \
+  EFFECT(ObliqueSlip)                    \
+  EFFECT(ChannelLatency)                 \
+  EFFECT(ThermalDrift)                   \
+  EFFECT(ReturnHysteresis)               \
+  EFFECT(ClockSkew)                      \
+  EFFECT(PollInterval)                   \
+  EFFECT(GaussianNoise)                  \
+  EFFECT(IncidenceNoise)                 \
+  EFFECT(HeavyTailNoise)                 \
+  EFFECT(MissedContact)                  \
+  /* any stage */                        \
+  EFFECT(Formula)
+
+namespace touchstone {
+
+#define TOUCHSTONE_DECLARE(function) Effect function();
+TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_DECLARE)
+#undef TOUCHSTONE_DECLARE
+
+namespace {
+
+class BuiltInCatalogue : public EffectCatalogue {
+ public:
+  BuiltInCatalogue() {
+#define TOUCHSTONE_ADD(function) effects_.push_back(std::make_shared<const Effect>(function()));
+    TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_ADD)
+#undef TOUCHSTONE_ADD
+  }
+
+  std::vector<std::shared_ptr<const Effect>> All() const override {
+    return effects_;
+  }
+
+  std::shared_ptr<const Effect> Find(const std::string& name) const override {
+    for (const auto& effect : effects_)
+      if (effect->name == name) return effect;
+    return nullptr;
+  }
+
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const override {
+    return MakeFormulaEffect(spec);
+  }
+
+ private:
+  std::vector<std::shared_ptr<const Effect>> effects_;
+};
+
+}  // namespace
+
+const EffectCatalogue& Catalogue() {
+  static const BuiltInCatalogue& catalogue = *new BuiltInCatalogue;
+  return catalogue;
+}
+
+}  // namespace touchstone

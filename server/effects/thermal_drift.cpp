@@ -1,0 +1,44 @@
+// Thermal drift: fingers and their electronics warm up, and each trigger point wanders through the session.
+//   d_i += rate_i * session time,  sum of the rates 0
+#include "server/effects/define_effect.h"
+
+namespace touchstone {
+namespace {
+
+struct Parameters {
+  PerFinger rate_m_s;
+};
+
+constexpr ParameterRow<Parameters> kRows[] = {
+    {&Parameters::rate_m_s, "rate_mm_per_h", Unit::kMillimetrePerHour, -5, 5, 0, 0.1,
+     "How fast each finger's trigger point recedes, first to last.", /*sum_zero=*/true},
+};
+
+void Apply(const Parameters& p, TouchBatch& touches) {
+  for (int finger = 0; finger < touches.fingers(); ++finger) {
+    const double rate_m_s = p.rate_m_s[finger];
+    const double* slope_s_m = touches.time_per_travel_s_m.data() + touches.At(finger, 0);
+    double* reported_time_s = touches.reported_time_s.data() + touches.At(finger, 0);
+    for (int touch = 0; touch < touches.size(); ++touch)
+      reported_time_s[touch] += rate_m_s * touches.session_time_s[touch] * slope_s_m[touch];
+  }
+}
+
+}  // namespace
+
+Effect ThermalDrift() {
+  return DefineEffect<Parameters>({
+      .name = "thermal_drift",
+      .stage = Stage::kSensor,
+      .meaning = "The fingers' trigger points wander apart while the rig warms up.",
+      .signature =
+          "The error of each finger grows in a straight line with session_time_s and starts anew with every "
+          "session; without session times it looks like too much noise.",
+      .check_on_rig = "Repeat one touch every ten minutes for two hours after switching on.",
+      .remedy = "Let the rig warm up first, or touch a reference plate every half hour and subtract it.",
+      .rows = kRows,
+      .apply = Apply,
+  });
+}
+
+}  // namespace touchstone
