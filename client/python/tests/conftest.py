@@ -1,0 +1,93 @@
+"""Real servers for the tests. TOUCHSTONE_SERVER names the program; default build/release/bin/touchstone-server."""
+
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import threading
+
+import pytest
+
+import touchstone
+
+_REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
+
+
+class Server:
+    """A touchstone-server on a free port, or on the one given."""
+
+    def __init__(self, program, *options, port=0):
+        self._program, self._options = str(program), options
+        self._start(port)
+
+    def _start(self, port):
+        self.process = subprocess.Popen(
+            [self._program, "--listen", f"127.0.0.1:{port}", *self._options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )
+        # The log is drained all along, or the server would block on a full pipe.
+        self.log = []
+        threading.Thread(target=lambda: self.log.extend(self.process.stderr), daemon=True).start()
+        for line in self.process.stdout:
+            found = re.search(r"listening on 127\.0\.0\.1:(\d+)", line)
+            if found:
+                break
+        else:
+            self.process.wait()
+            raise RuntimeError(f"{self._program} ended with {self.process.returncode}: {''.join(self.log)}")
+        threading.Thread(target=lambda: list(self.process.stdout), daemon=True).start()
+        self.port = int(found.group(1))
+        self.target = f"127.0.0.1:{self.port}"
+
+    def kill(self):
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def start_again(self):
+        self._start(self.port)
+
+    def stop(self):
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=20)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            raise
+
+
+@pytest.fixture(scope="session")
+def server_program():
+    program = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or _REPOSITORY / "build/release/bin/touchstone-server")
+    if not program.exists():
+        pytest.fail(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER.")
+    return program
+
+
+@pytest.fixture(scope="session")
+def server(server_program):
+    """One server for all tests that leave it as it is."""
+    running = Server(server_program)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def new_server(server_program):
+    """A function that starts servers of the test's own."""
+    started = []
+
+    def start(*options, port=0):
+        started.append(Server(server_program, *options, port=port))
+        return started[-1]
+
+    yield start
+    for running in started:
+        if running.process.poll() is None:
+            running.kill()
+
+
+@pytest.fixture
+def client(server):
+    with touchstone.connect(server.target) as connected:
+        yield connected

@@ -1,0 +1,84 @@
+"""Mistakes that are found before anything is sent."""
+
+import numpy as np
+import pytest
+
+import touchstone
+from touchstone import InvalidRequest
+from touchstone.connection import parse_targets
+from touchstone.models import model_ref
+from touchstone.specification import specification
+
+ONE = {"target_mm": (0, 0, 0), "approach": (0, 0, -1), "lateral": (1, 0, 0), "standoff_mm": 120}
+
+
+@pytest.mark.parametrize("arguments, says", [
+    (dict(objects=[]), "objects is"),
+    (dict(objects=["a"], plan="sphere"), "plan is str"),
+    (dict(objects=["a"]), "samples is missing"),
+    (dict(objects=["a"], samples=0), "samples is 0"),
+    (dict(objects=["a"], samples=1, seed=-1), "seed is -1"),
+    (dict(objects=["a"], samples=1, seed=1.5), "seed is 1.5, not a whole number"),
+    (dict(objects=["a"], samples=1, speed_mm_s=0), "speed_mm_s is 0"),
+    (dict(objects=["a"], samples=1, speed_mm_s=float("nan")), "speed_mm_s is nan"),
+    (dict(objects=["a"], samples=1, plan=touchstone.sphere(step_angle_deg=0)), "step_angle_deg is 0"),
+    (dict(objects=["a"], plan=touchstone.touches([ONE]), speed_mm_s=10), "carry their own"),
+    (dict(objects=["a"], samples=1, columns=["descriptor"], image=touchstone.image()), 'add "image"'),
+    (dict(objects=["a"], samples=1, image=touchstone.image(encoding="pgn")), 'Did you mean "png"'),
+    (dict(objects=["a"], samples=1, image=touchstone.image(width=0)), "image width is 0"),
+    (dict(objects=["a"], samples=1, model="no/such.yaml"), "no/such.yaml: No such file"),
+])
+def test_a_mistake_names_the_argument(arguments, says):
+    with pytest.raises(InvalidRequest, match=says):
+        specification(**arguments)
+
+
+def test_units_go_to_the_wire_as_si():
+    spec = specification(["a"], touchstone.faces(2, 3, most_tilt_deg=45, standoff_mm=60), speed_mm_s=20)
+    assert spec.plan.speed_m_s == 0.02 and spec.plan.faces.standoff_m == 0.06
+    assert spec.plan.faces.most_tilt_rad == pytest.approx(np.pi / 4)
+    assert spec.samples == 6 * 2 * 3
+
+
+def test_touches_are_rows_or_columns():
+    rows = touchstone.touches([ONE, {**ONE, "standoff_mm": 100}])
+    columns = touchstone.touches(target_mm=np.zeros((2, 3)), approach=(0, 0, -1), lateral=(1, 0, 0),
+                                 standoff_mm=[120, 100])
+    assert rows.to_proto() == columns.to_proto()
+    assert rows.to_messages()[1].standoff_m == 0.1 and rows.to_messages()[0].speed_m_s == 0.02
+    assert len(rows[1]) == 1 and rows[1].standoff_mm[0] == 100 and len(rows[-1]) == 1
+    assert touchstone.Touches.from_messages(rows.to_messages()).to_proto() == rows.to_proto()
+    with_more = touchstone.touches([{**ONE, "stroke_mm": 50, "cov_humidity": 0.3}])
+    assert with_more.to_messages()[0].covariates["cov_humidity"] == 0.3
+    assert with_more.to_messages()[0].stroke_m == 0.05
+
+
+@pytest.mark.parametrize("arguments, says", [
+    (dict(rows=[]), "empty"),
+    (dict(rows=[ONE, {"target_mm": (0, 0, 0)}]), "Touch 1"),
+    (dict(target_mm=(0, 0, 0)), "needs approach"),
+    (dict(**ONE, aproach=1), 'Did you mean "approach"'),
+    (dict(**{**ONE, "approach": (0, 1)}), "approach has shape"),
+    (dict(**{**ONE, "standoff_mm": [1, 2, 3], "target_mm": [[0, 0, 0]] * 2}), "has 2 rows"),
+    (dict(**{**ONE, "standoff_mm": float("nan")}), "standoff_mm is not finite in row 0"),
+])
+def test_a_malformed_touch_is_named(arguments, says):
+    with pytest.raises(InvalidRequest, match=says):
+        touchstone.touches(**arguments)
+
+
+def test_a_model_is_a_name_a_hash_a_file_or_its_text(tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_text("touchstone: model/1\n")
+    assert model_ref(None).WhichOneof("ref") is None
+    assert model_ref("nominal").name == "nominal"
+    assert model_ref("deadbeef00").hash == "deadbeef00"
+    assert model_ref(path).yaml == model_ref(str(path)).yaml == "touchstone: model/1\n"
+    assert model_ref("touchstone: model/1\nname: a\n").yaml.startswith("touchstone")
+
+
+def test_targets_are_checked():
+    assert parse_targets("a:1, b:2") == ("a:1", "b:2") == parse_targets(["a:1", "b:2"])
+    for bad in ("localhost", "host:", ":1", "host:0", "host:99999", ""):
+        with pytest.raises(InvalidRequest, match="host:port"):
+            parse_targets(bad)

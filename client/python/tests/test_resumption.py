@@ -1,0 +1,93 @@
+"""A stream whose server dies goes on without a gap or a repeat."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import touchstone
+
+OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
+               columns=("index", "descriptor"))
+
+
+def expected(server):
+    dataset = touchstone.connect(server.target).dataset(**OPTIONS)
+    return np.concatenate([batch["descriptor_us"] for batch in dataset])
+
+
+def stream(dataset, at, disturb):
+    """All batches; `disturb` is called when batch number `at` was taken."""
+    batches = []
+    for batch in dataset:
+        batches.append(batch)
+        if len(batches) == at:
+            disturb()
+    np.testing.assert_array_equal(np.concatenate([b["index"] for b in batches]), np.arange(dataset.stop))
+    return np.concatenate([b["descriptor_us"] for b in batches])
+
+
+def test_another_server_goes_on_where_the_first_was_killed(server, new_server):
+    first, second = new_server(), new_server()
+    client = touchstone.connect([first.target, second.target], retry_for_s=20)
+    dataset = client.dataset(**OPTIONS, batch_size=500)
+    values = stream(dataset, 37, first.kill)
+    np.testing.assert_array_equal(values, expected(server))
+
+
+def test_the_same_server_started_again_goes_on(server, new_server):
+    own = new_server()
+
+    def crash():
+        own.kill()
+        threading.Timer(1.0, own.start_again).start()
+
+    dataset = touchstone.connect(own.target, retry_for_s=20).dataset(**OPTIONS, batch_size=500)
+    np.testing.assert_array_equal(stream(dataset, 37, crash), expected(server))
+
+
+def test_a_drained_server_hands_over(server, new_server):
+    first, second = new_server("--drain-s", "0.2"), new_server()
+    client = touchstone.connect(f"{first.target},{second.target}", retry_for_s=20)
+    values = stream(client.dataset(**OPTIONS, batch_size=500), 11, first.process.terminate)
+    np.testing.assert_array_equal(values, expected(server))
+
+
+def test_patience_is_bounded(new_server):
+    own = new_server()
+    dataset = touchstone.connect(own.target, retry_for_s=1.0).dataset(**OPTIONS, batch_size=500)
+    begin = None
+    with pytest.raises(touchstone.SourceUnreachable, match=own.target):
+        for batch in dataset:
+            if begin is None:
+                begin = time.monotonic()
+                own.kill()
+    assert 0.9 < time.monotonic() - begin < 10
+
+
+def test_a_server_with_another_model_is_refused(new_server, tmp_path):
+    # Both have a model called "rig", but not the same one.
+    def model(radius_mm):
+        return ("touchstone: model/1\nname: rig\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+                f"effects:\n  - tip_radius: {{radius_mm: {radius_mm}}}\n")
+
+    first, second = new_server(), new_server()
+    touchstone.connect(first.target).add_model(model(2))
+    touchstone.connect(second.target).add_model(model(3))
+    client = touchstone.connect([first.target, second.target], retry_for_s=5)
+    with pytest.raises(touchstone.SourceChanged, match="model hash"):
+        stream(client.dataset(**OPTIONS, model="rig", batch_size=500), 5, first.kill)
+
+
+def test_unary_calls_find_the_server_that_is_there(server):
+    client = touchstone.connect(["127.0.0.1:9", server.target])
+    assert client.target == server.target and client.objects()
+
+
+def test_a_call_is_not_repeated_when_it_was_refused(client):
+    begin = time.monotonic()
+    with pytest.raises(touchstone.NotFound):
+        client.touch("no such object", touchstone.touches(
+            target_mm=(0, 0, 0), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=200))
+    assert time.monotonic() - begin < 2

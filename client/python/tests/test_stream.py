@@ -1,0 +1,179 @@
+"""Datasets from a real server: contents, parts, errors."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+
+import touchstone
+
+OBJECTS = ["lat00", "lat20"]
+PLAN = touchstone.sphere(step_angle_deg=5)
+
+
+def joined(dataset, name):
+    return np.concatenate([batch[name] for batch in dataset])
+
+
+def test_a_source_describes_itself(client):
+    description = client.describe()
+    assert description.kind == "virtual" and "sphere" in description.plans and description.version
+    assert description.most_batch_size >= 4096
+
+
+def test_objects_have_their_size_in_millimetres(client):
+    objects = {o.name: o for o in client.objects()}
+    assert set(objects) >= {"lat00", "lat05", "lat10", "lat15", "lat20"}
+    low, high = objects["lat20"].bounds_min_mm, objects["lat20"].bounds_max_mm
+    assert high[0] - low[0] == pytest.approx(150, abs=0.5)
+
+
+def test_batches_have_the_promised_shapes_and_units(client):
+    dataset = client.dataset(OBJECTS, PLAN, samples=1000, seed=3, batch_size=300,
+                             columns=("index", "object", "descriptor", "contact_time"))
+    batches = list(dataset)
+    assert [b.rows for b in batches] == [300, 300, 300, 100] and len(dataset) == 4
+    assert [b.start_index for b in batches] == [0, 300, 600, 900]
+    first = batches[0]
+    assert first["descriptor_us"].shape == (300, 3) and first["descriptor_us"].dtype == np.float32
+    assert first["object"].dtype == np.int32 and first["index"].dtype == np.uint64
+    np.testing.assert_array_equal(joined(dataset, "index"), np.arange(1000))
+    np.testing.assert_array_equal(joined(dataset, "object"), np.arange(1000) % 2)
+    # One finger came first; the others are the same differences as in the full times.
+    descriptor, times = joined(dataset, "descriptor_us"), joined(dataset, "contact_time_us")
+    assert (descriptor.min(axis=1) == 0).all() and descriptor.max() > 100
+    np.testing.assert_allclose(descriptor, times - times.min(axis=1, keepdims=True), atol=1.0)
+    # At 20 mm/s from a start outside the object: between a tenth of a second and half a minute.
+    assert 1e5 < np.median(times) < 3e7
+
+
+def test_the_header_tells_what_makes_the_dataset(client):
+    dataset = client.dataset(OBJECTS, PLAN, samples=10, image=touchstone.image(32, 16))
+    header = dataset.header
+    assert header.samples == 10 and header.fingers == 3 and header.spacing_mm == pytest.approx(30)
+    assert len(header.model_hash) == 64 and set(header.mesh_hashes) == set(OBJECTS)
+    assert header.columns["descriptor_us"] == (3,) and header.columns["image"] == (16, 32, 1)
+    assert next(iter(dataset)).model_hash == header.model_hash
+
+
+def test_samples_do_not_depend_on_how_they_are_cut(client):
+    options = dict(objects=OBJECTS, plan=PLAN, samples=5000, seed=9)
+    whole = joined(client.dataset(**options, batch_size=5000), "descriptor_us")
+    np.testing.assert_array_equal(whole, joined(client.dataset(**options, batch_size=77), "descriptor_us"))
+    part = joined(client.dataset(**options, batch_size=77, start=1234, stop=4321), "descriptor_us")
+    np.testing.assert_array_equal(whole[1234:4321], part)
+    si = joined(client.dataset(**options, units="si"), "descriptor_s")
+    np.testing.assert_array_equal(si * np.float32(1e6), whole)
+    assert not np.array_equal(whole, joined(client.dataset(**{**options, "seed": 10}), "descriptor_us"))
+
+
+def test_strides_share_a_dataset_out(client):
+    options = dict(objects=OBJECTS, plan=PLAN, samples=1000, seed=1, batch_size=64, columns=["index"])
+    parts = [client.dataset(**options, start=64 * w, stride=3) for w in range(3)]
+    assert [len(part) for part in parts] == [6, 5, 5]
+    batches = sorted((b for part in parts for b in part), key=lambda b: b.start_index)
+    np.testing.assert_array_equal(np.concatenate([b["index"] for b in batches]), np.arange(1000))
+
+
+def test_the_pose_says_where_and_the_contact_lies_on_the_object(client):
+    batch = next(iter(client.dataset(["lat20"], PLAN, samples=200, columns=("pose", "contact"))))
+    np.testing.assert_allclose(np.linalg.norm(batch["approach"], axis=1), 1, atol=1e-6)
+    np.testing.assert_allclose(np.sum(batch["approach"] * batch["lateral"], axis=1), 0, atol=1e-6)
+    np.testing.assert_allclose(batch["speed_mm_s"], 20, rtol=1e-6)
+    assert batch["contact_point_mm"].shape == (200, 3, 3) and np.abs(batch["contact_point_mm"]).max() < 76
+
+
+def test_a_plan_is_the_datasets_touches(client):
+    touches = client.plan(PLAN, "lat10", 50, seed=4)
+    batch = next(iter(client.dataset("lat10", PLAN, samples=50, seed=4, columns=["pose"])))
+    # Only touches that hit enter a dataset: others were drawn again.
+    same = np.isclose(touches.target_mm, batch["target_mm"], atol=1e-3).all(axis=1)
+    same &= np.isclose(touches.approach, batch["approach"], atol=1e-6).all(axis=1)
+    assert same.mean() > 0.5
+
+
+def test_touches_give_a_result_a_finger(client):
+    touches = touchstone.touches(target_mm=(0, 0, 0), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=[200, 210])
+    noiseless = "touchstone: model/1\nname: ideal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects: []\n"
+    result = client.touch("lat20", touches, model=noiseless)
+    assert result.rows == 2 and result["complete"].all() and len(result.model_hash) == 64
+    assert result["descriptor_us"].shape == (2, 3) and result["contact_point_mm"].shape == (2, 3, 3)
+    # 10 mm farther at 20 mm/s: half a second later.
+    later = result["contact_time_us"][1] - result["contact_time_us"][0]
+    np.testing.assert_allclose(later, 5e5, rtol=1e-6)
+    np.testing.assert_allclose(result["travel_mm"] / 20 * 1e6, result["contact_time_us"], rtol=1e-6)
+    # A touch beside the object reports nothing, as NaN.
+    beside = touchstone.touches(target_mm=(500, 0, 0), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=200)
+    missed = client.touch("lat20", beside, model=noiseless)
+    assert not missed["complete"][0] and np.isnan(missed["contact_time_us"]).all()
+
+
+def test_a_list_of_touches_is_a_dataset(client):
+    touches = client.plan(touchstone.faces(samples_per_face=2, rounds=1), "lat20", 12)
+    dataset = client.dataset(["lat20"], touches, columns=["index", "pose"])
+    batch = next(iter(dataset))
+    assert dataset.stop == 12 and batch.rows == 12
+    np.testing.assert_allclose(batch["target_mm"], touches.target_mm, atol=1e-4)
+
+
+def test_the_catalogue_and_the_store_are_readable(client, tmp_path):
+    effects = {e.name: e for e in client.effects()}
+    assert effects["tip_radius"].parameters[0].unit == "mm" and effects["tip_radius"].stage == "contact"
+    nominal = client.model()
+    assert nominal.fingers == 3 and nominal.name in {m.name for m in client.models()}
+    path = tmp_path / "round.yaml"
+    path.write_text("touchstone: model/1\nname: python_round\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+                    "effects:\n  - tip_radius: {radius_mm: 3}\n")
+    added = client.add_model(path)
+    assert client.model("python_round").hash == added.hash == client.model(added.hash[:12]).hash
+    one = joined(client.dataset(["lat20"], PLAN, samples=100, model=path), "descriptor_us")
+    two = joined(client.dataset(["lat20"], PLAN, samples=100, model=added), "descriptor_us")
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("kind, change, says", [
+    (touchstone.NotFound, dict(objects=["lat21"]), "lat21"),
+    (touchstone.NotFound, dict(model="no_such_model"), "no_such_model"),
+    (touchstone.InvalidRequest, dict(model="touchstone: model/1\neffects:\n  - tip_raduis: {}\n"), "tip_raduis"),
+    (touchstone.InvalidRequest, dict(columns=["descriptors"]), "descriptors"),
+    (touchstone.InvalidRequest, dict(image=touchstone.image(20000, 20000)), "20000"),
+    (touchstone.InvalidRequest, dict(plan=touchstone.sphere(step_angle_deg=120)), "step_angle"),
+])
+def test_the_sources_own_words_reach_the_caller(client, kind, change, says):
+    options = {**dict(objects=["lat20"], plan=PLAN, samples=10), **change}
+    with pytest.raises(kind, match=says) as caught:
+        list(client.dataset(**options))
+    # No gRPC exception behind it.
+    assert caught.value.__cause__ is None and caught.value.__suppress_context__
+
+
+def test_nobody_listening_is_said_at_once():
+    begin = time.monotonic()
+    with pytest.raises(touchstone.SourceUnreachable, match="127.0.0.1:9"):
+        touchstone.connect("127.0.0.1:9", timeout_s=0.5)
+    assert time.monotonic() - begin < 5
+
+
+def test_an_interrupt_ends_a_stream_at_once(server):
+    script = textwrap.dedent(f"""
+        import touchstone
+        dataset = touchstone.connect("{server.target}").dataset(["lat20"], samples=10**12)
+        print("streaming", flush=True)
+        try:
+            for batch in dataset:
+                pass
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """)
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+    assert process.stdout.readline().strip() == "streaming"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=10)
+    assert "interrupted" in out and "Traceback" not in err and process.returncode == 0

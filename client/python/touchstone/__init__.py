@@ -1,0 +1,34 @@
+"""Touchstone: touches and images of a data-generation service, as NumPy batches.
+
+    import touchstone
+
+    client = touchstone.connect("127.0.0.1:50051")
+    for batch in client.dataset(["lat00", "lat20"], touchstone.sphere(step_angle_deg=5), samples=100_000, seed=1):
+        print(batch["object"], batch["descriptor_us"])
+
+`touchstone.torch` has the PyTorch dataset; it is imported on its own, since PyTorch is optional.
+"""
+
+from .batch import Batch, EncodedImages
+from .client import Client, connect
+from .dataset import Dataset, Header
+from .errors import (
+    InvalidRequest,
+    NotFound,
+    Refused,
+    SourceChanged,
+    SourceFailed,
+    SourceUnreachable,
+    TouchstoneError,
+)
+from .images import Camera, ImageOptions, image
+from .models import Description, Effect, Model, ObjectInfo, Parameter
+from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
+from .version import __version__
+
+__all__ = [
+    "Batch", "Camera", "Client", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
+    "ImageOptions", "InvalidRequest", "Model", "NotFound", "ObjectInfo", "Parameter", "Refused", "SourceChanged",
+    "SourceFailed", "SourceUnreachable", "SpherePlan", "Touches", "TouchstoneError", "__version__", "connect",
+    "faces", "image", "sphere", "touches",
+]

@@ -1,0 +1,117 @@
+"""One batch of samples: arrays by name, viewed in the received bytes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Iterator, Mapping, Sequence, Union
+
+import numpy as np
+
+from . import errors, units
+from .v1 import types_pb2
+
+_DTYPES = {
+    types_pb2.DATA_TYPE_FLOAT32: np.dtype("<f4"),
+    types_pb2.DATA_TYPE_FLOAT64: np.dtype("<f8"),
+    types_pb2.DATA_TYPE_UINT8: np.dtype("u1"),
+    types_pb2.DATA_TYPE_INT32: np.dtype("<i4"),
+    types_pb2.DATA_TYPE_UINT64: np.dtype("<u8"),
+}
+
+
+class EncodedImages(Sequence):
+    """PNG or JPEG files of a batch; `images[i]` is a file as bytes, `images[a:b]` a list of them."""
+
+    __slots__ = ("_data", "_offsets")
+
+    def __init__(self, data: bytes, offsets: Sequence[int]):
+        self._data = memoryview(data)
+        self._offsets = offsets
+
+    def __len__(self) -> int:
+        return len(self._offsets) - 1
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        count = len(self)
+        if not -count <= index < count:
+            raise IndexError(f"image {index} of a batch of {count}")
+        index %= count
+        return bytes(self._data[self._offsets[index] : self._offsets[index + 1]])
+
+    def __repr__(self) -> str:
+        return f"EncodedImages({len(self)} images, {len(self._data)} bytes)"
+
+
+Column = Union[np.ndarray, EncodedImages]
+
+
+def decode_column(column: types_pb2.Column, rows: int) -> Column:
+    """The column as (rows, *shape): a read-only view of the message's bytes."""
+    if column.type == types_pb2.DATA_TYPE_BYTES:
+        offsets = list(column.offsets)
+        if len(offsets) != rows + 1 or offsets[-1] > len(column.data) or offsets != sorted(offsets):
+            raise errors.SourceFailed(f'Column "{column.name}" has wrong offsets for {rows} encoded images.')
+        return EncodedImages(column.data, offsets)
+    dtype = _DTYPES.get(column.type)
+    if dtype is None:
+        raise errors.SourceFailed(
+            f'Column "{column.name}" has data type {column.type}, which this version of the package does not know.'
+        )
+    data = column.data
+    shape = (rows, *column.shape)
+    if len(data) != math.prod(shape) * dtype.itemsize:
+        raise errors.SourceFailed(
+            f'Column "{column.name}" has {len(data)} bytes; {shape} of {dtype.name} are '
+            f"{math.prod(shape) * dtype.itemsize}."
+        )
+    return np.frombuffer(data, dtype).reshape(shape)
+
+
+class Batch(Mapping[str, Any]):
+    """Samples start_index .. start_index + rows - 1; `batch["descriptor_us"]` is an array of `rows` entries.
+
+    Columns that need no conversion are read-only views of the received bytes; the others are converted when
+    they are first asked for. `batch["image"]` is uint8 (rows, height, width, channels), or EncodedImages.
+
+    Attributes:
+      start_index: index of the first sample.
+      rows: number of samples.
+      model_hash: of the model that made them; "" if unknown.
+    """
+
+    __slots__ = ("start_index", "rows", "model_hash", "_columns", "_wire_names")
+
+    def __init__(self, start_index: int, rows: int, columns: dict[str, Column], *, model_hash: str = "",
+                 si: bool = False):
+        self.start_index = start_index
+        self.rows = rows
+        self.model_hash = model_hash
+        # Public name -> name on the wire, as long as the column is not converted yet.
+        self._wire_names = {} if si else {units.lab_name(name): name for name in columns}
+        self._columns = columns if si else {units.lab_name(name): values for name, values in columns.items()}
+
+    @classmethod
+    def from_columns(cls, start_index: int, rows: int, columns: Sequence[types_pb2.Column], **more) -> Batch:
+        return cls(start_index, rows, {c.name: decode_column(c, rows) for c in columns}, **more)
+
+    def __getitem__(self, name: str) -> Any:
+        try:
+            values = self._columns[name]
+        except KeyError:
+            raise KeyError(f"{name!r}; the columns are {', '.join(self._columns)}") from None
+        wire_name = self._wire_names.pop(name, None)
+        if wire_name is not None and isinstance(values, np.ndarray):
+            values = self._columns[name] = units.lab_array(wire_name, values)
+        return values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        """Number of columns, as for every mapping; `rows` is the number of samples."""
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        return f"Batch(start_index={self.start_index}, rows={self.rows}, columns={list(self._columns)})"

@@ -1,0 +1,189 @@
+"""connect() and the client that it returns."""
+
+from __future__ import annotations
+
+from typing import Any, Sequence
+
+import numpy as np
+
+from . import checks, models, units
+from .batch import Batch
+from .connection import Connection, Targets
+from .dataset import Dataset
+from .errors import InvalidRequest
+from .images import ImageOptions, Views, image as default_image, to_views
+from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
+from .plans import PlanLike, Touches
+from .specification import specification
+from .v1 import models_pb2, models_pb2_grpc, source_pb2, source_pb2_grpc
+
+_SOURCE = source_pb2_grpc.SourceStub
+_MODELS = models_pb2_grpc.ModelsStub
+
+
+def connect(targets: Targets = "127.0.0.1:50051", *, timeout_s: float = 3.0, retry_for_s: float = 60.0) -> Client:
+    """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
+
+    Args:
+      timeout_s: how long to wait for the first answer; SourceUnreachable after that.
+      retry_for_s: how long a lost source is tried again, and the other targets with it, before
+        SourceUnreachable is raised; counted from the last thing that arrived.
+    """
+    client = Client(targets, retry_for_s=retry_for_s)
+    client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
+    return client
+
+
+class Client:
+    """A source of touches and images. Usable as a context manager.
+
+    The constructor does not connect; the first method that is called does.
+    """
+
+    def __init__(self, targets: Targets, *, retry_for_s: float = 60.0):
+        self._connection = Connection(targets, checks.number("retry_for_s", retry_for_s))
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        return self._connection.targets
+
+    @property
+    def target(self) -> str:
+        """The one in use."""
+        return self._connection.target
+
+    @property
+    def retry_for_s(self) -> float:
+        return self._connection.retry_for_s
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def describe(self, *, timeout_s: float | None = None, retry_for_s: float | None = None) -> Description:
+        """What the source is, its limits, and what it can do."""
+        return Description.from_proto(
+            self._connection.call(_SOURCE, "Describe", source_pb2.DescribeRequest(), timeout_s=timeout_s,
+                                  retry_for_s=retry_for_s)
+        )
+
+    def objects(self) -> list[ObjectInfo]:
+        """The objects that can be touched."""
+        reply = self._connection.call(_SOURCE, "ListObjects", source_pb2.ListObjectsRequest())
+        return [ObjectInfo.from_proto(message) for message in reply.objects]
+
+    def effects(self) -> list[Effect]:
+        """Every effect that a model may name, with its parameters."""
+        reply = self._connection.call(_MODELS, "ListEffects", models_pb2.ListEffectsRequest())
+        return [Effect.from_proto(message) for message in reply.effects]
+
+    def models(self) -> list[Model]:
+        """The models in the source's store."""
+        reply = self._connection.call(_MODELS, "ListModels", models_pb2.ListModelsRequest())
+        return [Model.from_proto(message) for message in reply.models]
+
+    def model(self, model: ModelLike = None) -> Model:
+        """One model: a name, a hash, a file (which is only checked), or the source's default."""
+        reference = model_ref(model)
+        if reference.WhichOneof("ref") == "yaml":
+            return self.add_model(reference.yaml, check_only=True)
+        return Model.from_proto(
+            self._connection.call(_MODELS, "GetModel", models_pb2.GetModelRequest(model=reference))
+        )
+
+    def add_model(self, model: ModelLike, *, check_only: bool = False) -> Model:
+        """Keeps a model file (its path or its text) at the source under the name in it."""
+        reference = model_ref(model)
+        if reference.WhichOneof("ref") != "yaml":
+            raise InvalidRequest(f"{model!r} is not a model file; give its path (*.yaml) or its text.")
+        request = models_pb2.CreateModelRequest(yaml=reference.yaml, validate_only=check_only)
+        return Model.from_proto(self._connection.call(_MODELS, "CreateModel", request))
+
+    def plan(self, plan: PlanLike, object: str = "", count: int = 100, *, seed: int = 0, start: int = 0,
+             speed_mm_s: float = 20.0) -> Touches:
+        """The commanded touches `start` .. `start + count - 1` of a plan for one object; nothing is touched."""
+        message = plan.to_proto()
+        if not isinstance(plan, Touches):
+            message.speed_m_s = units.si_value("speed_m_s", checks.positive("speed_mm_s", speed_mm_s))
+        request = source_pb2.ExpandPlanRequest(
+            plan=message, object=object, seed=checks.uint64("seed", seed), first_index=checks.uint64("start", start),
+            count=checks.whole_number("count", count, 1, 2**32 - 1),
+        )
+        return Touches.from_messages(self._connection.call(_SOURCE, "ExpandPlan", request).touches)
+
+    def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
+              lease_token: str = "") -> Batch:
+        """Touches in the order given, as one session. NaN where a finger reported nothing.
+
+        Args:
+          start: touch k draws the noise of index start + k.
+          lease_token: for a source that moves something.
+
+        Returns:
+          A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
+          (N, fingers, 3) `contact_point_mm` and `normal`; (N,) `complete`.
+        """
+        request = source_pb2.TouchRequest(
+            object=object, touches=touches.to_messages(), model=model_ref(model), seed=checks.uint64("seed", seed),
+            first_index=checks.uint64("start", start), lease_token=lease_token,
+        )
+        # A touch of a real arm is not repeated without being asked.
+        reply = self._connection.call(_SOURCE, "Touch", request, repeat=not lease_token)
+        columns = {}
+        for name, entry in (("descriptor_s", ()), ("contact_time_s", ()), ("travel_m", ()),
+                            ("contact_point_m", (3,)), ("normal", (3,))):
+            rows = [getattr(result, name) for result in reply.results]
+            if rows and len(rows[0]):
+                columns[name] = np.array([list(row) for row in rows], float).reshape(len(rows), -1, *entry)
+        columns["complete"] = np.array([result.complete for result in reply.results], bool)
+        return Batch(start, len(reply.results), columns, model_hash=reply.model_hash)
+
+    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, lease_token: str = "") -> Batch:
+        """Photographs: one for each touch (its camera) or each touchstone.Camera.
+
+        Returns:
+          A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
+        """
+        request = source_pb2.CaptureRequest(
+            object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=lease_token
+        )
+        reply = self._connection.call(_SOURCE, "Capture", request, repeat=not lease_token)
+        return Batch.from_columns(0, reply.rows, reply.columns)
+
+    def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
+                seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
+                touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                image: ImageOptions | None = None, most_draws: int = 0, batch_size: int | None = None,
+                start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab") -> Dataset:
+        """A dataset to iterate over; sample i is the same bits whoever asks, however it is cut into batches.
+
+        Args:
+          objects: names; sample i shows objects[i mod count]. The column "object" is the position in this list.
+          plan: sphere(...) (the default), faces(...) or touches(...).
+          samples: how many; needed for a sphere plan, by default all touches of the others once.
+          seed: of poses and noise, 0 to 2**64 - 1.
+          model: a name, a hash, a path to a model file, its text, or a Model; default: the source's.
+          speed_mm_s: commanded speed, 20 unless told; explicit touches carry their own.
+          touch_interval_s: time between the starts of neighbouring touches.
+          columns: "index", "object", "descriptor", "contact_time", "pose", "contact", "image"; default
+            ("descriptor", "object"), and "image" if `image` is given.
+          image: touchstone.image(...).
+          most_draws: draws for one index before the stream fails; 0: the source's own limit.
+          batch_size: samples a batch; default 4096, 64 with images.
+          start, stop: a part of the dataset, samples start .. stop - 1.
+          stride: of every `stride` batches the first is delivered: worker w of W takes
+            start=w * batch_size, stride=W.
+          units: "lab" (mm, us, deg, mm/s), or "si": the wire's own columns (descriptor_s, ...), never copied.
+        """
+        si = bool(checks.choice("units", units, {"lab": 0, "si": 1}))
+        spec = specification(
+            objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
+            touch_interval_s=touch_interval_s, columns=columns, image=image, most_draws=most_draws,
+        )
+        # A connection of its own: losing one stream must not close another's channel.
+        return Dataset(self._connection.another(), spec, batch_size=batch_size, start=start, stop=stop, stride=stride, si=si)

@@ -1,0 +1,158 @@
+"""A channel to one of several equal sources, made when it is first needed and made anew when it is lost."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from typing import Any, Sequence, Union
+
+import grpc
+
+from . import errors
+
+Targets = Union[str, Sequence[str]]
+
+_MIB = 1024 * 1024
+_OPTIONS = (
+    ("grpc.max_receive_message_length", 256 * _MIB),
+    ("grpc.max_send_message_length", 256 * _MIB),
+    # Window of a stream: the source can work on while one large batch is being used.
+    ("grpc.http2.lookahead_bytes", 8 * _MIB),
+    # Every Connection has a socket of its own, and no back-off inherited from another one to the same target.
+    ("grpc.use_local_subchannel_pool", 1),
+    # Retrying is done here, where it is known which index comes next.
+    ("grpc.enable_retries", 0),
+    # A machine that vanished without a word is noticed within two minutes.
+    ("grpc.keepalive_time_ms", 100_000),
+    ("grpc.keepalive_timeout_ms", 20_000),
+    # The reading thread drives the stream itself: half the time a message of the default hand-over.
+    ("SingleThreadedUnaryStream", 1),
+)
+
+# The processes, this one and those it was forked from, in which a channel was made.
+_processes_with_grpc: set[int] = set()
+
+
+def grpc_was_used_before_fork() -> bool:
+    """True in a process forked from one that had used gRPC, whose threads did not come along: a call would hang."""
+    return any(pid != os.getpid() for pid in _processes_with_grpc)
+
+
+def grpc_was_used() -> bool:
+    """True if a process forked now could not use gRPC."""
+    return bool(_processes_with_grpc)
+
+
+def parse_targets(targets: Targets) -> tuple[str, ...]:
+    """("host:port", ...) from one text, "a:1,b:2", or a sequence of them."""
+    if isinstance(targets, str):
+        targets = targets.split(",")
+    result = tuple(str(target).strip() for target in targets)
+    if not result:
+        raise errors.InvalidRequest('No target is given; say for instance "127.0.0.1:50051".')
+    for target in result:
+        if target.startswith(("unix:", "dns:", "ipv4:", "ipv6:", "passthrough:")):
+            continue
+        host, _, port = target.rpartition(":")
+        if not host or not port.isdigit() or not 0 < int(port) < 65536:
+            raise errors.InvalidRequest(f'Target "{target}" is not "host:port"; say for instance "127.0.0.1:50051".')
+    return result
+
+
+class Retry:
+    """Decides after each loss whether to try again, and waits: the next target at once, a whole round with back-off."""
+
+    def __init__(self, targets: int, retry_for_s: float):
+        self._targets = targets
+        self._retry_for_s = retry_for_s
+        self.succeeded()
+
+    def succeeded(self) -> None:
+        """Something arrived: the patience starts anew."""
+        self._losses = 0
+        self._since: float | None = None
+
+    def lost(self, error: errors.TouchstoneError) -> None:
+        """Returns when to try again, or raises `error` when the patience is over."""
+        now = time.monotonic()
+        self._since = now if self._since is None else self._since
+        self._losses += 1
+        if self._losses % self._targets:
+            return
+        rounds = self._losses // self._targets
+        # Jitter keeps a thousand workers from coming back in the same instant.
+        pause_s = min(5.0, 0.05 * 2 ** min(rounds, 10)) * random.uniform(0.5, 1.0)
+        left_s = self._since + self._retry_for_s - now
+        if left_s <= 0:
+            raise error from None
+        time.sleep(min(pause_s, left_s))
+
+
+class Connection:
+    """Not thread-safe to reconnect; give every thread its own."""
+
+    def __init__(self, targets: Targets, retry_for_s: float = 60.0, begin_with: int = 0):
+        """`begin_with`: which target comes first, modulo their number, so that many clients spread over them."""
+        self.targets = parse_targets(targets)
+        self.retry_for_s = retry_for_s
+        self._position = begin_with % len(self.targets)
+        self._channel: grpc.Channel | None = None
+        self._pid = 0
+
+    @property
+    def target(self) -> str:
+        return self.targets[self._position]
+
+    def another(self) -> Connection:
+        """A new one to the same targets, beginning with the one in use."""
+        return Connection(self.targets, self.retry_for_s, self._position)
+
+    def channel(self) -> grpc.Channel:
+        if self._channel is not None and self._pid != os.getpid():
+            raise self._forked()
+        if self._channel is None:
+            if grpc_was_used_before_fork():
+                raise self._forked()
+            self._channel = grpc.insecure_channel(self.target, options=_OPTIONS)
+            self._pid = os.getpid()
+            _processes_with_grpc.add(self._pid)
+        return self._channel
+
+    @staticmethod
+    def _forked() -> errors.Refused:
+        return errors.Refused(
+            "This process was forked from one that had used gRPC already, and gRPC does not work after that. Use "
+            'TouchstoneDataset.loader(), or DataLoader(..., multiprocessing_context="forkserver"), or connect only '
+            "in the workers."
+        )
+
+    def move_on(self) -> None:
+        """Leaves the target that was lost; the next call goes to the next one."""
+        self.close()
+        self._position = (self._position + 1) % len(self.targets)
+
+    def close(self) -> None:
+        if self._channel is not None and self._pid == os.getpid():
+            self._channel.close()
+        self._channel = None
+
+    def call(self, stub: type, method: str, request: Any, *, timeout_s: float | None = None, repeat: bool = True,
+             retry_for_s: float | None = None) -> Any:
+        """One unary call; a lost source is replaced by the next if the call may be repeated.
+
+        Args:
+          stub: generated stub class, e.g. source_pb2_grpc.SourceStub.
+          timeout_s: deadline of each attempt.
+          retry_for_s: how long to go on trying; by default the connection's.
+        """
+        retry = Retry(len(self.targets), self.retry_for_s if retry_for_s is None else retry_for_s)
+        while True:
+            try:
+                return getattr(stub(self.channel()), method)(request, timeout=timeout_s)
+            except grpc.RpcError as error:
+                failure = errors.from_rpc(error, self.target)
+                if not (repeat and errors.is_lost(error)):
+                    raise failure from None
+            self.move_on()
+            retry.lost(failure)

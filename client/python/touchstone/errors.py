@@ -1,0 +1,84 @@
+"""What can go wrong, as exceptions with the source's own message. No gRPC exception leaves the package."""
+
+from __future__ import annotations
+
+import grpc
+
+
+class TouchstoneError(Exception):
+    """Base of all.
+
+    Attributes:
+      code: the canonical status ("INVALID_ARGUMENT", ...); "" if the request never left this process.
+      target: the source that said so; "" likewise.
+    """
+
+    def __init__(self, message: str, code: str = "", target: str = ""):
+        super().__init__(message)
+        self.code = code
+        self.target = target
+
+
+class InvalidRequest(TouchstoneError, ValueError):
+    """The request cannot be meant: an unknown word, a value out of range, a malformed model file."""
+
+
+class NotFound(TouchstoneError, LookupError):
+    """An object, model or effect that the source does not have."""
+
+
+class SourceUnreachable(TouchstoneError, ConnectionError):
+    """No source answered, or the only ones that did were lost and did not come back in time."""
+
+
+class Refused(TouchstoneError):
+    """The source understood and will not: a lease is missing, a limit is reached, the method is not offered."""
+
+
+class SourceChanged(Refused):
+    """Another source, or the same one restarted, would not make the same samples: going on would mix two datasets."""
+
+
+class SourceFailed(TouchstoneError):
+    """The source failed at a legitimate request."""
+
+
+_CLASSES = {
+    "INVALID_ARGUMENT": InvalidRequest,
+    "OUT_OF_RANGE": InvalidRequest,
+    "NOT_FOUND": NotFound,
+    "UNAVAILABLE": SourceUnreachable,
+    "DEADLINE_EXCEEDED": SourceUnreachable,
+    "FAILED_PRECONDITION": Refused,
+    "ABORTED": Refused,
+    "ALREADY_EXISTS": Refused,
+    "PERMISSION_DENIED": Refused,
+    "UNAUTHENTICATED": Refused,
+    "RESOURCE_EXHAUSTED": Refused,
+    "UNIMPLEMENTED": Refused,
+}
+
+
+def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
+    """The exception for a failed call; raise it `from None`."""
+    code = error.code().name
+    details = error.details() or "no message"
+    kind = _CLASSES.get(code, SourceFailed)
+    if kind is SourceUnreachable:
+        details = f"{target}: {details}"
+    return kind(details, code, target)
+
+
+def is_lost(error: grpc.RpcError) -> bool:
+    """True if the connection or the server went away, so that the same request may succeed elsewhere or later."""
+    code, details = error.code(), error.details() or ""
+    if code == grpc.StatusCode.UNAVAILABLE:
+        return True
+    # A killed server also shows as a reset stream; one whose drain ran out cancels what is left. This process
+    # never takes a cancellation of its own for that: it does not look at a call after cancelling it.
+    if code == grpc.StatusCode.CANCELLED:
+        return True
+    if code in (grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN):
+        return "RST_STREAM" in details or "Stream removed" in details or "Socket closed" in details
+    # All streams of the source are taken: a stream of an ended epoch may still be closing there.
+    return code == grpc.StatusCode.RESOURCE_EXHAUSTED and "larger than max" not in details

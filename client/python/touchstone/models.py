@@ -1,0 +1,148 @@
+"""Models, effects and objects as a source describes them, and how a request names a model."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import re
+from typing import Union
+
+from . import images, units
+from .errors import InvalidRequest
+from .v1 import models_pb2, source_pb2, types_pb2
+
+
+@dataclasses.dataclass(frozen=True)
+class Description:
+    """What a source is and what it can do; limits are 0 where a method is not offered."""
+
+    kind: str  # "virtual" or "physical"
+    version: str
+    plans: tuple[str, ...]
+    default_model: str
+    default_model_hash: str
+    renderer: str  # "egl", "cpu" or "": no camera
+    renderer_description: str
+    most_touches_per_request: int
+    most_images_per_request: int
+    most_image_side: int
+    most_batch_size: int
+    most_fingers: int
+    lease_required: bool
+    touch_duration_s: float
+    clock_uncertainty_us: float
+
+    @classmethod
+    def from_proto(cls, m: source_pb2.DescribeResponse) -> Description:
+        return cls(
+            m.kind, m.version, tuple(m.plans), m.default_model, m.default_model_hash,
+            images.renderer_name(m.renderer), m.renderer_description, m.most_touches_per_request,
+            m.most_images_per_request, m.most_image_side, m.most_batch_size, m.most_fingers, m.lease_required,
+            m.touch_duration_s, units.lab_value("clock_uncertainty_s", m.clock_uncertainty_s),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class ObjectInfo:
+    """An object that can be touched; its box is in the object frame."""
+
+    name: str
+    vertices: int
+    triangles: int
+    bounds_min_mm: tuple[float, float, float]
+    bounds_max_mm: tuple[float, float, float]
+    closed: bool
+    mesh_hash: str
+    origin: str
+
+    @classmethod
+    def from_proto(cls, m: source_pb2.Object) -> ObjectInfo:
+        corner = lambda v: tuple(units.lab_value("_m", c) for c in (v.x, v.y, v.z))
+        return cls(m.name, m.vertices, m.triangles, corner(m.bounds_min_m), corner(m.bounds_max_m), m.closed,
+                   m.mesh_hash, m.origin)
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect, in the unit of model files."""
+
+    name: str
+    unit: str
+    arity: str  # "scalar", "vector3" or "finger"
+    min: float
+    max: float
+    default: float
+    typical: float
+    sum_zero: bool
+    meaning: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """An effect of the catalogue."""
+
+    name: str
+    stage: str  # "pose", "contact", "motion" or "sensor"
+    meaning: str
+    signature: str
+    check_on_rig: str
+    remedy: str
+    parameters: tuple[Parameter, ...]
+
+    @classmethod
+    def from_proto(cls, m: types_pb2.Effect) -> Effect:
+        parameters = tuple(
+            Parameter(p.name, p.unit, p.arity, p.min, p.max, p.default_value, p.typical, p.sum_zero, p.meaning)
+            for p in m.parameters
+        )
+        return cls(m.name, m.stage, m.meaning, m.signature, m.check_on_rig, m.remedy, parameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """A model of the source's store; `yaml` is the whole model file."""
+
+    name: str
+    hash: str
+    yaml: str
+    fingers: int
+    spacing_mm: float
+
+    @classmethod
+    def from_proto(cls, m: models_pb2.Model) -> Model:
+        return cls(m.name, m.hash, m.yaml, m.fingers, units.lab_value("spacing_m", m.spacing_m))
+
+
+ModelLike = Union[None, str, os.PathLike, Model]
+
+
+def model_ref(model: ModelLike) -> types_pb2.ModelRef:
+    """What a request says for a model.
+
+    None: the source's default. A Model: its hash. A path, or a text that ends in .yaml or .yml: the contents of
+    that file are sent. A text with more than one line: a whole model file. 8 to 64 hexadecimal digits: a hash.
+    Any other text: a name in the source's store.
+    """
+    if model is None:
+        return types_pb2.ModelRef()
+    if isinstance(model, Model):
+        return types_pb2.ModelRef(hash=model.hash)
+    if isinstance(model, str):
+        if "\n" in model:
+            return types_pb2.ModelRef(yaml=model)
+        if not model.endswith((".yaml", ".yml")):
+            is_hash = re.fullmatch("[0-9a-f]{8,64}", model)
+            return types_pb2.ModelRef(hash=model) if is_hash else types_pb2.ModelRef(name=model)
+    elif not isinstance(model, os.PathLike):
+        raise InvalidRequest(f"model is {type(model).__name__}; give a name, a hash, a path or a Model.")
+    return types_pb2.ModelRef(yaml=read_model_file(model))
+
+
+def read_model_file(path: str | os.PathLike) -> str:
+    try:
+        return pathlib.Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InvalidRequest(f"Model file {os.fspath(path)}: {error.strerror}.") from None
+    except UnicodeDecodeError:
+        raise InvalidRequest(f"Model file {os.fspath(path)} is not UTF-8 text.") from None

@@ -1,0 +1,72 @@
+"""A dataset's specification from a user's arguments."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from . import checks, units
+from .errors import InvalidRequest
+from .images import ImageOptions, image as default_image
+from .models import ModelLike, model_ref
+from .plans import PlanLike, SpherePlan, Touches, sphere
+from .v1 import source_pb2
+
+# Samples a batch unless told otherwise: enough to make a message's overhead small, and a few MB with images.
+DEFAULT_BATCH_SIZE = 4096
+DEFAULT_BATCH_SIZE_WITH_IMAGES = 64
+
+
+def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
+                  seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
+                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                  image: ImageOptions | None = None, most_draws: int = 0) -> source_pb2.DatasetSpec:
+    """The message; arguments as in Client.dataset(). samples is resolved, so that the size is known here."""
+    objects = [objects] if isinstance(objects, str) else list(objects)
+    if not objects or not checks.is_sequence_of_text(objects):
+        raise InvalidRequest(f"objects is {objects!r}; give at least one object's name.")
+    plan = sphere() if plan is None else plan
+    if not hasattr(plan, "to_proto"):
+        raise InvalidRequest(
+            f"plan is {type(plan).__name__}; give touchstone.sphere(...), faces(...) or touches(...)."
+        )
+    # The size: a plan with an end has one of its own.
+    if samples is None:
+        if isinstance(plan, SpherePlan):
+            raise InvalidRequest(
+                "samples is missing: a sphere plan has no end of its own; say for instance samples=10_000."
+            )
+        samples = plan.samples(len(objects))
+    # The speed: explicit touches carry their own.
+    message = plan.to_proto()
+    if isinstance(plan, Touches):
+        if speed_mm_s is not None:
+            raise InvalidRequest("speed_mm_s is given, but explicit touches carry their own; set it there.")
+    else:
+        message.speed_m_s = units.si_value(
+            "speed_m_s", checks.positive("speed_mm_s", 20.0 if speed_mm_s is None else speed_mm_s)
+        )
+    message.touch_interval_s = checks.number("touch_interval_s", touch_interval_s)
+    # The columns: an image's options without the image are a mistake.
+    if columns is None:
+        columns = ("descriptor", "object", *(("image",) if image is not None else ()))
+    columns = [columns] if isinstance(columns, str) else list(columns)
+    if image is not None and "image" not in columns:
+        raise InvalidRequest(f'image is given, but columns is {columns}; add "image" to it.')
+    spec = source_pb2.DatasetSpec(
+        objects=objects,
+        plan=message,
+        model=model_ref(model),
+        seed=checks.uint64("seed", seed),
+        samples=checks.whole_number("samples", samples, 1, 2**63 - 1),
+        columns=columns,
+        most_draws=checks.whole_number("most_draws", most_draws, 0, 2**32 - 1),
+    )
+    if "image" in columns:
+        spec.image.CopyFrom((image or default_image()).to_proto())
+    return spec
+
+
+def resolve_batch_size(spec: source_pb2.DatasetSpec, batch_size: int | None) -> int:
+    if batch_size is None:
+        return DEFAULT_BATCH_SIZE_WITH_IMAGES if "image" in spec.columns else DEFAULT_BATCH_SIZE
+    return checks.whole_number("batch_size", batch_size, 1, 2**32 - 1)

@@ -1,0 +1,358 @@
+"""Touchstone datasets for PyTorch.
+
+    from touchstone.torch import TouchstoneDataset
+
+    dataset = TouchstoneDataset("127.0.0.1:50051", ["lat00", "lat20"], samples=100_000, seed=1, batch_size=512)
+    loader = dataset.loader(num_workers=2)
+    for batch in loader:
+        batch["descriptor_us"], batch["object"]      # tensors (512, 3) and (512,)
+
+Order. Batch k holds samples k * batch_size and following. With R ranks, rank r gets batches r, r + R, ...; its
+DataLoader workers take them in turn, and the DataLoader takes from its workers in turn: so what a rank sees does
+not depend on the number of workers, nothing is left out and nothing comes twice.
+
+Resumption. `loader.state_dict()` counts the batches that were handed out, not those prefetched, and stands for
+the rest of the epoch and all later ones. After the last batch of an epoch but before the loop has ended it
+stands for an empty rest; after that for the next epoch.
+
+Fork. gRPC does not survive a fork, so a TouchstoneDataset connects only where it is iterated. A process that has
+used gRPC itself (touchstone.connect()) must not fork workers: loader() then starts them by "forkserver", which
+like "spawn" needs the script's main part under `if __name__ == "__main__":`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from typing import Any, Dict, Iterator, Sequence
+
+import numpy as np
+import torch
+from google.protobuf import json_format
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
+
+from . import checks
+from .batch import Batch, EncodedImages
+from .client import Client
+from .connection import Connection, Targets, grpc_was_used, parse_targets
+from .dataset import Dataset, fingerprint
+from .errors import InvalidRequest, Refused, SourceChanged
+from .images import ImageOptions
+from .models import ModelLike
+from .plans import PlanLike
+from .specification import resolve_batch_size, specification
+from .v1 import source_pb2
+
+__all__ = ["TouchstoneDataset", "TouchstoneLoader", "epoch_seed"]
+
+# Workers that compare what their sources serve; further ones share places.
+_FINGERPRINTS = 256
+_PICTURES = ("image", "depth_mm", "mask")
+
+
+def epoch_seed(seed: int, epoch: int) -> int:
+    """The seed of an epoch when every epoch has new samples: `seed` itself for epoch 0, then unrelated ones.
+
+    They are not seed + epoch, which would make the second epoch of a training set with seed 1 equal to a test set
+    with seed 2.
+    """
+    if epoch == 0:
+        return seed
+    digest = hashlib.sha256(f"touchstone epoch {seed} {epoch}".encode()).digest()
+    return int.from_bytes(digest[:8], "little")
+
+
+class TouchstoneDataset(IterableDataset):
+    """An IterableDataset of batches (dicts of tensors), or of samples with batched=False.
+
+    Give it to `loader()`, or to DataLoader(dataset, batch_size=None, num_workers=...); with batched=False to
+    DataLoader(dataset, batch_size=N) with the N given here as batch_size, or the order would depend on the number
+    of workers. Only `loader()` can count what was delivered when there are workers.
+
+    Tensors: "descriptor_us" float32 (N, fingers), "object" int32 (N,), "index" int64 (N,), "image" uint8
+    (N, channels, height, width), and so on; encoded images are a list of bytes.
+    """
+
+    def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
+                 samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
+                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                 image: ImageOptions | None = None, most_draws: int = 0, batch_size: int | None = None,
+                 start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
+                 ranks: int | None = None, whole_rounds: bool = False, new_samples_each_epoch: bool = False,
+                 retry_for_s: float = 60.0):
+        """Arguments as in Client.dataset(), and:
+
+        Args:
+          target: "host:port", several of them (workers spread over them), or a Client.
+          batched: yield batches, not samples.
+          rank, ranks: this process and how many there are; default: torch.distributed's, or those of torchrun's
+            environment, or 0 of 1.
+          whole_rounds: leave out the last round of batches if it is not whole, so that every rank gets the same
+            number of batches of the same size.
+          new_samples_each_epoch: epoch e is drawn with epoch_seed(seed, e), not with seed.
+          retry_for_s: how long a lost source is tried again.
+        """
+        super().__init__()
+        self._targets = target.targets if isinstance(target, Client) else parse_targets(target)
+        self._retry_for_s = target.retry_for_s if isinstance(target, Client) else retry_for_s
+        spec = specification(
+            objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
+            touch_interval_s=touch_interval_s, columns=columns, image=image, most_draws=most_draws,
+        )
+        # Bytes travel to spawned workers whatever the protobuf version.
+        self._spec = spec.SerializeToString()
+        self._spec_digest = _digest(spec)
+        self._seed = spec.seed
+        self.batch_size = resolve_batch_size(spec, batch_size)
+        self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
+        self.start = checks.whole_number("start", start, 0, self.stop)
+        self.batched = batched
+        default_rank, default_ranks = _ranks_of_this_job()
+        self.ranks = default_ranks if ranks is None else checks.whole_number("ranks", ranks, 1, 2**20)
+        self.rank = checks.whole_number("rank", default_rank if rank is None else rank, 0, self.ranks - 1)
+        self.whole_rounds = whole_rounds
+        self.new_samples_each_epoch = new_samples_each_epoch
+        # Where an iteration begins: epoch, sample index of its first round, samples of its first batch to skip. In
+        # shared memory, so that workers which live for several epochs see it move.
+        self._begin = torch.tensor([0, self.start, 0], dtype=torch.int64).share_memory_()
+        # What the sources serve, as digests: row 0 what a loaded state expects, then a row a worker.
+        self._fingerprints = torch.zeros((1 + _FINGERPRINTS, 32), dtype=torch.uint8).share_memory_()
+        # Progress of the iteration in this process: batches that this rank was given, samples of the next one.
+        self._delivered = 0
+        self._skipped = 0
+        self._loader_counts = False
+
+    @property
+    def epoch(self) -> int:
+        """The epoch under way, from 0."""
+        return int(self._begin[0])
+
+    def set_epoch(self, epoch: int) -> None:
+        """Begins that epoch at the next iteration. Needed only for a DataLoader with workers made without loader()."""
+        self._begin_at(checks.whole_number("epoch", epoch, 0, 2**31), self.start, 0)
+
+    def __len__(self) -> int:
+        """Batches, or samples with batched=False, that this rank sees in a whole epoch."""
+        batches = self._rank_batches(self.start)
+        if self.batched or batches == 0:
+            return batches
+        last = self.start + (self.rank + self.ranks * (batches - 1)) * self.batch_size
+        return (batches - 1) * self.batch_size + min(self.batch_size, self._stop(self.start) - last)
+
+    def __iter__(self) -> Iterator[Dict[str, Any]]:
+        info = get_worker_info()
+        worker, workers = (info.id, info.num_workers) if info is not None else (0, 1)
+        if info is not None or self._loader_counts:
+            for batch in self._batches(worker, workers):
+                yield from [batch] if self.batched else _samples(batch)
+            return
+        # In the only process: count here. Whatever was handed out is counted before it is.
+        self._delivered = 0
+        for batch in self._batches(0, 1):
+            if self.batched:
+                self._delivered += 1
+                yield batch
+                continue
+            samples = list(_samples(batch))
+            already = int(self._begin[2]) if self._delivered == 0 else 0
+            for k, sample in enumerate(samples):
+                last = k + 1 == len(samples)
+                self._delivered, self._skipped = self._delivered + last, 0 if last else already + k + 1
+                yield sample
+        self._end_epoch()
+
+    def loader(self, num_workers: int = 0, **options: Any) -> TouchstoneLoader:
+        """A DataLoader over this dataset that can be saved and resumed.
+
+        Args:
+          num_workers: processes; 0: none but this one.
+          options: further ones of DataLoader, for instance pin_memory, prefetch_factor, persistent_workers,
+            multiprocessing_context.
+        """
+        return TouchstoneLoader(self, num_workers, options)
+
+    def state_dict(self) -> Dict[str, Any]:
+        """Where the next batch stands; plain numbers and text. With workers, use the loader's."""
+        known = [row for row in self._fingerprints.numpy() if row.any()]
+        return {
+            "version": 1,
+            "specification": self._spec_digest,
+            "served": known[0].tobytes().hex() if known else "",
+            "epoch": self.epoch,
+            "next_index": int(self._begin[1]) + self._delivered * self.ranks * self.batch_size,
+            "skip_samples": self._skipped if self._delivered or self._skipped else int(self._begin[2]),
+        }
+
+    def load_state_dict(self, state: Dict[str, Any]) -> None:
+        """Goes on there at the next iteration. The number of workers may differ, and, if all ranks had been given
+        equally many batches, the number of ranks too."""
+        if state.get("version") != 1:
+            raise InvalidRequest(f"The state has version {state.get('version')!r}; this package reads 1.")
+        if state["specification"] != self._spec_digest:
+            raise InvalidRequest(
+                "The state was saved with another specification (objects, plan, seed, model, columns, ...); make the "
+                "dataset with the same arguments."
+            )
+        self._fingerprints.zero_()
+        if state["served"]:
+            self._fingerprints[0] = torch.tensor(list(bytes.fromhex(state["served"])), dtype=torch.uint8)
+        self._begin_at(state["epoch"], state["next_index"], state["skip_samples"])
+
+    def _begin_at(self, epoch: int, index: int, skip: int) -> None:
+        self._begin.copy_(torch.tensor([epoch, index, skip], dtype=torch.int64))
+        self._delivered = self._skipped = 0
+
+    def _end_epoch(self) -> None:
+        self._begin_at(self.epoch + 1, self.start, 0)
+
+    def _stop(self, base: int) -> int:
+        """The sample after the last one that is delivered, with rounds counted from sample `base`."""
+        a_round = self.ranks * self.batch_size
+        return base + (self.stop - base) // a_round * a_round if self.whole_rounds else self.stop
+
+    def _rank_batches(self, base: int) -> int:
+        """Batches that this rank gets of samples base .. stop."""
+        batches = max(0, -(-(self._stop(base) - base) // self.batch_size))
+        return max(0, -(-(batches - self.rank) // self.ranks))
+
+    def _batches(self, worker: int, workers: int) -> Iterator[Dict[str, Any]]:
+        """The share of one worker, from where the iteration begins."""
+        epoch, base, skip = self._begin.tolist()
+        if skip and workers > 1:
+            raise Refused("The state was saved within a batch; go on with at most one worker.")
+        stop = self._stop(base)
+        start = base + (self.rank + self.ranks * worker) * self.batch_size
+        if start >= stop:
+            return
+        spec = source_pb2.DatasetSpec.FromString(self._spec)
+        if self.new_samples_each_epoch:
+            spec.seed = epoch_seed(self._seed, epoch)
+        connection = Connection(self._targets, self._retry_for_s, begin_with=self.rank * workers + worker)
+        dataset = Dataset(
+            connection, spec, batch_size=self.batch_size, start=start, stop=stop, stride=self.ranks * workers
+        )
+        try:
+            for k, batch in enumerate(dataset):
+                if k == 0:
+                    self._compare(worker, bytes.fromhex(fingerprint(dataset.raw_header)), connection.target)
+                yield _tensors(batch, skip if k == 0 else 0)
+        finally:
+            connection.close()
+
+    def _compare(self, worker: int, served: bytes, target: str) -> None:
+        """All workers, and the one who saved a state, must have been served the same dataset."""
+        self._fingerprints[1 + worker % _FINGERPRINTS] = torch.tensor(list(served), dtype=torch.uint8)
+        for row in self._fingerprints.numpy():
+            if row.any() and row.tobytes() != served:
+                raise SourceChanged(
+                    f"{target} serves another dataset than the other workers got, or than the loaded state was saved "
+                    "with: the model, a mesh, the columns or the renderer differ. Serve the same everywhere, send the "
+                    "model as a file, and name the renderer.",
+                    "FAILED_PRECONDITION", target,
+                )
+
+
+class TouchstoneLoader:
+    """A DataLoader that knows how many batches it has handed out. Made by TouchstoneDataset.loader().
+
+    Each `for` goes through one epoch, or through the rest of one after load_state_dict(). A loop that was broken
+    off begins its epoch anew, unless a state is loaded.
+    """
+
+    def __init__(self, dataset: TouchstoneDataset, num_workers: int, options: Dict[str, Any]):
+        for name in ("batch_size", "shuffle", "sampler", "batch_sampler", "drop_last"):
+            if name in options:
+                raise InvalidRequest(f"{name} is the dataset's; leave it out here.")
+        if not options.get("in_order", True):
+            raise InvalidRequest("in_order=False gives up the order that a state stands for.")
+        self.dataset = dataset
+        self._num_workers = num_workers
+        self._options = options
+        self._loader: DataLoader | None = None
+        # Where the epoch under way began, to begin it anew after a break.
+        self._fresh = True
+
+    def __len__(self) -> int:
+        """Batches of this rank in a whole epoch."""
+        return self.dataset._rank_batches(self.dataset.start)
+
+    @property
+    def epoch(self) -> int:
+        return self.dataset.epoch
+
+    def set_epoch(self, epoch: int) -> None:
+        self.dataset.set_epoch(epoch)
+        self._fresh = True
+
+    def state_dict(self) -> Dict[str, Any]:
+        return self.dataset.state_dict()
+
+    def load_state_dict(self, state: Dict[str, Any]) -> None:
+        self.dataset.load_state_dict(state)
+        self._fresh = True
+
+    def _make(self) -> DataLoader:
+        options = dict(self._options)
+        if self._num_workers > 0 and "multiprocessing_context" not in options and grpc_was_used():
+            # The imports are made once, by the process that all workers are forked from.
+            context = torch.multiprocessing.get_context("forkserver")
+            context.set_forkserver_preload(["__main__", __name__])
+            options["multiprocessing_context"] = context
+        batch_size = None if self.dataset.batched else self.dataset.batch_size
+        return DataLoader(self.dataset, batch_size=batch_size, num_workers=self._num_workers, **options)
+
+    def __iter__(self) -> Iterator[Any]:
+        dataset = self.dataset
+        if not self._fresh:
+            dataset.set_epoch(dataset.epoch)
+        self._fresh = False
+        # Workers that live on belong to one DataLoader; others are made anew, by fork only as long as that works.
+        if self._loader is None or not self._options.get("persistent_workers"):
+            self._loader = self._make()
+        dataset._delivered = dataset._skipped = 0
+        dataset._loader_counts = True
+        try:
+            for batch in self._loader:
+                dataset._delivered += 1
+                yield batch
+            dataset._end_epoch()
+            self._fresh = True
+        finally:
+            dataset._loader_counts = False
+
+
+def _tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
+    """The batch as tensors, without its first `skip` samples; pictures with the channels first."""
+    result: Dict[str, Any] = {}
+    for name, values in batch.items():
+        if isinstance(values, EncodedImages):
+            result[name] = values[skip:]
+            continue
+        if values.dtype == np.uint64:
+            values = values.astype(np.int64)
+        elif not values.flags.writeable:
+            # PyTorch has no read-only tensors.
+            values = values.copy()
+        tensor = torch.from_numpy(values)[skip:]
+        result[name] = tensor.permute(0, 3, 1, 2) if name in _PICTURES and tensor.dim() == 4 else tensor
+    return result
+
+
+def _samples(batch: Dict[str, Any]) -> Iterator[Dict[str, Any]]:
+    for k in range(len(next(iter(batch.values())))):
+        yield {name: values[k] for name, values in batch.items()}
+
+
+def _digest(spec: source_pb2.DatasetSpec) -> str:
+    """Equal for equal specifications, whatever the version of protobuf."""
+    return hashlib.sha256(json.dumps(json_format.MessageToDict(spec), sort_keys=True).encode()).hexdigest()
+
+
+def _ranks_of_this_job() -> tuple[int, int]:
+    """(rank, ranks)."""
+    if torch.distributed.is_available() and torch.distributed.is_initialized():
+        return torch.distributed.get_rank(), torch.distributed.get_world_size()
+    if "RANK" in os.environ and "WORLD_SIZE" in os.environ:
+        return int(os.environ["RANK"]), int(os.environ["WORLD_SIZE"])
+    return 0, 1
