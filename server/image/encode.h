@@ -11,7 +11,8 @@ namespace touchstone {
 
 // `channels` 1 or 3, rows from the top. Fast rather than small: libspng, compression level 1, filter SUB.
 absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int height, int channels);
-absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels, int quality);
+absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels,
+                                       int quality);
 
 // For tests and clients; refuses more than kMostImageSide a side.
 absl::StatusOr<Image> DecodePng(const std::string& png);

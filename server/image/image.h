@@ -19,18 +19,19 @@ struct Camera {
   double far_m = 0;
 };
 
-// The seed's camera of a touch (DESIGN 4): eye = the middle finger's start, at = target, up = lateral x approach.
+// The seed's camera of a touch (DESIGN 4): eye = the middle finger's start, at = target, up = lateral x
+// approach.
 Camera CameraOfTouch(const Eigen::Vector3d& target_m, const Eigen::Vector3d& approach,
                      const Eigen::Vector3d& lateral, double standoff_m);
 
 enum class PixelFormat { kGrey, kRgb };
 enum class Look {
-  kShaded,         // white point lights, no shadows, black background
-  kDarkOnWhite,    // the seed's post-processed look: a dark object on a white background
+  kShaded,       // white point lights, no shadows, black background
+  kDarkOnWhite,  // the seed's post-processed look: a dark object on a white background
 };
 
 struct ImageOptions {
-  int width = 224;   // 1 to kMostImageSide
+  int width = 224;  // 1 to kMostImageSide
   int height = 224;
   PixelFormat format = PixelFormat::kGrey;
   Look look = Look::kShaded;
@@ -42,10 +43,11 @@ inline constexpr int kMostImageSide = 2048;
 struct Image {
   int width = 0;
   int height = 0;
-  int channels = 0;                // 1 or 3
-  std::vector<uint8_t> pixels;     // height x width x channels, rows from the top
-  std::vector<float> depth_m;      // height x width, along the viewing axis; 0 where no object; empty if not asked
-  std::vector<uint8_t> mask;       // height x width, 255 object, 0 background; empty if not asked
+  int channels = 0;             // 1 or 3
+  std::vector<uint8_t> pixels;  // height x width x channels, rows from the top
+  std::vector<float>
+      depth_m;                // height x width, along the viewing axis; 0 where no object; empty if not asked
+  std::vector<uint8_t> mask;  // height x width, 255 object, 0 background; empty if not asked
 };
 
 }  // namespace touchstone

@@ -1,7 +1,8 @@
-// A renderer turns (surface, camera, options) into an image. Two exist: EGL (any OpenGL 3.3 driver, no display)
-// and CPU (Embree packets). Both compute the same picture: the same sampling (pixel centres), the same smooth
-// normals (area-weighted vertex normals, split at creases sharper than kCreaseRad), the same lights; grey levels
-// agree within 1/255 away from silhouettes. One renderer always gives the same bytes for the same request.
+// A renderer turns (surface, camera, options) into an image. Two exist: EGL (any OpenGL 3.3 driver, no
+// display) and CPU (Embree packets). Both compute the same picture: the same sampling (pixel centres), the
+// same smooth normals (area-weighted vertex normals, split at creases sharper than kCreaseRad), the same
+// lights; grey levels agree within 1/255 away from silhouettes. One renderer always gives the same bytes for
+// the same request.
 #pragma once
 
 #include <memory>
@@ -30,14 +31,15 @@ enum class RendererKind { kAuto, kEgl, kCpu };
 
 struct RendererOptions {
   RendererKind kind = RendererKind::kAuto;  // kAuto: the faster one, timed once on a small scene
-  int egl_device = -1;                      // index into ListEglDevices(); -1: the first that renders, GPU first
+  int egl_device = -1;  // index into ListEglDevices(); -1: the first that renders, GPU first
 };
 
 // An error says why no renderer of that kind can be had (for instance a build without EGL).
 absl::StatusOr<std::shared_ptr<Renderer>> CreateRenderer(const RendererOptions& options);
 
-absl::StatusOr<std::shared_ptr<Renderer>> CreateCpuRenderer();             // renderer_cpu.cpp
-absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int device);   // renderer_egl.cpp or renderer_absent.cpp
+absl::StatusOr<std::shared_ptr<Renderer>> CreateCpuRenderer();  // renderer_cpu.cpp
+absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(
+    int device);  // renderer_egl.cpp or renderer_absent.cpp
 
 // One EGL device (or the surfaceless default platform) for `doctor`.
 struct EglDevice {
@@ -46,7 +48,7 @@ struct EglDevice {
   std::string name;      // GL_RENDERER, or the driver's file
   bool renders = false;  // an OpenGL 3.3 core context could be made
   bool software = false;
-  std::string problem;   // in words, if it does not render
+  std::string problem;  // in words, if it does not render
 };
 std::vector<EglDevice> ListEglDevices();
 

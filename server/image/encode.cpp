@@ -1,0 +1,133 @@
+#include "server/image/encode.h"
+
+#include <cstdlib>
+#include <memory>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <spng.h>
+#include <turbojpeg.h>
+
+#include "server/base/status.h"
+
+namespace touchstone {
+namespace {
+
+struct SpngDelete {
+  void operator()(spng_ctx* context) const { spng_ctx_free(context); }
+};
+using SpngContext = std::unique_ptr<spng_ctx, SpngDelete>;
+
+struct FreeDelete {
+  void operator()(void* memory) const { std::free(memory); }
+};
+
+absl::Status CheckPixels(const uint8_t* pixels, int width, int height, int channels) {
+  if (pixels == nullptr) return absl::InvalidArgumentError("image has no pixels");
+  if (width < 1 || width > kMostImageSide || height < 1 || height > kMostImageSide) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "image is %d x %d pixels; each side must be from 1 to %d", width, height, kMostImageSide));
+  }
+  if (channels != 1 && channels != 3) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("image has %d channels; must be 1 (grey) or 3 (RGB)", channels));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PngError(const char* action, int code) {
+  return absl::InternalError(absl::StrCat("PNG: ", action, " failed: ", spng_strerror(code)));
+}
+absl::Status BadPng(const char* what, int code) {
+  return absl::InvalidArgumentError(absl::StrCat("PNG: ", what, ": ", spng_strerror(code)));
+}
+
+// A TurboJPEG compressor keeps some hundred kilobytes of tables: one a thread, made at its first image.
+tjhandle ThreadCompressor() {
+  struct Compressor {
+    tjhandle handle = tjInitCompress();
+    ~Compressor() {
+      if (handle != nullptr) tjDestroy(handle);
+    }
+  };
+  static thread_local Compressor compressor;
+  return compressor.handle;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int height, int channels) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPixels(pixels, width, height, channels));
+  SpngContext context(spng_ctx_new(SPNG_CTX_ENCODER));
+  if (context == nullptr) return absl::ResourceExhaustedError("PNG: no memory for an encoder");
+  spng_set_option(context.get(), SPNG_ENCODE_TO_BUFFER, 1);
+  spng_set_option(context.get(), SPNG_IMG_COMPRESSION_LEVEL, 1);
+  spng_set_option(context.get(), SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_SUB);
+
+  spng_ihdr header{};
+  header.width = static_cast<uint32_t>(width);
+  header.height = static_cast<uint32_t>(height);
+  header.bit_depth = 8;
+  header.color_type = channels == 3 ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_GRAYSCALE;
+  if (int code = spng_set_ihdr(context.get(), &header); code != 0) return PngError("header", code);
+  const size_t bytes = static_cast<size_t>(width) * height * channels;
+  if (int code = spng_encode_image(context.get(), pixels, bytes, SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE);
+      code != 0)
+    return PngError("encoding", code);
+  size_t size = 0;
+  int code = 0;
+  std::unique_ptr<void, FreeDelete> buffer(spng_get_png_buffer(context.get(), &size, &code));
+  if (buffer == nullptr) return PngError("encoding", code);
+  return std::string(static_cast<const char*>(buffer.get()), size);
+}
+
+absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels,
+                                       int quality) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPixels(pixels, width, height, channels));
+  if (quality < 1 || quality > 100) {
+    return absl::InvalidArgumentError(absl::StrFormat("JPEG quality is %d; must be from 1 to 100", quality));
+  }
+  const tjhandle handle = ThreadCompressor();
+  if (handle == nullptr) return absl::ResourceExhaustedError("JPEG: no memory for an encoder");
+
+  // Colour is kept at full resolution: a dataset should not learn from chroma blocks.
+  const int sampling = channels == 3 ? TJSAMP_444 : TJSAMP_GRAY;
+  const int format = channels == 3 ? TJPF_RGB : TJPF_GRAY;
+  std::string jpeg(tjBufSize(width, height, sampling), '\0');
+  unsigned char* out = reinterpret_cast<unsigned char*>(jpeg.data());
+  unsigned long size = jpeg.size();
+  if (tjCompress2(handle, pixels, width, 0, height, format, &out, &size, sampling, quality,
+                  TJFLAG_NOREALLOC) != 0)
+    return absl::InternalError(absl::StrCat("JPEG: encoding failed: ", tjGetErrorStr2(handle)));
+  jpeg.resize(size);
+  return jpeg;
+}
+
+absl::StatusOr<Image> DecodePng(const std::string& png) {
+  SpngContext context(spng_ctx_new(0));
+  if (context == nullptr) return absl::ResourceExhaustedError("PNG: no memory for a decoder");
+  spng_set_image_limits(context.get(), kMostImageSide, kMostImageSide);
+  spng_set_chunk_limits(context.get(), 1 << 20, 1 << 22);
+  spng_set_crc_action(context.get(), SPNG_CRC_ERROR, SPNG_CRC_ERROR);
+  if (int code = spng_set_png_buffer(context.get(), png.data(), png.size()); code != 0)
+    return BadPng("no data", code);
+  spng_ihdr header{};
+  if (int code = spng_get_ihdr(context.get(), &header); code != 0)
+    return BadPng(absl::StrFormat("header (each side must be from 1 to %d)", kMostImageSide).c_str(), code);
+
+  Image image;
+  image.width = static_cast<int>(header.width);
+  image.height = static_cast<int>(header.height);
+  const bool grey = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && header.bit_depth <= 8;
+  image.channels = grey ? 1 : 3;
+  const spng_format format = grey ? SPNG_FMT_G8 : SPNG_FMT_RGB8;
+  size_t bytes = 0;
+  if (int code = spng_decoded_image_size(context.get(), format, &bytes); code != 0)
+    return BadPng("size", code);
+  image.pixels.resize(bytes);
+  if (int code = spng_decode_image(context.get(), image.pixels.data(), bytes, format, 0); code != 0)
+    return BadPng("pixels", code);
+  return image;
+}
+
+}  // namespace touchstone

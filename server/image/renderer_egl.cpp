@@ -1,0 +1,138 @@
+// The EGL renderer: OpenGL 3.3 on any device that EGL finds, no window system, no display variable.
+//
+// A context belongs to a thread of the renderer's own for all its life: callers hand it their requests and
+// wait, so whatever contexts they have themselves stay untouched, and drivers never see a context change
+// threads.
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "server/base/status.h"
+#include "server/image/egl_device.h"
+#include "server/image/gl_painter.h"
+#include "server/image/renderer.h"
+#include "server/image/shading_mesh.h"
+
+namespace touchstone {
+namespace {
+
+class EglRenderer final : public Renderer {
+ public:
+  static absl::StatusOr<std::shared_ptr<Renderer>> Create(int device, int contexts) {
+    auto renderer = std::make_shared<EglRenderer>();
+    for (int i = 0; i < contexts; ++i) {
+      std::promise<absl::Status> started;
+      std::future<absl::Status> status = started.get_future();
+      renderer->threads_.emplace_back(&EglRenderer::Run, renderer.get(), device, &started);
+      TOUCHSTONE_RETURN_IF_ERROR(status.get());
+    }
+    return std::shared_ptr<Renderer>(std::move(renderer));
+  }
+
+  ~EglRenderer() override {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  std::string name() const override { return "egl"; }
+  std::string description() const override { return absl::StrCat("EGL on ", gl_renderer_); }
+
+  absl::StatusOr<Image> Render(const std::shared_ptr<const Surface>& surface, const Camera& camera,
+                               const ImageOptions& options) override {
+    TOUCHSTONE_RETURN_IF_ERROR(ValidateImageRequest(camera, options));
+    Job job{surface, meshes_.Get(surface), camera, options, {}};
+    std::future<absl::StatusOr<Image>> image = job.image.get_future();
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      jobs_.push_back(&job);
+    }
+    wake_.notify_one();
+    return image.get();
+  }
+
+ private:
+  struct Job {
+    std::shared_ptr<const Surface> surface;
+    std::shared_ptr<const ShadingMesh> mesh;
+    const Camera& camera;
+    const ImageOptions& options;
+    std::promise<absl::StatusOr<Image>> image;
+  };
+
+  // The life of one context's thread.
+  void Run(int device, std::promise<absl::Status>* started) {
+    absl::StatusOr<std::unique_ptr<EglContext>> context = EglContext::Create(EglDisplays()[device]);
+    if (!context.ok()) return started->set_value(context.status());
+    absl::StatusOr<std::unique_ptr<GlPainter>> painter = GlPainter::Create();
+    if (!painter.ok()) return started->set_value(painter.status());
+    gl_renderer_ = (*painter)->gl_renderer();
+    started->set_value(absl::OkStatus());
+
+    while (Job* job = NextJob())
+      job->image.set_value((*painter)->Paint(job->surface, *job->mesh, job->camera, job->options));
+    painter->reset();  // while its context is still current
+  }
+
+  // Null when the renderer goes.
+  Job* NextJob() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    wake_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
+    if (jobs_.empty()) return nullptr;
+    Job* job = jobs_.front();
+    jobs_.pop_front();
+    return job;
+  }
+
+  ShadingMeshCache meshes_;
+  std::string gl_renderer_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Job*> jobs_;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+std::string Describe(const EglDevice& device) {
+  return absl::StrFormat("%d (%s: %s)", device.index, device.name.empty() ? "unnamed" : device.name,
+                         device.renders ? "renders" : device.problem);
+}
+
+// The first device that renders, hardware before software; or the one asked for.
+absl::StatusOr<EglDevice> ChooseDevice(int wanted) {
+  const std::vector<EglDevice> devices = ListEglDevices();
+  std::string all;
+  for (const EglDevice& device : devices) absl::StrAppend(&all, all.empty() ? "" : ", ", Describe(device));
+  if (wanted >= static_cast<int>(devices.size()) || wanted < -1) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("EGL device is %d; must be -1 (choose one) or one of: %s", wanted, all));
+  }
+  if (wanted >= 0) {
+    if (devices[wanted].renders) return devices[wanted];
+    return absl::UnavailableError(absl::StrFormat("EGL device %d does not render: %s; all devices: %s",
+                                                  wanted, devices[wanted].problem, all));
+  }
+  for (const bool software : {false, true})
+    for (const EglDevice& device : devices)
+      if (device.renders && device.software == software) return device;
+  return absl::UnavailableError(absl::StrCat("no EGL device renders: ", all));
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int device) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const EglDevice chosen, ChooseDevice(device));
+  const char* const env = getenv("TS_CONTEXTS");
+  return EglRenderer::Create(chosen.index, env ? atoi(env) : 1);
+}
+
+}  // namespace touchstone
