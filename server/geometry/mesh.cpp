@@ -1,0 +1,187 @@
+#include "server/geometry/mesh.h"
+
+#include <absl/container/flat_hash_map.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "server/base/check.h"
+#include "server/base/text.h"
+
+namespace touchstone {
+namespace {
+
+// The bits of a position; -0 and 0 are the same place.
+using PositionBits = std::array<uint32_t, 3>;
+
+PositionBits BitsOf(const Eigen::Vector3f& position) {
+  PositionBits bits;
+  for (int k = 0; k < 3; ++k) {
+    const float value = position[k] + 0.0f;
+    std::memcpy(&bits[k], &value, sizeof value);
+  }
+  return bits;
+}
+
+// For every vertex the first vertex at the same place.
+std::vector<uint32_t> FirstAtSamePlace(const std::vector<Eigen::Vector3f>& vertices_m) {
+  absl::flat_hash_map<PositionBits, uint32_t> first_at;
+  first_at.reserve(vertices_m.size());
+  std::vector<uint32_t> first(vertices_m.size());
+  for (uint32_t v = 0; v < vertices_m.size(); ++v)
+    first[v] = first_at.try_emplace(BitsOf(vertices_m[v]), v).first->second;
+  return first;
+}
+
+uint64_t Mix(uint64_t x) {  // the finaliser of SplitMix64
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+  return x ^ (x >> 31);
+}
+
+// Finds triangles whose corners, in any order, are those of one that was added before. An open-addressing
+// table of triangle numbers, keyed by a sum of the corners' hashes, which does not depend on their order.
+class TriangleSet {
+ public:
+  explicit TriangleSet(const TriangleMesh& mesh) : mesh_(mesh), vertex_hash_(mesh.vertices_m.size()) {
+    for (size_t v = 0; v < vertex_hash_.size(); ++v) {
+      const PositionBits bits = BitsOf(mesh.vertices_m[v]);
+      vertex_hash_[v] = Mix(Mix((uint64_t{bits[0]} << 32) | bits[1]) + bits[2] + 0x9E3779B97F4A7C15u);
+    }
+    size_t slots = 16;
+    while (slots < 2 * mesh.triangles.size()) slots *= 2;
+    slots_.resize(slots);
+  }
+
+  // False if an equal triangle is in the set already.
+  bool Add(uint32_t triangle) {
+    const auto& corner = mesh_.triangles[triangle];
+    const uint64_t key = Mix(vertex_hash_[corner[0]] + vertex_hash_[corner[1]] + vertex_hash_[corner[2]]);
+    const uint32_t tag = static_cast<uint32_t>(key >> 32);
+    for (size_t at = key & (slots_.size() - 1);; at = (at + 1) & (slots_.size() - 1)) {
+      Slot& slot = slots_[at];
+      if (slot.triangle == kEmpty) {
+        slot = {triangle, tag};
+        return true;
+      }
+      if (slot.tag == tag && Places(slot.triangle) == Places(triangle)) return false;
+    }
+  }
+
+ private:
+  static constexpr uint32_t kEmpty = 0xFFFFFFFFu;
+  struct Slot {
+    uint32_t triangle = kEmpty;
+    uint32_t tag = 0;
+  };
+
+  std::array<PositionBits, 3> Places(uint32_t triangle) const {
+    std::array<PositionBits, 3> places;
+    for (int c = 0; c < 3; ++c) places[c] = BitsOf(mesh_.vertices_m[mesh_.triangles[triangle][c]]);
+    std::sort(places.begin(), places.end());
+    return places;
+  }
+
+  const TriangleMesh& mesh_;
+  std::vector<uint64_t> vertex_hash_;
+  std::vector<Slot> slots_;
+};
+
+bool HasNoArea(const TriangleMesh& mesh, uint32_t triangle) {
+  return IsDegenerate(mesh.Corner(triangle, 0), mesh.Corner(triangle, 1), mesh.Corner(triangle, 2));
+}
+
+// Counts edges by how many triangles run along them and in which direction. Each directed edge is one number:
+// lower vertex, higher vertex, direction; sorting puts the uses of one edge side by side.
+void CountEdges(const TriangleMesh& mesh, MeshReport* report) {
+  TOUCHSTONE_CHECK(mesh.vertices_m.size() < (uint64_t{1} << 31));
+  const std::vector<uint32_t> place = FirstAtSamePlace(mesh.vertices_m);
+  std::vector<uint64_t> edges;
+  edges.reserve(3 * mesh.triangles.size());
+  for (const auto& corner : mesh.triangles) {
+    for (int c = 0; c < 3; ++c) {
+      const uint64_t from = place[corner[c]], to = place[corner[(c + 1) % 3]];
+      if (from == to) continue;  // an edge of no length bounds nothing
+      edges.push_back((std::min(from, to) << 32) | (std::max(from, to) << 1) | (from < to ? 0 : 1));
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (size_t begin = 0, end; begin < edges.size(); begin = end) {
+    end = begin + 1;
+    while (end < edges.size() && (edges[end] >> 1) == (edges[begin] >> 1)) ++end;
+    if (end - begin == 1) ++report->boundary_edges;
+    if (end - begin > 2) ++report->nonmanifold_edges;
+    if (end - begin == 2 && edges[begin] == edges[begin + 1]) ++report->inconsistent_edges;
+  }
+}
+
+}  // namespace
+
+bool IsDegenerate(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  return ((b - a).cross(c - a).array() == 0.0).all();
+}
+
+Bounds ComputeBounds(const TriangleMesh& mesh) {
+  Eigen::Vector3f lower = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Vector3f upper = -lower;
+  for (const auto& corner : mesh.triangles) {
+    for (int c = 0; c < 3; ++c) {
+      lower = lower.cwiseMin(mesh.vertices_m[corner[c]]);
+      upper = upper.cwiseMax(mesh.vertices_m[corner[c]]);
+    }
+  }
+  Bounds bounds;
+  if (mesh.triangles.empty()) return bounds;
+  bounds.min_m = lower.cast<double>();
+  bounds.max_m = upper.cast<double>();
+  return bounds;
+}
+
+MeshReport InspectMesh(const TriangleMesh& mesh) {
+  MeshReport report;
+  report.vertices = mesh.vertices_m.size();
+  report.triangles = mesh.triangles.size();
+  CountEdges(mesh, &report);
+
+  TriangleSet seen(mesh);
+  std::vector<bool> used(mesh.vertices_m.size());
+  // Signed volume: tetrahedra from the box's centre, so that a mesh far from the origin loses no digits.
+  const Eigen::Vector3d centre =
+      mesh.triangles.empty() ? Eigen::Vector3d::Zero() : ComputeBounds(mesh).Centre();
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (HasNoArea(mesh, t)) ++report.degenerate_triangles;
+    if (!seen.Add(t)) ++report.duplicate_triangles;
+    const Eigen::Vector3d a = mesh.Corner(t, 0) - centre, b = mesh.Corner(t, 1) - centre,
+                          c = mesh.Corner(t, 2) - centre;
+    report.signed_volume_m3 += a.dot(b.cross(c)) / 6.0;
+    for (int k = 0; k < 3; ++k) used[mesh.triangles[t][k]] = true;
+  }
+  report.unused_vertices = std::count(used.begin(), used.end(), false);
+  return report;
+}
+
+TriangleMesh WithoutDegenerateAndDuplicate(TriangleMesh mesh) {
+  std::vector<bool> keep(mesh.triangles.size());
+  {
+    TriangleSet seen(mesh);
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) keep[t] = !HasNoArea(mesh, t) && seen.Add(t);
+  }
+  size_t kept = 0;
+  for (size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (keep[t]) mesh.triangles[kept++] = mesh.triangles[t];
+  mesh.triangles.resize(kept);
+  return mesh;
+}
+
+std::string MeshHash(const TriangleMesh& mesh) {
+  static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(std::array<uint32_t, 3>) == 12);
+  const uint64_t counts[2] = {mesh.vertices_m.size(), mesh.triangles.size()};
+  std::string bytes;
+  bytes.reserve(sizeof counts + 12 * (counts[0] + counts[1]));
+  bytes.append(reinterpret_cast<const char*>(counts), sizeof counts);
+  bytes.append(reinterpret_cast<const char*>(mesh.vertices_m.data()), 12 * counts[0]);
+  bytes.append(reinterpret_cast<const char*>(mesh.triangles.data()), 12 * counts[1]);
+  return Sha256Hex(bytes);
+}
+
+}  // namespace touchstone
