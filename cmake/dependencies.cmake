@@ -12,6 +12,7 @@ find_package(Protobuf REQUIRED)
 find_package(gRPC CONFIG REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
+find_package(tomlplusplus REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 
 pkg_check_modules(YAMLCPP REQUIRED IMPORTED_TARGET yaml-cpp)

@@ -66,11 +66,11 @@ absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std:
   std::vector<double>& press_m = workspace->previous_press_m;
   press_m.assign(indices.size() * fingers, 0.0);
   TOUCHSTONE_RETURN_IF_ERROR(Run(previous, Until::kMotion, {}, cancelled, workspace,
-                                 [&](const TouchBatch& batch, absl::Span<const uint32_t> slots, absl::Span<const uint8_t> accepted) {
-                                   for (int touch = 0; touch < batch.size(); ++touch)
-                                     for (int finger = 0; accepted[touch] && finger < fingers; ++finger)
-                                       press_m[slot_of_previous[slots[touch]] * fingers + finger] =
-                                           batch.press_m[batch.At(finger, touch)];
+                                 [&](const Block& block) {
+                                   for (int touch = 0; touch < block.batch.size(); ++touch)
+                                     for (int finger = 0; block.accepted[touch] && finger < fingers; ++finger)
+                                       press_m[slot_of_previous[block.slots[touch]] * fingers + finger] =
+                                           block.batch.press_m[block.batch.At(finger, touch)];
                                  }));
   return Run(indices, Until::kSensor, press_m, cancelled, workspace, sink);
 }
@@ -111,7 +111,7 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
       const absl::Span<const uint32_t> block(&workspace->order[begin], std::min(kBlock, pending - begin));
       TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, block, until, previous_press_m, workspace));
-      sink(workspace->batch, workspace->block_slots, workspace->accepted);
+      sink({workspace->batch, workspace->block_slots, workspace->accepted, workspace->poses, block});
       for (size_t k = 0; k < block.size(); ++k)
         if (!workspace->accepted[k]) workspace->missed.push_back(workspace->block_slots[k]);
     }

@@ -25,8 +25,18 @@ class TouchSampler {
   struct Workspace;
   static std::unique_ptr<Workspace> NewWorkspace();
 
-  // Called for every accepted touch, in no particular order: indices[slot] is touch `touch` of `batch`.
-  using Sink = std::function<void(const TouchBatch& batch, absl::Span<const uint32_t> slots, absl::Span<const uint8_t> accepted)>;
+  // A simulated block. Touch t of the batch is sample indices[slots[t]] if accepted[t]; else it missed and is
+  // drawn again. Pose(t) is as commanded; effects may have changed the batch's own vectors.
+  struct Block {
+    const TouchBatch& batch;
+    absl::Span<const uint32_t> slots;
+    absl::Span<const uint8_t> accepted;
+    absl::Span<const TouchPose> poses;
+    absl::Span<const uint32_t> order;
+    const TouchPose& Pose(int touch) const { return poses[order[touch]]; }
+  };
+  // Called for every block, in no particular order.
+  using Sink = std::function<void(const Block& block)>;
 
   // Simulates the samples `indices`. Returns CANCELLED soon after `cancelled` becomes true. Thread-safe.
   absl::Status Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled, Workspace* workspace,

@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "server/base/status.h"
+#include "server/dataset/stream.h"
+#include "server/image/encode.h"
+
+namespace touchstone {
+namespace {
+
+// Writes numbers of one column at the row of a sample, whichever batch of the run it falls into.
+class ColumnWriter {
+ public:
+  ColumnWriter(absl::Span<DatasetBatch> batches, size_t column, uint32_t batch_size, size_t bytes_per_sample)
+      : batch_size_(batch_size), bytes_(bytes_per_sample) {
+    for (DatasetBatch& batch : batches) {
+      batch.data[column].resize(batch.rows * bytes_);
+      begin_.push_back(batch.data[column].data());
+    }
+  }
+  char* At(uint32_t slot) const { return begin_[slot / batch_size_] + (slot % batch_size_) * bytes_; }
+  template <typename T>
+  void Put(uint32_t slot, size_t k, T value) const {
+    std::memcpy(At(slot) + k * sizeof(T), &value, sizeof(T));
+  }
+  void PutVector(uint32_t slot, size_t k, const Eigen::Vector3d& v) const {
+    for (int i = 0; i < 3; ++i) Put(slot, 3 * k + i, static_cast<float>(v[i]));
+  }
+
+ private:
+  std::vector<char*> begin_;
+  uint32_t batch_size_;
+  size_t bytes_;
+};
+
+// What a column takes from an accepted touch.
+using PutColumn = void (*)(const ColumnWriter&, const TouchSampler::Block&, int touch, uint32_t slot);
+
+void PutDescriptor(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
+  double descriptor_s[kMostFingers];
+  Descriptor(block.batch, touch, descriptor_s);
+  for (int finger = 0; finger < block.batch.fingers(); ++finger)
+    writer.Put(slot, finger, static_cast<float>(descriptor_s[finger]));
+}
+
+void PutContactTime(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
+  for (int finger = 0; finger < block.batch.fingers(); ++finger)
+    writer.Put(slot, finger, static_cast<float>(block.batch.reported_time_s[block.batch.At(finger, touch)]));
+}
+
+void PutContactPoint(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
+  for (int finger = 0; finger < block.batch.fingers(); ++finger)
+    writer.PutVector(slot, finger, block.batch.contact_m[block.batch.At(finger, touch)]);
+}
+
+void PutNormal(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
+  for (int finger = 0; finger < block.batch.fingers(); ++finger)
+    writer.PutVector(slot, finger, block.batch.normal[block.batch.At(finger, touch)]);
+}
+
+struct NamedPut {
+  const char* name;
+  PutColumn put;
+};
+constexpr NamedPut kTouchColumns[] = {
+    {"descriptor_s", PutDescriptor},
+    {"contact_time_s", PutContactTime},
+    {"target_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).target_m); }},
+    {"approach", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).approach); }},
+    {"lateral", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).lateral); }},
+    {"standoff_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.Put(s, 0, static_cast<float>(b.Pose(t).standoff_m)); }},
+    {"speed_m_s", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.Put(s, 0, static_cast<float>(b.batch.speed_m_s[t])); }},
+    {"contact_point_m", PutContactPoint},
+    {"normal", PutNormal},
+};
+
+}  // namespace
+
+absl::StatusOr<std::string> EncodeImage(const Image& picture, const DatasetImage& image) {
+  if (image.encoding == ImageEncoding::kPng)
+    return EncodePng(picture.pixels.data(), picture.width, picture.height, picture.channels);
+  return EncodeJpeg(picture.pixels.data(), picture.width, picture.height, picture.channels, image.jpeg_quality);
+}
+
+BatchMaker::BatchMaker(std::shared_ptr<const DatasetSpecification> specification)
+    : specification_(std::move(specification)), columns_(ColumnsOf(*specification_)), sampler_(*specification_) {}
+
+absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomic<bool>& cancelled,
+                              TouchSampler::Workspace* workspace) const {
+  if (batches.empty()) return absl::OkStatus();
+  const uint32_t batch_size = batches[0].rows;  // only the last may have fewer
+  std::vector<uint64_t> indices;
+  for (DatasetBatch& batch : batches) {
+    batch.data.resize(columns_.size());
+    batch.offsets.resize(columns_.size());
+    for (uint32_t row = 0; row < batch.rows; ++row) indices.push_back(batch.start_index + row);
+  }
+
+  // Columns that the index alone decides, and writers for those that the simulation fills.
+  const size_t objects = specification_->objects.size();
+  std::vector<std::pair<ColumnWriter, PutColumn>> puts;
+  for (size_t column = 0; column < columns_.size(); ++column) {
+    const std::string& name = columns_[column].name;
+    if (name == "index" || name == "object") {
+      const ColumnWriter writer(batches, column, batch_size, columns_[column].BytesPerSample());
+      for (size_t slot = 0; slot < indices.size(); ++slot) {
+        if (name == "index") writer.Put(slot, 0, indices[slot]);
+        if (name == "object") writer.Put(slot, 0, static_cast<int32_t>(indices[slot] % objects));
+      }
+    }
+    for (const NamedPut& named : kTouchColumns)
+      if (name == named.name)
+        puts.emplace_back(ColumnWriter(batches, column, batch_size, columns_[column].BytesPerSample()), named.put);
+  }
+
+  std::vector<TouchPose> poses(specification_->columns.image ? indices.size() : 0);
+  TOUCHSTONE_RETURN_IF_ERROR(sampler_.Sample(indices, cancelled, workspace, [&](const TouchSampler::Block& block) {
+    for (const auto& [writer, put] : puts)
+      for (int touch = 0; touch < block.batch.size(); ++touch)
+        if (block.accepted[touch]) put(writer, block, touch, block.slots[touch]);
+    if (!poses.empty())
+      for (int touch = 0; touch < block.batch.size(); ++touch)
+        if (block.accepted[touch]) poses[block.slots[touch]] = block.Pose(touch);
+  }));
+  if (specification_->columns.image) return MakeImages(batches, poses, cancelled);
+  return absl::OkStatus();
+}
+
+absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, absl::Span<const TouchPose> poses,
+                                    const std::atomic<bool>& cancelled) const {
+  const DatasetImage& image = specification_->image;
+  size_t slot = 0;
+  for (DatasetBatch& batch : batches) {
+    for (size_t column = 0; column < columns_.size(); ++column)
+      if (columns_[column].name == "image" || columns_[column].name == "depth_m" || columns_[column].name == "mask")
+        batch.data[column].reserve(batch.rows * columns_[column].BytesPerSample());
+    for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
+      if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
+      const TouchPose& pose = poses[slot];
+      Camera camera = CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
+      camera.vertical_fov_rad = image.vertical_fov_rad;
+      const auto& object = specification_->objects[(batch.start_index + row) % specification_->objects.size()];
+      TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, image.renderer->Render(object, camera, image.options));
+      for (size_t column = 0; column < columns_.size(); ++column) {
+        std::string& data = batch.data[column];
+        if (columns_[column].name == "image") {
+          if (image.encoding == ImageEncoding::kRaw) {
+            data.append(reinterpret_cast<const char*>(picture.pixels.data()), picture.pixels.size());
+            continue;
+          }
+          TOUCHSTONE_ASSIGN_OR_RETURN(const std::string file, EncodeImage(picture, image));
+          batch.offsets[column].push_back(data.size());
+          data += file;
+          if (row + 1 == batch.rows) batch.offsets[column].push_back(data.size());
+        } else if (columns_[column].name == "depth_m") {
+          data.append(reinterpret_cast<const char*>(picture.depth_m.data()), picture.depth_m.size() * sizeof(float));
+        } else if (columns_[column].name == "mask") {
+          data.append(reinterpret_cast<const char*>(picture.mask.data()), picture.mask.size());
+        }
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone

@@ -1,0 +1,130 @@
+#include "server/dataset/stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+
+#include "server/base/status.h"
+
+namespace touchstone {
+namespace {
+
+// Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more touches
+// together makes each cheaper.
+constexpr uint64_t kFirstChunkSamples = 8192;
+constexpr uint64_t kMostChunkSamples = 131072;
+// Bytes that one chunk may hold, whatever its columns.
+constexpr uint64_t kMostChunkBytes = 16 << 20;
+// Bytes of one batch, safely below the message limit.
+constexpr uint64_t kMostBatchBytes = 192 << 20;
+
+}  // namespace
+
+struct DatasetStream::Shared {
+  explicit Shared(std::shared_ptr<const DatasetSpecification> specification) : maker(std::move(specification)) {}
+
+  const BatchMaker maker;
+  std::atomic<bool> cancelled{false};
+  std::mutex mutex;
+  std::condition_variable ready;
+  std::vector<std::unique_ptr<TouchSampler::Workspace>> workspaces;  // at rest
+
+  std::unique_ptr<TouchSampler::Workspace> TakeWorkspace() {
+    std::lock_guard<std::mutex> lock(mutex);
+    if (workspaces.empty()) return TouchSampler::NewWorkspace();
+    auto workspace = std::move(workspaces.back());
+    workspaces.pop_back();
+    return workspace;
+  }
+};
+
+absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
+    std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool) {
+  std::unique_ptr<DatasetStream> stream(new DatasetStream);
+  stream->shared_ = std::make_shared<Shared>(specification);
+  stream->pool_ = pool;
+  uint64_t bytes = 0;
+  for (const ColumnInfo& column : stream->shared_->maker.columns())
+    bytes += column.type == ColumnType::kBytes ? specification->image.options.width * specification->image.options.height
+                                               : column.BytesPerSample();
+  const uint64_t most_rows = std::max<uint64_t>(1, kMostBatchBytes / bytes);
+
+  DatasetPart& resolved = stream->part_;
+  resolved = part;
+  if (resolved.stop_index == 0) resolved.stop_index = specification->samples;
+  if (resolved.batch_size == 0)
+    resolved.batch_size = std::min<uint64_t>(specification->columns.image ? 64 : 4096, most_rows);
+  if (resolved.batch_stride == 0) resolved.batch_stride = 1;
+  if (resolved.stop_index > specification->samples)
+    return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
+                                              specification->samples, " samples"));
+  if (resolved.batch_size > most_rows)
+    return absl::InvalidArgumentError(absl::StrCat("batch_size = ", part.batch_size, ": a sample of these columns has ",
+                                                   bytes, " bytes, so at most ", most_rows, " go into a batch"));
+  // A part may be empty: a worker beyond the last batch, or a resumption at the very end.
+  stream->next_index_ = part.start_index;
+  stream->most_chunk_samples_ =
+      specification->columns.image ? 64 : std::clamp<uint64_t>(kMostChunkBytes / bytes, 1, kMostChunkSamples);
+  stream->chunk_samples_ = std::min(kFirstChunkSamples, stream->most_chunk_samples_);
+  return stream;
+}
+
+DatasetStream::~DatasetStream() { shared_->cancelled = true; }
+
+const DatasetSpecification& DatasetStream::specification() const { return shared_->maker.specification(); }
+
+// The batches of the next task; null at the end of the part.
+std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
+  auto chunk = std::make_shared<Chunk>();
+  uint64_t samples = 0;
+  while (next_index_ < part_.stop_index && (samples == 0 || samples + part_.batch_size <= chunk_samples_)) {
+    DatasetBatch batch;
+    batch.start_index = next_index_;
+    batch.rows = static_cast<uint32_t>(std::min<uint64_t>(part_.batch_size, part_.stop_index - next_index_));
+    samples += batch.rows;
+    chunk->batches.push_back(std::move(batch));
+    const uint64_t step = uint64_t{part_.batch_size} * part_.batch_stride;
+    next_index_ = step > part_.stop_index - next_index_ ? part_.stop_index : next_index_ + step;
+  }
+  if (chunk->batches.empty()) return nullptr;
+  chunk_samples_ = std::min(2 * chunk_samples_, most_chunk_samples_);
+  return chunk;
+}
+
+// Keeps one task a thread under way and one waiting.
+void DatasetStream::Schedule() {
+  while (chunks_.size() < static_cast<size_t>(pool_->size()) + 1) {
+    std::shared_ptr<Chunk> chunk = NextChunk();
+    if (chunk == nullptr) return;
+    chunks_.push_back(chunk);
+    pool_->Submit([shared = shared_, chunk] {
+      absl::Status status = absl::CancelledError("the stream was cancelled");
+      std::unique_ptr<TouchSampler::Workspace> workspace = shared->TakeWorkspace();
+      if (!shared->cancelled) status = shared->maker.Make(absl::MakeSpan(chunk->batches), shared->cancelled, workspace.get());
+      std::lock_guard<std::mutex> lock(shared->mutex);
+      shared->workspaces.push_back(std::move(workspace));
+      chunk->status = status;
+      chunk->ready = true;
+      shared->ready.notify_all();
+    });
+  }
+}
+
+absl::StatusOr<std::optional<DatasetBatch>> DatasetStream::Next(const std::function<bool()>& cancelled) {
+  if (!chunks_.empty() && chunks_.front()->taken == chunks_.front()->batches.size()) chunks_.pop_front();
+  Schedule();
+  if (chunks_.empty()) return std::optional<DatasetBatch>();
+
+  Chunk& chunk = *chunks_.front();
+  if (chunk.taken == 0) {
+    std::unique_lock<std::mutex> lock(shared_->mutex);
+    while (!chunk.ready) {
+      if (cancelled && cancelled()) return absl::CancelledError("the stream was cancelled");
+      shared_->ready.wait_for(lock, std::chrono::milliseconds(50));
+    }
+    if (!chunk.status.ok()) return chunk.status;
+  }
+  return std::optional<DatasetBatch>(std::move(chunk.batches[chunk.taken++]));
+}
+
+}  // namespace touchstone

@@ -1,0 +1,99 @@
+// A dataset, or a part of one, as batches in order, computed ahead by a thread pool.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/base/thread_pool.h"
+#include "server/dataset/sampler.h"
+#include "server/dataset/specification.h"
+
+namespace touchstone {
+
+// Which samples, and cut how.
+struct DatasetPart {
+  uint64_t start_index = 0;
+  uint64_t stop_index = 0;    // exclusive; 0: to the end
+  uint32_t batch_size = 0;    // 0: 4096, or 64 with images
+  uint32_t batch_stride = 1;  // after each batch, stride - 1 batches are left out
+};
+
+// One batch: samples start_index .. start_index + rows - 1.
+struct DatasetBatch {
+  uint64_t start_index = 0;
+  uint32_t rows = 0;
+  std::vector<std::string> data;                // one a column, as ColumnsOf tells them
+  std::vector<std::vector<uint64_t>> offsets;   // one a column: rows + 1 entries for kBytes, else empty
+};
+
+// The file of a picture in the encoding that `image` asks for (kPng or kJpeg).
+absl::StatusOr<std::string> EncodeImage(const Image& picture, const DatasetImage& image);
+
+// Fills one contiguous run of batches, by the calling thread alone. Sample i is the same in whatever run.
+class BatchMaker {
+ public:
+  explicit BatchMaker(std::shared_ptr<const DatasetSpecification> specification);
+
+  const DatasetSpecification& specification() const { return *specification_; }
+  const std::vector<ColumnInfo>& columns() const { return columns_; }
+
+  // batches[k] has start_index and rows set by the caller. CANCELLED soon after `cancelled`.
+  absl::Status Make(absl::Span<DatasetBatch> batches, const std::atomic<bool>& cancelled,
+                    TouchSampler::Workspace* workspace) const;
+
+ private:
+  absl::Status MakeImages(absl::Span<DatasetBatch> batches, absl::Span<const TouchPose> poses,
+                          const std::atomic<bool>& cancelled) const;
+
+  std::shared_ptr<const DatasetSpecification> specification_;
+  std::vector<ColumnInfo> columns_;
+  TouchSampler sampler_;
+};
+
+class DatasetStream {
+ public:
+  // Checks the part against the specification (which must be valid).
+  static absl::StatusOr<std::unique_ptr<DatasetStream>> Create(std::shared_ptr<const DatasetSpecification> specification,
+                                                               const DatasetPart& part, ThreadPool* pool);
+  ~DatasetStream();  // cancels
+
+  const DatasetSpecification& specification() const;
+
+  // The next batch in order; nothing at the end. Waits for the pool, looking at `cancelled` twenty times a second
+  // (may be empty). Not thread-safe.
+  absl::StatusOr<std::optional<DatasetBatch>> Next(const std::function<bool()>& cancelled);
+
+ private:
+  // A run of batches that one task makes.
+  struct Chunk {
+    std::vector<DatasetBatch> batches;
+    absl::Status status;
+    bool ready = false;
+    size_t taken = 0;
+  };
+  // What tasks share with the stream; they may outlive it.
+  struct Shared;
+
+  DatasetStream() = default;
+  void Schedule();
+  std::shared_ptr<Chunk> NextChunk();
+
+  std::shared_ptr<Shared> shared_;
+  DatasetPart part_;
+  ThreadPool* pool_ = nullptr;
+  uint64_t next_index_ = 0;        // start of the first batch that is not scheduled yet
+  uint64_t chunk_samples_ = 0;     // about, of the next chunk: grows, so that the first batch comes soon
+  uint64_t most_chunk_samples_ = 0;
+  std::deque<std::shared_ptr<Chunk>> chunks_;
+};
+
+}  // namespace touchstone

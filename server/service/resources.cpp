@@ -1,0 +1,181 @@
+#include "server/service/resources.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <filesystem>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/effects/all_effects.h"
+#include "server/geometry/mesh_file.h"
+#include "server/geometry/supershape.h"
+
+namespace touchstone {
+namespace {
+
+constexpr char kBuiltIn[] = "built-in supershape";
+
+absl::StatusOr<ServedObject> Serve(const std::string& name, TriangleMesh mesh, const std::string& origin) {
+  ServedObject object;
+  object.closed = InspectMesh(mesh).closed();
+  object.origin = origin;
+  TOUCHSTONE_ASSIGN_OR_RETURN(object.surface, Surface::Create(name, std::move(mesh)));
+  return object;
+}
+
+absl::StatusOr<ServedObject> MakeBuiltIn(const std::string& name, int triangles) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const SupershapeParameters parameters, NamedSupershape(name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(TriangleMesh mesh, MakeSupershape(parameters, triangles));
+  return Serve(name, std::move(mesh), kBuiltIn);
+}
+
+absl::StatusOr<ServedObject> ReadObject(const MeshSource& source) {
+  MeshImport import;
+  import.unit = source.unit;
+  import.up = source.up;
+  import.scale = source.scale;
+  if (source.fit_mm > 0) import.fit_mm = source.fit_mm;
+  auto mesh = ReadMeshFile(source.path, import);
+  if (!mesh.ok()) return mesh.status();
+  auto object = Serve(source.name, *std::move(mesh), std::filesystem::path(source.path).filename().string());
+  if (!object.ok())
+    return absl::Status(object.status().code(), absl::StrCat(source.path, ": ", object.status().message()));
+  return object;
+}
+
+}  // namespace
+
+absl::StatusOr<ObjectStore> ObjectStore::Load(const ServerOptions& options, ThreadPool* pool) {
+  const std::vector<std::string> shapes = SupershapeNames();
+  const int count = static_cast<int>(shapes.size() + options.meshes.size());
+  std::vector<absl::StatusOr<ServedObject>> loaded(count, absl::UnknownError("not loaded"));
+  pool->ParallelFor(count, 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      if (k >= static_cast<int>(shapes.size())) {
+        loaded[k] = ReadObject(options.meshes[k - shapes.size()]);
+        continue;
+      }
+      loaded[k] = MakeBuiltIn(shapes[k], options.supershape_triangles);
+    }
+  });
+  ObjectStore store;
+  for (auto& object : loaded) {
+    if (!object.ok()) return object.status();
+    const std::string name = object->surface->name();
+    // A file may take the place of a built-in shape, but two files may not share a name.
+    const bool replaces_builtin = store.objects_.count(name) && store.objects_[name].origin == kBuiltIn;
+    if (store.objects_.count(name) && !replaces_builtin)
+      return absl::InvalidArgumentError(absl::StrCat("two meshes are named '", name, "': give each a name of its own, --mesh NAME=FILE"));
+    store.objects_[name] = *std::move(object);
+  }
+  return store;
+}
+
+absl::StatusOr<const ServedObject*> ObjectStore::Find(const std::string& name, const std::string& field) const {
+  const auto found = objects_.find(name);
+  if (found != objects_.end()) return &found->second;
+  std::vector<std::string> names;
+  for (const auto& [known, object] : objects_) names.push_back(known);
+  return absl::NotFoundError(absl::StrCat(field, ": no object is named '", name, "'", DidYouMean(name, names)));
+}
+
+absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& folder) {
+  auto store = std::make_unique<ModelStore>();
+  store->folder_ = folder;
+  auto nominal = std::make_shared<Model>(NominalModel());
+  nominal->name = "nominal";
+  store->models_["nominal"] = nominal;
+  if (folder.empty()) return store;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return absl::InvalidArgumentError(absl::StrCat("models_dir: ", folder, ": ", error.message()));
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".yaml") continue;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(entry.path().string(), 1 << 20));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(text, entry.path().string(), Catalogue()));
+    model.name = entry.path().stem().string();
+    store->models_[model.name] = std::make_shared<const Model>(std::move(model));
+  }
+  return store;
+}
+
+// Files that another replica wrote; one that does not parse is left to the replica that starts next.
+void ModelStore::Refresh() const {
+  if (folder_.empty()) return;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, error)) {
+    const std::string name = entry.path().stem().string();
+    if (entry.path().extension() != ".yaml" || models_.count(name)) continue;
+    const auto text = ReadFile(entry.path().string(), 1 << 20);
+    if (!text.ok()) continue;
+    auto model = ParseModel(*text, entry.path().string(), Catalogue());
+    if (!model.ok()) continue;
+    model->name = name;
+    models_[name] = std::make_shared<const Model>(*std::move(model));
+  }
+}
+
+absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByName(const std::string& name) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!models_.count(name)) Refresh();
+  const auto found = models_.find(name);
+  if (found != models_.end()) return found->second;
+  std::vector<std::string> names;
+  for (const auto& [known, model] : models_) names.push_back(known);
+  return absl::NotFoundError(absl::StrCat("model: no model is named '", name, "'", DidYouMean(name, names)));
+}
+
+absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::string& prefix) const {
+  if (prefix.size() < 8)
+    return absl::InvalidArgumentError(absl::StrCat("model.hash = '", prefix, "': give at least its first 8 digits"));
+  std::lock_guard<std::mutex> lock(mutex_);
+  for (int tries = 0; tries < 2; ++tries) {
+    for (const auto& [name, model] : models_)
+      if (absl::StartsWith(model->Hash(), prefix)) return model;
+    Refresh();
+  }
+  return absl::NotFoundError(absl::StrCat("model: no model has the hash ", prefix, "; `touchstone model list` shows them"));
+}
+
+absl::Status ModelStore::Create(const Model& model) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const bool plain = !model.name.empty() && model.name.size() <= 64 && model.name[0] != '.' &&
+                     model.name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") == std::string::npos;
+  if (!plain)
+    return absl::InvalidArgumentError(absl::StrCat("model.name = '", model.name,
+                                                   "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+  Refresh();
+  const auto found = models_.find(model.name);
+  if (found != models_.end()) {
+    if (found->second->Hash() == model.Hash()) return absl::OkStatus();
+    return absl::AlreadyExistsError(absl::StrCat("model '", model.name, "' stands for the hash ", found->second->Hash().substr(0, 8),
+                                                 " and a model never changes: give ", model.Hash().substr(0, 8), " another name"));
+  }
+  if (models_.size() >= 10000) return absl::ResourceExhaustedError("the store holds 10000 models; remove some from models_dir");
+  if (!folder_.empty())
+    TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), FormatModel(model)));
+  models_[model.name] = std::make_shared<const Model>(model);
+  return absl::OkStatus();
+}
+
+std::vector<std::shared_ptr<const Model>> ModelStore::All() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  Refresh();
+  std::vector<std::shared_ptr<const Model>> all;
+  for (const auto& [name, model] : models_) all.push_back(model);
+  return all;
+}
+
+absl::StatusOr<std::shared_ptr<Renderer>> Resources::RendererFor(RendererKind kind) {
+  std::lock_guard<std::mutex> lock(renderer_mutex_);
+  if (kind == RendererKind::kAuto) kind = options.renderer.kind;
+  std::shared_ptr<Renderer>& renderer = renderers_[kind];
+  if (renderer != nullptr) return renderer;
+  RendererOptions renderer_options = options.renderer;
+  renderer_options.kind = kind;
+  TOUCHSTONE_ASSIGN_OR_RETURN(renderer, CreateRenderer(renderer_options));
+  return renderer;
+}
+
+}  // namespace touchstone

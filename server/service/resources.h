@@ -1,0 +1,97 @@
+// What the services share: objects, models, the renderer, the thread pool, the limits, the counters.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/base/thread_pool.h"
+#include "server/geometry/surface.h"
+#include "server/image/renderer.h"
+#include "server/model/model.h"
+#include "server/service/server_options.h"
+
+namespace touchstone {
+
+inline constexpr char kVersion[] = "0.1.0";
+
+struct ServedObject {
+  std::shared_ptr<const Surface> surface;
+  bool closed = false;
+  std::string origin;  // "built-in supershape", or the file's name
+};
+
+// The objects by name; fixed once loaded.
+class ObjectStore {
+ public:
+  // The built-in supershapes and the given files, read in parallel.
+  static absl::StatusOr<ObjectStore> Load(const ServerOptions& options, ThreadPool* pool);
+  const std::map<std::string, ServedObject>& all() const { return objects_; }
+  // `field` is named in the error, which suggests near names.
+  absl::StatusOr<const ServedObject*> Find(const std::string& name, const std::string& field) const;
+
+ private:
+  std::map<std::string, ServedObject> objects_;
+};
+
+// Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so that
+// replicas that share it serve the same ones.
+class ModelStore {
+ public:
+  static absl::StatusOr<std::unique_ptr<ModelStore>> Open(const std::string& folder);
+
+  absl::StatusOr<std::shared_ptr<const Model>> FindByName(const std::string& name) const;
+  absl::StatusOr<std::shared_ptr<const Model>> FindByHash(const std::string& prefix) const;
+  absl::Status Create(const Model& model);
+  std::vector<std::shared_ptr<const Model>> All() const;
+
+ private:
+  void Refresh() const;  // reads files that appeared
+
+  std::string folder_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::string, std::shared_ptr<const Model>> models_;
+};
+
+struct Resources {
+  ServerOptions options;
+  std::unique_ptr<ThreadPool> pool;
+  ObjectStore objects;
+  std::unique_ptr<ModelStore> models;
+  std::shared_ptr<const Model> default_model;
+
+  // Made at the first use, so that a server is ready before a driver is.
+  absl::StatusOr<std::shared_ptr<Renderer>> RendererFor(RendererKind kind);
+
+  std::atomic<bool> draining{false};
+  std::atomic<uint64_t> stop_count{0};       // grows with every Stop; running touches compare
+  std::atomic<uint32_t> running_requests{0};
+  std::atomic<uint32_t> running_streams{0};
+  std::atomic<uint64_t> touches{0};
+  std::atomic<uint64_t> images{0};
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+
+ private:
+  std::mutex renderer_mutex_;
+  std::map<RendererKind, std::shared_ptr<Renderer>> renderers_;
+};
+
+// Counts a running call while it lives.
+class RunningGuard {
+ public:
+  explicit RunningGuard(std::atomic<uint32_t>* counter) : counter_(counter) { ++*counter_; }
+  ~RunningGuard() { --*counter_; }
+  RunningGuard(const RunningGuard&) = delete;
+  RunningGuard& operator=(const RunningGuard&) = delete;
+
+ private:
+  std::atomic<uint32_t>* counter_;
+};
+
+}  // namespace touchstone
