@@ -65,9 +65,9 @@ start_server() {
   trap 'exit 143' TERM
   "$bin/touchstone-server" --listen 127.0.0.1:0 "$@" > "$log" 2>&1 < /dev/null &
   server_pid=$!
-  # Port 0 is any free one; the log tells which.
+  # Port 0 is any free one; the line 'listening on HOST:PORT' tells which.
   local tries=0
-  until server_address=$(grep -oE -m 1 '127\.0\.0\.1:[1-9][0-9]*' "$log"); do
+  until server_address=$(sed -nE '/listening on /{s/.*listening on ([^ ]+).*/\1/p;q}' "$log") && [[ -n $server_address ]]; do
     if ! kill -0 "$server_pid" 2> /dev/null || ((++tries > 300)); then
       echo "touchstone-server did not start; its log, $log:" >&2
       tail -n 20 "$log" >&2
