@@ -39,7 +39,7 @@ Effect ReturnHysteresis() {
       .remedy = "Stronger return springs, grease, a pause between touches; or keep the effect and the order "
                 "of touches.",
       .rows = kRows,
-      .needs = {.previous_press = true},
+      .needs = {/*previous_press=*/true, /*curvature=*/false, /*covariates=*/{}},
       .apply = Apply,
   });
 }

@@ -29,32 +29,34 @@ enum class Arity {
 
 // One parameter. Numbers here are in the unit of files; values inside a model are SI.
 struct ParameterInfo {
-  std::string name;      // ends in the unit's suffix: "shift_mm"
+  std::string name;  // ends in the unit's suffix: "shift_mm"
   Unit unit = Unit::kNone;
   Arity arity = Arity::kScalar;
-  double lower = 0;      // inclusive
-  double upper = 0;      // inclusive
-  double neutral = 0;    // the default: the value that changes nothing
-  double typical = 0;    // the size that rigs show; the scale of the prior: neutral +- typical
-  bool sum_zero = false; // per finger: only differences between fingers can be seen, so the values sum to 0
+  double lower = 0;       // inclusive
+  double upper = 0;       // inclusive
+  double neutral = 0;     // the default: the value that changes nothing
+  double typical = 0;     // the size that rigs show; the scale of the prior: neutral +- typical
+  bool sum_zero = false;  // per finger: only differences between fingers can be seen, so the values sum to 0
   std::string meaning;
 
-  int Count(int fingers) const { return arity == Arity::kScalar ? 1 : arity == Arity::kVector3 ? 3 : fingers; }
+  int Count(int fingers) const {
+    return arity == Arity::kScalar ? 1 : arity == Arity::kVector3 ? 3 : fingers;
+  }
 };
 
 // What a simulation must provide beyond the ordinary for an effect to work.
 struct EffectNeeds {
-  bool previous_press = false;  // the press of the session's previous touch
-  bool curvature = false;       // the surface's mean curvature at each contact
+  bool previous_press = false;          // the press of the session's previous touch
+  bool curvature = false;               // the surface's mean curvature at each contact
   std::vector<std::string> covariates;  // cov_* columns
 };
 
 // What a formula effect is made of, as the model file has it.
 struct FormulaSpec {
   std::string name;
-  bool adds_time = false;   // adds: time_us instead of travel_mm
+  bool adds_time = false;  // adds: time_us instead of travel_mm
   Stage stage = Stage::kMotion;
-  std::string expression;   // in the units of files
+  std::string expression;  // in the units of files
   std::vector<ParameterInfo> parameters;
   std::vector<double> values;  // in the unit of files, one a parameter
 };
@@ -63,9 +65,10 @@ struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
   bool always_per_object = false;  // scope: object without being told (surface_error)
-  bool before_cast = false;        // contact stage only: sets up the cast instead of changing its result (tip_radius)
-  std::string meaning;       // what it is
-  std::string signature;     // how it shows in the data, and what is told apart from it
+  bool before_cast =
+      false;              // contact stage only: sets up the cast instead of changing its result (tip_radius)
+  std::string meaning;    // what it is
+  std::string signature;  // how it shows in the data, and what is told apart from it
   std::string check_on_rig;  // how to check it
   std::string remedy;        // how to mend it
   std::vector<ParameterInfo> parameters;
@@ -75,8 +78,8 @@ struct Effect {
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, TouchBatch& batch)> apply;
 
-  int ValueCount(int fingers) const;                       // of the flat array
-  std::vector<double> NeutralValues(int fingers) const;    // SI
+  int ValueCount(int fingers) const;                     // of the flat array
+  std::vector<double> NeutralValues(int fingers) const;  // SI
 };
 
 // The effects that a model file may name. effects/ implements it; model/ only asks.

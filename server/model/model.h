@@ -18,7 +18,8 @@ inline constexpr int kMostFingers = 16;
 struct EffectInstance {
   std::shared_ptr<const Effect> effect;
   bool per_object = false;  // scope: object
-  std::vector<double> values;  // SI, flat, in the order of the effect's parameters; for every object not below
+  std::vector<double>
+      values;  // SI, flat, in the order of the effect's parameters; for every object not below
   std::map<std::string, std::vector<double>> object_values;  // by object name; only with per_object
 
   absl::Span<const double> ValuesFor(const std::string& object) const;
@@ -26,8 +27,8 @@ struct EffectInstance {
 
 struct Model {
   std::string name;
-  int fingers = 3;             // 1 to kMostFingers
-  double spacing_m = 0.030;    // between neighbouring fingers, > 0
+  int fingers = 3;           // 1 to kMostFingers
+  double spacing_m = 0.030;  // between neighbouring fingers, > 0
   std::vector<EffectInstance> effects;
 
   // SHA-256 over everything but the name, in a canonical text: equal physics, equal hash.
@@ -36,7 +37,8 @@ struct Model {
 
 // Reads a model file. Errors name `origin` (usually the path), line and column, the key or value, and what
 // would be right; an unknown key is an error.
-absl::StatusOr<Model> ParseModel(const std::string& yaml, const std::string& origin, const EffectCatalogue& catalogue);
+absl::StatusOr<Model> ParseModel(const std::string& yaml, const std::string& origin,
+                                 const EffectCatalogue& catalogue);
 
 // The model as a file that ParseModel reads back to the same hash.
 std::string FormatModel(const Model& model);
@@ -47,7 +49,8 @@ Model NominalModel(int fingers = 3, double spacing_m = 0.030);
 // `assignments` are "radius_mm=1.5", "offset_mm=0.25,0,-0.1", "scope=object", for a formula "name=...",
 // "expression=...", "adds=...", "k=0.3" ("k_unit=mm", "k_min", "k_max" declare one). Returns a new model.
 absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_name,
-                                const std::vector<std::string>& assignments, const EffectCatalogue& catalogue);
+                                const std::vector<std::string>& assignments,
+                                const EffectCatalogue& catalogue);
 
 // What changed from `before` to `after`, a line each, in words and units; empty if the hashes are equal.
 std::vector<std::string> DiffModels(const Model& before, const Model& after);

@@ -1,0 +1,109 @@
+// A model as the file that a person would have written.
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+
+#include "server/base/text.h"
+#include "server/model/model.h"
+#include "server/model/parameter_values.h"
+
+namespace touchstone {
+namespace {
+
+// In double quotes, with what YAML would take apart escaped.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const unsigned char c : text) {
+    if (c == '"' || c == '\\')
+      absl::StrAppend(&quoted, "\\", std::string(1, c));
+    else if (c < 0x20 || c == 0x7F)
+      absl::StrAppendFormat(&quoted, "\\x%02x", c);
+    else
+      quoted.push_back(c);
+  }
+  return quoted + "\"";
+}
+
+// Without quotes where no reader could take the text for anything but a text.
+std::string Scalar(const std::string& text) {
+  const std::string lower = absl::AsciiStrToLower(text);
+  const bool word = !text.empty() && absl::ascii_isalpha(text[0]) &&
+                    std::all_of(text.begin(), text.end(), [](unsigned char c) {
+                      return absl::ascii_isalnum(c) || c == '_' || c == '-' || c == '.';
+                    });
+  const bool special = lower == "null" || lower == "true" || lower == "false" || lower == "yes" ||
+                       lower == "no" || lower == "on" || lower == "off" || lower == "y" || lower == "n";
+  return word && !special ? text : Quoted(text);
+}
+
+// "radius_mm: 1.5", one a parameter.
+std::vector<std::string> Entries(const Effect& effect, const std::vector<double>& values, int fingers) {
+  std::vector<std::string> entries;
+  for (size_t i = 0; i < effect.parameters.size(); ++i) {
+    const ParameterInfo& parameter = effect.parameters[i];
+    const absl::Span<const double> own =
+        absl::MakeConstSpan(values).subspan(ValueOffset(effect, i, fingers), parameter.Count(fingers));
+    entries.push_back(absl::StrCat(parameter.name, ": ", FileNumbers(parameter, own)));
+  }
+  return entries;
+}
+
+void AppendObjects(const EffectInstance& instance, int fingers, std::string* text) {
+  if (instance.object_values.empty()) return;
+  absl::StrAppend(text, "      objects:\n");
+  for (const auto& [object, values] : instance.object_values)
+    absl::StrAppend(text, "        ", Scalar(object), ": {",
+                    absl::StrJoin(Entries(*instance.effect, values, fingers), ", "), "}\n");
+}
+
+void AppendFormula(const EffectInstance& instance, int fingers, std::string* text) {
+  const Effect& effect = *instance.effect;
+  const FormulaSpec& spec = *effect.formula;
+  absl::StrAppend(text, "  - formula:\n      name: ", Scalar(spec.name), "\n");
+  if (instance.per_object) absl::StrAppend(text, "      scope: object\n");
+  absl::StrAppend(text, "      adds: ", spec.adds_time ? "time_us" : "travel_mm", "\n");
+  if (spec.stage != (spec.adds_time ? Stage::kSensor : Stage::kMotion))
+    absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
+  absl::StrAppend(text, "      expression: ", Quoted(spec.expression), "\n");
+  if (!effect.parameters.empty()) absl::StrAppend(text, "      parameters:\n");
+  for (size_t i = 0; i < effect.parameters.size(); ++i) {
+    const ParameterInfo& parameter = effect.parameters[i];
+    const absl::string_view symbol = UnitSymbol(parameter.unit);
+    absl::StrAppend(text, "        ", parameter.name,
+                    ": {value: ", FileNumber(parameter.unit, instance.values[i]),
+                    ", unit: ", symbol.empty() ? "1" : symbol, ", min: ", ShortestNumber(parameter.lower),
+                    ", max: ", ShortestNumber(parameter.upper), "}\n");
+  }
+  AppendObjects(instance, fingers, text);
+}
+
+}  // namespace
+
+std::string FormatModel(const Model& model) {
+  std::string text = absl::StrCat("touchstone: model/1\nname: ", Scalar(model.name),
+                                  "\nend_effector: {fingers: ", model.fingers,
+                                  ", spacing_mm: ", FileNumber(Unit::kMillimetre, model.spacing_m), "}\n",
+                                  model.effects.empty() ? "effects: []\n" : "effects:\n");
+  for (const EffectInstance& instance : model.effects) {
+    const Effect& effect = *instance.effect;
+    if (effect.formula) {
+      AppendFormula(instance, model.fingers, &text);
+      continue;
+    }
+    std::vector<std::string> entries = Entries(effect, instance.values, model.fingers);
+    if (instance.per_object && !effect.always_per_object) entries.insert(entries.begin(), "scope: object");
+    if (instance.object_values.empty()) {
+      absl::StrAppend(&text, "  - ", effect.name, ": {", absl::StrJoin(entries, ", "), "}\n");
+      continue;
+    }
+    absl::StrAppend(&text, "  - ", effect.name, ":\n");
+    for (const std::string& entry : entries) absl::StrAppend(&text, "      ", entry, "\n");
+    AppendObjects(instance, model.fingers, &text);
+  }
+  return text;
+}
+
+}  // namespace touchstone

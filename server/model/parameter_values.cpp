@@ -1,0 +1,152 @@
+#include "server/model/parameter_values.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone {
+namespace {
+
+// Values that should sum to 0 may miss it by what was lost in writing nine digits.
+constexpr double kSumTolerance = 1e-9;
+
+double Number(const std::string& text) {
+  const absl::StatusOr<double> value = ParseNumber(text);
+  return value.ok() ? *value : NAN;
+}
+
+// A number of files with at most 17 digits that reads back to the SI value; empty if there is none.
+std::string ExactFileNumber(Unit unit, double si_value) {
+  const double near = FromSi(unit, si_value);
+  for (int digits = 15; digits <= 17; ++digits) {
+    const std::string text = absl::StrFormat("%.*g", digits, near);
+    if (ToSi(unit, Number(text)) == si_value) return text;
+  }
+  // Division and multiplication need not undo each other: a neighbour may.
+  for (int steps = 1; steps <= 2; ++steps) {
+    for (const double end : {-HUGE_VAL, HUGE_VAL}) {
+      double candidate = near;
+      for (int step = 0; step < steps; ++step) candidate = std::nextafter(candidate, end);
+      const std::string text = absl::StrFormat("%.17g", candidate);
+      if (ToSi(unit, Number(text)) == si_value) return text;
+    }
+  }
+  return "";
+}
+
+std::string RangeInWords(const ParameterInfo& parameter) {
+  const absl::string_view symbol = UnitSymbol(parameter.unit);
+  return absl::StrCat(ShortestNumber(parameter.lower), " to ", ShortestNumber(parameter.upper),
+                      symbol.empty() ? "" : " ", symbol);
+}
+
+std::string ShortList(const std::vector<double>& values) {
+  return absl::StrCat(
+      "[",
+      absl::StrJoin(values, ", ",
+                    [](std::string* out, double value) { absl::StrAppendFormat(out, "%.12g", value); }),
+      "]");
+}
+
+}  // namespace
+
+std::string FileNumber(Unit unit, double si_value) {
+  if (si_value == 0) return "0";  // also for -0
+  std::string text = ExactFileNumber(unit, si_value);
+  if (!text.empty()) return text;
+  const double nearest = ToSi(unit, Number(absl::StrFormat("%.17g", FromSi(unit, si_value))));
+  text = ExactFileNumber(unit, nearest);
+  return text.empty() ? ShortestNumber(FromSi(unit, si_value)) : text;
+}
+
+std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> si_values) {
+  if (parameter.arity == Arity::kScalar) return FileNumber(parameter.unit, si_values.at(0));
+  return absl::StrCat("[",
+                      absl::StrJoin(si_values, ", ",
+                                    [&](std::string* out, double value) {
+                                      absl::StrAppend(out, FileNumber(parameter.unit, value));
+                                    }),
+                      "]");
+}
+
+int ValueOffset(const Effect& effect, int index, int fingers) {
+  int offset = 0;
+  for (int i = 0; i < index; ++i) offset += effect.parameters[i].Count(fingers);
+  return offset;
+}
+
+absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, const ParameterInfo& parameter,
+                                                   const std::vector<double>& file_values, int fingers) {
+  const size_t count = parameter.Count(fingers);
+  if (file_values.size() != count) {
+    const std::string wanted = parameter.arity == Arity::kPerFinger ? absl::StrCat("one a finger, ", count)
+                               : parameter.arity == Arity::kVector3 ? "3, for x, y and z"
+                                                                    : "1";
+    return absl::InvalidArgumentError(absl::StrCat(what, " has ", file_values.size(),
+                                                   file_values.size() == 1 ? " value" : " values",
+                                                   "; it needs ", wanted));
+  }
+  std::vector<double> si_values;
+  double sum = 0;
+  double largest = 0;
+  for (const double value : file_values) {
+    if (!(value >= parameter.lower && value <= parameter.upper))
+      return absl::InvalidArgumentError(
+          absl::StrCat(what, " is ", ShortestNumber(value), "; it must lie in ", RangeInWords(parameter)));
+    sum += value;
+    largest = std::max(largest, std::fabs(value));
+    si_values.push_back(value == 0 ? 0.0 : ToSi(parameter.unit, value));
+  }
+  if (parameter.sum_zero && std::fabs(sum) > kSumTolerance * largest) {
+    std::vector<double> centred = file_values;
+    for (double& value : centred) value -= sum / centred.size();
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s: the values sum to %.6g and must sum to 0, since only differences between fingers can be "
+        "seen; less their mean they are %s",
+        what, sum, ShortList(centred)));
+  }
+  return si_values;
+}
+
+absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name) {
+  std::vector<std::string> known;
+  for (size_t i = 0; i < effect.parameters.size(); ++i) {
+    if (effect.parameters[i].name == name) return static_cast<int>(i);
+    known.push_back(effect.parameters[i].name);
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(EffectTitle(effect), " has no parameter '", name, "'", DidYouMean(name, known)));
+}
+
+std::string EffectTitle(const Effect& effect) {
+  return effect.formula ? absl::StrCat("formula '", effect.formula->name, "'") : effect.name;
+}
+
+absl::Status CheckRig(int fingers, double spacing_mm) {
+  if (fingers < 1 || fingers > kMostFingers)
+    return absl::InvalidArgumentError(
+        absl::StrCat("end_effector.fingers is ", fingers, "; it must lie in 1 to ", kMostFingers));
+  if (!(spacing_mm > 0 && spacing_mm <= kMostSpacingMm))
+    return absl::InvalidArgumentError(absl::StrCat("end_effector.spacing_mm is ", ShortestNumber(spacing_mm),
+                                                   "; it must be above 0 and at most ", kMostSpacingMm,
+                                                   " mm"));
+  return absl::OkStatus();
+}
+
+absl::Status CheckAddition(const Model& model, const Effect& effect) {
+  if (model.effects.size() >= kMostEffects)
+    return absl::InvalidArgumentError(absl::StrCat("a model has at most ", kMostEffects, " effects"));
+  for (const EffectInstance& present : model.effects)
+    if (EffectTitle(*present.effect) == EffectTitle(effect))
+      return absl::AlreadyExistsError(
+          absl::StrCat(EffectTitle(effect), " is in the model already; ",
+                       effect.formula ? "give the formula another name" : "change its values instead"));
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone

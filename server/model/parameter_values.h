@@ -1,0 +1,45 @@
+// Values of parameters between files and models: one place that checks counts, ranges and sums, and that
+// prints an SI value as the number that a person would have written.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <absl/types/span.h>
+
+#include "server/model/model.h"
+
+namespace touchstone {
+
+// The SI value as a number of files: the one of fewest digits (15 to 17) that reads back to the same SI
+// value, "30" for 0.030 m. Where no number of files does (a fit may end there), the nearest one; that reads
+// back to the same text.
+std::string FileNumber(Unit unit, double si_value);
+
+// The values of one parameter: "1.5", or "[0.25, 0, -0.25]".
+std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> si_values);
+
+// Where the values of parameter `index` begin in the flat array.
+int ValueOffset(const Effect& effect, int index, int fingers);
+
+// Checks numbers of a file (how many, finite, within bounds, sum) and converts them to SI. The error begins
+// with `what`, the parameter's full name ("tip_radius.radius_mm").
+absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, const ParameterInfo& parameter,
+                                                   const std::vector<double>& file_values, int fingers);
+
+// The index of a parameter; an error that proposes one if there is none.
+absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name);
+
+// "tip_radius", or "formula 'lead_screw'".
+std::string EffectTitle(const Effect& effect);
+
+// Checks what concerns the model as a whole: number of fingers, spacing, repeated effects.
+absl::Status CheckRig(int fingers, double spacing_mm);
+absl::Status CheckAddition(const Model& model, const Effect& effect);
+
+inline constexpr int kMostEffects = 64;
+inline constexpr double kMostSpacingMm = 1000;
+
+}  // namespace touchstone

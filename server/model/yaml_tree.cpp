@@ -1,0 +1,178 @@
+#include "server/model/yaml_tree.h"
+
+#include <absl/strings/str_cat.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
+
+#include <exception>
+#include <sstream>
+#include <unordered_set>
+
+namespace touchstone {
+namespace {
+
+// Thrown through yaml-cpp's parser and caught in ParseYaml: the parser has no other way to be stopped.
+struct Refused {
+  YAML::Mark mark;
+  std::string message;
+};
+
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    Add(YamlNode::Kind::kNull, mark, "", anchor, "");
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    throw Refused{mark, "aliases (*name) are not taken here; write the value out"};
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    Add(YamlNode::Kind::kScalar, mark, tag, anchor, value);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    Open(YamlNode::Kind::kSequence, mark, tag, anchor);
+  }
+  void OnSequenceEnd() override { Close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    Open(YamlNode::Kind::kMap, mark, tag, anchor);
+  }
+  void OnMapEnd() override { Close(); }
+
+  YamlNode TakeRoot() { return std::move(root_); }
+
+ private:
+  // A map or list under construction; in a map keys and values take turns.
+  struct Level {
+    YamlNode node;
+    bool key_is_next = true;
+    std::unordered_set<std::string> seen;
+  };
+
+  static YamlNode MakeNode(YamlNode::Kind kind, const YAML::Mark& mark) {
+    YamlNode node;
+    node.kind = kind;
+    node.line = mark.line + 1;
+    node.column = mark.column + 1;
+    return node;
+  }
+
+  void Check(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
+    if (anchor != YAML::NullAnchor)
+      throw Refused{mark, "anchors (&name) are not taken here; write the value out"};
+    if (!tag.empty() && tag != "?" && tag != "!")
+      throw Refused{mark, absl::StrCat("tags (", tag, ") are not taken here")};
+    if (++nodes_ > kMostYamlNodes)
+      throw Refused{mark,
+                    absl::StrCat("more than ", kMostYamlNodes, " values and keys; nothing longer is read")};
+  }
+
+  void Add(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+           const std::string& text) {
+    Check(mark, tag, anchor);
+    YamlNode node = MakeNode(kind, mark);
+    node.text = text;
+    Place(std::move(node), mark);
+  }
+
+  void Open(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
+    Check(mark, tag, anchor);
+    if (levels_.size() >= kMostYamlDepth)
+      throw Refused{mark, absl::StrCat("nested more than ", kMostYamlDepth, " levels deep")};
+    if (!levels_.empty() && levels_.back().node.kind == YamlNode::Kind::kMap && levels_.back().key_is_next)
+      throw Refused{mark, "a key must be a name, not a list or a map"};
+    levels_.emplace_back();
+    levels_.back().node = MakeNode(kind, mark);
+  }
+
+  void Close() {
+    YamlNode node = std::move(levels_.back().node);
+    levels_.pop_back();
+    Place(std::move(node), YAML::Mark::null_mark());
+  }
+
+  void Place(YamlNode node, const YAML::Mark& mark) {
+    if (levels_.empty()) {
+      root_ = std::move(node);
+      return;
+    }
+    Level& level = levels_.back();
+    if (level.node.kind == YamlNode::Kind::kSequence) {
+      level.node.items.push_back(std::move(node));
+      return;
+    }
+    if (level.key_is_next) {
+      if (node.kind != YamlNode::Kind::kScalar) throw Refused{mark, "a key is missing before ':'"};
+      if (!level.seen.insert(node.text).second)
+        throw Refused{mark, absl::StrCat("'", node.text, "' is given twice; leave one out")};
+      level.node.keys.push_back(std::move(node));
+    } else {
+      level.node.items.push_back(std::move(node));
+    }
+    level.key_is_next = !level.key_is_next;
+  }
+
+  std::vector<Level> levels_;
+  YamlNode root_;
+  int nodes_ = 0;
+};
+
+absl::Status ErrorAtMark(const std::string& origin, const YAML::Mark& mark, absl::string_view message) {
+  YamlNode place;
+  place.line = mark.is_null() ? 1 : mark.line + 1;
+  place.column = mark.is_null() ? 1 : mark.column + 1;
+  return ErrorAt(origin, place, message);
+}
+
+}  // namespace
+
+const YamlNode* YamlNode::Find(absl::string_view key) const {
+  for (size_t i = 0; i < keys.size(); ++i)
+    if (keys[i].text == key) return &items[i];
+  return nullptr;
+}
+
+const char* YamlNode::KindInWords() const {
+  switch (kind) {
+    case Kind::kNull:
+      return "nothing";
+    case Kind::kScalar:
+      return "a single value";
+    case Kind::kSequence:
+      return "a list";
+    case Kind::kMap:
+      return "a map";
+  }
+  return "";
+}
+
+absl::Status ErrorAt(const std::string& origin, const YamlNode& node, absl::string_view message) {
+  return absl::InvalidArgumentError(absl::StrCat(origin, ":", node.line, ":", node.column, ": ", message));
+}
+
+absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& origin) {
+  if (text.size() > kMostYamlBytes)
+    return absl::InvalidArgumentError(
+        absl::StrCat(origin, ": has ", text.size(), " bytes; at most ", kMostYamlBytes, " are read"));
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    TreeBuilder builder;
+    if (!parser.HandleNextDocument(builder))
+      return absl::InvalidArgumentError(absl::StrCat(origin, ": is empty"));
+    YamlNode root = builder.TakeRoot();
+    TreeBuilder rest;
+    if (parser.HandleNextDocument(rest))
+      return ErrorAt(origin, rest.TakeRoot(), "a second document begins here; one file holds one");
+    return root;
+  } catch (const Refused& refused) {
+    return ErrorAtMark(origin, refused.mark, refused.message);
+  } catch (const YAML::Exception& error) {
+    return ErrorAtMark(origin, error.mark, absl::StrCat("not valid YAML: ", error.msg));
+  }
+}
+
+}  // namespace touchstone
