@@ -1,0 +1,160 @@
+// touchstone capture: photographs as PNG or JPEG files.
+#include <filesystem>
+
+#include "client/cli/plan_options.h"
+#include "client/source/batch.h"
+#include "client/source/lab_units.h"
+#include "client/source/npy.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/image/encode.h"
+
+namespace touchstone::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  TouchFlags touch;
+  ImageFlags image;
+  std::string object;
+  std::string plan;
+  std::string eye_mm, at_mm, up = "0,0,1";
+  std::string output;
+};
+
+absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std::string& text) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Vector3 v, ParseVector(name, text));
+  v.set_x(ToSi(Unit::kMillimetre, v.x()));
+  v.set_y(ToSi(Unit::kMillimetre, v.y()));
+  v.set_z(ToSi(Unit::kMillimetre, v.z()));
+  return v;
+}
+
+absl::Status AddViews(const Options& options, v1::CaptureRequest* request) {
+  const int ways = !options.plan.empty() + !options.eye_mm.empty() + !options.touch.approach.empty();
+  if (ways != 1)
+    return absl::InvalidArgumentError(
+        "where from? Give exactly one of --approach (the camera of that touch), --eye-mm (a camera of your "
+        "own) and "
+        "--plan FILE (the cameras of its touches)");
+  if (!options.plan.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<client::MeasuredTouch> touches, ReadTouches(options.plan));
+    for (client::MeasuredTouch& touch : touches)
+      *request->add_views()->mutable_touch() = std::move(touch.commanded);
+    return absl::OkStatus();
+  }
+  if (!options.eye_mm.empty()) {
+    v1::CameraPose* camera = request->add_views()->mutable_camera();
+    TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_eye_m(), ParseMillimetres("--eye-mm", options.eye_mm));
+    TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_at_m(),
+                                ParseMillimetres("--at-mm", options.at_mm.empty() ? "0,0,0" : options.at_mm));
+    TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_up(), ParseVector("--up", options.up));
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(*request->add_views()->mutable_touch(), MakeTouch(options.touch));
+  return absl::OkStatus();
+}
+
+// "top.png" for the first of one; "top-0003.png" for one of several.
+fs::path FileOfView(const fs::path& output, int view, int views) {
+  if (views == 1) return output;
+  char number[16];
+  std::snprintf(number, sizeof number, "-%04d", view);
+  return output.parent_path() / absl::StrCat(output.stem().string(), number, output.extension().string());
+}
+
+absl::Status RunCapture(const Cli& cli, const Options& options) {
+  const fs::path output(options.output);
+  const std::string extension = output.extension().string();
+  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg")
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: '", options.output, "' does not say the format; its name ends in .png or .jpg"));
+  v1::CaptureRequest request;
+  request.set_object(options.object);
+  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_image(),
+                              MakeImageSpec(cli, options.image, extension == ".png" ? "png" : "jpeg"));
+  TOUCHSTONE_RETURN_IF_ERROR(AddViews(options, &request));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+
+  if (request.views_size() > 1 && output.has_parent_path()) {
+    std::error_code error;
+    fs::create_directories(output.parent_path(), error);
+    if (error)
+      return absl::InvalidArgumentError(
+          absl::StrCat("-o: ", output.parent_path().string(), " cannot be made: ", error.message()));
+  }
+  // One view a request: any number of views, and no large message.
+  std::vector<std::string> written;
+  const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
+  for (int i = 0; i < views.size(); ++i) {
+    request.clear_views();
+    *request.add_views() = views[i];
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const v1::CaptureResponse response,
+        client::Connection::Call(&v1::Source::Stub::Capture, connection->source(), request));
+    const fs::path file = FileOfView(output, i, views.size());
+    const auto beside = [&](const char* ending) {
+      return (file.parent_path() / file.stem()).string() + ending;
+    };
+    for (const v1::Column& column : response.columns()) {
+      TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(column, response.rows()));
+      std::string path = file.string();
+      std::string bytes;
+      const client::FileColumn shape = client::FileColumnOf(column);
+      if (column.type() == v1::DATA_TYPE_BYTES) {
+        bytes = std::string(client::FileOf(column, 0));
+      } else if (column.name() == "mask" && shape.shape.size() >= 2) {
+        path = beside(".mask.png");
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            bytes, EncodePng(reinterpret_cast<const uint8_t*>(column.data().data()),
+                             static_cast<int>(shape.shape[1]), static_cast<int>(shape.shape[0]), 1));
+      } else {
+        path = beside(("." + shape.name + ".npy").c_str());
+        client::AppendLabValues(shape, column, 0, 1, &bytes);
+        bytes = client::NpyFile(shape.type, shape.shape, bytes);
+      }
+      TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(path, bytes));
+      written.push_back(path);
+    }
+  }
+  if (cli.output().json) PrintJson({{"files", written}});
+  cli.Log(written.size() == 1
+              ? "wrote " + written[0]
+              : absl::StrCat("wrote ", written.size(), " files, ", written.front(), " to ", written.back()));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddCapture(Cli* cli) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = cli->AddCommand(
+      nullptr, "capture", "Photographs an object: PNG or JPEG, with depth and mask on request.",
+      "touchstone capture lat20 --approach 0,0,-1 -o top.png\n"
+      "touchstone capture lat20 --eye-mm 300,200,150 --image 640x480 --format rgb -o view.jpg\n"
+      "touchstone capture lat20 --eye-mm 300,0,80 --depth --mask -o side.png    also side.depth_mm.npy, "
+      "side.mask.png\n"
+      "touchstone capture lat20 --plan plan.csv -o views/touch.png              views/touch-0000.png, ...",
+      [cli, options] { return RunCapture(*cli, *options); });
+  command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
+      ->type_name("")
+      ->required();
+  command->add_option("-o,--output", options->output, "The file to write, .png or .jpg")
+      ->type_name("FILE")
+      ->required();
+  const auto camera = [&](const std::string& name, std::string& value, const std::string& text) {
+    command->add_option(name, value, text)->type_name("X,Y,Z")->group("Camera");
+  };
+  camera("--eye-mm", options->eye_mm, "Where the camera stands, in the object's frame");
+  camera("--at-mm", options->at_mm, "What it looks at. Default: 0,0,0");
+  camera("--up", options->up, "What is up in the picture. Default: 0,0,1");
+  command->add_option("--plan", options->plan, "The cameras of the touches of a CSV file")
+      ->type_name("FILE")
+      ->group("Camera");
+  AddTouchOptions(command, &options->touch);
+  AddImageOptions(command, &options->image);
+  cli->AddSourceOptions(command);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,278 @@
+// Parsing: the help with examples first, and usage errors that say what was probably meant.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <set>
+
+#include "client/cli/common.h"
+#include "client/cli/interrupt.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr size_t kHelpColumn = 32;
+constexpr size_t kHelpWidth = 110;
+
+// One line of what it is, then examples, then usage and options.
+class ExamplesFirst : public CLI::Formatter {
+ public:
+  explicit ExamplesFirst(std::string examples) : examples_(std::move(examples)) {
+    column_width(kHelpColumn);
+    label("OPTIONS", "OPTIONS");
+    label("Positionals", "Arguments");
+    label("Subcommands", "Commands");
+    label("REQUIRED", "(required)");
+    label("TEXT", "TEXT");
+  }
+
+  std::string make_description(const CLI::App* app) const override {
+    return absl::StrCat(Wrap(app->get_description(), kHelpWidth, 0), "\n\nExamples:\n", examples_, "\n");
+  }
+
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    std::string usage = CLI::Formatter::make_usage(app, name.empty() ? app->get_name() : name);
+    return usage;
+  }
+
+  // The first sentence is enough in a list of commands.
+  std::string make_subcommand(const CLI::App* sub) const override {
+    std::string line = sub->get_description();
+    line = line.substr(0, line.find(". "));
+    if (!line.empty() && line.back() == '.') line.pop_back();
+    std::string text = "  " + sub->get_name();
+    text.append(text.size() < 14 ? 14 - text.size() : 1, ' ');
+    return text + line + "\n";
+  }
+
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    std::string left = "  " + make_option_name(option, is_positional) + make_option_opts(option);
+    if (left.size() + 2 > kHelpColumn)
+      left += "\n" + std::string(kHelpColumn, ' ');
+    else
+      left.append(kHelpColumn - left.size(), ' ');
+    return left + Wrap(make_option_desc(option), kHelpWidth, kHelpColumn) + "\n";
+  }
+
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text;
+    if (option->get_type_size() != 0) text += " " + option->get_type_name();
+    if (option->get_required()) text += " (required)";
+    return text;
+  }
+
+ private:
+  std::string examples_;
+};
+
+// "  touchstone objects" for each line of examples.
+std::string Indented(const std::string& lines) {
+  std::string text = "  ";
+  for (const char c : lines) {
+    text += c;
+    if (c == '\n') text += "  ";
+  }
+  return text + "\n";
+}
+
+std::vector<std::string> OptionNames(const CLI::App* app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app->get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+std::vector<std::string> CommandNames(const CLI::App* app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app->get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+int PrintError(absl::string_view message) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "touchstone: error: %s\n", std::string(message).c_str());
+  return kBadInput;
+}
+
+}  // namespace
+
+Cli::Cli()
+    : app_("Touches and photographs objects in simulation, and streams datasets of them to files",
+           "touchstone") {
+  app_.formatter(std::make_shared<ExamplesFirst>(
+      Indented("touchstone objects                                    what can be touched\n"
+               "touchstone touch lat20 --approach 0,0,-1              one touch from above\n"
+               "touchstone capture lat20 --approach 0,0,-1 -o top.png its photograph\n"
+               "touchstone stream --samples 10000 --out data          a dataset of touches\n"
+               "touchstone doctor                                     is everything in order here?")));
+  app_.set_help_flag("-h,--help", "This text; also touchstone COMMAND --help");
+  app_.set_version_flag("--version", "touchstone " TOUCHSTONE_VERSION, "The version");
+  app_.require_subcommand(0, 1);
+  app_.footer(
+      "Without --server the simulation runs in this process; with --server HOST:PORT a running "
+      "touchstone-server\n"
+      "does it. Both give the same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable,\n"
+      "4 refused or failed by the source, 130 interrupted.");
+}
+
+CLI::App* Cli::AddCommand(CLI::App* parent, const std::string& name, const std::string& description,
+                          const std::string& examples, std::function<absl::Status()> run) {
+  CLI::App* command = (parent == nullptr ? &app_ : parent)->add_subcommand(name, description);
+  command->group("Commands");
+  command->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
+  command->set_help_flag("-h,--help", "This text")->group("Output");
+  command->add_flag("--json", output_.json, "Machine-readable output; the names of numbers end in their unit")
+      ->group("Output");
+  command->add_flag("-q,--quiet", output_.quiet, "Nothing but errors on stderr")->group("Output");
+  command->add_flag("-v,--verbose", output_.verbose, "More about what happens on stderr")->group("Output");
+  runs_[command] = std::move(run);
+  return command;
+}
+
+CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
+                        const std::string& examples) {
+  CLI::App* group = app_.add_subcommand(name, description);
+  group->group("Commands");
+  group->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
+  group->set_help_flag("-h,--help", "This text");
+  group->require_subcommand(0, 1);
+  return group;
+}
+
+void Cli::AddSourceOptions(CLI::App* command) {
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) {
+    return command->add_option(name, value, text)->type_name(type)->group("Source");
+  };
+  add("--server", source_.servers, "HOST:PORT",
+      "A touchstone-server, or several with commas (the next one goes on if one is lost). "
+      "Default: simulate in this process")
+      ->delimiter(',')
+      ->take_all()
+      ->expected(1);
+  add("--mesh", source_.meshes, "NAME=FILE",
+      "A mesh to touch besides the built-in shapes, repeatable; with what the file does not say: "
+      "NAME=FILE,unit=mm|cm|m|inch,up=x|y|z,scale=1,fit_mm=150")
+      ->take_all()
+      ->expected(1);
+  add("--mesh-dir", source_.mesh_folder, "FOLDER", "Every mesh file of a folder, named by its stem");
+  add("--renderer", source_.renderer, "KIND",
+      "auto, egl or cpu: what makes images. Default: auto, the faster one");
+  add("--egl-device", source_.egl_device, "N", "EGL device to render on, as touchstone doctor numbers them");
+  add("--threads", source_.threads, "N", "Threads that simulate. Default: one a core");
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
+  client::ConnectionOptions options;
+  options.servers = SplitCommas(source_.servers);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, {"auto", "egl", "cpu"}).status());
+  if (!options.servers.empty()) {
+    const char* embedded_only = !source_.meshes.empty()        ? "--mesh"
+                                : !source_.mesh_folder.empty() ? "--mesh-dir"
+                                : source_.threads != 0         ? "--threads"
+                                : source_.egl_device >= 0      ? "--egl-device"
+                                                               : nullptr;
+    if (embedded_only != nullptr)
+      return absl::InvalidArgumentError(absl::StrCat(
+          embedded_only,
+          ": works only without --server; give it to touchstone-server instead (the same option there)"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
+    Detail("connected to " + connection->address());
+    return connection;
+  }
+  ServerOptions& embedded = options.embedded;
+  if (!source_.mesh_folder.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(embedded.meshes, MeshSourcesOfFolder(source_.mesh_folder));
+  }
+  for (const std::string& text : source_.meshes) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource mesh, ParseMeshSource(text));
+    embedded.meshes.push_back(std::move(mesh));
+  }
+  if (source_.threads < 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one a core"));
+  embedded.threads = source_.threads;
+  embedded.renderer.kind = source_.renderer == "egl"   ? RendererKind::kEgl
+                           : source_.renderer == "cpu" ? RendererKind::kCpu
+                                                       : RendererKind::kAuto;
+  embedded.renderer.egl_device = source_.egl_device;
+  return client::Connection::Open(std::move(options));
+}
+
+void Cli::Log(absl::string_view line) const {
+  if (!output_.quiet) std::fprintf(stderr, "%s\n", std::string(line).c_str());
+}
+
+void Cli::Detail(absl::string_view line) const {
+  if (output_.verbose && !output_.quiet) std::fprintf(stderr, "%s\n", std::string(line).c_str());
+}
+
+std::string Cli::HelpCommand() const {
+  std::string text = "touchstone";
+  const CLI::App* app = &app_;
+  while (!app->get_subcommands().empty()) {
+    app = app->get_subcommands()[0];
+    text += " " + app->get_name();
+  }
+  return text;
+}
+
+int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
+  // The deepest command that was understood.
+  const CLI::App* app = &app_;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands()[0];
+  const std::string help = absl::StrCat(" (see ", HelpCommand(), " --help)");
+
+  for (const std::string& word : app_.remaining(true)) {
+    if (word.size() > 1 && word[0] == '-') {
+      const std::string name = word.substr(0, word.find('='));
+      return PrintError(
+          absl::StrCat("unknown option '", name, "'", DidYouMean(name, OptionNames(app)), help));
+    }
+    const std::vector<std::string> commands = CommandNames(app);
+    if (!commands.empty())
+      return PrintError(absl::StrCat("unknown command '", word, "'", DidYouMean(word, commands), help));
+    return PrintError(absl::StrCat("'", word, "' is one argument too many", help));
+  }
+  return PrintError(absl::StrCat(error.what(), help));
+}
+
+int Cli::Run(int argc, char** argv) {
+  // CLI11 stops at the first unknown option of a command with required ones; collect them all first instead.
+  try {
+    app_.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    const CLI::App* app = &app_;
+    while (!app->get_subcommands().empty()) app = app->get_subcommands()[0];
+    std::printf("%s", app->help(HelpCommand()).c_str());
+    return kDone;
+  } catch (const CLI::CallForVersion&) {
+    std::printf("touchstone %s\n", TOUCHSTONE_VERSION);
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    return UsageError(error, argc, argv);
+  }
+  const CLI::App* app = &app_;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands()[0];
+  const auto run = runs_.find(app);
+  if (run == runs_.end()) {
+    // "touchstone" or "touchstone model" alone: what there is, but not as a success.
+    std::fprintf(stderr, "%s", app->help(HelpCommand()).c_str());
+    return kBadInput;
+  }
+  absl::Status status = run->second();
+  if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
+    if (status.ok()) status = absl::ResourceExhaustedError("stdout: the output could not be written whole");
+  }
+  if (Interrupt::Raised()) {
+    if (!status.ok() && !absl::IsCancelled(status)) PrintError(status.message());
+    return kInterrupted;
+  }
+  if (status.ok()) return kDone;
+  PrintError(status.message());
+  return ExitCodeOf(status);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,144 @@
+#include "client/cli/common.h"
+
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <filesystem>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone::cli {
+
+namespace {
+
+constexpr uint64_t kMostModelBytes = 16 << 20;
+
+}  // namespace
+
+ExitCode ExitCodeOf(const absl::Status& status) {
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return kDone;
+    case absl::StatusCode::kUnavailable:
+      return kUnreachable;
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kOutOfRange:
+    case absl::StatusCode::kAlreadyExists:
+      return kBadInput;
+    default:
+      return kRefused;
+  }
+}
+
+absl::StatusOr<v1::Vector3> ParseVector(const std::string& name, const std::string& text) {
+  const std::vector<std::string> parts = absl::StrSplit(text, ',');
+  const auto wrong = [&](absl::string_view why) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, ": '", text, "' ", why, "; three numbers with commas were expected, for instance 0,0,-1"));
+  };
+  if (parts.size() != 3)
+    return wrong(absl::StrCat("has ", parts.size(), parts.size() == 1 ? " part" : " parts"));
+  double values[3];
+  for (int i = 0; i < 3; ++i) {
+    const absl::StatusOr<double> value = ParseNumber(parts[i]);
+    if (!value.ok()) return wrong(absl::StrCat("is no vector: ", value.status().message()));
+    values[i] = *value;
+  }
+  v1::Vector3 vector;
+  vector.set_x(values[0]);
+  vector.set_y(values[1]);
+  vector.set_z(values[2]);
+  return vector;
+}
+
+absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {
+  v1::ModelRef ref;
+  if (text.empty()) return ref;
+  const std::filesystem::path path(text);
+  const bool looks_like_file =
+      text.find('/') != std::string::npos || path.extension() == ".yaml" || path.extension() == ".yml";
+  if (looks_like_file) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMostModelBytes));
+    return ref;
+  }
+  const bool hex = text.size() >= 8 && text.size() <= 64 &&
+                   text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (hex)
+    ref.set_hash(text);
+  else
+    ref.set_name(text);
+  return ref;
+}
+
+std::vector<std::string> SplitCommas(const std::vector<std::string>& texts) {
+  std::vector<std::string> result;
+  for (const std::string& text : texts)
+    for (const absl::string_view part : absl::StrSplit(text, ','))
+      if (!part.empty()) result.emplace_back(part);
+  return result;
+}
+
+absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& text,
+                                  const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), text) != known.end()) return text;
+  return absl::InvalidArgumentError(absl::StrCat(name, ": '", text, "' is unknown", DidYouMean(text, known)));
+}
+
+std::string Table::Text() const {
+  std::vector<size_t> widths;
+  for (const auto& row : rows_) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (const auto& row : rows_) {
+    for (size_t i = 0; i < row.size(); ++i) {
+      text += row[i];
+      if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
+    }
+    text.erase(text.find_last_not_of(' ') + 1);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string Wrap(absl::string_view text, size_t width, size_t indent) {
+  std::string result;
+  size_t column = indent;
+  for (const absl::string_view word : absl::StrSplit(text, ' ', absl::SkipEmpty())) {
+    if (column > indent && column + 1 + word.size() > width) {
+      absl::StrAppend(&result, "\n", std::string(indent, ' '));
+      column = indent;
+    } else if (column > indent) {
+      result += ' ';
+      ++column;
+    }
+    absl::StrAppend(&result, word);
+    column += word.size();
+  }
+  return result;
+}
+
+std::string Rounded(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+void PrintJson(const Json& json) {
+  std::printf("%s\n", json.dump(2).c_str());
+}
+
+absl::Status WriteOutput(const std::string& path, const std::string& data) {
+  if (!path.empty() && path != "-") return WriteFileAtomically(path, data);
+  std::fwrite(data.data(), 1, data.size(), stdout);
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone::cli

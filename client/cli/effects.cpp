@@ -1,0 +1,158 @@
+// touchstone effects: the catalogue, and what one effect is.
+#include "client/cli/common.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/effects/formula.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr size_t kWidth = 100;
+constexpr size_t kIndent = 12;
+
+std::string WithUnit(double value, const std::string& unit) {
+  return unit.empty() ? ShortestNumber(value) : absl::StrCat(ShortestNumber(value), " ", unit);
+}
+
+std::string ArityInWords(const v1::Parameter& parameter) {
+  if (parameter.arity() == "vector3") return "x,y,z in the object frame";
+  if (parameter.arity() == "finger") return parameter.sum_zero() ? "one a finger, sum 0" : "one a finger";
+  return "one number";
+}
+
+Json EffectJson(const v1::Effect& effect) {
+  Json parameters = Json::array();
+  for (const v1::Parameter& p : effect.parameters())
+    parameters.push_back({{"name", p.name()},
+                          {"unit", p.unit()},
+                          {"arity", p.arity()},
+                          {"min", p.min()},
+                          {"max", p.max()},
+                          {"default", p.default_value()},
+                          {"typical", p.typical()},
+                          {"sum_zero", p.sum_zero()},
+                          {"meaning", p.meaning()}});
+  return {{"name", effect.name()},
+          {"stage", effect.stage()},
+          {"meaning", effect.meaning()},
+          {"signature", effect.signature()},
+          {"check_on_rig", effect.check_on_rig()},
+          {"remedy", effect.remedy()},
+          {"parameters", parameters}};
+}
+
+std::string Paragraph(const std::string& title, const std::string& text) {
+  std::string line = title;
+  line.append(line.size() < kIndent ? kIndent - line.size() : 1, ' ');
+  return line + Wrap(text, kWidth, kIndent) + "\n";
+}
+
+// What an expression may use: the table that the formula's compiler reads.
+std::string FormulaHelp() {
+  Table variables({"VARIABLE", "UNIT", "SINCE STAGE", "MEANING"});
+  for (const FormulaVariable& variable : FormulaVariables())
+    variables.Add({variable.name, variable.unit[0] == '\0' ? "-" : variable.unit, StageName(variable.since),
+                   variable.meaning});
+  variables.Add({"cov_NAME", "-", "pose", "the column cov_NAME of the measurements"});
+  Table functions({"FUNCTION", "MEANING"});
+  for (const FormulaWord& word : FormulaFunctions()) functions.Add({word.usage, word.meaning});
+  for (const FormulaWord& word : FormulaConstants()) functions.Add({word.usage, word.meaning});
+  return absl::StrCat(
+      "\nIn an expression:\n\n", variables.Text(), "\n", functions.Text(),
+      "\nAn expression for travel_mm may use what its stage and earlier ones know.\n"
+      "For instance:\n"
+      "  touchstone model add nominal formula name=lead_screw adds=travel_mm \\\n"
+      "    'expression=k * sin(2*pi*travel_mm/lead)' k=0.1 k_unit=mm lead=4 lead_unit=mm -o screw.yaml\n");
+}
+
+Json FormulaJson() {
+  Json variables = Json::array();
+  for (const FormulaVariable& variable : FormulaVariables())
+    variables.push_back({{"name", variable.name},
+                         {"unit", variable.unit},
+                         {"since_stage", StageName(variable.since)},
+                         {"meaning", variable.meaning}});
+  Json functions = Json::array();
+  for (const FormulaWord& word : FormulaFunctions())
+    functions.push_back({{"name", word.name}, {"usage", word.usage}, {"meaning", word.meaning}});
+  Json constants = Json::array();
+  for (const FormulaWord& word : FormulaConstants())
+    constants.push_back({{"name", word.name}, {"meaning", word.meaning}});
+  return {{"variables", variables}, {"functions", functions}, {"constants", constants}};
+}
+
+absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
+  if (cli.output().json) {
+    Json json = EffectJson(effect);
+    if (effect.name() == "formula") json.update(FormulaJson());
+    PrintJson(json);
+    return absl::OkStatus();
+  }
+  std::string text = absl::StrCat(effect.name(), "  (stage: ", effect.stage(), ")\n\n");
+  text += Paragraph("What it is", effect.meaning());
+  text += Paragraph("It shows as", effect.signature());
+  text += Paragraph("Check", effect.check_on_rig());
+  text += Paragraph("Remedy", effect.remedy());
+  if (effect.parameters_size() > 0) {
+    Table table({"PARAMETER", "VALUES", "MIN", "MAX", "DEFAULT", "TYPICAL", "MEANING"});
+    for (const v1::Parameter& p : effect.parameters())
+      table.Add({p.name(), ArityInWords(p), WithUnit(p.min(), p.unit()), WithUnit(p.max(), p.unit()),
+                 WithUnit(p.default_value(), p.unit()), WithUnit(p.typical(), p.unit()), p.meaning()});
+    absl::StrAppend(&text, "\n", table.Text());
+    const v1::Parameter& first = effect.parameters(0);
+    const std::string value = first.arity() == "scalar" ? ShortestNumber(first.typical())
+                              : first.sum_zero()        ? absl::StrCat(ShortestNumber(first.typical()), ",0,",
+                                                                       ShortestNumber(-first.typical()))
+                                                 : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
+    absl::StrAppend(&text, "\nAdd it:  touchstone model add nominal ", effect.name(), " ", first.name(), "=",
+                    value, " -o better.yaml\n");
+  }
+  if (effect.name() == "formula") text += FormulaHelp();
+  return WriteOutput("", text);
+}
+
+absl::Status RunEffects(const Cli& cli, const std::string& name) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListEffectsResponse response,
+                              client::Connection::Call(&v1::Models::Stub::ListEffects, connection->models(),
+                                                       v1::ListEffectsRequest()));
+  if (!name.empty()) {
+    std::vector<std::string> known;
+    for (const v1::Effect& effect : response.effects()) {
+      if (effect.name() == name) return Explain(cli, effect);
+      known.push_back(effect.name());
+    }
+    return absl::NotFoundError(absl::StrCat("there is no effect '", name, "'", DidYouMean(name, known)));
+  }
+  if (cli.output().json) {
+    Json list = Json::array();
+    for (const v1::Effect& effect : response.effects()) list.push_back(EffectJson(effect));
+    PrintJson({{"effects", list}});
+    return absl::OkStatus();
+  }
+  Table table({"EFFECT", "STAGE", "PARAMETERS", "MEANING"});
+  for (const v1::Effect& effect : response.effects()) {
+    std::string parameters;
+    for (const v1::Parameter& p : effect.parameters())
+      absl::StrAppend(&parameters, parameters.empty() ? "" : ", ", p.name());
+    table.Add({effect.name(), effect.stage(), parameters, effect.meaning()});
+  }
+  return WriteOutput("", absl::StrCat(table.Text(), "\ntouchstone effects NAME explains one.\n"));
+}
+
+}  // namespace
+
+void AddEffects(Cli* cli) {
+  auto name = std::make_shared<std::string>();
+  CLI::App* command = cli->AddCommand(
+      nullptr, "effects", "Lists the physical effects that a model can have, or explains one.",
+      "touchstone effects\n"
+      "touchstone effects tip_radius\n"
+      "touchstone effects formula          what an expression of your own may use\n"
+      "touchstone effects --json",
+      [cli, name] { return RunEffects(*cli, *name); });
+  command->add_option("NAME", *name, "The effect to explain")->type_name("");
+  cli->AddSourceOptions(command);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,38 @@
+#include <cstdio>
+
+#include "client/cli/common.h"
+#include "client/cli/interrupt.h"
+
+namespace touchstone::cli {
+
+// One line a command; each is a file of its own.
+void AddCommands(Cli* cli) {
+  AddObjects(cli);
+  AddEffects(cli);
+  AddModel(cli);
+  AddPlan(cli);
+  AddTouch(cli);
+  AddCapture(cli);
+  AddStream(cli);
+  AddMesh(cli);
+  AddDoctor(cli);
+}
+
+}  // namespace touchstone::cli
+
+int main(int argc, char** argv) {
+#ifdef __AVX2__
+  // Built for x86-64-v3: on an older processor everything after this would end in an illegal instruction.
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || !__builtin_cpu_supports("bmi2")) {
+    std::fputs(
+        "touchstone: error: this build needs a processor with AVX2, FMA and BMI2 (x86-64-v3); "
+        "configure it with -DTOUCHSTONE_ARCH= for older ones\n",
+        stderr);
+    return touchstone::cli::kRefused;
+  }
+#endif
+  touchstone::cli::Interrupt::Install();
+  touchstone::cli::Cli cli;
+  touchstone::cli::AddCommands(&cli);
+  return cli.Run(argc, argv);
+}

@@ -1,0 +1,243 @@
+// touchstone mesh import|supershape|info: mesh files.
+#include <filesystem>
+
+#include "client/cli/common.h"
+#include "client/source/lab_units.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/geometry/mesh_file.h"
+#include "server/geometry/supershape.h"
+
+namespace touchstone::cli {
+namespace {
+
+struct Options {
+  std::string input;
+  std::string output;
+  std::string unit = "mm";
+  std::string up = "z";
+  double scale = 1;
+  double fit_mm = 0;
+  bool force = false;
+  // Supershapes.
+  std::string name;
+  uint64_t triangles = 20000;
+  std::optional<double> width_mm;
+  std::string longitude;  // "m,n1,n2,n3[,a,b]"
+  std::string latitude;
+};
+
+Json ReportJson(const TriangleMesh& mesh, const MeshReport& report) {
+  const Bounds bounds = ComputeBounds(mesh);
+  const auto mm = [](const Eigen::Vector3d& v) {
+    return Json{client::LabNumber(Unit::kMillimetre, v.x()), client::LabNumber(Unit::kMillimetre, v.y()),
+                client::LabNumber(Unit::kMillimetre, v.z())};
+  };
+  constexpr double kCubicMillimetresPerCubicMetre =
+      1 / (kMetresPerMillimetre * kMetresPerMillimetre * kMetresPerMillimetre);
+  return {{"vertices", report.vertices},
+          {"triangles", report.triangles},
+          {"closed", report.closed()},
+          {"bounds_min_mm", mm(bounds.min_m)},
+          {"bounds_max_mm", mm(bounds.max_m)},
+          {"volume_mm3", report.signed_volume_m3 * kCubicMillimetresPerCubicMetre},
+          {"boundary_edges", report.boundary_edges},
+          {"nonmanifold_edges", report.nonmanifold_edges},
+          {"inconsistent_edges", report.inconsistent_edges},
+          {"degenerate_triangles", report.degenerate_triangles},
+          {"duplicate_triangles", report.duplicate_triangles},
+          {"unused_vertices", report.unused_vertices},
+          {"mesh_hash", MeshHash(mesh)}};
+}
+
+std::string Counted(uint64_t count, const char* one, const char* many) {
+  return absl::StrCat(count, " ", count == 1 ? one : many);
+}
+
+// What the numbers of a report mean for touching.
+std::string ReportInWords(const std::string& name, const TriangleMesh& mesh, const MeshReport& report) {
+  const Bounds bounds = ComputeBounds(mesh);
+  const Eigen::Vector3d size_m = bounds.max_m - bounds.min_m;
+  const Eigen::Vector3d centre_m = bounds.Centre();
+  const auto mm = [](double metres) { return Rounded(FromSi(Unit::kMillimetre, metres)); };
+  std::string text = absl::StrCat(name, ": ", Counted(report.triangles, "triangle", "triangles"), ", ",
+                                  Counted(report.vertices, "vertex", "vertices"), "\n");
+  absl::StrAppend(&text, "  Size      ", mm(size_m.x()), " x ", mm(size_m.y()), " x ", mm(size_m.z()),
+                  " mm, centre at ", mm(centre_m.x()), ", ", mm(centre_m.y()), ", ", mm(centre_m.z()),
+                  " mm\n");
+  absl::StrAppend(&text, "  Hash      ", MeshHash(mesh), "\n");
+  if (report.closed()) {
+    constexpr double kCubicCentimetresPerCubicMetre = 1e6;
+    absl::StrAppend(&text, "  Surface   closed, volume ",
+                    Rounded(std::abs(report.signed_volume_m3) * kCubicCentimetresPerCubicMetre), " cm3\n");
+  } else {
+    absl::StrAppend(&text, "  Surface   not closed: ");
+    if (report.boundary_edges > 0)
+      absl::StrAppend(&text, Counted(report.boundary_edges, "open edge", "open edges"),
+                      " (a finger may pass through a hole)");
+    if (report.nonmanifold_edges > 0)
+      absl::StrAppend(&text, report.boundary_edges > 0 ? ", " : "",
+                      Counted(report.nonmanifold_edges, "edge", "edges"), " with three triangles or more");
+    text += "\n";
+  }
+  // Only a closed, consistent surface has an inside.
+  if (report.closed() && report.inconsistent_edges == 0 && report.signed_volume_m3 < 0)
+    text +=
+        "  Note      it is inside out: its triangles run clockwise seen from outside. Touches do not mind\n";
+  if (report.inconsistent_edges > 0)
+    absl::StrAppend(&text, "  Note      ", Counted(report.inconsistent_edges, "edge is", "edges are"),
+                    " run through twice in the same direction: neighbouring triangles face opposite ways\n");
+  if (report.degenerate_triangles > 0 || report.duplicate_triangles > 0)
+    absl::StrAppend(&text, "  Note      ", Counted(report.degenerate_triangles, "triangle", "triangles"),
+                    " without area and ", report.duplicate_triangles,
+                    " repeated: they are left out when the object is touched\n");
+  if (report.unused_vertices > 0)
+    absl::StrAppend(&text, "  Note      ",
+                    Counted(report.unused_vertices, "vertex belongs", "vertices belong"),
+                    " to no triangle\n");
+  return text;
+}
+
+void Report(const Cli& cli, const std::string& name, const TriangleMesh& mesh) {
+  const MeshReport report = InspectMesh(mesh);
+  if (cli.output().json)
+    PrintJson(ReportJson(mesh, report));
+  else if (!cli.output().quiet)
+    std::fputs(ReportInWords(name, mesh, report).c_str(), stdout);
+}
+
+absl::StatusOr<TriangleMesh> Read(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--unit", options.unit, MeshUnitNames()).status());
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--up", options.up, MeshUpAxisNames()).status());
+  MeshImport import;
+  import.unit = options.unit;
+  import.up = options.up;
+  import.scale = options.scale;
+  if (options.fit_mm != 0) import.fit_mm = options.fit_mm;
+  std::vector<std::string> notes;
+  TOUCHSTONE_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadMeshFile(options.input, import, &notes));
+  for (const std::string& note : notes) cli.Log("note: " + note);
+  return mesh;
+}
+
+absl::Status Write(const Cli& cli, const Options& options, const TriangleMesh& mesh) {
+  std::error_code error;
+  if (!options.force && std::filesystem::exists(options.output, error))
+    return absl::AlreadyExistsError(absl::StrCat(
+        "-o: ", options.output, " exists already; choose another name, or --force to replace it"));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteMeshFile(options.output, mesh));
+  Report(cli, options.output, mesh);
+  return absl::OkStatus();
+}
+
+absl::Status RunImport(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, Read(cli, options));
+  return Write(cli, options, mesh);
+}
+
+absl::Status RunInfo(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, Read(cli, options));
+  Report(cli, options.input, mesh);
+  return absl::OkStatus();
+}
+
+// "4,10,15,10" or "4,10,15,10,1,1": m, n1, n2, n3 and, if other than 1, a and b.
+absl::StatusOr<Superformula> ParseSuperformula(const std::string& name, const std::string& text) {
+  std::vector<double> values;
+  for (const std::string& part : SplitCommas({text})) {
+    const absl::StatusOr<double> value = ParseNumber(part);
+    if (!value.ok()) return absl::InvalidArgumentError(absl::StrCat(name, ": ", value.status().message()));
+    values.push_back(*value);
+  }
+  if (values.size() != 4 && values.size() != 6)
+    return absl::InvalidArgumentError(absl::StrCat(name, ": '", text, "' has ", values.size(),
+                                                   " numbers; m,n1,n2,n3 or m,n1,n2,n3,a,b was expected"));
+  Superformula formula;
+  formula.m = values[0];
+  formula.n1 = values[1];
+  formula.n2 = values[2];
+  formula.n3 = values[3];
+  if (values.size() == 6) formula.a = values[4], formula.b = values[5];
+  return formula;
+}
+
+absl::Status RunSupershape(const Cli& cli, const Options& options) {
+  SupershapeParameters parameters;
+  if (!options.name.empty()) {
+    if (!options.longitude.empty() || !options.latitude.empty())
+      return absl::InvalidArgumentError(
+          "--longitude and --latitude make a shape of your own; leave NAME out");
+    TOUCHSTONE_ASSIGN_OR_RETURN(parameters, NamedSupershape(options.name));
+  } else if (options.longitude.empty() || options.latitude.empty()) {
+    return absl::InvalidArgumentError(
+        "which shape? Give NAME (lat00, lat05, lat10, lat15, lat20), or --longitude and --latitude");
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(parameters.longitude, ParseSuperformula("--longitude", options.longitude));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parameters.latitude, ParseSuperformula("--latitude", options.latitude));
+  }
+  if (options.width_mm) parameters.width_m = ToSi(Unit::kMillimetre, *options.width_mm);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, MakeSupershape(parameters, options.triangles));
+  return Write(cli, options, mesh);
+}
+
+void AddImportOptions(CLI::App* command, Options* options) {
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) { command->add_option(name, value, text)->type_name(type); };
+  add("--unit", options->unit, "UNIT", "Of the file's coordinates: mm, cm, m or inch. Default: mm");
+  add("--up", options->up, "AXIS", "The file's axis that points up: x, y or z. Default: z");
+  add("--scale", options->scale, "FACTOR", "A further factor. Default: 1");
+  add("--fit-mm", options->fit_mm, "MM",
+      "Instead of unit and scale: make the longest side of the box this long");
+}
+
+}  // namespace
+
+void AddMesh(Cli* cli) {
+  auto options = std::make_shared<Options>();
+  CLI::App* group = cli->AddGroup("mesh", "Converts, makes and inspects mesh files.",
+                                  "touchstone mesh info cup.stl --unit inch\n"
+                                  "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
+                                  "touchstone mesh supershape lat20 --triangles 100000 -o lat20.obj");
+  const auto add_output = [&](CLI::App* command) {
+    command->add_option("-o,--output", options->output, "The file to write, .off or .obj")
+        ->type_name("FILE")
+        ->required();
+    command->add_flag("--force", options->force, "Replace the file if it exists");
+  };
+
+  CLI::App* import =
+      cli->AddCommand(group, "import", "Converts a mesh (OFF, OBJ, STL, PLY) to millimetres, z up.",
+                      "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
+                      "touchstone mesh import scan.ply --fit-mm 150 -o scan.obj",
+                      [cli, options] { return RunImport(*cli, *options); });
+  import->add_option("FILE", options->input, "The mesh to read")->type_name("")->required();
+  add_output(import);
+  AddImportOptions(import, options.get());
+
+  CLI::App* shape = cli->AddCommand(
+      group, "supershape", "Writes a Gielis supershape: one of the five built-in ones, or one of your own.",
+      "touchstone mesh supershape lat20 --triangles 100000 -o lat20.obj\n"
+      "touchstone mesh supershape --longitude 6,10,10,10 --latitude 4,10,20,10 --width-mm 120 -o star.off",
+      [cli, options] { return RunSupershape(*cli, *options); });
+  shape->add_option("NAME", options->name, "lat00, lat05, lat10, lat15 or lat20")->type_name("");
+  shape->add_option("--triangles", options->triangles, "About so many, 48 to 4000000. Default: 20000")
+      ->type_name("N");
+  shape
+      ->add_option("--longitude", options->longitude,
+                   "The formula round the z axis; a and b are 1 if left out")
+      ->type_name("M,N1,N2,N3[,A,B]");
+  shape->add_option("--latitude", options->latitude, "The formula from pole to pole")
+      ->type_name("M,N1,N2,N3[,A,B]");
+  shape->add_option("--width-mm", options->width_mm, "The larger extent along x and y. Default: 150")
+      ->type_name("MM");
+  add_output(shape);
+
+  CLI::App* info = cli->AddCommand(group, "info", "Says what a mesh is like: size, holes, faults.",
+                                   "touchstone mesh info cup.stl --unit inch\n"
+                                   "touchstone mesh info scan.ply --json",
+                                   [cli, options] { return RunInfo(*cli, *options); });
+  info->add_option("FILE", options->input, "The mesh to read")->type_name("")->required();
+  AddImportOptions(info, options.get());
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,248 @@
+#include "client/cli/plan_options.h"
+
+#include <absl/strings/numbers.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr char kPlanGroup[] = "Plan";
+constexpr char kImageGroup[] = "Image";
+constexpr char kTouchGroup[] = "Touch";
+constexpr uint64_t kMostPlanBytes = 1 << 30;
+
+// The generators' defaults (source.proto), in the units of files.
+constexpr double kStepAngleDeg = 1;
+constexpr double kRadiusRatio = 1.05;
+constexpr uint32_t kSamplesPerFace = 8;
+constexpr uint32_t kRounds = 4;
+constexpr double kMostTiltDeg = 20;
+constexpr double kSpread = 0.6;
+constexpr double kStandoffMm = 60;
+constexpr double kSpeedMmS = 20;
+
+v1::Vector3 Cross(const v1::Vector3& a, const v1::Vector3& b) {
+  v1::Vector3 c;
+  c.set_x(a.y() * b.z() - a.z() * b.y());
+  c.set_y(a.z() * b.x() - a.x() * b.z());
+  c.set_z(a.x() * b.y() - a.y() * b.x());
+  return c;
+}
+
+double Norm(const v1::Vector3& v) {
+  return std::sqrt(v.x() * v.x() + v.y() * v.y() + v.z() * v.z());
+}
+
+}  // namespace
+
+void AddPlanOptions(CLI::App* command, PlanOptions* options) {
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) {
+    command->add_option(name, value, text)->type_name(type)->group(kPlanGroup);
+  };
+  add("--plan", options->plan, "PLAN",
+      "sphere: random directions round the object; faces: rounds of poses on the six faces of its box; or a "
+      "CSV file "
+      "of explicit touches (touchstone plan writes one). Default: sphere");
+  add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20; a file has its own");
+  add("--touch-interval-s", options->touch_interval_s, "S", "Time between the starts of touches. Default: 0");
+  add("--step-angle-deg", options->step_angle_deg, "DEG",
+      "sphere: directions are multiples of it. Default: 1");
+  add("--roll-step-deg", options->roll_step_deg, "DEG",
+      "sphere: the fingers' row is turned by random multiples of it. Default: 0, not turned");
+  add("--radius-ratio", options->radius_ratio, "RATIO",
+      "sphere: radius of the start sphere over half the box's diagonal. Default: 1.05");
+  add("--samples-per-face", options->samples_per_face, "N", "faces: poses a face. Default: 8");
+  add("--rounds", options->rounds, "N", "faces: repeats of all poses. Default: 4");
+  add("--most-tilt-deg", options->most_tilt_deg, "DEG",
+      "faces: largest angle to the face's normal. Default: 20");
+  add("--spread", options->spread, "RATIO", "faces: targets lie within this share of a face. Default: 0.6");
+  add("--standoff-mm", options->standoff_mm, "MM",
+      "faces: distance of the start from the target. Default: 60");
+}
+
+absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>* objects) {
+  // An option that does nothing is a mistake; it is told, not passed over.
+  const std::pair<const char*, bool> sphere_only[] = {{"--step-angle-deg", o.step_angle_deg.has_value()},
+                                                      {"--roll-step-deg", o.roll_step_deg.has_value()},
+                                                      {"--radius-ratio", o.radius_ratio.has_value()}};
+  const std::pair<const char*, bool> faces_only[] = {{"--samples-per-face", o.samples_per_face.has_value()},
+                                                     {"--rounds", o.rounds.has_value()},
+                                                     {"--most-tilt-deg", o.most_tilt_deg.has_value()},
+                                                     {"--spread", o.spread.has_value()},
+                                                     {"--standoff-mm", o.standoff_mm.has_value()}};
+  const std::pair<const char*, bool> not_in_list[] = {{"--speed-mm-s", o.speed_mm_s.has_value()},
+                                                      {"--touch-interval-s", o.touch_interval_s.has_value()}};
+  const auto misplaced = [&](const auto& options, const char* home) -> absl::Status {
+    for (const auto& [name, given] : options)
+      if (given)
+        return absl::InvalidArgumentError(
+            absl::StrCat(name, " belongs to ", home, ", not to --plan ", o.plan));
+    return absl::OkStatus();
+  };
+  if (o.plan != "sphere") TOUCHSTONE_RETURN_IF_ERROR(misplaced(sphere_only, "--plan sphere"));
+  if (o.plan != "faces") TOUCHSTONE_RETURN_IF_ERROR(misplaced(faces_only, "--plan faces"));
+
+  v1::Plan plan;
+  if (o.plan == "sphere" || o.plan == "faces") {
+    plan.set_speed_m_s(ToSi(Unit::kMillimetrePerSecond, o.speed_mm_s.value_or(kSpeedMmS)));
+    plan.set_touch_interval_s(o.touch_interval_s.value_or(0));
+  }
+  // Zero means "default" on the wire; here it is what the user typed, and wrong.
+  const auto positive = [](const char* name, double value) {
+    return value > 0 ? absl::OkStatus()
+                     : absl::InvalidArgumentError(
+                           absl::StrCat(name, ": ", ShortestNumber(value), " is out of range; above 0"));
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(positive("--speed-mm-s", o.speed_mm_s.value_or(kSpeedMmS)));
+  if (o.plan == "sphere") {
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--step-angle-deg", o.step_angle_deg.value_or(kStepAngleDeg)));
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--radius-ratio", o.radius_ratio.value_or(kRadiusRatio)));
+    v1::SpherePlan* sphere = plan.mutable_sphere();
+    sphere->set_step_angle_rad(ToSi(Unit::kDegree, o.step_angle_deg.value_or(kStepAngleDeg)));
+    sphere->set_roll_step_rad(ToSi(Unit::kDegree, o.roll_step_deg.value_or(0)));
+    sphere->set_radius_ratio(o.radius_ratio.value_or(kRadiusRatio));
+    return plan;
+  }
+  if (o.plan == "faces") {
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--samples-per-face", o.samples_per_face.value_or(kSamplesPerFace)));
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--rounds", o.rounds.value_or(kRounds)));
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--standoff-mm", o.standoff_mm.value_or(kStandoffMm)));
+    v1::FacesPlan* faces = plan.mutable_faces();
+    faces->set_samples_per_face(o.samples_per_face.value_or(kSamplesPerFace));
+    faces->set_rounds(o.rounds.value_or(kRounds));
+    faces->set_most_tilt_rad(ToSi(Unit::kDegree, o.most_tilt_deg.value_or(kMostTiltDeg)));
+    faces->set_spread(o.spread.value_or(kSpread));
+    faces->set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm.value_or(kStandoffMm)));
+    return plan;
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(misplaced(not_in_list, "--plan sphere and faces"));
+  std::error_code error;
+  if (!std::filesystem::exists(o.plan, error))
+    return absl::NotFoundError(absl::StrCat("--plan: '", o.plan, "' is no generator and no file",
+                                            DidYouMean(o.plan, {"sphere", "faces"})));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<client::MeasuredTouch> touches, ReadTouches(o.plan));
+  for (client::MeasuredTouch& touch : touches) {
+    *plan.mutable_list()->add_touches() = std::move(touch.commanded);
+    if (objects != nullptr && std::find(objects->begin(), objects->end(), touch.object) == objects->end())
+      objects->push_back(touch.object);
+  }
+  return plan;
+}
+
+absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMostPlanBytes));
+  return client::ParseMeasurements(text, path);
+}
+
+void AddImageOptions(CLI::App* command, ImageFlags* options) {
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) {
+    command->add_option(name, value, text)->type_name(type)->group(kImageGroup);
+  };
+  add("--image", options->size, "WxH", "Size of images in pixels, up to 2048x2048, for instance 224x224");
+  add("--format", options->format, "FORMAT", "grey or rgb. Default: grey");
+  add("--look", options->look, "LOOK",
+      "shaded: lit, on black; dark-on-white: a dark object on white. Default: shaded");
+  add("--jpeg-quality", options->jpeg_quality, "1-100", "Of JPEG files. Default: 90");
+  add("--fov-deg", options->fov_deg, "DEG", "Vertical field of view. Default: 45");
+  command
+      ->add_flag("--depth", options->depth, "Also depth along the viewing axis, in mm, 0 where no object is")
+      ->group(kImageGroup);
+  command->add_flag("--mask", options->mask, "Also the object's mask, 255 on the object, 0 beside it")
+      ->group(kImageGroup);
+}
+
+absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& o,
+                                            const std::string& encoding) {
+  v1::ImageSpec spec;
+  const std::string size = o.size.empty() ? "224x224" : o.size;
+  const size_t cross = size.find('x');
+  uint32_t width = 0, height = 0;
+  if (cross == std::string::npos || !absl::SimpleAtoi(size.substr(0, cross), &width) ||
+      !absl::SimpleAtoi(size.substr(cross + 1), &height) || width == 0 || height == 0)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--image: '", size, "' is no size; WIDTHxHEIGHT in pixels from 1x1 on, for instance 224x224"));
+  spec.set_width(width);
+  spec.set_height(height);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--format", o.format, {"grey", "rgb"}).status());
+  spec.set_format(o.format == "rgb" ? v1::PIXEL_FORMAT_RGB : v1::PIXEL_FORMAT_GREY);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--look", o.look, {"shaded", "dark-on-white"}).status());
+  spec.set_look(o.look == "shaded" ? v1::LOOK_SHADED : v1::LOOK_DARK_ON_WHITE);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--encoding", encoding, {"png", "jpeg", "raw"}).status());
+  spec.set_encoding(encoding == "png"    ? v1::IMAGE_ENCODING_PNG
+                    : encoding == "jpeg" ? v1::IMAGE_ENCODING_JPEG
+                                         : v1::IMAGE_ENCODING_RAW);
+  if (o.jpeg_quality < 1 || o.jpeg_quality > 100)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--jpeg-quality: ", o.jpeg_quality, " is out of range; 1 to 100"));
+  if (spec.encoding() == v1::IMAGE_ENCODING_JPEG) spec.set_jpeg_quality(o.jpeg_quality);
+  if (!(o.fov_deg > 0 && o.fov_deg < 180))
+    return absl::InvalidArgumentError(
+        absl::StrCat("--fov-deg: ", ShortestNumber(o.fov_deg), " is out of range; above 0, below 180"));
+  spec.set_vertical_fov_rad(ToSi(Unit::kDegree, o.fov_deg));
+  spec.set_depth(o.depth);
+  spec.set_mask(o.mask);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", cli.source().renderer, {"auto", "egl", "cpu"}).status());
+  if (cli.source().renderer == "egl") spec.set_renderer(v1::RENDERER_KIND_EGL);
+  if (cli.source().renderer == "cpu") spec.set_renderer(v1::RENDERER_KIND_CPU);
+  return spec;
+}
+
+void AddTouchOptions(CLI::App* command, TouchFlags* options) {
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) {
+    command->add_option(name, value, text)->type_name(type)->group(kTouchGroup);
+  };
+  add("--approach", options->approach, "X,Y,Z",
+      "Unit vector along which the fingers move, for instance 0,0,-1");
+  add("--target-mm", options->target_mm, "X,Y,Z", "Point that the middle finger aims at. Default: 0,0,0");
+  add("--lateral", options->lateral, "X,Y,Z",
+      "Unit vector from the first finger towards the last, perpendicular to the approach. "
+      "Default: approach x z, or x for a vertical approach");
+  add("--standoff-mm", options->standoff_mm, "MM", "Distance of the start from the target. Default: 100");
+  add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20");
+}
+
+absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& o) {
+  v1::CommandedTouch touch;
+  if (o.approach.empty())
+    return absl::InvalidArgumentError(
+        "--approach is missing: the direction of the touch, for instance 0,0,-1");
+  TOUCHSTONE_ASSIGN_OR_RETURN(*touch.mutable_approach(), ParseVector("--approach", o.approach));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Vector3 target, ParseVector("--target-mm", o.target_mm));
+  touch.mutable_target_m()->set_x(ToSi(Unit::kMillimetre, target.x()));
+  touch.mutable_target_m()->set_y(ToSi(Unit::kMillimetre, target.y()));
+  touch.mutable_target_m()->set_z(ToSi(Unit::kMillimetre, target.z()));
+  if (!o.lateral.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(*touch.mutable_lateral(), ParseVector("--lateral", o.lateral));
+  } else {
+    v1::Vector3 z;
+    z.set_z(1);
+    v1::Vector3 lateral = Cross(touch.approach(), z);
+    const double length = Norm(lateral);
+    // A vertical approach has no horizontal "right"; x is as good as any.
+    constexpr double kVertical = 1e-9;
+    if (length > kVertical) {
+      lateral.set_x(lateral.x() / length);
+      lateral.set_y(lateral.y() / length);
+      lateral.set_z(0);
+    } else {
+      lateral = v1::Vector3();
+      lateral.set_x(1);
+    }
+    *touch.mutable_lateral() = lateral;
+  }
+  touch.set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm));
+  touch.set_speed_m_s(ToSi(Unit::kMillimetrePerSecond, o.speed_mm_s));
+  return touch;
+}
+
+}  // namespace touchstone::cli

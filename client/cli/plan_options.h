@@ -1,0 +1,55 @@
+// Options that several commands share: the plan, the image, explicit touches.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/common.h"
+#include "client/source/measurement_csv.h"
+
+namespace touchstone::cli {
+
+// --plan and what belongs to its generators; unset options are the generator's defaults.
+struct PlanOptions {
+  std::string plan = "sphere";  // sphere, faces or a CSV file
+  std::optional<double> step_angle_deg, roll_step_deg, radius_ratio;
+  std::optional<uint32_t> samples_per_face, rounds;
+  std::optional<double> most_tilt_deg, spread, standoff_mm;
+  std::optional<double> speed_mm_s, touch_interval_s;
+};
+void AddPlanOptions(CLI::App* command, PlanOptions* options);
+
+// The plan with every default written out, so that a specification means the same for ever. A list's objects,
+// in the order of their first row, go to `objects` (may be null).
+absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& options, std::vector<std::string>* objects);
+
+// --image, --format, ...
+struct ImageFlags {
+  std::string size;  // "224x224"
+  std::string format = "grey";
+  std::string look = "shaded";
+  bool depth = false;
+  bool mask = false;
+  int jpeg_quality = 90;
+  double fov_deg = 45;
+};
+void AddImageOptions(CLI::App* command, ImageFlags* options);
+absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& options,
+                                            const std::string& encoding);
+
+// One touch told by options: --approach and so on.
+struct TouchFlags {
+  std::string target_mm = "0,0,0";
+  std::string approach;
+  std::string lateral;
+  double standoff_mm = 100;
+  double speed_mm_s = 20;
+};
+void AddTouchOptions(CLI::App* command, TouchFlags* options);
+absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& options);
+
+// Reads a plan or measurement file.
+absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path);
+
+}  // namespace touchstone::cli

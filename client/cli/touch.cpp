@@ -1,0 +1,157 @@
+// touchstone touch: explicit touches and their contact times.
+#include <cmath>
+
+#include "client/cli/plan_options.h"
+#include "client/source/lab_units.h"
+#include "client/source/measurement_csv.h"
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+struct Options {
+  TouchFlags touch;
+  std::string object;
+  std::string plan;
+  std::string model;
+  uint64_t seed = 0;
+  uint32_t repeats = 1;
+  std::string output;
+};
+
+// What a touch gave, beside the row of the measurement file.
+struct TouchRow {
+  client::MeasuredTouch measured;
+  v1::TouchResult result;
+};
+
+absl::StatusOr<std::vector<TouchRow>> CommandedRows(const Options& options) {
+  std::vector<client::MeasuredTouch> touches;
+  if (!options.plan.empty()) {
+    if (!options.touch.approach.empty())
+      return absl::InvalidArgumentError(
+          "--approach and --plan: give one touch by options, or many by a file");
+    TOUCHSTONE_ASSIGN_OR_RETURN(touches, ReadTouches(options.plan));
+    for (client::MeasuredTouch& touch : touches)
+      if (!options.object.empty()) touch.object = options.object;
+  } else {
+    if (options.object.empty())
+      return absl::InvalidArgumentError("OBJECT is missing: what to touch (touchstone objects lists it)");
+    client::MeasuredTouch touch;
+    touch.object = options.object;
+    TOUCHSTONE_ASSIGN_OR_RETURN(touch.commanded, MakeTouch(options.touch));
+    touches.push_back(std::move(touch));
+  }
+  if (options.repeats < 1) return absl::InvalidArgumentError("--repeats: 0 is out of range; 1 or more");
+  std::vector<TouchRow> rows;
+  for (uint32_t repeat = 0; repeat < options.repeats; ++repeat)
+    for (const client::MeasuredTouch& touch : touches) {
+      rows.push_back({touch, {}});
+      rows.back().measured.touch = rows.size() - 1;
+    }
+  return rows;
+}
+
+// Rows of one object that follow each other are one session; the noise hangs on the row's number alone.
+absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchRow>* rows,
+                      std::string* model_hash) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::DescribeResponse source,
+      client::Connection::Call(&v1::Source::Stub::Describe, connection->source(), v1::DescribeRequest()));
+  const size_t most = std::max<uint32_t>(1, source.most_touches_per_request());
+  for (size_t first = 0; first < rows->size();) {
+    v1::TouchRequest request;
+    request.set_object((*rows)[first].measured.object);
+    *request.mutable_model() = model;
+    request.set_seed(options.seed);
+    request.set_first_index(first);
+    size_t stop = first;
+    while (stop < rows->size() && stop - first < most && (*rows)[stop].measured.object == request.object())
+      *request.add_touches() = (*rows)[stop++].measured.commanded;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        v1::TouchResponse response,
+        client::Connection::Call(&v1::Source::Stub::Touch, connection->source(), request));
+    if (static_cast<size_t>(response.results_size()) != stop - first)
+      return absl::InternalError(absl::StrCat("the source gave ", response.results_size(), " results for ",
+                                              stop - first, " touches"));
+    for (size_t row = first; row < stop; ++row) {
+      v1::TouchResult& result = *response.mutable_results(static_cast<int>(row - first));
+      (*rows)[row].measured.time_s.assign(result.contact_time_s().begin(), result.contact_time_s().end());
+      (*rows)[row].result = std::move(result);
+    }
+    *model_hash = response.model_hash();
+    first = stop;
+  }
+  return absl::OkStatus();
+}
+
+// JSON has no NaN: a finger that reported nothing is null.
+Json Numbers(const google::protobuf::RepeatedField<double>& values, Unit unit) {
+  Json list = Json::array();
+  for (const double value : values)
+    list.push_back(std::isfinite(value) ? Json(client::LabNumber(unit, value)) : Json());
+  return list;
+}
+
+Json RowJson(const TouchRow& row) {
+  const v1::TouchResult& r = row.result;
+  return {{"touch", row.measured.touch},
+          {"object", row.measured.object},
+          {"complete", r.complete()},
+          {"descriptor_us", Numbers(r.descriptor_s(), Unit::kMicrosecond)},
+          {"contact_time_us", Numbers(r.contact_time_s(), Unit::kMicrosecond)},
+          {"travel_mm", Numbers(r.travel_m(), Unit::kMillimetre)},
+          {"contact_point_mm", Numbers(r.contact_point_m(), Unit::kMillimetre)},
+          {"normal", Numbers(r.normal(), Unit::kNone)}};
+}
+
+absl::Status RunTouch(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<TouchRow> rows, CommandedRows(options));
+  std::string model_hash;
+  TOUCHSTONE_RETURN_IF_ERROR(TouchAll(cli, options, &rows, &model_hash));
+  size_t incomplete = 0;
+  for (const TouchRow& row : rows) incomplete += !row.result.complete();
+  if (incomplete > 0)
+    cli.Log(absl::StrCat(incomplete, " of ", rows.size(),
+                         " touches are incomplete: a finger met nothing, its time is left empty"));
+  if (cli.output().json) {
+    Json list = Json::array();
+    for (const TouchRow& row : rows) list.push_back(RowJson(row));
+    return WriteOutput(options.output, Json({{"model_hash", model_hash}, {"touches", list}}).dump(2) + "\n");
+  }
+  std::vector<client::MeasuredTouch> measured;
+  for (TouchRow& row : rows) measured.push_back(std::move(row.measured));
+  return WriteOutput(options.output, client::FormatMeasurements(measured));
+}
+
+}  // namespace
+
+void AddTouch(Cli* cli) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = cli->AddCommand(
+      nullptr, "touch",
+      "Touches an object and prints a measurement file: one row a touch, t_*_us when each finger met it.",
+      "touchstone touch lat20 --approach 0,0,-1\n"
+      "touchstone touch lat20 --approach 0,0,-1 --target-mm 10,0,0 --lateral 0,1,0 --repeats 10 --model "
+      "noisy.yaml\n"
+      "touchstone touch --plan plan.csv --model tips.yaml --seed 7 -o set.csv\n"
+      "touchstone touch lat20 --approach=-1,0,0 --json",
+      [cli, options] { return RunTouch(*cli, *options); });
+  command->add_option("OBJECT", options->object, "What to touch; with --plan, instead of the file's objects")
+      ->type_name("");
+  command->add_option("--plan", options->plan, "A CSV file of touches (touchstone plan writes one)")
+      ->type_name("FILE");
+  command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")
+      ->type_name("MODEL");
+  command->add_option("--seed", options->seed, "Seed of the noise. Default: 0")->type_name("N");
+  command->add_option("--repeats", options->repeats, "How often all of it is touched. Default: 1")
+      ->type_name("N");
+  command->add_option("-o,--output", options->output, "The file to write. Default: stdout")
+      ->type_name("FILE");
+  AddTouchOptions(command, &options->touch);
+  cli->AddSourceOptions(command);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,100 @@
+#include "client/source/connection.h"
+
+#include <absl/strings/str_cat.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+
+#include <chrono>
+
+#include "server/base/status.h"
+
+namespace touchstone::client {
+namespace {
+
+std::chrono::system_clock::time_point InSeconds(double seconds) {
+  return std::chrono::system_clock::now() + std::chrono::microseconds(static_cast<int64_t>(seconds * 1e6));
+}
+
+// "host:port" with a port from 1 to 65535, or an address scheme of gRPC's own ("unix:/run/touchstone").
+absl::Status ValidateAddress(const std::string& address) {
+  const size_t colon = address.rfind(':');
+  if (address.rfind("unix:", 0) == 0 && address.size() > 5) return absl::OkStatus();
+  const std::string port = colon == std::string::npos ? "" : address.substr(colon + 1);
+  const bool digits =
+      !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
+  if (colon == 0 || !digits || std::stoi(port) < 1 || std::stoi(port) > 65535)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--server: '", address, "' is not HOST:PORT, for instance 127.0.0.1:50051"));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(ConnectionOptions options) {
+  for (const std::string& server : options.servers) TOUCHSTONE_RETURN_IF_ERROR(ValidateAddress(server));
+  std::unique_ptr<Connection> connection(new Connection);
+  connection->options_ = std::move(options);
+  if (connection->options_.servers.empty()) {
+    ServerOptions embedded = connection->options_.embedded;
+    embedded.listen.clear();
+    TOUCHSTONE_ASSIGN_OR_RETURN(connection->server_, Server::Start(std::move(embedded)));
+    connection->address_ = "this process";
+    connection->channel_ = connection->server_->InProcessChannel();
+    connection->MakeStubs();
+    return connection;
+  }
+  connection->server_index_ = connection->server_count() - 1;
+  TOUCHSTONE_RETURN_IF_ERROR(connection->ConnectToNext());
+  return connection;
+}
+
+Connection::~Connection() {
+  // The server drains when it goes; no call may be left on the channel by then.
+  source_.reset();
+  models_.reset();
+  control_.reset();
+  channel_.reset();
+}
+
+absl::Status Connection::ConnectToNext() {
+  if (embedded()) return absl::FailedPreconditionError("a source in this process cannot be lost");
+  std::string tried;
+  for (int i = 1; i <= server_count(); ++i) {
+    const int index = (server_index_ + i) % server_count();
+    const absl::Status status = Connect(index);
+    if (status.ok()) return status;
+    absl::StrAppend(&tried, tried.empty() ? "" : "; ", status.message());
+  }
+  return absl::UnavailableError(absl::StrCat(
+      tried, ". Is touchstone-server running there? Without --server the simulation runs in this process"));
+}
+
+absl::Status Connection::Connect(int server_index) {
+  const std::string& address = options_.servers[server_index];
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMostMessageBytes);
+  arguments.SetMaxSendMessageSize(kMostMessageBytes);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  // A server whose machine died sends nothing: ask for a sign of life, so that a stream does not wait for
+  // ever.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  if (!channel->WaitForConnected(InSeconds(options_.connect_timeout_s)))
+    return absl::UnavailableError(
+        absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
+  server_index_ = server_index;
+  address_ = address;
+  channel_ = std::move(channel);
+  MakeStubs();
+  return absl::OkStatus();
+}
+
+void Connection::MakeStubs() {
+  source_ = v1::Source::NewStub(channel_);
+  models_ = v1::Models::NewStub(channel_);
+  control_ = v1::Control::NewStub(channel_);
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,80 @@
+// The way to a source: over the network to one of several equal servers, or to a virtual source inside this
+// process. Both are gRPC channels, so whatever runs over one runs over the other and gives the same bytes.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+
+#include "client/source/errors.h"
+#include "server/service/server.h"
+#include "server/service/server_options.h"
+#include "touchstone/v1/control.grpc.pb.h"
+#include "touchstone/v1/models.grpc.pb.h"
+#include "touchstone/v1/source.grpc.pb.h"
+
+namespace touchstone::client {
+
+// The largest message that a client accepts: a batch of images goes well beyond gRPC's 4 MiB.
+inline constexpr int kMostMessageBytes = 256 << 20;
+
+struct ConnectionOptions {
+  std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process
+  ServerOptions embedded;            // of the source in this process; `listen` is ignored
+  double connect_timeout_s = 5;      // for one server
+};
+
+// Not safe for use by several threads at once, apart from the stubs, which are.
+class Connection {
+ public:
+  // Connects to the first server that answers, or starts a source in this process. UNAVAILABLE names every
+  // server that was tried.
+  static absl::StatusOr<std::unique_ptr<Connection>> Open(ConnectionOptions options);
+  ~Connection();
+
+  v1::Source::Stub& source() { return *source_; }
+  v1::Models::Stub& models() { return *models_; }
+  v1::Control::Stub& control() { return *control_; }
+  const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
+
+  // "127.0.0.1:50051", or "this process".
+  const std::string& address() const { return address_; }
+  bool embedded() const { return server_ != nullptr; }
+  int server_count() const { return static_cast<int>(options_.servers.size()); }
+
+  // Goes on to the next server that answers, beginning after the present one; the present one is the last
+  // that is tried. For a source in this process: an error, since it cannot be lost.
+  absl::Status ConnectToNext();
+
+  // One unary call: Call(&v1::Source::Stub::Describe, connection.source(), request).
+  template <typename Stub, typename Request, typename Response>
+  static absl::StatusOr<Response> Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                                    Response*),
+                                       Stub& stub, const Request& request) {
+    grpc::ClientContext context;
+    Response response;
+    const absl::Status status = FromGrpc((stub.*method)(&context, request, &response));
+    if (!status.ok()) return status;
+    return response;
+  }
+
+ private:
+  Connection() = default;
+  absl::Status Connect(int server_index);
+  void MakeStubs();
+
+  ConnectionOptions options_;
+  std::unique_ptr<Server> server_;  // in this process; outlives the channel
+  int server_index_ = 0;
+  std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::Source::Stub> source_;
+  std::unique_ptr<v1::Models::Stub> models_;
+  std::unique_ptr<v1::Control::Stub> control_;
+};
+
+}  // namespace touchstone::client

@@ -1,0 +1,164 @@
+#include "client/source/dataset_stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "server/base/status.h"
+
+namespace touchstone::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFirstBackoffS = 0.1;
+constexpr double kLongestBackoffS = 3;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// The stream may go on only where the same request means the same bytes.
+absl::Status CompareHeaders(const v1::DatasetHeader& before, const v1::DatasetHeader& now,
+                            const std::string& address) {
+  const auto differs = [&](const char* what, const auto& a, const auto& b) {
+    return absl::FailedPreconditionError(absl::StrCat("the stream cannot go on at ", address, ": its ", what,
+                                                      " is ", b, ", it was ", a,
+                                                      "; the rest would not fit the beginning"));
+  };
+  if (before.model_hash() != now.model_hash())
+    return differs("model hash", before.model_hash(), now.model_hash());
+  if (before.version() != now.version()) return differs("version", before.version(), now.version());
+  if (before.samples() != now.samples()) return differs("number of samples", before.samples(), now.samples());
+  if (before.renderer() != now.renderer())
+    return differs("renderer", v1::RendererKind_Name(before.renderer()),
+                   v1::RendererKind_Name(now.renderer()));
+  if (before.mesh_hashes_size() != now.mesh_hashes_size())
+    return differs("number of objects", before.mesh_hashes_size(), now.mesh_hashes_size());
+  for (int i = 0; i < before.mesh_hashes_size(); ++i)
+    if (before.mesh_hashes(i) != now.mesh_hashes(i))
+      return differs("mesh hash", before.mesh_hashes(i), now.mesh_hashes(i));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+DatasetStream::DatasetStream(Connection* connection, v1::StreamDatasetRequest request,
+                             DatasetStreamOptions options)
+    : connection_(connection), request_(std::move(request)), options_(std::move(options)) {}
+
+DatasetStream::~DatasetStream() {
+  if (reader_ == nullptr) return;
+  Cancel();
+  CloseReader().IgnoreError();
+}
+
+absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Open(Connection* connection,
+                                                                   v1::StreamDatasetRequest request,
+                                                                   DatasetStreamOptions options) {
+  std::unique_ptr<DatasetStream> stream(
+      new DatasetStream(connection, std::move(request), std::move(options)));
+  absl::Status status = stream->Start();
+  if (IsLostServer(status)) status = stream->Reconnect(status);
+  TOUCHSTONE_RETURN_IF_ERROR(status);
+  return stream;
+}
+
+absl::Status DatasetStream::Start() {
+  {
+    std::lock_guard<std::mutex> lock(context_mutex_);
+    if (cancelled_) return absl::CancelledError("the stream was cancelled");
+    context_ = std::make_unique<grpc::ClientContext>();
+  }
+  reader_ = connection_->source().StreamDataset(context_.get(), request_);
+  v1::StreamDatasetResponse first;
+  if (!reader_->Read(&first)) {
+    const absl::Status status = CloseReader();
+    return status.ok() ? absl::InternalError("the source ended the dataset before its header") : status;
+  }
+  if (!first.has_header()) return absl::InternalError("the source began the dataset without a header");
+  if (have_header_) return CompareHeaders(header_, first.header(), connection_->address());
+
+  // What the first server chose for itself is asked of every later one: its model, whole, and its renderer.
+  header_ = first.header();
+  have_header_ = true;
+  if (!header_.model_yaml().empty()) request_.mutable_spec()->mutable_model()->set_yaml(header_.model_yaml());
+  if (header_.renderer() != v1::RENDERER_KIND_UNSPECIFIED)
+    request_.mutable_spec()->mutable_image()->set_renderer(header_.renderer());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
+  while (true) {
+    if (reader_ == nullptr) return false;
+    if (reader_->Read(&batch->message_)) {
+      if (!batch->message_.has_batch())
+        return absl::InternalError("the source sent a message without a batch in the middle of a dataset");
+      // Where the stream would go on after this batch, were the server lost now.
+      if (request_.batch_size() > 0)
+        batch_rows_ = request_.batch_size();
+      else
+        batch_rows_ = std::max(batch_rows_, batch->rows());
+      const uint64_t stride = std::max<uint64_t>(1, request_.batch_stride());
+      request_.set_start_index(batch->start_index() + (stride == 1 ? batch->rows() : batch_rows_ * stride));
+      return true;
+    }
+    const absl::Status status = CloseReader();
+    if (cancelled_) return absl::CancelledError("the stream was cancelled");
+    if (status.ok()) return false;
+    if (!IsLostServer(status)) return status;
+    // Lost after the last batch but before the goodbye: there is nothing left to ask for.
+    const uint64_t stop = request_.stop_index() > 0 ? request_.stop_index() : header_.samples();
+    if (request_.start_index() >= stop) return false;
+    TOUCHSTONE_RETURN_IF_ERROR(Reconnect(status));
+  }
+}
+
+absl::Status DatasetStream::Reconnect(absl::Status lost) {
+  if (connection_->embedded() || options_.reconnect_s <= 0) return lost;
+  if (options_.log) options_.log(absl::StrCat("lost ", connection_->address(), ": ", lost.message()));
+  const Clock::time_point start = Clock::now();
+  double backoff_s = kFirstBackoffS;
+  while (true) {
+    absl::Status status = connection_->ConnectToNext();
+    if (status.ok()) status = Start();
+    if (status.ok()) {
+      if (options_.log)
+        options_.log(
+            absl::StrCat("going on at ", connection_->address(), " with sample ", request_.start_index()));
+      return status;
+    }
+    // A server that is full may have room soon; anything else will not get better by waiting.
+    if (!IsLostServer(status) && !absl::IsResourceExhausted(status)) return status;
+    if (SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
+    const Clock::time_point wake =
+        Clock::now() + std::chrono::milliseconds(static_cast<int>(backoff_s * 1000));
+    while (Clock::now() < wake) {
+      if (cancelled_) return absl::CancelledError("the stream was cancelled");
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+  }
+}
+
+absl::Status DatasetStream::CloseReader() {
+  // Reads to the end what a cancelled call still has in store: gRPC demands it before Finish.
+  v1::StreamDatasetResponse rest;
+  while (reader_->Read(&rest)) {
+  }
+  const absl::Status status = FromGrpc(reader_->Finish());
+  reader_.reset();
+  std::lock_guard<std::mutex> lock(context_mutex_);
+  context_.reset();
+  return status;
+}
+
+void DatasetStream::Cancel() {
+  std::lock_guard<std::mutex> lock(context_mutex_);
+  cancelled_ = true;
+  if (context_ != nullptr) context_->TryCancel();
+}
+
+}  // namespace touchstone::client

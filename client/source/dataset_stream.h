@@ -1,0 +1,62 @@
+// A dataset as a stream of batches that survives the loss of its server: since a sample is a pure function of
+// its index, the stream goes on at the same or another server where it stopped, without a gap or a repeat.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include <absl/status/statusor.h>
+#include <grpcpp/support/sync_stream.h>
+
+#include "client/source/batch.h"
+#include "client/source/connection.h"
+
+namespace touchstone::client {
+
+struct DatasetStreamOptions {
+  // A lost server is looked for, there and at the others, for this long since the last batch; then the stream
+  // fails with UNAVAILABLE.
+  double reconnect_s = 60;
+  // Told, from the reading thread, when a server was lost and when the stream goes on.
+  std::function<void(const std::string&)> log;
+};
+
+class DatasetStream {
+ public:
+  // Sends the request and waits for the header. `connection` must outlive the stream; two streams at once
+  // need two connections.
+  static absl::StatusOr<std::unique_ptr<DatasetStream>> Open(Connection* connection,
+                                                             v1::StreamDatasetRequest request,
+                                                             DatasetStreamOptions options = {});
+  ~DatasetStream();  // cancels what is still under way
+
+  const v1::DatasetHeader& header() const { return header_; }
+
+  // The next batch, read into `batch`, whose buffers are reused: hand in the same one again. False at the
+  // end. CANCELLED after Cancel.
+  absl::StatusOr<bool> Next(Batch* batch);
+
+  // Ends the stream; Next returns CANCELLED within a batch. Safe from any thread.
+  void Cancel();
+
+ private:
+  DatasetStream(Connection* connection, v1::StreamDatasetRequest request, DatasetStreamOptions options);
+  absl::Status Start();  // one try: sends the request, reads and compares the header
+  absl::Status Reconnect(absl::Status lost);
+  absl::Status CloseReader();  // the stream's final status
+
+  Connection* connection_;
+  v1::StreamDatasetRequest request_;  // start_index moves on with every batch
+  DatasetStreamOptions options_;
+  v1::DatasetHeader header_;
+  bool have_header_ = false;
+  uint64_t batch_rows_ = 0;  // rows of a full batch, learned from the first
+  std::atomic<bool> cancelled_{false};
+  std::mutex context_mutex_;  // guards context_ against Cancel
+  std::unique_ptr<grpc::ClientContext> context_;
+  std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>> reader_;
+};
+
+}  // namespace touchstone::client

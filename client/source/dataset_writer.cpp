@@ -1,0 +1,341 @@
+#include "client/source/dataset_writer.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+
+#include "client/source/synced_file.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMostManifestBytes = uint64_t{1} << 30;
+constexpr double kManifestIntervalS = 1;
+constexpr char kHowToGoOn[] = "Use another folder, or --restart to delete what is there";
+
+// "shard-000012.tar", "shard-000012", "shard-000012.h5" and their .part; nothing else in a folder is ours.
+bool IsShardName(const std::string& name) {
+  const std::string prefix = "shard-";
+  if (name.rfind(prefix, 0) != 0) return false;
+  const size_t end = name.find_first_not_of("0123456789", prefix.size());
+  const std::string rest = end == std::string::npos ? "" : name.substr(end);
+  return end != prefix.size() && (rest.empty() || rest == ".tar" || rest == ".h5" || rest == ".part" ||
+                                  rest == ".tar.part" || rest == ".h5.part");
+}
+
+// "dataset.json" and the jobs' "dataset.job-1-of-4.json".
+bool IsManifestName(const std::string& name) {
+  return name == kManifestName || name == absl::StrCat(kManifestName, kPartSuffix) ||
+         (name.rfind("dataset.job-", 0) == 0 && name.find(".json") != std::string::npos);
+}
+
+std::vector<fs::path> ListFolder(const std::string& folder) {
+  std::vector<fs::path> paths;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    paths.push_back(entry->path());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+bool IsWholeManifest(const fs::path& path) {
+  return IsManifestName(path.filename().string()) && path.extension() == ".json";
+}
+
+}  // namespace
+
+// Keeps two runs from writing the same shards: one run alone, or parallel jobs with numbers of their own.
+class DatasetWriter::FolderLock {
+ public:
+  ~FolderLock() {
+    for (const int descriptor : descriptors_) ::close(descriptor);
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+
+  absl::Status Take(const DatasetJob& job) {
+    TOUCHSTONE_RETURN_IF_ERROR(
+        TakeOne(job.folder, O_RDONLY | O_DIRECTORY, job.job_count == 1 ? LOCK_EX : LOCK_SH));
+    if (job.job_count == 1) return absl::OkStatus();
+    const std::string path =
+        absl::StrCat(job.folder, "/.job-", job.job_index, "-of-", job.job_count, ".lock");
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOne(path, O_RDWR | O_CREAT, LOCK_EX));
+    path_ = path;
+    return absl::OkStatus();
+  }
+
+ private:
+  absl::Status TakeOne(const std::string& path, int flags, int operation) {
+    const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+    if (descriptor < 0) return FileError(errno, path, "cannot be opened");
+    descriptors_.push_back(descriptor);
+    if (::flock(descriptor, operation | LOCK_NB) == 0) return absl::OkStatus();
+    if (errno == EWOULDBLOCK)
+      return absl::InvalidArgumentError(absl::StrCat(path,
+                                                     ": another run is writing there now. Wait for it, use "
+                                                     "another folder, or share the work with --shards"));
+    return absl::OkStatus();  // a file system without locks
+  }
+
+  std::vector<int> descriptors_;
+  std::string path_;
+};
+
+DatasetWriter::DatasetWriter(Connection* connection, DatasetJob job)
+    : connection_(connection), job_(std::move(job)), request_spec_(job_.spec) {}
+
+DatasetWriter::~DatasetWriter() = default;
+
+void DatasetWriter::Cancel() {
+  std::lock_guard<std::mutex> lock(stream_mutex_);
+  cancelled_ = true;
+  if (running_ != nullptr) running_->Cancel();
+}
+
+std::string DatasetWriter::ManifestPath() const {
+  if (job_.job_count == 1) return absl::StrCat(job_.folder, "/", kManifestName);
+  return absl::StrCat(job_.folder, "/dataset.job-", job_.job_index, "-of-", job_.job_count, ".json");
+}
+
+absl::Status DatasetWriter::Run() {
+  if (job_.shard_size == 0) return absl::InvalidArgumentError("--shard-size: 0; at least 1 sample a shard");
+  if (job_.job_count == 0 || job_.job_index >= job_.job_count)
+    return absl::InvalidArgumentError(absl::StrCat("--shards: ", job_.job_index, "/", job_.job_count,
+                                                   "; the first number goes from 0 to the second less one"));
+  if (job_.restart && job_.job_count > 1)
+    return absl::InvalidArgumentError(
+        "--restart with --shards would delete the other jobs' shards; empty the folder before the jobs "
+        "start");
+  TOUCHSTONE_RETURN_IF_ERROR(PrepareFolder());
+  TOUCHSTONE_RETURN_IF_ERROR(Resolve());
+  TOUCHSTONE_RETURN_IF_ERROR(FindFinishedShards());
+
+  // Runs of missing shards: each is one stream.
+  const uint64_t shards = layout_.ShardCount();
+  const auto missing = [&](uint64_t shard) { return Mine(shard) && manifest_.shards.count(shard) == 0; };
+  absl::Status status = WriteManifest();
+  for (uint64_t first = 0; status.ok() && first < shards; ++first) {
+    if (!missing(first)) continue;
+    uint64_t stop = first + 1;
+    while (stop < shards && missing(stop)) ++stop;
+    status = WriteShards(first, stop);
+    first = stop - 1;
+  }
+  // Whatever ended the run: what is finished is written down.
+  const absl::Status written = WriteManifest();
+  TOUCHSTONE_RETURN_IF_ERROR(status);
+  TOUCHSTONE_RETURN_IF_ERROR(written);
+  if (job_.job_count > 1) return CompleteTogether();
+  result_.dataset_complete = true;
+  return absl::OkStatus();
+}
+
+absl::Status DatasetWriter::PrepareFolder() {
+  std::error_code error;
+  fs::create_directories(job_.folder, error);
+  if (error)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--out: ", job_.folder, " cannot be made: ", error.message()));
+  if (::access(job_.folder.c_str(), W_OK | X_OK) != 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--out: ", job_.folder, " may not be written: ", std::strerror(errno)));
+  lock_ = std::make_unique<FolderLock>();
+  TOUCHSTONE_RETURN_IF_ERROR(lock_->Take(job_));
+  if (job_.restart)
+    for (const fs::path& path : ListFolder(job_.folder))
+      if (IsShardName(path.filename().string()) || IsManifestName(path.filename().string())) {
+        fs::remove_all(path, error);
+        if (error) return FileError(error.value(), path.string(), "cannot be deleted");
+      }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetWriter::OpenStream(uint64_t start_index,
+                                                                         uint64_t stop_index,
+                                                                         uint32_t batch_size) {
+  if (cancelled_) return absl::CancelledError("interrupted");
+  v1::StreamDatasetRequest request;
+  *request.mutable_spec() = request_spec_;
+  request.set_start_index(start_index);
+  request.set_stop_index(stop_index);
+  request.set_batch_size(batch_size);
+  DatasetStreamOptions options;
+  options.reconnect_s = job_.reconnect_s;
+  options.log = on_log;
+  return DatasetStream::Open(connection_, std::move(request), options);
+}
+
+absl::Status DatasetWriter::Resolve() {
+  // A dataset begun by one renderer is finished by it.
+  if (request_spec_.image().renderer() == v1::RENDERER_KIND_UNSPECIFIED && request_spec_.has_image()) {
+    for (const fs::path& path : ListFolder(job_.folder)) {
+      if (!IsWholeManifest(path)) continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path.string(), kMostManifestBytes));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ParseManifest(text, path.string()));
+      request_spec_.mutable_image()->set_renderer(RendererOfName(before.identity.value("renderer", "")));
+      break;
+    }
+  }
+  // One sample tells all: the header comes with it.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<DatasetStream> stream, OpenStream(0, 1, 1));
+  const v1::DatasetHeader& header = stream->header();
+  if (header.samples() == 0)
+    return absl::InvalidArgumentError("--samples: 0; a dataset has at least one sample");
+
+  layout_.format = job_.format;
+  layout_.folder = job_.folder;
+  layout_.samples = header.samples();
+  layout_.shard_size = job_.shard_size;
+  layout_.objects.assign(job_.spec.objects().begin(), job_.spec.objects().end());
+  layout_.fingers = static_cast<int>(header.fingers());
+  layout_.image_extension = job_.spec.image().encoding() == v1::IMAGE_ENCODING_JPEG ? "jpg" : "png";
+  for (const v1::Column& column : header.columns()) layout_.columns.push_back(FileColumnOf(column));
+  manifest_.identity = MakeIdentity(job_.spec, header, layout_);
+
+  if (!header.model_yaml().empty()) request_spec_.mutable_model()->set_yaml(header.model_yaml());
+  if (header.renderer() != v1::RENDERER_KIND_UNSPECIFIED)
+    request_spec_.mutable_image()->set_renderer(header.renderer());
+  return absl::OkStatus();
+}
+
+absl::Status DatasetWriter::FindFinishedShards() {
+  // Every manifest in the folder must be of this very dataset.
+  bool any_manifest = false;
+  std::map<uint64_t, ShardFacts> listed;
+  for (const fs::path& path : ListFolder(job_.folder)) {
+    if (!IsWholeManifest(path)) continue;
+    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMostManifestBytes);
+    if (absl::IsNotFound(text.status()) && job_.job_count > 1)
+      continue;  // another job has just completed the dataset
+    TOUCHSTONE_RETURN_IF_ERROR(text.status());
+    TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ParseManifest(*text, path.string()));
+    const std::vector<std::string> differences = DiffIdentities(before.identity, manifest_.identity);
+    if (!differences.empty())
+      return absl::InvalidArgumentError(absl::StrCat(
+          path.string(), " is another dataset: ", absl::StrJoin(differences, "; "), ". ", kHowToGoOn));
+    any_manifest = true;
+    listed.insert(before.shards.begin(), before.shards.end());
+  }
+  if (!any_manifest)
+    for (const fs::path& path : ListFolder(job_.folder))
+      if (IsShardName(path.filename().string()) && path.extension() != kPartSuffix && job_.job_count == 1)
+        return absl::InvalidArgumentError(absl::StrCat(path.string(), " stands there, but no ", kManifestName,
+                                                       " says of what dataset. ", kHowToGoOn));
+
+  // What stands under a shard's own name is whole. One that the manifest does not list yet is hashed now.
+  for (uint64_t shard = 0; shard < layout_.ShardCount(); ++shard) {
+    if (!Mine(shard)) continue;
+    progress_.samples_in_job += layout_.SamplesIn(shard);
+    const std::string path = absl::StrCat(job_.folder, "/", layout_.ShardName(shard));
+    std::error_code error;
+    if (!fs::exists(path, error)) continue;
+    const auto known = listed.find(shard);
+    const bool same_size = known != listed.end() && (layout_.format == ShardFormat::kFolder ||
+                                                     fs::file_size(path, error) == known->second.bytes);
+    if (known != listed.end() && !same_size)
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, " has ", fs::file_size(path, error), " bytes, but ", kManifestName, " says ",
+                       known->second.bytes, ": it was changed. Delete it, and it will be made again"));
+    if (same_size) {
+      manifest_.shards[shard] = known->second;
+    } else {
+      TOUCHSTONE_ASSIGN_OR_RETURN(manifest_.shards[shard], ReadShardFacts(layout_, shard));
+    }
+    progress_.samples_done += layout_.SamplesIn(shard);
+    ++result_.shards_found;
+  }
+  result_.samples_in_dataset = layout_.samples;
+  return absl::OkStatus();
+}
+
+absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shard) {
+  const uint64_t stop_index = layout_.FirstIndex(stop_shard - 1) + layout_.SamplesIn(stop_shard - 1);
+  uint64_t next_index = layout_.FirstIndex(first_shard);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<DatasetStream> stream,
+                              OpenStream(next_index, stop_index, job_.batch_size));
+  {
+    std::lock_guard<std::mutex> lock(stream_mutex_);
+    running_ = stream.get();
+    if (cancelled_) running_->Cancel();
+  }
+  const auto forget_stream = [this](void*) {
+    std::lock_guard<std::mutex> lock(stream_mutex_);
+    running_ = nullptr;
+  };
+  const std::unique_ptr<void, decltype(forget_stream)> guard(this, forget_stream);
+
+  auto manifest_written = std::chrono::steady_clock::now();
+  uint64_t shard = first_shard;
+  std::unique_ptr<ShardWriter> writer;
+  Batch batch;
+  while (next_index < stop_index) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, stream->Next(&batch));
+    if (!more || batch.start_index() != next_index || batch.rows() == 0)
+      return absl::InternalError(absl::StrCat("the source ", more ? "skipped from" : "ended the dataset at",
+                                              " sample ", next_index, "; ", stop_index, " were asked for"));
+    // A batch may end in the middle of a shard, or hold several.
+    for (uint64_t row = 0; row < batch.rows();) {
+      if (writer == nullptr) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(writer, CreateShardWriter(layout_, shard));
+      }
+      const uint64_t shard_stop = layout_.FirstIndex(shard) + layout_.SamplesIn(shard);
+      const uint64_t rows = std::min(batch.rows() - row, shard_stop - next_index);
+      TOUCHSTONE_RETURN_IF_ERROR(writer->Append(batch, row, rows));
+      row += rows;
+      next_index += rows;
+      if (next_index < shard_stop) continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(manifest_.shards[shard], writer->Finish());
+      writer.reset();
+      ++shard;
+      ++result_.shards_written;
+      const auto now = std::chrono::steady_clock::now();
+      if (std::chrono::duration<double>(now - manifest_written).count() >= kManifestIntervalS) {
+        TOUCHSTONE_RETURN_IF_ERROR(WriteManifest());
+        manifest_written = now;
+      }
+    }
+    result_.samples_written += batch.rows();
+    progress_.samples_done += batch.rows();
+    progress_.samples_this_run += batch.rows();
+    if (on_progress) on_progress(progress_);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DatasetWriter::WriteManifest() {
+  const bool complete = job_.job_count == 1 && manifest_.shards.size() == layout_.ShardCount();
+  return WriteFileAtomically(ManifestPath(), FormatManifest(manifest_, complete));
+}
+
+absl::Status DatasetWriter::CompleteTogether() {
+  // The merged manifest is a pure function of the shards, so that two jobs that end at the same time write
+  // the same file; the jobs' own files go once it stands.
+  DatasetManifest merged = manifest_;
+  for (const fs::path& path : ListFolder(job_.folder)) {
+    if (!IsWholeManifest(path)) continue;
+    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMostManifestBytes);
+    if (!text.ok()) continue;  // removed by a job that has completed the dataset
+    TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest other, ParseManifest(*text, path.string()));
+    merged.shards.insert(other.shards.begin(), other.shards.end());
+  }
+  if (merged.shards.size() < layout_.ShardCount()) return absl::OkStatus();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      WriteFileAtomically(absl::StrCat(job_.folder, "/", kManifestName), FormatManifest(merged, true)));
+  std::error_code ignored;
+  for (const fs::path& path : ListFolder(job_.folder))
+    if (IsWholeManifest(path) && path.filename() != kManifestName) fs::remove(path, ignored);
+  result_.dataset_complete = true;
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,15 @@
+// gRPC statuses and ours are the same codes under two names.
+#pragma once
+
+#include <absl/status/status.h>
+#include <grpcpp/support/status.h>
+
+namespace touchstone::client {
+
+// The same code and message.
+absl::Status FromGrpc(const grpc::Status& status);
+
+// True if another try, at this server or another, may succeed without any change of the request.
+bool IsLostServer(const absl::Status& status);
+
+}  // namespace touchstone::client
