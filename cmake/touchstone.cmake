@@ -30,14 +30,20 @@ function(touchstone_library name)
   touchstone_link(touchstone_${name} PUBLIC ${ARG_LINKS})
 endfunction()
 
+# Where the tests find files: macros in a header, not on the command line, so that a test that uses none is found in
+# ccache although the clone lies elsewhere.
+set(TOUCHSTONE_TEST_PATHS ${CMAKE_BINARY_DIR}/generated/touchstone_test_paths.h)
+file(CONFIGURE OUTPUT ${TOUCHSTONE_TEST_PATHS} CONTENT [[
+#define TOUCHSTONE_SOURCE_DIR "@CMAKE_SOURCE_DIR@"
+#define TOUCHSTONE_SHARED_DATA "@CMAKE_SOURCE_DIR@/../shared/data"
+]] @ONLY)
+
 # touchstone_test(NAME SOURCES a_test.cpp ... LINKS ...): one test binary a folder, NAME_test.
 function(touchstone_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name}_test ${ARG_SOURCES})
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
-  target_compile_definitions(${name}_test PRIVATE
-    TOUCHSTONE_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
-    TOUCHSTONE_SHARED_DATA="${CMAKE_SOURCE_DIR}/../shared/data")
+  target_compile_options(${name}_test PRIVATE -include ${TOUCHSTONE_TEST_PATHS})
   add_test(NAME ${name} COMMAND ${name}_test)
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
 endfunction()
