@@ -2,6 +2,8 @@
 
 #include <absl/container/flat_hash_map.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cstring>
 
@@ -99,9 +101,10 @@ void CountEdges(const TriangleMesh& mesh, MeshReport* report) {
   std::vector<uint64_t> edges;
   edges.reserve(3 * mesh.triangles.size());
   for (const auto& corner : mesh.triangles) {
+    const std::array<uint64_t, 3> at = {place[corner[0]], place[corner[1]], place[corner[2]]};
+    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;  // shrunk to a line: it bounds nothing
     for (int c = 0; c < 3; ++c) {
-      const uint64_t from = place[corner[c]], to = place[corner[(c + 1) % 3]];
-      if (from == to) continue;  // an edge of no length bounds nothing
+      const uint64_t from = at[c], to = at[(c + 1) % 3];
       edges.push_back((std::min(from, to) << 32) | (std::max(from, to) << 1) | (from < to ? 0 : 1));
     }
   }

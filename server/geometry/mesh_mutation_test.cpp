@@ -22,7 +22,9 @@ struct Seed {
   std::string bytes;
 };
 
-std::string F32(float value) { return std::string(reinterpret_cast<const char*>(&value), 4); }
+std::string F32(float value) {
+  return std::string(reinterpret_cast<const char*>(&value), 4);
+}
 
 std::string BinaryStl() {
   std::string bytes = "solid but binary";
@@ -47,13 +49,19 @@ std::string BinaryPly() {
 // One small file of each format, and the small ones of the corpus where it is at hand.
 std::vector<Seed> Seeds() {
   std::vector<Seed> seeds = {
-      {"tetrahedron", "off", "OFF\n4 4 6 # counts\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2 255 0 0\n"},
-      {"concave", "obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 .5 0\nv 0 2 0\nvt 0 0\ng a\nf 1/1 2/1 3/1 \\\n 4/1 5/1\nf -1 -2 -3\n"},
-      {"text", "stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"},
+      {"tetrahedron", "off",
+       "OFF\n4 4 6 # counts\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2 255 0 0\n"},
+      {"concave", "obj",
+       "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 .5 0\nv 0 2 0\nvt 0 0\ng a\nf 1/1 2/1 3/1 \\\n 4/1 5/1\nf -1 -2 -3\n"},
+      {"text", "stl",
+       "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+       "0\nendloop\nendfacet\nendsolid a\n"},
       {"binary", "stl", BinaryStl()},
-      {"text", "ply", "ply\nformat ascii 1.0\ncomment c\nelement vertex 4\nproperty float x\nproperty double y\nproperty int z\n"
-                      "element face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nend_header\n"
-                      "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 7\n"},
+      {"text", "ply",
+       "ply\nformat ascii 1.0\ncomment c\nelement vertex 4\nproperty float x\nproperty double y\nproperty "
+       "int z\n"
+       "element face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nend_header\n"
+       "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 7\n"},
       {"binary", "ply", BinaryPly()},
   };
   const std::string corpus = TOUCHSTONE_SHARED_DATA "/meshes";
@@ -100,8 +108,8 @@ class MeshMutation : public testing::Test {
   template <typename F>
   void ForSomeSeconds(double seconds, F damage) {
     const std::vector<Seed> seeds = Seeds();
-    const Clock::time_point end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                                     std::chrono::duration<double>(seconds));
+    const Clock::time_point end =
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
     const int64_t before_kib = PeakMemoryKib();
     for (uint64_t round = 0; round < 400 && Clock::now() < end; ++round) {
       for (size_t s = 0; s < seeds.size(); ++s) {
@@ -141,16 +149,17 @@ TEST_F(MeshMutation, FilesWithAWrongDigitAreAnswered) {
       if (bytes[i] >= '0' && bytes[i] <= '9') digits.push_back(i);
     if (digits.empty()) return;
     // A number becomes huge, negative or something else: the classical damage to counts and indices.
-    static const char* const kInstead[] = {"99999999999999999999", "4294967295", "2147483648", "1000000000000", "-1",
-                                           "-9223372036854775808", "1e308",      "nan",        "65536",         ""};
+    static const char* const kInstead[] = {
+        "99999999999999999999", "4294967295", "2147483648", "1000000000000", "-1",
+        "-9223372036854775808", "1e308",      "nan",        "65536",         ""};
     bytes.replace(digits[random->Below(digits.size())], 1, kInstead[random->Below(10)]);
     ReadDamaged(seed, bytes);
   });
 }
 
 TEST_F(MeshMutation, EveryTruncationOfACompleteTextFileIsRefused) {
-  // Whatever is missing of these files, the header's promise or a closing word is broken; only white space and
-  // the last face's colour may go unnoticed.
+  // Whatever is missing of these files, the header's promise or a closing word is broken; only white space
+  // and the last face's colour may go unnoticed.
   for (const Seed& seed : Seeds()) {
     if (seed.name != "tetrahedron" && seed.name != "text" && seed.name != "binary") continue;
     const size_t may_miss = seed.format == "off" ? sizeof " 255 0 0\n" - 1 : seed.format == "stl" ? 3 : 3;

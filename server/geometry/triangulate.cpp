@@ -5,6 +5,7 @@
 // holds no other corner; cut it off, look again. D. Eberly, "Triangulation by Ear Clipping", 2002; there too:
 // only corners that do not turn the face's way can stand inside an ear, and corners at the very place of an
 // ear's own do not count, so that holes joined to the rim by a double edge work.
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "server/geometry/mesh_reader.h"
