@@ -26,9 +26,9 @@ class Server:
             [self._program, "--listen", f"127.0.0.1:{port}", *self._options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )
-        # The log is drained all along, or the server would block on a full pipe.
+        # Both pipes are drained all along, or the server would block on a full one.
         self.log = []
-        threading.Thread(target=lambda: self.log.extend(self.process.stderr), daemon=True).start()
+        threading.Thread(target=self._drain, args=(self.process.stderr, self.log), daemon=True).start()
         for line in self.process.stdout:
             found = re.search(r"listening on 127\.0\.0\.1:(\d+)", line)
             if found:
@@ -36,9 +36,14 @@ class Server:
         else:
             self.process.wait()
             raise RuntimeError(f"{self._program} ended with {self.process.returncode}: {''.join(self.log)}")
-        threading.Thread(target=lambda: list(self.process.stdout), daemon=True).start()
+        threading.Thread(target=self._drain, args=(self.process.stdout, []), daemon=True).start()
         self.port = int(found.group(1))
         self.target = f"127.0.0.1:{self.port}"
+
+    @staticmethod
+    def _drain(pipe, lines):
+        with pipe:
+            lines.extend(pipe)
 
     def kill(self):
         self.process.send_signal(signal.SIGKILL)

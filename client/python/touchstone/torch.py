@@ -148,7 +148,9 @@ class TouchstoneDataset(IterableDataset):
                 yield from [batch] if self.batched else _samples(batch)
             return
         # In the only process: count here. Whatever was handed out is counted before it is.
-        self._delivered = 0
+        if self._all_delivered():
+            self._end_epoch()
+        self._delivered = self._skipped = 0
         for batch in self._batches(0, 1):
             if self.batched:
                 self._delivered += 1
@@ -202,6 +204,10 @@ class TouchstoneDataset(IterableDataset):
     def _begin_at(self, epoch: int, index: int, skip: int) -> None:
         self._begin.copy_(torch.tensor([epoch, index, skip], dtype=torch.int64))
         self._delivered = self._skipped = 0
+
+    def _all_delivered(self) -> bool:
+        """True if the last batch was handed out but nobody asked for one more, as zip() and islice() do not."""
+        return 0 < self._delivered == self._rank_batches(int(self._begin[1]))
 
     def _end_epoch(self) -> None:
         self._begin_at(self.epoch + 1, self.start, 0)
@@ -270,7 +276,7 @@ class TouchstoneLoader:
         self._num_workers = num_workers
         self._options = options
         self._loader: DataLoader | None = None
-        # Where the epoch under way began, to begin it anew after a break.
+        # False from the begin of an epoch to its end: then it was broken off.
         self._fresh = True
 
     def __len__(self) -> int:
@@ -294,18 +300,18 @@ class TouchstoneLoader:
 
     def _make(self) -> DataLoader:
         options = dict(self._options)
-        if self._num_workers > 0 and "multiprocessing_context" not in options and grpc_was_used():
+        if self._num_workers > 0 and options.get("multiprocessing_context") is None and grpc_was_used():
+            options["multiprocessing_context"] = "forkserver"
+        if options.get("multiprocessing_context") == "forkserver":
             # The imports are made once, by the process that all workers are forked from.
-            context = torch.multiprocessing.get_context("forkserver")
-            context.set_forkserver_preload(["__main__", __name__])
-            options["multiprocessing_context"] = context
+            torch.multiprocessing.get_context("forkserver").set_forkserver_preload(["__main__", __name__])
         batch_size = None if self.dataset.batched else self.dataset.batch_size
         return DataLoader(self.dataset, batch_size=batch_size, num_workers=self._num_workers, **options)
 
     def __iter__(self) -> Iterator[Any]:
         dataset = self.dataset
         if not self._fresh:
-            dataset.set_epoch(dataset.epoch)
+            dataset.set_epoch(dataset.epoch + dataset._all_delivered())
         self._fresh = False
         # Workers that live on belong to one DataLoader; others are made anew, by fork only as long as that works.
         if self._loader is None or not self._options.get("persistent_workers"):
