@@ -32,13 +32,18 @@ inline double Log(double x) {
   const uint64_t shifted = bits - kSqrtHalfBits;
   // The exponent, arithmetic shift by 52, as a double without an integer conversion (AVX2 has none).
   const uint64_t biased = (shifted >> 52) ^ 0x800ull;  // sign bit of the 12-bit field flipped
-  const double exponent = BitsToDouble(0x4330000000000000ull | (biased & 0xFFFull)) - 4503599627370496.0 - 2048.0;
+  const double exponent =
+      BitsToDouble(0x4330000000000000ull | (biased & 0xFFFull)) - 4503599627370496.0 - 2048.0;
   const double m = BitsToDouble(bits - ((shifted >> 52) << 52));
   const double z = (m - 1.0) / (m + 1.0);
   const double w = z * z;
   const double series =
-      1.0 + w * (1.0 / 3 + w * (1.0 / 5 + w * (1.0 / 7 + w * (1.0 / 9 + w * (1.0 / 11 + w * (1.0 / 13 +
-      w * (1.0 / 15 + w * (1.0 / 17 + w * (1.0 / 19)))))))));
+      1.0 + w * (1.0 / 3 +
+                 w * (1.0 / 5 +
+                      w * (1.0 / 7 +
+                           w * (1.0 / 9 +
+                                w * (1.0 / 11 +
+                                     w * (1.0 / 13 + w * (1.0 / 15 + w * (1.0 / 17 + w * (1.0 / 19)))))))));
   return exponent * 0.693147180559945309417 + 2.0 * z * series;
 }
 
@@ -49,10 +54,19 @@ inline void CosSinTurn(double u, double* cosine, double* sine) {
   const uint64_t quarter = DoubleToBits(rounded);
   const double a = (u * 4.0 - (rounded - kShift)) * (kPi / 2);  // |a| <= pi / 4
   const double w = a * a;
-  const double s = a * (1.0 + w * (-1.0 / 6 + w * (1.0 / 120 + w * (-1.0 / 5040 + w * (1.0 / 362880 +
-                   w * (-1.0 / 39916800 + w * (1.0 / 6227020800.0 + w * (-1.0 / 1307674368000.0))))))));
-  const double c = 1.0 + w * (-0.5 + w * (1.0 / 24 + w * (-1.0 / 720 + w * (1.0 / 40320 + w * (-1.0 / 3628800 +
-                   w * (1.0 / 479001600.0 + w * (-1.0 / 87178291200.0 + w * (1.0 / 20922789888000.0))))))));
+  const double s =
+      a * (1.0 + w * (-1.0 / 6 +
+                      w * (1.0 / 120 + w * (-1.0 / 5040 +
+                                            w * (1.0 / 362880 + w * (-1.0 / 39916800 +
+                                                                     w * (1.0 / 6227020800.0 +
+                                                                          w * (-1.0 / 1307674368000.0))))))));
+  const double c =
+      1.0 +
+      w * (-0.5 + w * (1.0 / 24 + w * (-1.0 / 720 +
+                                       w * (1.0 / 40320 + w * (-1.0 / 3628800 +
+                                                               w * (1.0 / 479001600.0 +
+                                                                    w * (-1.0 / 87178291200.0 +
+                                                                         w * (1.0 / 20922789888000.0))))))));
   // Quarter turn q: (c, s), (-s, c), (-c, -s), (s, -c); signs and the swap by bits, without a branch.
   const uint64_t swap = (quarter & 1) ? ~0ull : 0ull;
   const uint64_t c_bits = DoubleToBits(c), s_bits = DoubleToBits(s);
@@ -81,7 +95,9 @@ std::array<uint64_t, 4> RandomBlock(uint64_t seed, RandomDomain domain, uint64_t
   return {words[0], words[1], words[2], words[3]};
 }
 
-double UniformFromWord(uint64_t word) { return BitsToDouble((word >> 12) | 0x3FF0000000000000ull) - 1.0; }
+double UniformFromWord(uint64_t word) {
+  return BitsToDouble((word >> 12) | 0x3FF0000000000000ull) - 1.0;
+}
 
 void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, int count, int width,
                  double* normals) {

@@ -10,9 +10,9 @@ namespace touchstone {
 
 // What a draw is for. Two purposes never share numbers. Values are part of the determinism promise.
 enum class RandomDomain : uint64_t {
-  kPose = 1,          // the pose of sample `index`
-  kObject = 2,        // which object sample `index` shows
-  kTouchNoise = 3,    // per-finger noise of touch `index`
+  kPose = 1,        // the pose of sample `index`
+  kObject = 2,      // which object sample `index` shows
+  kTouchNoise = 3,  // per-finger noise of touch `index`
   kMissedContact = 4,
   kPollPhase = 5,
   kSurfaceField = 6,  // the smooth error of an object's surface
@@ -41,10 +41,10 @@ class RandomStream {
       : seed_(seed), domain_(domain), index_(index), attempt_(attempt) {}
 
   uint64_t Word();
-  double Uniform() { return UniformFromWord(Word()); }                              // [0, 1)
+  double Uniform() { return UniformFromWord(Word()); }  // [0, 1)
   double Uniform(double lower, double upper) { return lower + (upper - lower) * Uniform(); }
-  uint64_t Below(uint64_t bound);                                                   // [0, bound)
-  double Normal();                                                                  // mean 0, sigma 1
+  uint64_t Below(uint64_t bound);  // [0, bound)
+  double Normal();                 // mean 0, sigma 1
 
  private:
   uint64_t seed_;

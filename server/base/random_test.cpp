@@ -9,7 +9,8 @@
 namespace touchstone {
 namespace {
 
-// numpy.random.Philox(counter=[6, 42, 3, 0], key=[123456789, 3]).random_raw(4); NumPy counts up before it draws.
+// numpy.random.Philox(counter=[6, 42, 3, 0], key=[123456789, 3]).random_raw(4); NumPy counts up before it
+// draws.
 TEST(RandomBlock, IsNumPysPhiloxBitForBit) {
   const auto words = RandomBlock(123456789, RandomDomain::kTouchNoise, 42, 3, 7);
   EXPECT_EQ(words[0], 13916713776070603951ull);

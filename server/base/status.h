@@ -9,10 +9,9 @@
 #define TOUCHSTONE_CONCAT_(a, b) TOUCHSTONE_CONCAT_INNER_(a, b)
 
 // Returns from the calling function if `expression` is an error.
-#define TOUCHSTONE_RETURN_IF_ERROR(expression)                   \
-  do {                                                           \
-    if (absl::Status touchstone_status_ = (expression); !touchstone_status_.ok()) \
-      return touchstone_status_;                                 \
+#define TOUCHSTONE_RETURN_IF_ERROR(expression)                                                               \
+  do {                                                                                                       \
+    if (absl::Status touchstone_status_ = (expression); !touchstone_status_.ok()) return touchstone_status_; \
   } while (false)
 
 // TOUCHSTONE_ASSIGN_OR_RETURN(Mesh mesh, ReadMesh(path)): assigns the value, or returns the error.

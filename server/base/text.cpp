@@ -65,7 +65,8 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
   for (const std::string& candidate : known) {
     size_t distance = EditDistance(word, candidate);
     // A long enough prefix, or the same name without its unit suffix, is as good as one edit.
-    if (word.size() >= 3 && (candidate.rfind(std::string(word), 0) == 0)) distance = std::min<size_t>(distance, 1);
+    if (word.size() >= 3 && (candidate.rfind(std::string(word), 0) == 0))
+      distance = std::min<size_t>(distance, 1);
     if (distance < best_distance) best = &candidate, best_distance = distance;
   }
   if (best != nullptr) return absl::StrCat(", did you mean '", *best, "'?");
@@ -123,7 +124,8 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, uint64_t limit_byt
   std::string data(info.st_size, '\0');
   file.read(data.data(), data.size());
   if (file.gcount() != static_cast<std::streamsize>(data.size()))
-    return absl::DataLossError(absl::StrCat(path, ": ended after ", file.gcount(), " of ", data.size(), " bytes"));
+    return absl::DataLossError(
+        absl::StrCat(path, ": ended after ", file.gcount(), " of ", data.size(), " bytes"));
   return data;
 }
 

@@ -25,7 +25,8 @@ TEST(Sha256, MatchesThePublishedVector) {
 }
 
 TEST(ShortestNumber, ReadsBackAsTheSameDouble) {
-  for (double value : {0.1, 1e-9, 123456789.123, -0.0}) EXPECT_EQ(ParseNumber(ShortestNumber(value)).value(), value);
+  for (double value : {0.1, 1e-9, 123456789.123, -0.0})
+    EXPECT_EQ(ParseNumber(ShortestNumber(value)).value(), value);
   EXPECT_EQ(ShortestNumber(0.1), "0.1");
 }
 

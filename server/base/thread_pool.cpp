@@ -53,7 +53,8 @@ void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int,
     int finished = 0;
   };
   auto shared = std::make_shared<Shared>();
-  const std::function<void(int, int)>* call = &body;  // used only while a piece is left, that is, before we return
+  const std::function<void(int, int)>* call =
+      &body;  // used only while a piece is left, that is, before we return
   const auto work = [shared, call, pieces, grain, count] {
     for (;;) {
       const int piece = shared->next++;

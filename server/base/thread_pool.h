@@ -18,8 +18,8 @@ class ThreadPool {
   int size() const { return static_cast<int>(threads_.size()); }
   void Submit(std::function<void()> task);
 
-  // Calls body(begin, end) over pieces of 0 .. count, of `grain` at the most, here and in the pool, and returns
-  // when all are done. May be called from several threads at once, not from inside a task.
+  // Calls body(begin, end) over pieces of 0 .. count, of `grain` at the most, here and in the pool, and
+  // returns when all are done. May be called from several threads at once, not from inside a task.
   void ParallelFor(int count, int grain, const std::function<void(int begin, int end)>& body);
 
  private:

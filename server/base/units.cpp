@@ -33,9 +33,15 @@ const UnitRow& Row(Unit unit) {
 
 }  // namespace
 
-double SiFactor(Unit unit) { return Row(unit).si_factor; }
-absl::string_view UnitSymbol(Unit unit) { return Row(unit).symbol; }
-absl::string_view UnitSuffix(Unit unit) { return Row(unit).suffix; }
+double SiFactor(Unit unit) {
+  return Row(unit).si_factor;
+}
+absl::string_view UnitSymbol(Unit unit) {
+  return Row(unit).symbol;
+}
+absl::string_view UnitSuffix(Unit unit) {
+  return Row(unit).suffix;
+}
 
 bool UnitFromSymbol(absl::string_view symbol, Unit* unit) {
   for (const UnitRow& row : kUnits) {

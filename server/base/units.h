@@ -23,8 +23,12 @@ enum class Unit {
 
 // The factor that turns a number of files into SI: si = file * SiFactor(unit).
 double SiFactor(Unit unit);
-inline double ToSi(Unit unit, double file_value) { return file_value * SiFactor(unit); }
-inline double FromSi(Unit unit, double si_value) { return si_value / SiFactor(unit); }
+inline double ToSi(Unit unit, double value) {
+  return value * SiFactor(unit);
+}
+inline double FromSi(Unit unit, double value) {
+  return value / SiFactor(unit);
+}
 
 // "mm", "deg", "us", "mm/s", ...; empty for kNone.
 absl::string_view UnitSymbol(Unit unit);

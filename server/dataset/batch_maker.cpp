@@ -66,11 +66,16 @@ struct NamedPut {
 constexpr NamedPut kTouchColumns[] = {
     {"descriptor_s", PutDescriptor},
     {"contact_time_s", PutContactTime},
-    {"target_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).target_m); }},
-    {"approach", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).approach); }},
-    {"lateral", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.PutVector(s, 0, b.Pose(t).lateral); }},
-    {"standoff_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.Put(s, 0, static_cast<float>(b.Pose(t).standoff_m)); }},
-    {"speed_m_s", [](const ColumnWriter& w, const TouchSampler::Block& b, int t, uint32_t s) { w.Put(s, 0, static_cast<float>(b.batch.speed_m_s[t])); }},
+    {"target_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
+                    uint32_t s) { w.PutVector(s, 0, b.Pose(t).target_m); }},
+    {"approach", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
+                    uint32_t s) { w.PutVector(s, 0, b.Pose(t).approach); }},
+    {"lateral", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
+                   uint32_t s) { w.PutVector(s, 0, b.Pose(t).lateral); }},
+    {"standoff_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
+                      uint32_t s) { w.Put(s, 0, static_cast<float>(b.Pose(t).standoff_m)); }},
+    {"speed_m_s", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
+                     uint32_t s) { w.Put(s, 0, static_cast<float>(b.batch.speed_m_s[t])); }},
     {"contact_point_m", PutContactPoint},
     {"normal", PutNormal},
 };
@@ -80,11 +85,14 @@ constexpr NamedPut kTouchColumns[] = {
 absl::StatusOr<std::string> EncodeImage(const Image& picture, const DatasetImage& image) {
   if (image.encoding == ImageEncoding::kPng)
     return EncodePng(picture.pixels.data(), picture.width, picture.height, picture.channels);
-  return EncodeJpeg(picture.pixels.data(), picture.width, picture.height, picture.channels, image.jpeg_quality);
+  return EncodeJpeg(picture.pixels.data(), picture.width, picture.height, picture.channels,
+                    image.jpeg_quality);
 }
 
 BatchMaker::BatchMaker(std::shared_ptr<const DatasetSpecification> specification)
-    : specification_(std::move(specification)), columns_(ColumnsOf(*specification_)), sampler_(*specification_) {}
+    : specification_(std::move(specification)),
+      columns_(ColumnsOf(*specification_)),
+      sampler_(*specification_) {}
 
 absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomic<bool>& cancelled,
                               TouchSampler::Workspace* workspace) const {
@@ -111,18 +119,20 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
     }
     for (const NamedPut& named : kTouchColumns)
       if (name == named.name)
-        puts.emplace_back(ColumnWriter(batches, column, batch_size, columns_[column].BytesPerSample()), named.put);
+        puts.emplace_back(ColumnWriter(batches, column, batch_size, columns_[column].BytesPerSample()),
+                          named.put);
   }
 
   std::vector<TouchPose> poses(specification_->columns.image ? indices.size() : 0);
-  TOUCHSTONE_RETURN_IF_ERROR(sampler_.Sample(indices, cancelled, workspace, [&](const TouchSampler::Block& block) {
-    for (const auto& [writer, put] : puts)
-      for (int touch = 0; touch < block.batch.size(); ++touch)
-        if (block.accepted[touch]) put(writer, block, touch, block.slots[touch]);
-    if (!poses.empty())
-      for (int touch = 0; touch < block.batch.size(); ++touch)
-        if (block.accepted[touch]) poses[block.slots[touch]] = block.Pose(touch);
-  }));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      sampler_.Sample(indices, cancelled, workspace, [&](const TouchSampler::Block& block) {
+        for (const auto& [writer, put] : puts)
+          for (int touch = 0; touch < block.batch.size(); ++touch)
+            if (block.accepted[touch]) put(writer, block, touch, block.slots[touch]);
+        if (!poses.empty())
+          for (int touch = 0; touch < block.batch.size(); ++touch)
+            if (block.accepted[touch]) poses[block.slots[touch]] = block.Pose(touch);
+      }));
   if (specification_->columns.image) return MakeImages(batches, poses, cancelled);
   return absl::OkStatus();
 }
@@ -133,14 +143,16 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, absl::Span
   size_t slot = 0;
   for (DatasetBatch& batch : batches) {
     for (size_t column = 0; column < columns_.size(); ++column)
-      if (columns_[column].name == "image" || columns_[column].name == "depth_m" || columns_[column].name == "mask")
+      if (columns_[column].name == "image" || columns_[column].name == "depth_m" ||
+          columns_[column].name == "mask")
         batch.data[column].reserve(batch.rows * columns_[column].BytesPerSample());
     for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
       const TouchPose& pose = poses[slot];
       Camera camera = CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
       camera.vertical_fov_rad = image.vertical_fov_rad;
-      const auto& object = specification_->objects[(batch.start_index + row) % specification_->objects.size()];
+      const auto& object =
+          specification_->objects[(batch.start_index + row) % specification_->objects.size()];
       TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, image.renderer->Render(object, camera, image.options));
       for (size_t column = 0; column < columns_.size(); ++column) {
         std::string& data = batch.data[column];
@@ -154,7 +166,8 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, absl::Span
           data += file;
           if (row + 1 == batch.rows) batch.offsets[column].push_back(data.size());
         } else if (columns_[column].name == "depth_m") {
-          data.append(reinterpret_cast<const char*>(picture.depth_m.data()), picture.depth_m.size() * sizeof(float));
+          data.append(reinterpret_cast<const char*>(picture.depth_m.data()),
+                      picture.depth_m.size() * sizeof(float));
         } else if (columns_[column].name == "mask") {
           data.append(reinterpret_cast<const char*>(picture.mask.data()), picture.mask.size());
         }

@@ -46,7 +46,8 @@ struct Quantiser {
 
 }  // namespace
 
-void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch, std::vector<uint32_t>* order) {
+void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
+                   std::vector<uint32_t>* order) {
   const size_t n = poses.size();
   order->resize(n);
   std::iota(order->begin(), order->end(), 0);
@@ -59,10 +60,13 @@ void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
   for (const TouchPose& pose : poses) {
     const Eigen::Array3d start = pose.target_m - pose.approach * pose.standoff_m;
     start_least = start_least.min(start), start_most = start_most.max(start);
-    target_least = target_least.min(pose.target_m.array()), target_most = target_most.max(pose.target_m.array());
+    target_least = target_least.min(pose.target_m.array()),
+    target_most = target_most.max(pose.target_m.array());
   }
-  const Quantiser sx(start_least[0], start_most[0]), sy(start_least[1], start_most[1]), sz(start_least[2], start_most[2]);
-  const Quantiser tx(target_least[0], target_most[0]), ty(target_least[1], target_most[1]), tz(target_least[2], target_most[2]);
+  const Quantiser sx(start_least[0], start_most[0]), sy(start_least[1], start_most[1]),
+      sz(start_least[2], start_most[2]);
+  const Quantiser tx(target_least[0], target_most[0]), ty(target_least[1], target_most[1]),
+      tz(target_least[2], target_most[2]);
   const Quantiser unit(-1, 1);
   std::vector<uint64_t>& keys = scratch->keys;
   keys.resize(n);
@@ -71,8 +75,9 @@ void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
     const TouchPose& pose = poses[k];
     const Eigen::Vector3d start = pose.target_m - pose.approach * pose.standoff_m;
     keys[k] = Spread(sx(start.x())) << 7 | Spread(sy(start.y())) << 6 | Spread(sz(start.z())) << 5 |
-              Spread(tx(pose.target_m.x())) << 4 | Spread(ty(pose.target_m.y())) << 3 | Spread(tz(pose.target_m.z())) << 2 |
-              Spread(unit(pose.lateral.x())) << 1 | Spread(unit(pose.lateral.z()));
+              Spread(tx(pose.target_m.x())) << 4 | Spread(ty(pose.target_m.y())) << 3 |
+              Spread(tz(pose.target_m.z())) << 2 | Spread(unit(pose.lateral.x())) << 1 |
+              Spread(unit(pose.lateral.z()));
     varying |= keys[k] ^ keys[0];
   }
 

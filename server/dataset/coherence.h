@@ -1,5 +1,5 @@
-// The order in which touches are simulated: neighbours in start, target and lateral come one after another, so that
-// their lines share nodes of the BVH. It changes speed, never a result.
+// The order in which touches are simulated: neighbours in start, target and lateral come one after another,
+// so that their lines share nodes of the BVH. It changes speed, never a result.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,7 @@ struct CoherenceScratch {
 };
 
 // order becomes a permutation of 0 .. poses.size() - 1.
-void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch, std::vector<uint32_t>* order);
+void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
+                   std::vector<uint32_t>* order);
 
 }  // namespace touchstone

@@ -9,7 +9,6 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/dataset/coherence.h"
 
 namespace touchstone {
 namespace {
@@ -20,20 +19,6 @@ constexpr size_t kBlock = 1024;
 constexpr uint32_t kProbeAfter = 16;
 
 }  // namespace
-
-struct TouchSampler::Workspace {
-  std::vector<uint32_t> slots, missed, block_slots, order;
-  std::vector<uint64_t> numbers;
-  std::vector<TouchPose> poses;
-  std::vector<uint8_t> accepted;
-  CoherenceScratch coherence;
-  TouchBatch batch;
-  TouchWorkspace touch;
-  std::vector<uint64_t> previous_indices;
-  std::vector<double> previous_press_m;
-};
-
-std::unique_ptr<TouchSampler::Workspace> TouchSampler::NewWorkspace() { return std::make_unique<Workspace>(); }
 
 TouchSampler::TouchSampler(const DatasetSpecification& specification)
     : specification_(specification), simulator_(specification.model) {
@@ -52,8 +37,8 @@ absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std:
                                   Workspace* workspace, const Sink& sink) const {
   if (!simulator_.needs_previous_press()) return Run(indices, Until::kSensor, {}, cancelled, workspace, sink);
 
-  // The touch before is the sample before: its motion is simulated first. Its own history does not reach its press,
-  // but through a formula, where it counts as none.
+  // The touch before is the sample before: its motion is simulated first. Its own history does not reach its
+  // press, but through a formula, where it counts as none.
   const int fingers = specification_.model->fingers;
   std::vector<uint64_t>& previous = workspace->previous_indices;
   std::vector<uint32_t> slot_of_previous;
@@ -65,32 +50,34 @@ absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std:
   }
   std::vector<double>& press_m = workspace->previous_press_m;
   press_m.assign(indices.size() * fingers, 0.0);
-  TOUCHSTONE_RETURN_IF_ERROR(Run(previous, Until::kMotion, {}, cancelled, workspace,
-                                 [&](const Block& block) {
-                                   for (int touch = 0; touch < block.batch.size(); ++touch)
-                                     for (int finger = 0; block.accepted[touch] && finger < fingers; ++finger)
-                                       press_m[slot_of_previous[block.slots[touch]] * fingers + finger] =
-                                           block.batch.press_m[block.batch.At(finger, touch)];
-                                 }));
+  TOUCHSTONE_RETURN_IF_ERROR(Run(previous, Until::kMotion, {}, cancelled, workspace, [&](const Block& block) {
+    for (int touch = 0; touch < block.batch.size(); ++touch)
+      for (int finger = 0; block.accepted[touch] && finger < fingers; ++finger)
+        press_m[slot_of_previous[block.slots[touch]] * fingers + finger] =
+            block.batch.press_m[block.batch.At(finger, touch)];
+  }));
   return Run(indices, Until::kSensor, press_m, cancelled, workspace, sink);
 }
 
-absl::Status TouchSampler::Run(absl::Span<const uint64_t> indices, Until until, absl::Span<const double> previous_press_m,
-                               const std::atomic<bool>& cancelled, Workspace* workspace, const Sink& sink) const {
+absl::Status TouchSampler::Run(absl::Span<const uint64_t> indices, Until until,
+                               absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
+                               Workspace* workspace, const Sink& sink) const {
   const size_t objects = specification_.objects.size();
   workspace->poses.resize(indices.size());
   for (size_t object = 0; object < objects; ++object) {
     workspace->slots.clear();
     for (size_t slot = 0; slot < indices.size(); ++slot)
       if (indices[slot] % objects == object) workspace->slots.push_back(slot);
-    TOUCHSTONE_RETURN_IF_ERROR(RunObject(object, indices, until, previous_press_m, cancelled, workspace, sink));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        RunObject(object, indices, until, previous_press_m, cancelled, workspace, sink));
   }
   return absl::OkStatus();
 }
 
 absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> indices, Until until,
-                                     absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
-                                     Workspace* workspace, const Sink& sink) const {
+                                     absl::Span<const double> previous_press_m,
+                                     const std::atomic<bool>& cancelled, Workspace* workspace,
+                                     const Sink& sink) const {
   const PoseGenerator& generator = *generators_[object];
   for (uint32_t attempt = 0; !workspace->slots.empty(); ++attempt) {
     const size_t pending = workspace->slots.size();
@@ -123,8 +110,9 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
 }
 
 // Simulates the drawn poses `block` (places in workspace->slots and ->poses).
-absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> block,
-                                    Until until, absl::Span<const double> previous_press_m, Workspace* workspace) const {
+absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices,
+                                    absl::Span<const uint32_t> block, Until until,
+                                    absl::Span<const double> previous_press_m, Workspace* workspace) const {
   FillBatch(object, indices, block, previous_press_m, workspace);
   TouchBatch& batch = workspace->batch;
   TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
@@ -138,8 +126,9 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
   return simulator_.RunSensor(&batch, &workspace->touch);
 }
 
-void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> block,
-                             absl::Span<const double> previous_press_m, Workspace* workspace) const {
+void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
+                             absl::Span<const uint32_t> block, absl::Span<const double> previous_press_m,
+                             Workspace* workspace) const {
   const Plan& plan = specification_.plan;
   TouchBatch& batch = workspace->batch;
   simulator_.Prepare(static_cast<int>(block.size()), &batch);
@@ -160,8 +149,9 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices, 
   }
   if (plan.kind == Plan::Kind::kList) {
     for (const std::string& name : simulator_.needed_covariates()) {
-      const bool everywhere = std::all_of(plan.list.begin(), plan.list.end(),
-                                          [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; });
+      const bool everywhere =
+          std::all_of(plan.list.begin(), plan.list.end(),
+                      [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; });
       if (everywhere) batch.covariates[name].resize(block.size());
     }
     for (size_t k = 0; k < block.size(); ++k) {
@@ -174,7 +164,8 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices, 
   if (!previous_press_m.empty())
     for (int finger = 0; finger < batch.fingers(); ++finger)
       for (size_t k = 0; k < block.size(); ++k)
-        batch.previous_press_m[batch.At(finger, k)] = previous_press_m[workspace->block_slots[k] * batch.fingers() + finger];
+        batch.previous_press_m[batch.At(finger, k)] =
+            previous_press_m[workspace->block_slots[k] * batch.fingers() + finger];
 }
 
 absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
@@ -182,14 +173,17 @@ absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
   const Eigen::Vector3d size_mm = (surface.bounds().max_m - surface.bounds().min_m) / kMetresPerMillimetre;
   const Model& model = *specification_.model;
   return absl::FailedPreconditionError(absl::StrCat(
-      "object '", surface.name(), "', sample ", index, ": in ", specification_.most_draws, " draws no touch met it with all ",
-      model.fingers, " fingers; they span ", ShortestNumber((model.fingers - 1) * model.spacing_m / kMetresPerMillimetre),
-      " mm and the object measures ", static_cast<int>(size_mm.x()), " x ", static_cast<int>(size_mm.y()), " x ",
-      static_cast<int>(size_mm.z()), " mm: use a larger object (scale at import), a narrower end effector, or a higher most_draws"));
+      "object '", surface.name(), "', sample ", index, ": in ", specification_.most_draws,
+      " draws no touch met it with all ", model.fingers, " fingers; they span ",
+      ShortestNumber((model.fingers - 1) * model.spacing_m / kMetresPerMillimetre),
+      " mm and the object measures ", static_cast<int>(size_mm.x()), " x ", static_cast<int>(size_mm.y()),
+      " x ", static_cast<int>(size_mm.z()),
+      " mm: use a larger object (scale at import), a narrower end effector, or a higher most_draws"));
 }
 
 // All further draws of one index at once.
-absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt, Workspace* workspace) const {
+absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt,
+                                      Workspace* workspace) const {
   TouchBatch batch;
   TouchWorkspace touch_workspace;
   const uint64_t number = NumberOf(index);

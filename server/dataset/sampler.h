@@ -1,5 +1,5 @@
-// Draws and simulates the touches of a dataset, many at once: sorted so that neighbouring lines travel together,
-// drawn again where a finger misses, each a pure function of its index.
+// Draws and simulates the touches of a dataset, many at once: sorted so that neighbouring lines travel
+// together, drawn again where a finger misses, each a pure function of its index.
 #pragma once
 
 #include <atomic>
@@ -10,6 +10,7 @@
 #include <absl/status/status.h>
 #include <absl/types/span.h>
 
+#include "server/dataset/coherence.h"
 #include "server/dataset/specification.h"
 #include "server/touch/simulate.h"
 
@@ -22,8 +23,16 @@ class TouchSampler {
   ~TouchSampler();
 
   // Memory that one thread keeps between calls.
-  struct Workspace;
-  static std::unique_ptr<Workspace> NewWorkspace();
+  struct Workspace {
+    std::vector<uint32_t> slots, missed, block_slots, order;
+    std::vector<uint64_t> numbers, previous_indices;
+    std::vector<TouchPose> poses;
+    std::vector<uint8_t> accepted;
+    std::vector<double> previous_press_m;
+    CoherenceScratch coherence;
+    TouchBatch batch;
+    TouchWorkspace touch;
+  };
 
   // A simulated block. Touch t of the batch is sample indices[slots[t]] if accepted[t]; else it missed and is
   // drawn again. Pose(t) is as commanded; effects may have changed the batch's own vectors.
@@ -39,8 +48,8 @@ class TouchSampler {
   using Sink = std::function<void(const Block& block)>;
 
   // Simulates the samples `indices`. Returns CANCELLED soon after `cancelled` becomes true. Thread-safe.
-  absl::Status Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled, Workspace* workspace,
-                      const Sink& sink) const;
+  absl::Status Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled,
+                      Workspace* workspace, const Sink& sink) const;
 
  private:
   enum class Until { kMotion, kSensor };
@@ -49,8 +58,8 @@ class TouchSampler {
   absl::Status RunObject(size_t object, absl::Span<const uint64_t> indices, Until until,
                          absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
                          Workspace* workspace, const Sink& sink) const;
-  absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots, Until until,
-                        absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots,
+                        Until until, absl::Span<const double> previous_press_m, Workspace* workspace) const;
   void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots,
                  absl::Span<const double> previous_press_m, Workspace* workspace) const;
   absl::Status Hopeless(size_t object, uint64_t index) const;

@@ -14,9 +14,12 @@ struct ColumnName {
   bool ColumnChoice::*field;
 };
 constexpr ColumnName kColumnNames[] = {
-    {"index", &ColumnChoice::index},       {"object", &ColumnChoice::object},
-    {"descriptor", &ColumnChoice::descriptor}, {"contact_time", &ColumnChoice::contact_time},
-    {"pose", &ColumnChoice::pose},         {"contact", &ColumnChoice::contact},
+    {"index", &ColumnChoice::index},
+    {"object", &ColumnChoice::object},
+    {"descriptor", &ColumnChoice::descriptor},
+    {"contact_time", &ColumnChoice::contact_time},
+    {"pose", &ColumnChoice::pose},
+    {"contact", &ColumnChoice::contact},
     {"image", &ColumnChoice::image},
 };
 
@@ -27,9 +30,11 @@ absl::Status ValidateImage(const DatasetImage& image) {
   camera.vertical_fov_rad = image.vertical_fov_rad;
   TOUCHSTONE_RETURN_IF_ERROR(ValidateImageRequest(camera, image.options));
   if (image.jpeg_quality < 1 || image.jpeg_quality > 100)
-    return absl::InvalidArgumentError(absl::StrCat("image.jpeg_quality = ", image.jpeg_quality, ": must be from 1 to 100"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("image.jpeg_quality = ", image.jpeg_quality, ": must be from 1 to 100"));
   if (image.renderer == nullptr)
-    return absl::FailedPreconditionError("images were asked for, but this source has no renderer: see `touchstone doctor`");
+    return absl::FailedPreconditionError(
+        "images were asked for, but this source has no renderer: see `touchstone doctor`");
   return absl::OkStatus();
 }
 
@@ -46,7 +51,9 @@ absl::StatusOr<ColumnChoice> ColumnChoice::FromNames(const std::vector<std::stri
       choice.*column.field = true;
       found = true;
     }
-    if (!found) return absl::InvalidArgumentError(absl::StrCat("columns: '", name, "' is unknown", DidYouMean(name, known)));
+    if (!found)
+      return absl::InvalidArgumentError(
+          absl::StrCat("columns: '", name, "' is unknown", DidYouMean(name, known)));
   }
   if (names.empty()) choice.descriptor = choice.object = true;
   return choice;
@@ -54,24 +61,28 @@ absl::StatusOr<ColumnChoice> ColumnChoice::FromNames(const std::vector<std::stri
 
 absl::Status ValidateDataset(DatasetSpecification* specification) {
   if (specification->objects.empty())
-    return absl::InvalidArgumentError("objects is empty: name at least one object (`touchstone objects` lists them)");
+    return absl::InvalidArgumentError(
+        "objects is empty: name at least one object (`touchstone objects` lists them)");
   if (specification->objects.size() > 10000)
-    return absl::InvalidArgumentError(absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
   TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&specification->plan));
   if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image));
   if (specification->most_draws < 1 || specification->most_draws > 1'000'000)
     return absl::InvalidArgumentError(
         absl::StrCat("most_draws = ", specification->most_draws, ": must be from 1 to 1000000"));
 
-  const auto generator = MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);
+  const auto generator =
+      MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);
   const uint64_t available = generator->Count() * specification->objects.size();
   if (specification->samples == 0) specification->samples = available;
   if (specification->samples == 0)
-    return absl::InvalidArgumentError("samples = 0: a sphere plan has no end, so say how many samples to draw");
+    return absl::InvalidArgumentError(
+        "samples = 0: a sphere plan has no end, so say how many samples to draw");
   if (available != 0 && specification->samples > available)
-    return absl::OutOfRangeError(absl::StrCat("samples = ", specification->samples, ": the plan has ", generator->Count(),
-                                              " touches for each of ", specification->objects.size(), " objects, so at most ",
-                                              available));
+    return absl::OutOfRangeError(absl::StrCat(
+        "samples = ", specification->samples, ": the plan has ", generator->Count(), " touches for each of ",
+        specification->objects.size(), " objects, so at most ", available));
   if (specification->samples > (uint64_t{1} << 48))
     return absl::InvalidArgumentError(absl::StrCat("samples = ", specification->samples, ": at most 2^48"));
   return absl::OkStatus();
@@ -81,10 +92,17 @@ size_t ColumnInfo::BytesPerSample() const {
   size_t bytes = 0;
   switch (type) {
     case ColumnType::kFloat32:
-    case ColumnType::kInt32: bytes = 4; break;
-    case ColumnType::kUint8: bytes = 1; break;
-    case ColumnType::kUint64: bytes = 8; break;
-    case ColumnType::kBytes: return 0;
+    case ColumnType::kInt32:
+      bytes = 4;
+      break;
+    case ColumnType::kUint8:
+      bytes = 1;
+      break;
+    case ColumnType::kUint64:
+      bytes = 8;
+      break;
+    case ColumnType::kBytes:
+      return 0;
   }
   for (uint32_t extent : shape) bytes *= extent;
   return bytes;
@@ -113,7 +131,8 @@ std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification) {
     const DatasetImage& image = specification.image;
     const uint32_t width = image.options.width, height = image.options.height;
     const uint32_t channels = image.options.format == PixelFormat::kRgb ? 3 : 1;
-    columns.push_back({"image", image.encoding == ImageEncoding::kRaw ? ColumnType::kUint8 : ColumnType::kBytes,
+    columns.push_back({"image",
+                       image.encoding == ImageEncoding::kRaw ? ColumnType::kUint8 : ColumnType::kBytes,
                        {height, width, channels}});
     if (image.options.depth) columns.push_back({"depth_m", ColumnType::kFloat32, {height, width}});
     if (image.options.mask) columns.push_back({"mask", ColumnType::kUint8, {height, width}});

@@ -1,5 +1,5 @@
-// What a dataset contains: everything that decides its samples. With the model's and the meshes' hashes it makes
-// sample i, bit for bit, whatever the number of threads, the batch size, the part or the replica.
+// What a dataset contains: everything that decides its samples. With the model's and the meshes' hashes it
+// makes sample i, bit for bit, whatever the number of threads, the batch size, the part or the replica.
 #pragma once
 
 #include <memory>
@@ -33,9 +33,9 @@ struct ColumnChoice {
   bool object = false;
   bool descriptor = false;
   bool contact_time = false;
-  bool pose = false;      // target_m, approach, lateral, standoff_m, speed_m_s
-  bool contact = false;   // contact_point_m, normal
-  bool image = false;     // and depth_m, mask where the options ask for them
+  bool pose = false;     // target_m, approach, lateral, standoff_m, speed_m_s
+  bool contact = false;  // contact_point_m, normal
+  bool image = false;    // and depth_m, mask where the options ask for them
 
   // Names as on the wire; an unknown name is an error that lists the known ones.
   static absl::StatusOr<ColumnChoice> FromNames(const std::vector<std::string>& names);

@@ -14,7 +14,8 @@ std::string Refusal(DatasetSpecification specification) {
 }
 
 TEST(DatasetSpecification, RefusesWhatCannotBeDrawnByName) {
-  DatasetSpecification endless = SmallDataset(0), empty = SmallDataset(10), blind = SmallDataset(10), many = SmallDataset(10);
+  DatasetSpecification endless = SmallDataset(0), empty = SmallDataset(10), blind = SmallDataset(10),
+                       many = SmallDataset(10);
   EXPECT_THAT(Refusal(endless), HasSubstr("samples = 0: a sphere plan has no end"));
   empty.objects.clear();
   EXPECT_THAT(Refusal(empty), HasSubstr("objects is empty"));
@@ -35,7 +36,8 @@ TEST(DatasetSpecification, APlanThatEndsTakesAllOfItsTouchesForEveryObject) {
 }
 
 TEST(ColumnChoice, UnknownNamesAreRefusedWithANearOne) {
-  EXPECT_THAT(std::string(ColumnChoice::FromNames({"descripter"}).status().message()), HasSubstr("did you mean 'descriptor'?"));
+  EXPECT_THAT(std::string(ColumnChoice::FromNames({"descripter"}).status().message()),
+              HasSubstr("did you mean 'descriptor'?"));
 }
 
 TEST(ColumnsOf, EveryNumberColumnTellsItsUnitAndShape) {

@@ -9,8 +9,8 @@
 namespace touchstone {
 namespace {
 
-// Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more touches
-// together makes each cheaper.
+// Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more
+// touches together makes each cheaper.
 constexpr uint64_t kFirstChunkSamples = 8192;
 constexpr uint64_t kMostChunkSamples = 131072;
 // Bytes that one chunk may hold, whatever its columns.
@@ -21,7 +21,8 @@ constexpr uint64_t kMostBatchBytes = 192 << 20;
 }  // namespace
 
 struct DatasetStream::Shared {
-  explicit Shared(std::shared_ptr<const DatasetSpecification> specification) : maker(std::move(specification)) {}
+  explicit Shared(std::shared_ptr<const DatasetSpecification> specification)
+      : maker(std::move(specification)) {}
 
   const BatchMaker maker;
   std::atomic<bool> cancelled{false};
@@ -31,7 +32,7 @@ struct DatasetStream::Shared {
 
   std::unique_ptr<TouchSampler::Workspace> TakeWorkspace() {
     std::lock_guard<std::mutex> lock(mutex);
-    if (workspaces.empty()) return TouchSampler::NewWorkspace();
+    if (workspaces.empty()) return std::make_unique<TouchSampler::Workspace>();
     auto workspace = std::move(workspaces.back());
     workspaces.pop_back();
     return workspace;
@@ -45,8 +46,9 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
   stream->pool_ = pool;
   uint64_t bytes = 0;
   for (const ColumnInfo& column : stream->shared_->maker.columns())
-    bytes += column.type == ColumnType::kBytes ? specification->image.options.width * specification->image.options.height
-                                               : column.BytesPerSample();
+    bytes += column.type == ColumnType::kBytes
+                 ? specification->image.options.width * specification->image.options.height
+                 : column.BytesPerSample();
   const uint64_t most_rows = std::max<uint64_t>(1, kMostBatchBytes / bytes);
 
   DatasetPart& resolved = stream->part_;
@@ -59,8 +61,9 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
     return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
                                               specification->samples, " samples"));
   if (resolved.batch_size > most_rows)
-    return absl::InvalidArgumentError(absl::StrCat("batch_size = ", part.batch_size, ": a sample of these columns has ",
-                                                   bytes, " bytes, so at most ", most_rows, " go into a batch"));
+    return absl::InvalidArgumentError(absl::StrCat("batch_size = ", part.batch_size,
+                                                   ": a sample of these columns has ", bytes,
+                                                   " bytes, so at most ", most_rows, " go into a batch"));
   // A part may be empty: a worker beyond the last batch, or a resumption at the very end.
   stream->next_index_ = part.start_index;
   stream->most_chunk_samples_ =
@@ -69,9 +72,13 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
   return stream;
 }
 
-DatasetStream::~DatasetStream() { shared_->cancelled = true; }
+DatasetStream::~DatasetStream() {
+  shared_->cancelled = true;
+}
 
-const DatasetSpecification& DatasetStream::specification() const { return shared_->maker.specification(); }
+const DatasetSpecification& DatasetStream::specification() const {
+  return shared_->maker.specification();
+}
 
 // The batches of the next task; null at the end of the part.
 std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
@@ -100,7 +107,8 @@ void DatasetStream::Schedule() {
     pool_->Submit([shared = shared_, chunk] {
       absl::Status status = absl::CancelledError("the stream was cancelled");
       std::unique_ptr<TouchSampler::Workspace> workspace = shared->TakeWorkspace();
-      if (!shared->cancelled) status = shared->maker.Make(absl::MakeSpan(chunk->batches), shared->cancelled, workspace.get());
+      if (!shared->cancelled)
+        status = shared->maker.Make(absl::MakeSpan(chunk->batches), shared->cancelled, workspace.get());
       std::lock_guard<std::mutex> lock(shared->mutex);
       shared->workspaces.push_back(std::move(workspace));
       chunk->status = status;

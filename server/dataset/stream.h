@@ -31,8 +31,8 @@ struct DatasetPart {
 struct DatasetBatch {
   uint64_t start_index = 0;
   uint32_t rows = 0;
-  std::vector<std::string> data;                // one a column, as ColumnsOf tells them
-  std::vector<std::vector<uint64_t>> offsets;   // one a column: rows + 1 entries for kBytes, else empty
+  std::vector<std::string> data;               // one a column, as ColumnsOf tells them
+  std::vector<std::vector<uint64_t>> offsets;  // one a column: rows + 1 entries for kBytes, else empty
 };
 
 // The file of a picture in the encoding that `image` asks for (kPng or kJpeg).
@@ -62,14 +62,14 @@ class BatchMaker {
 class DatasetStream {
  public:
   // Checks the part against the specification (which must be valid).
-  static absl::StatusOr<std::unique_ptr<DatasetStream>> Create(std::shared_ptr<const DatasetSpecification> specification,
-                                                               const DatasetPart& part, ThreadPool* pool);
+  static absl::StatusOr<std::unique_ptr<DatasetStream>> Create(
+      std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool);
   ~DatasetStream();  // cancels
 
   const DatasetSpecification& specification() const;
 
-  // The next batch in order; nothing at the end. Waits for the pool, looking at `cancelled` twenty times a second
-  // (may be empty). Not thread-safe.
+  // The next batch in order; nothing at the end. Waits for the pool, looking at `cancelled` twenty times a
+  // second (may be empty). Not thread-safe.
   absl::StatusOr<std::optional<DatasetBatch>> Next(const std::function<bool()>& cancelled);
 
  private:
@@ -90,8 +90,8 @@ class DatasetStream {
   std::shared_ptr<Shared> shared_;
   DatasetPart part_;
   ThreadPool* pool_ = nullptr;
-  uint64_t next_index_ = 0;        // start of the first batch that is not scheduled yet
-  uint64_t chunk_samples_ = 0;     // about, of the next chunk: grows, so that the first batch comes soon
+  uint64_t next_index_ = 0;     // start of the first batch that is not scheduled yet
+  uint64_t chunk_samples_ = 0;  // about, of the next chunk: grows, so that the first batch comes soon
   uint64_t most_chunk_samples_ = 0;
   std::deque<std::shared_ptr<Chunk>> chunks_;
 };

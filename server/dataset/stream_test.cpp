@@ -25,20 +25,23 @@ TEST(DatasetStream, ThreadsAndBatchSizesChangeNoByte) {
     for (uint32_t batch_size : {1u, 1000u, 4096u, 65536u}) {
       DatasetPart part;
       part.batch_size = batch_size;
-      EXPECT_EQ(Columns(SmallDataset(kSamples), part, threads), Whole()) << threads << " threads, batches of " << batch_size;
+      EXPECT_EQ(Columns(SmallDataset(kSamples), part, threads), Whole())
+          << threads << " threads, batches of " << batch_size;
     }
 }
 
 TEST(DatasetStream, APartIsTheSamePartOfTheWhole) {
   const std::vector<ColumnInfo> infos = ColumnsOf(SmallDataset(kSamples));
-  for (const auto& [start, stop] : {std::pair<uint64_t, uint64_t>(0, 1), {12345, 12346}, {9999, 20001}, {29999, 30000}}) {
+  for (const auto& [start, stop] :
+       {std::pair<uint64_t, uint64_t>(0, 1), {12345, 12346}, {9999, 20001}, {29999, 30000}}) {
     DatasetPart part;
     part.start_index = start;
     part.stop_index = stop;
     part.batch_size = 777;
     const std::vector<std::string> columns = Columns(SmallDataset(kSamples), part, 2);
     for (size_t k = 0; k < columns.size(); ++k)
-      EXPECT_EQ(columns[k], Whole()[k].substr(start * infos[k].BytesPerSample(), (stop - start) * infos[k].BytesPerSample()));
+      EXPECT_EQ(columns[k], Whole()[k].substr(start * infos[k].BytesPerSample(),
+                                              (stop - start) * infos[k].BytesPerSample()));
   }
 }
 
@@ -104,7 +107,8 @@ TEST(DatasetStream, ResultsAreThoseOfTouchesMadeOneByOne) {
     }
     float streamed[3];
     std::memcpy(streamed, columns[2].data() + 12 * index, 12);
-    for (int finger = 0; finger < 3; ++finger) EXPECT_EQ(streamed[finger], static_cast<float>(descriptor_s[finger])) << index;
+    for (int finger = 0; finger < 3; ++finger)
+      EXPECT_EQ(streamed[finger], static_cast<float>(descriptor_s[finger])) << index;
   }
 }
 
@@ -141,7 +145,8 @@ TEST(DatasetStream, AnObjectThatNoTouchCanMeetFailsSoonAndSaysWhy) {
   const auto stream = DatasetStream::Create(shared, {}, &pool);
   const auto batch = (*stream)->Next({});
   EXPECT_EQ(batch.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(batch.status().message()), testing::AllOf(testing::HasSubstr("'crumb', sample 0"), testing::HasSubstr("60 mm")));
+  EXPECT_THAT(std::string(batch.status().message()),
+              testing::AllOf(testing::HasSubstr("'crumb', sample 0"), testing::HasSubstr("60 mm")));
 }
 
 TEST(DatasetStream, ExplicitTouchesThatMissAreReportedAsNotANumber) {
@@ -183,9 +188,11 @@ TEST(DatasetStream, RefusesPartsBeyondTheEndAndBatchesBeyondAMessage) {
   ASSERT_TRUE(ValidateDataset(specification.get()).ok());
   DatasetPart beyond, large;
   beyond.stop_index = 101;
-  EXPECT_THAT(std::string(DatasetStream::Create(specification, beyond, &pool).status().message()), testing::HasSubstr("100 samples"));
+  EXPECT_THAT(std::string(DatasetStream::Create(specification, beyond, &pool).status().message()),
+              testing::HasSubstr("100 samples"));
   large.batch_size = 10'000'000;
-  EXPECT_THAT(std::string(DatasetStream::Create(specification, large, &pool).status().message()), testing::HasSubstr("batch_size = 10000000"));
+  EXPECT_THAT(std::string(DatasetStream::Create(specification, large, &pool).status().message()),
+              testing::HasSubstr("batch_size = 10000000"));
 }
 
 TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
@@ -206,12 +213,15 @@ TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
   std::memcpy(lateral, columns[2].data() + 12 * k, 12);
   std::memcpy(&standoff, columns[3].data() + 4 * k, 4);
   const auto vector = [](const float* v) { return Eigen::Vector3d(v[0], v[1], v[2]); };
-  const Camera camera = CameraOfTouch(vector(target), vector(approach).normalized(), vector(lateral).normalized(), standoff);
-  const auto image = specification.image.renderer->Render(specification.objects[k % 3], camera, specification.image.options);
+  const Camera camera =
+      CameraOfTouch(vector(target), vector(approach).normalized(), vector(lateral).normalized(), standoff);
+  const auto image =
+      specification.image.renderer->Render(specification.objects[k % 3], camera, specification.image.options);
   ASSERT_TRUE(image.ok());
   int different = 0;
   for (size_t p = 0; p < image->pixels.size(); ++p)
-    different += std::abs(image->pixels[p] - static_cast<uint8_t>(columns[5][k * image->pixels.size() + p])) > 1;
+    different +=
+        std::abs(image->pixels[p] - static_cast<uint8_t>(columns[5][k * image->pixels.size() + p])) > 1;
   EXPECT_LT(different, 10);  // the pose in the column is rounded to single precision
 }
 

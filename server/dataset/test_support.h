@@ -27,18 +27,21 @@ inline std::shared_ptr<const Model> ModelOf(const std::string& effects) {
   return std::make_shared<const Model>(*std::move(model));
 }
 
-inline DatasetSpecification SmallDataset(uint64_t samples, const std::string& effects = "  - gaussian_noise: {sigma_us: 5000}\n") {
+inline DatasetSpecification SmallDataset(
+    uint64_t samples, const std::string& effects = "  - gaussian_noise: {sigma_us: 5000}\n") {
   DatasetSpecification specification;
   specification.objects = {Supershape("lat00"), Supershape("lat10"), Supershape("lat20")};
   specification.model = ModelOf(effects);
   specification.seed = 7;
   specification.samples = samples;
-  specification.columns = *ColumnChoice::FromNames({"index", "object", "descriptor", "contact_time", "pose", "contact"});
+  specification.columns =
+      *ColumnChoice::FromNames({"index", "object", "descriptor", "contact_time", "pose", "contact"});
   return specification;
 }
 
 // All bytes of a part, column after column, samples in order.
-inline std::vector<std::string> Columns(const DatasetSpecification& specification, const DatasetPart& part, int threads) {
+inline std::vector<std::string> Columns(const DatasetSpecification& specification, const DatasetPart& part,
+                                        int threads) {
   ThreadPool pool(threads);
   auto shared = std::make_shared<DatasetSpecification>(specification);
   EXPECT_TRUE(ValidateDataset(shared.get()).ok());

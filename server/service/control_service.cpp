@@ -21,7 +21,9 @@ std::string NewToken() {
 
 }  // namespace
 
-bool LeaseBook::Held(Clock::time_point now) const { return !token_.empty() && now < until_; }
+bool LeaseBook::Held(Clock::time_point now) const {
+  return !token_.empty() && now < until_;
+}
 
 v1::Lease LeaseBook::Describe() const {
   v1::Lease lease;
@@ -34,11 +36,13 @@ v1::Lease LeaseBook::Describe() const {
 
 absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, Clock::time_point now) {
   if (holder.empty() || holder.size() > 256)
-    return absl::InvalidArgumentError("holder: say who asks, in 1 to 256 characters, for instance 'ana@bench2'");
+    return absl::InvalidArgumentError(
+        "holder: say who asks, in 1 to 256 characters, for instance 'ana@bench2'");
   std::lock_guard<std::mutex> lock(mutex_);
   if (Held(now) && !take)
-    return absl::FailedPreconditionError(absl::StrCat("the lease is held by '", holder_, "' (epoch ", epoch_,
-                                                      "): ask them to release it, or take it with take = true"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("the lease is held by '", holder_, "' (epoch ", epoch_,
+                     "): ask them to release it, or take it with take = true"));
   token_ = NewToken();
   holder_ = holder;
   ++epoch_;
@@ -48,8 +52,9 @@ absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool tak
 
 absl::Status LeaseBook::CheckToken(const std::string& token, Clock::time_point now) const {
   if (Held(now) && token == token_) return absl::OkStatus();
-  return absl::AbortedError(Held(now) ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
-                                      : std::string("this lease is stale: it ran out or was released; acquire a new one"));
+  return absl::AbortedError(
+      Held(now) ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
+                : std::string("this lease is stale: it ran out or was released; acquire a new one"));
 }
 
 absl::StatusOr<v1::Lease> LeaseBook::Renew(const std::string& token, Clock::time_point now) {
@@ -83,14 +88,16 @@ uint64_t LeaseBook::epoch() const {
   return epoch_;
 }
 
-grpc::Status ControlService::AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request, v1::Lease* response) {
+grpc::Status ControlService::AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request,
+                                          v1::Lease* response) {
   auto lease = leases_->Acquire(request->holder(), request->take());
   if (!lease.ok()) return ToGrpc(lease.status());
   *response = *std::move(lease);
   return grpc::Status::OK;
 }
 
-grpc::Status ControlService::RenewLease(grpc::ServerContext*, const v1::RenewLeaseRequest* request, v1::Lease* response) {
+grpc::Status ControlService::RenewLease(grpc::ServerContext*, const v1::RenewLeaseRequest* request,
+                                        v1::Lease* response) {
   auto lease = leases_->Renew(request->token());
   if (!lease.ok()) return ToGrpc(lease.status());
   *response = *std::move(lease);
@@ -102,10 +109,12 @@ grpc::Status ControlService::ReleaseLease(grpc::ServerContext*, const v1::Releas
   return ToGrpc(leases_->Release(request->token()));
 }
 
-grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRequest* request, v1::StopResponse* response) {
+grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRequest* request,
+                                  v1::StopResponse* response) {
   const uint32_t running = resources_->running_requests;
   ++resources_->stop_count;
-  spdlog::warn("stop from {}: {}; {} requests under way end", context->peer(), request->reason().empty() ? "no reason given" : request->reason(), running);
+  spdlog::warn("stop from {}: {}; {} requests under way end", context->peer(),
+               request->reason().empty() ? "no reason given" : request->reason(), running);
   response->set_aborted_touches(running);
   return grpc::Status::OK;
 }
@@ -119,7 +128,8 @@ grpc::Status ControlService::GetState(grpc::ServerContext*, const v1::GetStateRe
   response->set_running_streams(streams);
   response->set_touches(resources_->touches);
   response->set_images(resources_->images);
-  response->set_uptime_s(std::chrono::duration<double>(std::chrono::steady_clock::now() - resources_->started).count());
+  response->set_uptime_s(
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - resources_->started).count());
   return grpc::Status::OK;
 }
 

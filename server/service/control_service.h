@@ -18,11 +18,12 @@ class LeaseBook {
   using Clock = std::chrono::steady_clock;
   explicit LeaseBook(double window_s) : window_s_(window_s) {}
 
-  absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take, Clock::time_point now = Clock::now());
+  absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take,
+                                    Clock::time_point now = Clock::now());
   absl::StatusOr<v1::Lease> Renew(const std::string& token, Clock::time_point now = Clock::now());
   absl::Status Release(const std::string& token, Clock::time_point now = Clock::now());
-  // Whether a request that carries `token` may act. A virtual source needs no lease, so none is right; a stale one
-  // is refused.
+  // Whether a request that carries `token` may act. A virtual source needs no lease, so none is right; a
+  // stale one is refused.
   absl::Status Check(const std::string& token, Clock::time_point now = Clock::now()) const;
 
   // Who holds it; empty if nobody.
@@ -47,7 +48,8 @@ class ControlService final : public v1::Control::Service {
 
   grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest*, v1::Lease*) override;
   grpc::Status RenewLease(grpc::ServerContext*, const v1::RenewLeaseRequest*, v1::Lease*) override;
-  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*, v1::ReleaseLeaseResponse*) override;
+  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*,
+                            v1::ReleaseLeaseResponse*) override;
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest*, v1::StopResponse*) override;
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
 

@@ -18,12 +18,16 @@ v1::Vector3 ToProto(const Eigen::Vector3d& v) {
   return message;
 }
 
-Eigen::Vector3d FromProto(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
+Eigen::Vector3d FromProto(const v1::Vector3& v) {
+  return {v.x(), v.y(), v.z()};
+}
 
 absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where) {
-  for (const auto& [present, name] : {std::pair(message.has_target_m(), "target_m"), std::pair(message.has_approach(), "approach"),
-                                      std::pair(message.has_lateral(), "lateral")})
-    if (!present) return absl::InvalidArgumentError(absl::StrCat(where, ".", name, " is missing: a touch needs it"));
+  for (const auto& [present, name] :
+       {std::pair(message.has_target_m(), "target_m"), std::pair(message.has_approach(), "approach"),
+        std::pair(message.has_lateral(), "lateral")})
+    if (!present)
+      return absl::InvalidArgumentError(absl::StrCat(where, ".", name, " is missing: a touch needs it"));
   CommandedTouch touch;
   touch.target_m = FromProto(message.target_m());
   touch.approach = FromProto(message.approach());
@@ -67,7 +71,8 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
       plan.kind = Plan::Kind::kFaces;
       const v1::FacesPlan& faces = message.faces();
       constexpr uint32_t kMost = 1'000'000;  // beyond, the plan's check refuses, whatever the number
-      if (faces.samples_per_face() != 0) plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMost + 1);
+      if (faces.samples_per_face() != 0)
+        plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMost + 1);
       if (faces.rounds() != 0) plan.faces.rounds = std::min(faces.rounds(), kMost + 1);
       if (faces.has_most_tilt_rad()) plan.faces.most_tilt_rad = faces.most_tilt_rad();
       if (faces.has_spread()) plan.faces.spread = faces.spread();
@@ -77,8 +82,9 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
     case v1::Plan::kList: {
       plan.kind = Plan::Kind::kList;
       for (int k = 0; k < message.list().touches_size(); ++k) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch,
-                                    FromProto(message.list().touches(k), absl::StrCat("plan.list.touches[", k, "]")));
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            CommandedTouch touch,
+            FromProto(message.list().touches(k), absl::StrCat("plan.list.touches[", k, "]")));
         plan.list.push_back(std::move(touch));
       }
       break;
@@ -90,15 +96,19 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
   return plan;
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message, const Resources& resources) {
+absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message,
+                                                       const Resources& resources) {
   switch (message.ref_case()) {
-    case v1::ModelRef::kName: return resources.models->FindByName(message.name());
-    case v1::ModelRef::kHash: return resources.models->FindByHash(message.hash());
+    case v1::ModelRef::kName:
+      return resources.models->FindByName(message.name());
+    case v1::ModelRef::kHash:
+      return resources.models->FindByHash(message.hash());
     case v1::ModelRef::kYaml: {
       TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(message.yaml(), "model.yaml", Catalogue()));
       return std::make_shared<const Model>(std::move(model));
     }
-    case v1::ModelRef::REF_NOT_SET: break;
+    case v1::ModelRef::REF_NOT_SET:
+      break;
   }
   return resources.default_model;
 }
@@ -106,7 +116,9 @@ absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& messa
 absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* resources) {
   DatasetImage image;
   // Out-of-range numbers reach the check as what they are: no wrap-around.
-  const auto side = [](uint32_t value) { return value == 0 ? 224 : static_cast<int>(std::min<uint32_t>(value, 1u << 30)); };
+  const auto side = [](uint32_t value) {
+    return value == 0 ? 224 : static_cast<int>(std::min<uint32_t>(value, 1u << 30));
+  };
   image.options.width = side(message.width());
   image.options.height = side(message.height());
   image.options.format = message.format() == v1::PIXEL_FORMAT_RGB ? PixelFormat::kRgb : PixelFormat::kGrey;
@@ -116,14 +128,18 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* 
   image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? ImageEncoding::kPng
                    : message.encoding() == v1::IMAGE_ENCODING_JPEG ? ImageEncoding::kJpeg
                                                                    : ImageEncoding::kRaw;
-  if (message.jpeg_quality() != 0) image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
+  if (message.jpeg_quality() != 0)
+    image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
   if (message.vertical_fov_rad() != 0) image.vertical_fov_rad = message.vertical_fov_rad();
   for (const auto& [value, valid, name] :
-       {std::tuple<int, bool, const char*>(message.format(), v1::PixelFormat_IsValid(message.format()), "format"),
+       {std::tuple<int, bool, const char*>(message.format(), v1::PixelFormat_IsValid(message.format()),
+                                           "format"),
         {message.encoding(), v1::ImageEncoding_IsValid(message.encoding()), "encoding"},
         {message.look(), v1::Look_IsValid(message.look()), "look"},
         {message.renderer(), v1::RendererKind_IsValid(message.renderer()), "renderer"}})
-    if (!valid) return absl::InvalidArgumentError(absl::StrCat("image.", name, " = ", value, ": is no value of its enumeration"));
+    if (!valid)
+      return absl::InvalidArgumentError(
+          absl::StrCat("image.", name, " = ", value, ": is no value of its enumeration"));
   const RendererKind kind = message.renderer() == v1::RENDERER_KIND_EGL   ? RendererKind::kEgl
                             : message.renderer() == v1::RENDERER_KIND_CPU ? RendererKind::kCpu
                                                                           : RendererKind::kAuto;
@@ -131,11 +147,13 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* 
   return image;
 }
 
-absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::DatasetSpec& message, Resources* resources) {
+absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::DatasetSpec& message,
+                                                                      Resources* resources) {
   auto specification = std::make_shared<DatasetSpecification>();
   for (int k = 0; k < message.objects_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
-                                resources->objects.Find(message.objects(k), absl::StrCat("spec.objects[", k, "]")));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const ServedObject* object,
+        resources->objects.Find(message.objects(k), absl::StrCat("spec.objects[", k, "]")));
     specification->objects.push_back(object->surface);
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(specification->plan, FromProto(message.plan()));
@@ -160,11 +178,21 @@ v1::Column ColumnToProto(const ColumnInfo& info) {
   v1::Column column;
   column.set_name(info.name);
   switch (info.type) {
-    case ColumnType::kFloat32: column.set_type(v1::DATA_TYPE_FLOAT32); break;
-    case ColumnType::kUint8: column.set_type(v1::DATA_TYPE_UINT8); break;
-    case ColumnType::kInt32: column.set_type(v1::DATA_TYPE_INT32); break;
-    case ColumnType::kUint64: column.set_type(v1::DATA_TYPE_UINT64); break;
-    case ColumnType::kBytes: column.set_type(v1::DATA_TYPE_BYTES); break;
+    case ColumnType::kFloat32:
+      column.set_type(v1::DATA_TYPE_FLOAT32);
+      break;
+    case ColumnType::kUint8:
+      column.set_type(v1::DATA_TYPE_UINT8);
+      break;
+    case ColumnType::kInt32:
+      column.set_type(v1::DATA_TYPE_INT32);
+      break;
+    case ColumnType::kUint64:
+      column.set_type(v1::DATA_TYPE_UINT64);
+      break;
+    case ColumnType::kBytes:
+      column.set_type(v1::DATA_TYPE_BYTES);
+      break;
   }
   column.mutable_shape()->Add(info.shape.begin(), info.shape.end());
   return column;
@@ -195,7 +223,9 @@ v1::Effect ToProto(const Effect& effect) {
     v1::Parameter* parameter = message.add_parameters();
     parameter->set_name(info.name);
     parameter->set_unit(std::string(UnitSymbol(info.unit)));
-    parameter->set_arity(info.arity == Arity::kScalar ? "scalar" : info.arity == Arity::kVector3 ? "vector3" : "finger");
+    parameter->set_arity(info.arity == Arity::kScalar    ? "scalar"
+                         : info.arity == Arity::kVector3 ? "vector3"
+                                                         : "finger");
     parameter->set_min(info.lower);
     parameter->set_max(info.upper);
     parameter->set_default_value(info.neutral);

@@ -21,12 +21,14 @@ absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, cons
 v1::CommandedTouch ToProto(const CommandedTouch& touch);
 
 absl::StatusOr<Plan> FromProto(const v1::Plan& message);
-absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message, const Resources& resources);
+absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message,
+                                                       const Resources& resources);
 
 // Image options with the source's defaults; `renderer` is resolved.
 absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* resources);
 
-absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::DatasetSpec& message, Resources* resources);
+absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::DatasetSpec& message,
+                                                                      Resources* resources);
 
 v1::RendererKind RendererKindOf(const Renderer& renderer);
 v1::Column ColumnToProto(const ColumnInfo& info);

@@ -7,24 +7,28 @@
 
 namespace touchstone {
 
-grpc::Status ModelsService::ListEffects(grpc::ServerContext*, const v1::ListEffectsRequest*, v1::ListEffectsResponse* response) {
+grpc::Status ModelsService::ListEffects(grpc::ServerContext*, const v1::ListEffectsRequest*,
+                                        v1::ListEffectsResponse* response) {
   for (const auto& effect : Catalogue().All()) *response->add_effects() = ToProto(*effect);
   return grpc::Status::OK;
 }
 
-grpc::Status ModelsService::ListModels(grpc::ServerContext*, const v1::ListModelsRequest*, v1::ListModelsResponse* response) {
+grpc::Status ModelsService::ListModels(grpc::ServerContext*, const v1::ListModelsRequest*,
+                                       v1::ListModelsResponse* response) {
   for (const auto& model : resources_->models->All()) *response->add_models() = ToProto(*model);
   return grpc::Status::OK;
 }
 
-grpc::Status ModelsService::GetModel(grpc::ServerContext*, const v1::GetModelRequest* request, v1::Model* response) {
+grpc::Status ModelsService::GetModel(grpc::ServerContext*, const v1::GetModelRequest* request,
+                                     v1::Model* response) {
   const auto model = FromProto(request->model(), *resources_);
   if (!model.ok()) return ToGrpc(model.status());
   *response = ToProto(**model);
   return grpc::Status::OK;
 }
 
-grpc::Status ModelsService::CreateModel(grpc::ServerContext*, const v1::CreateModelRequest* request, v1::Model* response) {
+grpc::Status ModelsService::CreateModel(grpc::ServerContext*, const v1::CreateModelRequest* request,
+                                        v1::Model* response) {
   const auto model = ParseModel(request->yaml(), "yaml", Catalogue());
   if (!model.ok()) return ToGrpc(model.status());
   if (!request->validate_only()) {

@@ -10,8 +10,10 @@ class ModelsService final : public v1::Models::Service {
  public:
   explicit ModelsService(Resources* resources) : resources_(resources) {}
 
-  grpc::Status ListEffects(grpc::ServerContext*, const v1::ListEffectsRequest*, v1::ListEffectsResponse*) override;
-  grpc::Status ListModels(grpc::ServerContext*, const v1::ListModelsRequest*, v1::ListModelsResponse*) override;
+  grpc::Status ListEffects(grpc::ServerContext*, const v1::ListEffectsRequest*,
+                           v1::ListEffectsResponse*) override;
+  grpc::Status ListModels(grpc::ServerContext*, const v1::ListModelsRequest*,
+                          v1::ListModelsResponse*) override;
   grpc::Status GetModel(grpc::ServerContext*, const v1::GetModelRequest*, v1::Model*) override;
   grpc::Status CreateModel(grpc::ServerContext*, const v1::CreateModelRequest*, v1::Model*) override;
 

@@ -66,18 +66,21 @@ absl::StatusOr<ObjectStore> ObjectStore::Load(const ServerOptions& options, Thre
     // A file may take the place of a built-in shape, but two files may not share a name.
     const bool replaces_builtin = store.objects_.count(name) && store.objects_[name].origin == kBuiltIn;
     if (store.objects_.count(name) && !replaces_builtin)
-      return absl::InvalidArgumentError(absl::StrCat("two meshes are named '", name, "': give each a name of its own, --mesh NAME=FILE"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("two meshes are named '", name, "': give each a name of its own, --mesh NAME=FILE"));
     store.objects_[name] = *std::move(object);
   }
   return store;
 }
 
-absl::StatusOr<const ServedObject*> ObjectStore::Find(const std::string& name, const std::string& field) const {
+absl::StatusOr<const ServedObject*> ObjectStore::Find(const std::string& name,
+                                                      const std::string& field) const {
   const auto found = objects_.find(name);
   if (found != objects_.end()) return &found->second;
   std::vector<std::string> names;
   for (const auto& [known, object] : objects_) names.push_back(known);
-  return absl::NotFoundError(absl::StrCat(field, ": no object is named '", name, "'", DidYouMean(name, names)));
+  return absl::NotFoundError(
+      absl::StrCat(field, ": no object is named '", name, "'", DidYouMean(name, names)));
 }
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& folder) {
@@ -128,33 +131,40 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByName(const std::s
 
 absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::string& prefix) const {
   if (prefix.size() < 8)
-    return absl::InvalidArgumentError(absl::StrCat("model.hash = '", prefix, "': give at least its first 8 digits"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("model.hash = '", prefix, "': give at least its first 8 digits"));
   std::lock_guard<std::mutex> lock(mutex_);
   for (int tries = 0; tries < 2; ++tries) {
     for (const auto& [name, model] : models_)
       if (absl::StartsWith(model->Hash(), prefix)) return model;
     Refresh();
   }
-  return absl::NotFoundError(absl::StrCat("model: no model has the hash ", prefix, "; `touchstone model list` shows them"));
+  return absl::NotFoundError(
+      absl::StrCat("model: no model has the hash ", prefix, "; `touchstone model list` shows them"));
 }
 
 absl::Status ModelStore::Create(const Model& model) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const bool plain = !model.name.empty() && model.name.size() <= 64 && model.name[0] != '.' &&
-                     model.name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") == std::string::npos;
+  const bool plain =
+      !model.name.empty() && model.name.size() <= 64 && model.name[0] != '.' &&
+      model.name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
+          std::string::npos;
   if (!plain)
-    return absl::InvalidArgumentError(absl::StrCat("model.name = '", model.name,
-                                                   "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "model.name = '", model.name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
   Refresh();
   const auto found = models_.find(model.name);
   if (found != models_.end()) {
     if (found->second->Hash() == model.Hash()) return absl::OkStatus();
-    return absl::AlreadyExistsError(absl::StrCat("model '", model.name, "' stands for the hash ", found->second->Hash().substr(0, 8),
-                                                 " and a model never changes: give ", model.Hash().substr(0, 8), " another name"));
+    return absl::AlreadyExistsError(
+        absl::StrCat("model '", model.name, "' stands for the hash ", found->second->Hash().substr(0, 8),
+                     " and a model never changes: give ", model.Hash().substr(0, 8), " another name"));
   }
-  if (models_.size() >= 10000) return absl::ResourceExhaustedError("the store holds 10000 models; remove some from models_dir");
+  if (models_.size() >= 10000)
+    return absl::ResourceExhaustedError("the store holds 10000 models; remove some from models_dir");
   if (!folder_.empty())
-    TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), FormatModel(model)));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), FormatModel(model)));
   models_[model.name] = std::make_shared<const Model>(model);
   return absl::OkStatus();
 }

@@ -40,8 +40,8 @@ class ObjectStore {
   std::map<std::string, ServedObject> objects_;
 };
 
-// Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so that
-// replicas that share it serve the same ones.
+// Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so
+// that replicas that share it serve the same ones.
 class ModelStore {
  public:
   static absl::StatusOr<std::unique_ptr<ModelStore>> Open(const std::string& folder);
@@ -70,7 +70,7 @@ struct Resources {
   absl::StatusOr<std::shared_ptr<Renderer>> RendererFor(RendererKind kind);
 
   std::atomic<bool> draining{false};
-  std::atomic<uint64_t> stop_count{0};       // grows with every Stop; running touches compare
+  std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
   std::atomic<uint32_t> running_requests{0};
   std::atomic<uint32_t> running_streams{0};
   std::atomic<uint64_t> touches{0};

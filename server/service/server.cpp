@@ -7,9 +7,10 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <spdlog/spdlog.h>
 
+#include "grpc/health/v1/health.pb.h"
 #include "server/base/status.h"
-#include "server/effects/all_effects.h"
 #include "server/base/text.h"
+#include "server/effects/all_effects.h"
 #include "server/service/control_service.h"
 #include "server/service/models_service.h"
 #include "server/service/resources.h"
@@ -23,6 +24,7 @@ void EnablePlugins() {
   static const bool enabled = [] {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::health::v1::HealthCheckRequest::descriptor();  // links the description, so that reflection has it
     return true;
   }();
   (void)enabled;
@@ -30,20 +32,26 @@ void EnablePlugins() {
 
 absl::Status CheckRange(int value, int lower, int upper, const char* name) {
   if (value >= lower && value <= upper) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(name, " = ", value, ": must be from ", lower, " to ", upper));
+  return absl::InvalidArgumentError(
+      absl::StrCat(name, " = ", value, ": must be from ", lower, " to ", upper));
 }
 
 absl::Status CheckOptions(const ServerOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.threads, 0, 1024, "threads"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_batch_size, 1, 1 << 20, "most_batch_size"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_touches_per_request, 1, 10'000'000, "most_touches_per_request"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_images_per_request, 1, 1'000'000, "most_images_per_request"));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckRange(options.most_touches_per_request, 1, 10'000'000, "most_touches_per_request"));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckRange(options.most_images_per_request, 1, 1'000'000, "most_images_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_streams, 1, 100'000, "most_streams"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_message_mib, 1, 2047, "most_message_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));
-  for (const auto& [value, name] : {std::pair(options.lease_window_s, "lease_window_s"), std::pair(options.drain_s, "drain_s")})
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));
+  for (const auto& [value, name] :
+       {std::pair(options.lease_window_s, "lease_window_s"), std::pair(options.drain_s, "drain_s")})
     if (!(value >= 0.01 && value <= 3600))
-      return absl::InvalidArgumentError(absl::StrCat(name, " = ", ShortestNumber(value), ": must be from 0.01 to 3600 seconds"));
+      return absl::InvalidArgumentError(
+          absl::StrCat(name, " = ", ShortestNumber(value), ": must be from 0.01 to 3600 seconds"));
   return absl::OkStatus();
 }
 
@@ -80,7 +88,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.objects, ObjectStore::Load(options, resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(options.models_dir));
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model, DefaultModel(options.default_model, resources.models.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
+                              DefaultModel(options.default_model, resources.models.get()));
   parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
   parts.source = std::make_unique<SourceService>(&resources, parts.leases.get());
   parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
@@ -90,14 +99,17 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   builder.SetMaxReceiveMessageSize(options.most_message_mib << 20);
   builder.SetMaxSendMessageSize(options.most_message_mib << 20);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a taken port is an error, not shared
-  if (!options.listen.empty()) builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &parts.port);
+  if (!options.listen.empty())
+    builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &parts.port);
   builder.RegisterService(parts.source.get());
   builder.RegisterService(parts.control.get());
   builder.RegisterService(parts.models.get());
   parts.server = builder.BuildAndStart();
   if (parts.server == nullptr || (!options.listen.empty() && parts.port == 0)) {
     parts.server = nullptr;
-    return absl::UnavailableError(absl::StrCat("listen = '", options.listen, "': cannot listen there; is the address right (HOST:PORT, port 0 for any), and the port free?"));
+    return absl::UnavailableError(absl::StrCat(
+        "listen = '", options.listen,
+        "': cannot listen there; is the address right (HOST:PORT, port 0 for any), and the port free?"));
   }
   if (auto* health = parts.server->GetHealthCheckService(); health != nullptr)
     for (const char* name : {"touchstone.v1.Source", "touchstone.v1.Control", "touchstone.v1.Models"})
@@ -112,7 +124,9 @@ Server::~Server() {
   }
 }
 
-int Server::port() const { return parts_->port; }
+int Server::port() const {
+  return parts_->port;
+}
 
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   grpc::ChannelArguments arguments;
@@ -122,7 +136,8 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 
 void Server::Drain() {
   parts_->resources.draining = true;
-  if (auto* health = parts_->server->GetHealthCheckService(); health != nullptr) health->SetServingStatus(false);
+  if (auto* health = parts_->server->GetHealthCheckService(); health != nullptr)
+    health->SetServingStatus(false);
   const auto limit = std::chrono::duration_cast<std::chrono::system_clock::duration>(
       std::chrono::duration<double>(parts_->resources.options.drain_s));
   parts_->server->Shutdown(std::chrono::system_clock::now() + limit);

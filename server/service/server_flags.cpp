@@ -1,9 +1,9 @@
 #include "server/service/server_flags.h"
 
-#include <CLI/CLI.hpp>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 #include <toml++/toml.h>
+#include <CLI/CLI.hpp>
 
 #include <functional>
 #include <set>
@@ -35,14 +35,21 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
   ServerOptions& o = flags->options;
   return {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.listen},
-      {"mesh", "Serve a mesh file, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x][,scale=S][,fit_mm=L]; may be repeated", &raw->mesh},
-      {"mesh_dir", "Serve every OFF, OBJ, STL and PLY file of a folder, in mm and z up, named by its stem; may be repeated", &raw->mesh_dir},
-      {"supershape_triangles", "About how many triangles each built-in supershape has", &o.supershape_triangles},
+      {"mesh",
+       "Serve a mesh file, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x][,scale=S][,fit_mm=L]; may be repeated",
+       &raw->mesh},
+      {"mesh_dir",
+       "Serve every OFF, OBJ, STL and PLY file of a folder, in mm and z up, named by its stem; may be "
+       "repeated",
+       &raw->mesh_dir},
+      {"supershape_triangles", "About how many triangles each built-in supershape has",
+       &o.supershape_triangles},
       {"models_dir", "Folder that keeps models; replicas may share it (default: memory)", &o.models_dir},
       {"default_model", "Model used when a request names none: a name, or a .yaml file", &o.default_model},
       {"threads", "Threads that simulate; 0: one a core", &o.threads},
       {"renderer", "auto (the faster one), egl or cpu", &raw->renderer},
-      {"egl_device", "Index of the EGL device (touchstone doctor lists them); -1: the first that renders", &o.renderer.egl_device},
+      {"egl_device", "Index of the EGL device (touchstone doctor lists them); -1: the first that renders",
+       &o.renderer.egl_device},
       {"most_batch_size", "Limit: samples a batch", &o.most_batch_size},
       {"most_touches_per_request", "Limit: explicit touches a request", &o.most_touches_per_request},
       {"most_images_per_request", "Limit: photographs a request", &o.most_images_per_request},
@@ -96,7 +103,8 @@ absl::Status ReadToml(const std::string& text, const std::string& origin, const 
   try {
     table = toml::parse(text, origin);
   } catch (const toml::parse_error& error) {
-    return absl::InvalidArgumentError(absl::StrCat(origin, ":", error.source().begin.line, ":", error.source().begin.column, ": ",
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":", error.source().begin.line, ":",
+                                                   error.source().begin.column, ": ",
                                                    std::string(error.description())));
   }
   std::vector<std::string> known;
@@ -104,8 +112,10 @@ absl::Status ReadToml(const std::string& text, const std::string& origin, const 
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
     const std::string where = absl::StrCat(origin, ":", key.source().begin.line, ": ", name);
-    const auto option = std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.key == name; });
-    if (option == options.end()) return absl::InvalidArgumentError(absl::StrCat(where, ": unknown key", DidYouMean(name, known)));
+    const auto option =
+        std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.key == name; });
+    if (option == options.end())
+      return absl::InvalidArgumentError(absl::StrCat(where, ": unknown key", DidYouMean(name, known)));
     if (set.count(name)) continue;
     TOUCHSTONE_RETURN_IF_ERROR(Assign(node, where, option->target));
   }
@@ -127,11 +137,13 @@ absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
   } else if (raw.renderer == "cpu") {
     options.renderer.kind = RendererKind::kCpu;
   } else if (raw.renderer != "auto") {
-    return absl::InvalidArgumentError(absl::StrCat("renderer = '", raw.renderer, "'", DidYouMean(raw.renderer, {"auto", "egl", "cpu"})));
+    return absl::InvalidArgumentError(
+        absl::StrCat("renderer = '", raw.renderer, "'", DidYouMean(raw.renderer, {"auto", "egl", "cpu"})));
   }
   const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
   if (std::find(levels.begin(), levels.end(), flags->log_level) == levels.end())
-    return absl::InvalidArgumentError(absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
+    return absl::InvalidArgumentError(
+        absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
   return absl::OkStatus();
 }
 
@@ -157,7 +169,8 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
       "touchstone-server");
   std::string config;
   bool version = false;
-  app.add_option("--config", config, "TOML file; its keys are the flags below with underscores (listen = \"127.0.0.1:0\")");
+  app.add_option("--config", config,
+                 "TOML file; its keys are the flags below with underscores (listen = \"127.0.0.1:0\")");
   app.add_flag("--version", version, "Print the version");
   for (const Option& option : options) {
     const std::string flag = "--" + absl::StrReplaceAll(option.key, {{"_", "-"}});
@@ -182,7 +195,8 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
     return flags;
   } catch (const CLI::ExtrasError& error) {
     std::vector<std::string> known = {"--config", "--version", "--help"};
-    for (const Option& option : options) known.push_back("--" + absl::StrReplaceAll(option.key, {{"_", "-"}}));
+    for (const Option& option : options)
+      known.push_back("--" + absl::StrReplaceAll(option.key, {{"_", "-"}}));
     const std::vector<std::string> extras = app.remaining();
     const std::string word = extras.empty() ? "" : extras[0].substr(0, extras[0].find('='));
     return absl::InvalidArgumentError(absl::StrCat("unknown flag ", word, DidYouMean(word, known)));

@@ -1,4 +1,5 @@
-// Command line and TOML file of touchstone-server. Every key of the file is a flag too; unknown ones are errors.
+// Command line and TOML file of touchstone-server. Every key of the file is a flag too; unknown ones are
+// errors.
 #pragma once
 
 #include <string>

@@ -15,20 +15,24 @@ namespace touchstone {
 namespace {
 
 absl::Status CheckName(const std::string& name, const std::string& text) {
-  const bool plain = !name.empty() && name.size() <= 64 &&
-                     std::all_of(name.begin(), name.end(), [](char c) { return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-'; });
+  const bool plain = !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
+    return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-';
+  });
   if (plain) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': the name '", name, "' must be 1 to 64 letters, digits, '_', '.' or '-'"));
+  return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': the name '", name,
+                                                 "' must be 1 to 64 letters, digits, '_', '.' or '-'"));
 }
 
 }  // namespace
 
 absl::StatusOr<MeshSource> ParseMeshSource(const std::string& text) {
-  // FILE[,key=value...] behind NAME=; a comma in a path cannot be told from a key, so it is refused by the key check.
+  // FILE[,key=value...] behind NAME=; a comma in a path cannot be told from a key, so it is refused by the
+  // key check.
   const std::vector<std::string> parts = absl::StrSplit(text, ',');
   const std::pair<std::string, std::string> head = absl::StrSplit(parts[0], absl::MaxSplits('=', 1));
   if (head.second.empty())
-    return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': write NAME=FILE, for instance cup=cup.off,fit_mm=150,up=y"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("mesh '", text, "': write NAME=FILE, for instance cup=cup.off,fit_mm=150,up=y"));
   MeshSource source;
   source.name = head.first;
   source.path = head.second;
@@ -40,10 +44,13 @@ absl::StatusOr<MeshSource> ParseMeshSource(const std::string& text) {
     } else if (option.first == "scale" || option.first == "fit_mm") {
       const auto value = ParseNumber(option.second);
       if (!value.ok() || *value <= 0)
-        return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': ", option.first, " = '", option.second, "' must be a number above 0"));
+        return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': ", option.first, " = '",
+                                                       option.second, "' must be a number above 0"));
       (option.first == "scale" ? source.scale : source.fit_mm) = *value;
     } else {
-      return absl::InvalidArgumentError(absl::StrCat("mesh '", text, "': '", option.first, "' is no option", DidYouMean(option.first, {"unit", "up", "scale", "fit_mm"})));
+      return absl::InvalidArgumentError(
+          absl::StrCat("mesh '", text, "': '", option.first, "' is no option",
+                       DidYouMean(option.first, {"unit", "up", "scale", "fit_mm"})));
     }
   }
   return source;
@@ -65,11 +72,13 @@ absl::StatusOr<std::vector<MeshSource>> MeshSourcesOfFolder(const std::string& f
   }
   if (error) return absl::InvalidArgumentError(absl::StrCat("mesh_dir '", folder, "': ", error.message()));
   // The same shape in two formats is one object: the first by name of the file.
-  std::sort(sources.begin(), sources.end(), [](const MeshSource& a, const MeshSource& b) { return a.path < b.path; });
+  std::sort(sources.begin(), sources.end(),
+            [](const MeshSource& a, const MeshSource& b) { return a.path < b.path; });
   for (size_t k = 1; k < sources.size(); ++k)
     if (sources[k].name == sources[k - 1].name)
-      return absl::InvalidArgumentError(absl::StrCat("mesh_dir '", folder, "': ", sources[k - 1].path, " and ", sources[k].path,
-                                                     " would share the name '", sources[k].name, "': keep one of them there"));
+      return absl::InvalidArgumentError(absl::StrCat("mesh_dir '", folder, "': ", sources[k - 1].path,
+                                                     " and ", sources[k].path, " would share the name '",
+                                                     sources[k].name, "': keep one of them there"));
   return sources;
 }
 

@@ -13,12 +13,12 @@ namespace touchstone {
 
 // A mesh file to serve under a name, with what the file does not say.
 struct MeshSource {
-  std::string name;              // [A-Za-z0-9_.-]{1,64}
+  std::string name;  // [A-Za-z0-9_.-]{1,64}
   std::string path;
-  std::string unit = "mm";       // "mm", "cm", "m", "inch"
-  std::string up = "z";          // which axis of the file points up: "x", "y", "z"
-  double scale = 1;              // further factor on the coordinates
-  double fit_mm = 0;             // > 0: scale so that the longest side of the bounding box is this long
+  std::string unit = "mm";  // "mm", "cm", "m", "inch"
+  std::string up = "z";     // which axis of the file points up: "x", "y", "z"
+  double scale = 1;         // further factor on the coordinates
+  double fit_mm = 0;        // > 0: scale so that the longest side of the bounding box is this long
 };
 
 // "lat10=lat10.off", or with what the file does not say "cup=cup.off,fit_mm=150,up=y,unit=m,scale=2".
@@ -34,16 +34,16 @@ struct ServerOptions {
   int supershape_triangles = 20000;        // about; of each built-in
   std::string models_dir;                  // where models are kept; empty: in memory
   std::string default_model = "nominal";
-  int threads = 0;                         // that simulate; 0: one a core
+  int threads = 0;  // that simulate; 0: one a core
   RendererOptions renderer;
   // Limits: every one in this place.
   int most_batch_size = 65536;
   int most_touches_per_request = 100000;
   int most_images_per_request = 1000;
-  int most_streams = 64;                   // dataset streams at once; one more is RESOURCE_EXHAUSTED
+  int most_streams = 64;  // dataset streams at once; one more is RESOURCE_EXHAUSTED
   int most_message_mib = 256;
   double lease_window_s = 2;
-  double drain_s = 10;                     // what running calls get after SIGTERM
+  double drain_s = 10;  // what running calls get after SIGTERM
 };
 
 }  // namespace touchstone

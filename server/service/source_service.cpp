@@ -48,14 +48,16 @@ absl::StatusOr<Camera> CameraOfView(const v1::View& view, const std::string& whe
       camera.far_m = view.camera().far_m();
       return camera;
     }
-    case v1::View::VIEW_NOT_SET: break;
+    case v1::View::VIEW_NOT_SET:
+      break;
   }
   return absl::InvalidArgumentError(absl::StrCat(where, " is empty: set touch or camera"));
 }
 
 }  // namespace
 
-grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeRequest*, v1::DescribeResponse* response) {
+grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeRequest*,
+                                     v1::DescribeResponse* response) {
   const ServerOptions& options = resources_->options;
   response->set_kind("virtual");
   response->set_version(kVersion);
@@ -64,7 +66,8 @@ grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeReq
   response->set_default_model_hash(resources_->default_model->Hash());
   const auto renderer = resources_->RendererFor(RendererKind::kAuto);
   if (renderer.ok()) response->set_renderer(RendererKindOf(**renderer));
-  response->set_renderer_description(renderer.ok() ? (*renderer)->description() : "none: " + std::string(renderer.status().message()));
+  response->set_renderer_description(renderer.ok() ? (*renderer)->description()
+                                                   : "none: " + std::string(renderer.status().message()));
   response->set_most_touches_per_request(options.most_touches_per_request);
   response->set_most_images_per_request(renderer.ok() ? options.most_images_per_request : 0);
   response->set_most_image_side(renderer.ok() ? kMostImageSide : 0);
@@ -73,7 +76,8 @@ grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeReq
   return grpc::Status::OK;
 }
 
-grpc::Status SourceService::ListObjects(grpc::ServerContext*, const v1::ListObjectsRequest*, v1::ListObjectsResponse* response) {
+grpc::Status SourceService::ListObjects(grpc::ServerContext*, const v1::ListObjectsRequest*,
+                                        v1::ListObjectsResponse* response) {
   for (const auto& [name, served] : resources_->objects.all()) {
     v1::Object* object = response->add_objects();
     object->set_name(name);
@@ -102,13 +106,15 @@ grpc::Status SourceService::ExpandPlan(grpc::ServerContext*, const v1::ExpandPla
   uint64_t count = request->count();
   if (generator->Count() != 0) {
     if (request->first_index() > generator->Count())
-      return ToGrpc(absl::OutOfRangeError(absl::StrCat("first_index = ", request->first_index(), ": the plan has ", generator->Count(), " touches")));
+      return ToGrpc(absl::OutOfRangeError(absl::StrCat("first_index = ", request->first_index(),
+                                                       ": the plan has ", generator->Count(), " touches")));
     const uint64_t left = generator->Count() - request->first_index();
     count = count == 0 ? left : std::min(count, left);
   }
   const uint64_t most = resources_->options.most_touches_per_request;
   if (count > most)
-    return ToGrpc(absl::InvalidArgumentError(absl::StrCat("count = ", count, ": at most ", most, " touches a request; ask in parts by first_index")));
+    return ToGrpc(absl::InvalidArgumentError(absl::StrCat(
+        "count = ", count, ": at most ", most, " touches a request; ask in parts by first_index")));
   for (uint64_t k = 0; k < count; ++k)
     *response->add_touches() = ToProto(TouchOfPlan(*plan, *generator, request->first_index() + k, 0));
   return grpc::Status::OK;
@@ -120,23 +126,30 @@ absl::Status SourceService::Ready(uint64_t stops_before) const {
   return absl::OkStatus();
 }
 
-grpc::Status SourceService::Touch(grpc::ServerContext* context, const v1::TouchRequest* request, v1::TouchResponse* response) {
+grpc::Status SourceService::Touch(grpc::ServerContext* context, const v1::TouchRequest* request,
+                                  v1::TouchResponse* response) {
   return ToGrpc(DoTouch(context, *request, response));
 }
 
-absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request, v1::TouchResponse* response) {
+absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request,
+                                    v1::TouchResponse* response) {
   const RunningGuard running(&resources_->running_requests);
   const uint64_t stops_before = resources_->stop_count;
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const Model> model, FromProto(request.model(), *resources_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+                              resources_->objects.Find(request.object(), "object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const Model> model,
+                              FromProto(request.model(), *resources_));
   const int most = resources_->options.most_touches_per_request;
-  if (request.touches_size() == 0) return absl::InvalidArgumentError("touches is empty: give at least one touch");
+  if (request.touches_size() == 0)
+    return absl::InvalidArgumentError("touches is empty: give at least one touch");
   if (request.touches_size() > most)
-    return absl::InvalidArgumentError(absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
   std::vector<CommandedTouch> touches;
   for (int k = 0; k < request.touches_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch, FromProto(request.touches(k), absl::StrCat("touches[", k, "]")));
+    TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch,
+                                FromProto(request.touches(k), absl::StrCat("touches[", k, "]")));
     touches.push_back(std::move(touch));
   }
 
@@ -149,7 +162,8 @@ absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::Touc
     TOUCHSTONE_RETURN_IF_ERROR(Ready(stops_before));
     // A model with history sees one touch after the other; touches of different strokes never share a batch.
     int count = 1;
-    while (!simulator.needs_previous_press() && count < kTouchBlock && begin + count < request.touches_size() &&
+    while (!simulator.needs_previous_press() && count < kTouchBlock &&
+           begin + count < request.touches_size() &&
            touches[begin + count].stroke_m == touches[begin].stroke_m)
       ++count;
     simulator.Prepare(count, &batch);
@@ -168,16 +182,20 @@ absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::Touc
       for (const std::string& name : simulator.needed_covariates()) {
         const auto value = touch.covariates.find(name);
         if (value == touch.covariates.end())
-          return absl::InvalidArgumentError(absl::StrCat("touches[", begin + k, "].covariates['", name, "'] is missing: a formula of model '", model->name, "' uses it"));
+          return absl::InvalidArgumentError(absl::StrCat("touches[", begin + k, "].covariates['", name,
+                                                         "'] is missing: a formula of model '", model->name,
+                                                         "' uses it"));
         std::vector<double>& values = batch.covariates[name];
         values.resize(count);
         values[k] = value->second;
       }
     }
     if (simulator.needs_previous_press())
-      for (int finger = 0; finger < model->fingers; ++finger) batch.previous_press_m[finger] = press_m[finger];
+      for (int finger = 0; finger < model->fingers; ++finger)
+        batch.previous_press_m[finger] = press_m[finger];
     TOUCHSTONE_RETURN_IF_ERROR(simulator.Run(&batch, &workspace));
-    for (int finger = 0; finger < model->fingers; ++finger) press_m[finger] = batch.press_m[batch.At(finger, count - 1)];
+    for (int finger = 0; finger < model->fingers; ++finger)
+      press_m[finger] = batch.press_m[batch.At(finger, count - 1)];
     AppendResults(batch, response);
     begin += count;
   }
@@ -186,28 +204,35 @@ absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::Touc
   return absl::OkStatus();
 }
 
-grpc::Status SourceService::Capture(grpc::ServerContext* context, const v1::CaptureRequest* request, v1::CaptureResponse* response) {
+grpc::Status SourceService::Capture(grpc::ServerContext* context, const v1::CaptureRequest* request,
+                                    v1::CaptureResponse* response) {
   return ToGrpc(DoCapture(context, *request, response));
 }
 
-absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request, v1::CaptureResponse* response) {
+absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request,
+                                      v1::CaptureResponse* response) {
   const RunningGuard running(&resources_->running_requests);
   const uint64_t stops_before = resources_->stop_count;
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+                              resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetImage image, FromProto(request.image(), resources_));
   const int most = resources_->options.most_images_per_request;
   if (request.views_size() == 0) return absl::InvalidArgumentError("views is empty: give at least one view");
   if (request.views_size() > most)
-    return absl::InvalidArgumentError(absl::StrCat("views has ", request.views_size(), ": at most ", most, " a request"));
-  const uint64_t bytes = uint64_t{3} * image.options.width * image.options.height * request.views_size() * (image.options.depth ? 3 : 1);
+    return absl::InvalidArgumentError(
+        absl::StrCat("views has ", request.views_size(), ": at most ", most, " a request"));
+  const uint64_t bytes = uint64_t{3} * image.options.width * image.options.height * request.views_size() *
+                         (image.options.depth ? 3 : 1);
   if (bytes > (uint64_t{192} << 20))
-    return absl::InvalidArgumentError(absl::StrCat("views has ", request.views_size(), " of ", image.options.width, " x ", image.options.height,
-                                                   " pixels: too much for one answer; ask for fewer at a time"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("views has ", request.views_size(), " of ", image.options.width, " x ",
+                     image.options.height, " pixels: too much for one answer; ask for fewer at a time"));
 
   std::vector<Camera> cameras;
   for (int k = 0; k < request.views_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera, CameraOfView(request.views(k), absl::StrCat("views[", k, "]")));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera,
+                                CameraOfView(request.views(k), absl::StrCat("views[", k, "]")));
     camera.vertical_fov_rad = image.vertical_fov_rad;
     if (const absl::Status status = ValidateImageRequest(camera, image.options); !status.ok())
       return absl::Status(status.code(), absl::StrCat("views[", k, "]: ", status.message()));
@@ -222,11 +247,13 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
   for (const Camera& camera : cameras) {
     if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
     TOUCHSTONE_RETURN_IF_ERROR(Ready(stops_before));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, image.renderer->Render(object->surface, camera, image.options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+                                image.renderer->Render(object->surface, camera, image.options));
     for (v1::Column& column : *response->mutable_columns()) {
       std::string* data = column.mutable_data();
       if (column.name() == "depth_m") {
-        data->append(reinterpret_cast<const char*>(picture.depth_m.data()), picture.depth_m.size() * sizeof(float));
+        data->append(reinterpret_cast<const char*>(picture.depth_m.data()),
+                     picture.depth_m.size() * sizeof(float));
       } else if (column.name() == "mask") {
         data->append(reinterpret_cast<const char*>(picture.mask.data()), picture.mask.size());
       } else if (image.encoding == ImageEncoding::kRaw) {
@@ -244,7 +271,8 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
   return absl::OkStatus();
 }
 
-grpc::Status SourceService::StreamDataset(grpc::ServerContext* context, const v1::StreamDatasetRequest* request,
+grpc::Status SourceService::StreamDataset(grpc::ServerContext* context,
+                                          const v1::StreamDatasetRequest* request,
                                           grpc::ServerWriter<v1::StreamDatasetResponse>* writer) {
   return ToGrpc(DoStream(context, *request, writer));
 }
@@ -254,17 +282,21 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
   const RunningGuard running(&resources_->running_streams);
   const ServerOptions& options = resources_->options;
   if (resources_->running_streams > static_cast<uint32_t>(options.most_streams))
-    return absl::ResourceExhaustedError(absl::StrCat("this server runs ", options.most_streams,
-                                                     " dataset streams already (most_streams): try again, or at another server"));
+    return absl::ResourceExhaustedError(
+        absl::StrCat("this server runs ", options.most_streams,
+                     " dataset streams already (most_streams): try again, or at another server"));
   if (request.batch_size() > static_cast<uint32_t>(options.most_batch_size))
-    return absl::InvalidArgumentError(absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.most_batch_size));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const DatasetSpecification> specification, FromProto(request.spec(), resources_));
+    return absl::InvalidArgumentError(
+        absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.most_batch_size));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const DatasetSpecification> specification,
+                              FromProto(request.spec(), resources_));
   DatasetPart part;
   part.start_index = request.start_index();
   part.stop_index = request.stop_index();
   part.batch_size = request.batch_size();
   part.batch_stride = request.batch_stride();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<DatasetStream> stream, DatasetStream::Create(specification, part, resources_->pool.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<DatasetStream> stream,
+                              DatasetStream::Create(specification, part, resources_->pool.get()));
 
   v1::StreamDatasetResponse response;
   v1::DatasetHeader* header = response.mutable_header();
@@ -283,7 +315,8 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
   response.clear_header();
 
   for (;;) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch, stream->Next([&] { return context->IsCancelled(); }));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch,
+                                stream->Next([&] { return context->IsCancelled(); }));
     if (!batch.has_value()) return absl::OkStatus();
     const uint32_t rows = batch->rows;
     *response.mutable_batch() = ToProto(*std::move(batch), columns);

@@ -4,17 +4,17 @@
 #include <map>
 #include <string>
 
-#include <Eigen/Core>
 #include <absl/status/status.h>
+#include <Eigen/Core>
 
 namespace touchstone {
 
 // Where and how the end effector approaches. Object frame, metres.
 struct TouchPose {
-  Eigen::Vector3d target_m = Eigen::Vector3d::Zero();     // T, of the middle of the fingers
-  Eigen::Vector3d approach = -Eigen::Vector3d::UnitZ();   // a: unit, direction of motion
-  Eigen::Vector3d lateral = Eigen::Vector3d::UnitX();     // s: unit, perpendicular to a, first finger to last
-  double standoff_m = 0.06;                               // from the start to T along a
+  Eigen::Vector3d target_m = Eigen::Vector3d::Zero();    // T, of the middle of the fingers
+  Eigen::Vector3d approach = -Eigen::Vector3d::UnitZ();  // a: unit, direction of motion
+  Eigen::Vector3d lateral = Eigen::Vector3d::UnitX();    // s: unit, perpendicular to a, first finger to last
+  double standoff_m = 0.06;                              // from the start to T along a
 };
 
 inline constexpr double kNoStrokeLimitM = 1e3;
@@ -22,14 +22,14 @@ inline constexpr double kDefaultSpeedMS = 0.020;
 
 struct CommandedTouch : TouchPose {
   double speed_m_s = kDefaultSpeedMS;
-  double stroke_m = kNoStrokeLimitM;    // the approach gives up after this travel
+  double stroke_m = kNoStrokeLimitM;  // the approach gives up after this travel
   double session_time_s = 0;
   std::map<std::string, double> covariates;  // names begin with "cov_"
 };
 
-// Checks every field and makes the vectors exactly unit and perpendicular: within 1e-3 they are corrected (the
-// approach is kept, the lateral is turned), beyond it is an error. Errors begin with `where` ("touches[3]") and
-// name field, value and what would be right.
+// Checks every field and makes the vectors exactly unit and perpendicular: within 1e-3 they are corrected
+// (the approach is kept, the lateral is turned), beyond it is an error. Errors begin with `where`
+// ("touches[3]") and name field, value and what would be right.
 absl::Status MakeExact(CommandedTouch* touch, const std::string& where);
 
 }  // namespace touchstone

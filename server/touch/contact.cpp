@@ -12,7 +12,8 @@ void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace) 
   Contacts& contacts = workspace->contacts;
   const double longest_m = batch->stroke_m / scale;
   if (batch->tip_radius_m > 0) {
-    surface.SweepSpheres(workspace->origins_m, workspace->directions, batch->tip_radius_m / scale, longest_m, &contacts);
+    surface.SweepSpheres(workspace->origins_m, workspace->directions, batch->tip_radius_m / scale, longest_m,
+                         &contacts);
   } else {
     surface.CastLines(workspace->origins_m, workspace->directions, longest_m, &contacts);
   }
@@ -28,7 +29,8 @@ void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace) 
   }
 
   // Back into the object frame. Without a moved surface the arrays change hands instead of being copied.
-  const bool moved = scale != 1 || !batch->surface_rotation.isIdentity(0) || !batch->surface_translation_m.isZero(0);
+  const bool moved =
+      scale != 1 || !batch->surface_rotation.isIdentity(0) || !batch->surface_translation_m.isZero(0);
   if (moved) {
     const Eigen::Matrix3d& rotation = batch->surface_rotation;
     for (size_t k = 0; k < count; ++k) {

@@ -35,7 +35,8 @@ class SphereGenerator : public PoseGenerator {
         centre_m_(bounds.Centre()),
         radius_m_(plan.radius_ratio * 0.5 * bounds.DiagonalM()),
         quarter_steps_(std::max<int64_t>(1, std::llround(kPi / 2 / plan.step_angle_rad))),
-        roll_steps_(plan.roll_step_rad > 0 ? std::max<int64_t>(1, std::llround(2 * kPi / plan.roll_step_rad)) : 1),
+        roll_steps_(plan.roll_step_rad > 0 ? std::max<int64_t>(1, std::llround(2 * kPi / plan.roll_step_rad))
+                                           : 1),
         theta_(0, 4 * quarter_steps_, kPi / 2 / quarter_steps_),
         phi_(-quarter_steps_, 2 * quarter_steps_ + 1, kPi / 2 / quarter_steps_),
         roll_(0, roll_steps_, 2 * kPi / roll_steps_) {}
@@ -135,8 +136,9 @@ class ListGenerator : public PoseGenerator {
 
 absl::Status CheckBetween(double value, double lower, double upper, const char* field) {
   if (value >= lower && value <= upper) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("plan.", field, " = ", ShortestNumber(value), ": must be from ",
-                                                 ShortestNumber(lower), " to ", ShortestNumber(upper)));
+  return absl::InvalidArgumentError(absl::StrCat("plan.", field, " = ", ShortestNumber(value),
+                                                 ": must be from ", ShortestNumber(lower), " to ",
+                                                 ShortestNumber(upper)));
 }
 
 }  // namespace
@@ -168,14 +170,18 @@ absl::Status ValidatePlan(Plan* plan) {
 
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const Bounds& bounds, uint64_t seed) {
   switch (plan.kind) {
-    case Plan::Kind::kFaces: return std::make_unique<FacesGenerator>(plan.faces, bounds, seed);
-    case Plan::Kind::kList: return std::make_unique<ListGenerator>(plan.list);
-    case Plan::Kind::kSphere: break;
+    case Plan::Kind::kFaces:
+      return std::make_unique<FacesGenerator>(plan.faces, bounds, seed);
+    case Plan::Kind::kList:
+      return std::make_unique<ListGenerator>(plan.list);
+    case Plan::Kind::kSphere:
+      break;
   }
   return std::make_unique<SphereGenerator>(plan.sphere, bounds, seed);
 }
 
-CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number, uint32_t attempt) {
+CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number,
+                           uint32_t attempt) {
   if (plan.kind == Plan::Kind::kList) return plan.list[number % plan.list.size()];
   CommandedTouch touch;
   generator.Draw({&number, 1}, attempt, &touch);

@@ -13,13 +13,13 @@
 
 namespace touchstone {
 
-// The seed's generator: theta and phi are uniform multiples of the step angle, the start lies on a sphere round
-// the bounding box, the target is its centre. theta turns about z from +x; phi rises from the xy plane. lateral
-// = approach x z, horizontal and to the right in the image; roll turns it about approach.
+// The seed's generator: theta and phi are uniform multiples of the step angle, the start lies on a sphere
+// round the bounding box, the target is its centre. theta turns about z from +x; phi rises from the xy plane.
+// lateral = approach x z, horizontal and to the right in the image; roll turns it about approach.
 struct SpherePlan {
   double step_angle_rad = kDefaultStepAngleRad;
-  double roll_step_rad = 0;   // 0: no roll
-  double radius_ratio = 1.05; // radius of the start sphere over half the box's diagonal
+  double roll_step_rad = 0;    // 0: no roll
+  double radius_ratio = 1.05;  // radius of the start sphere over half the box's diagonal
   static constexpr double kDefaultStepAngleRad = 3.14159265358979323846 / 180;
 };
 
@@ -29,7 +29,7 @@ struct FacesPlan {
   int samples_per_face = 8;
   int rounds = 4;
   double most_tilt_rad = 20 * 3.14159265358979323846 / 180;  // between approach and the inward face normal
-  double spread = 0.6;       // targets lie within this share of the face's half sides
+  double spread = 0.6;  // targets lie within this share of the face's half sides
   double standoff_m = 0.06;
 };
 
@@ -62,6 +62,7 @@ class PoseGenerator {
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const Bounds& bounds, uint64_t seed);
 
 // Touch `number` of the plan with everything that is commanded.
-CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number, uint32_t attempt);
+CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number,
+                           uint32_t attempt);
 
 }  // namespace touchstone

@@ -56,7 +56,10 @@ TEST(SpherePlan, AnglesAreMultiplesOfTheStep) {
 
 TEST(SpherePlan, LateralPointsRightInTheImageSoThatUpIsUp) {
   for (const TouchPose& pose : DrawPoses(Plan(), 500)) {
-    EXPECT_NEAR((pose.approach.cross(Eigen::Vector3d::UnitZ()) - pose.lateral * std::hypot(pose.approach.x(), pose.approach.y())).norm(), 0, 1e-12);
+    EXPECT_NEAR((pose.approach.cross(Eigen::Vector3d::UnitZ()) -
+                 pose.lateral * std::hypot(pose.approach.x(), pose.approach.y()))
+                    .norm(),
+                0, 1e-12);
     EXPECT_GE(pose.lateral.cross(pose.approach).z(), -1e-12);
   }
 }

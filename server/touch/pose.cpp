@@ -19,10 +19,12 @@ void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace) {
       directions[touch] = batch.approach[touch];
     }
     if (!moved) continue;
-    // surface = translation + rotation * (scale * mesh), so the line goes the other way into the mesh's frame.
+    // surface = translation + rotation * (scale * mesh), so the line goes the other way into the mesh's
+    // frame.
     const Eigen::Matrix3d mesh_from_object = batch.surface_rotation.transpose();
     for (int touch = 0; touch < size; ++touch) {
-      origins[touch] = mesh_from_object * (origins[touch] - batch.surface_translation_m) / batch.surface_scale;
+      origins[touch] =
+          mesh_from_object * (origins[touch] - batch.surface_translation_m) / batch.surface_scale;
       directions[touch] = mesh_from_object * directions[touch];
     }
   }

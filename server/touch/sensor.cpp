@@ -14,7 +14,8 @@ namespace {
 double StudentT(RandomStream* random, double degrees_of_freedom) {
   const double u = 1 - random->Uniform();
   const double v = random->Uniform();
-  return std::sqrt(degrees_of_freedom * std::expm1(-2 / degrees_of_freedom * std::log(u))) * std::cos(2 * kPi * v);
+  return std::sqrt(degrees_of_freedom * std::expm1(-2 / degrees_of_freedom * std::log(u))) *
+         std::cos(2 * kPi * v);
 }
 
 void AddNoise(TouchBatch* batch, TouchWorkspace* workspace) {
@@ -33,7 +34,8 @@ void AddNoise(TouchBatch* batch, TouchWorkspace* workspace) {
   for (int finger = 0; finger < fingers; ++finger) {
     const int begin = batch->At(finger, 0);
     if (!batch->noise_growth.empty())
-      for (int touch = 0; touch < size; ++touch) batch->noise_sigma_s[begin + touch] *= batch->noise_growth[begin + touch];
+      for (int touch = 0; touch < size; ++touch)
+        batch->noise_sigma_s[begin + touch] *= batch->noise_growth[begin + touch];
     for (int touch = 0; touch < size; ++touch)
       batch->reported_time_s[begin + touch] +=
           batch->noise_sigma_s[begin + touch] * deviates[touch * fingers + finger];
@@ -50,7 +52,8 @@ void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace) {
     // Up to the next tick; a touch's loop has a phase of its own, the same for all of its fingers.
     const double interval_s = batch->poll_interval_s;
     for (int touch = 0; touch < batch->size(); ++touch) {
-      const double phase_s = interval_s * RandomStream(batch->seed, RandomDomain::kPollPhase, batch->index[touch]).Uniform();
+      const double phase_s =
+          interval_s * RandomStream(batch->seed, RandomDomain::kPollPhase, batch->index[touch]).Uniform();
       for (int finger = 0; finger < batch->fingers(); ++finger) {
         double& time_s = batch->reported_time_s[batch->At(finger, touch)];
         time_s = std::ceil((time_s - phase_s) / interval_s) * interval_s + phase_s;
@@ -61,7 +64,8 @@ void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace) {
     for (int touch = 0; touch < batch->size(); ++touch) {
       RandomStream random(batch->seed, RandomDomain::kMissedContact, batch->index[touch]);
       for (int finger = 0; finger < batch->fingers(); ++finger)
-        if (random.Uniform() < batch->missed_probability) batch->reported_time_s[batch->At(finger, touch)] = NAN;
+        if (random.Uniform() < batch->missed_probability)
+          batch->reported_time_s[batch->At(finger, touch)] = NAN;
     }
   }
 }

@@ -45,9 +45,9 @@ absl::Status TouchSimulator::RunToMotion(TouchBatch* batch, TouchWorkspace* work
   for (const std::string& name : needed_covariates_) {
     const auto found = batch->covariates.find(name);
     if (found == batch->covariates.end() || static_cast<int>(found->second.size()) != batch->size())
-      return absl::InvalidArgumentError(
-          absl::StrCat("the model's formula uses ", name, ", which the touches do not carry: give covariates['", name,
-                       "'] with every touch (a column ", name, " in the plan), or use another model"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "the model's formula uses ", name, ", which the touches do not carry: give covariates['", name,
+          "'] with every touch (a column ", name, " in the plan), or use another model"));
   }
   ApplyStage(Stage::kPose, false, batch);
   ApplyStage(Stage::kContact, true, batch);

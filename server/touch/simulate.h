@@ -1,5 +1,6 @@
 // The touch simulation: a batch of commanded touches through pose -> contact -> motion -> sensor (DESIGN 3).
-// A pure function of the batch's given fields, the model and the surface; no state between calls but work space.
+// A pure function of the batch's given fields, the model and the surface; no state between calls but work
+// space.
 #pragma once
 
 #include <memory>
@@ -32,7 +33,8 @@ class TouchSimulator {
   bool needs_previous_press() const { return needs_previous_press_; }
   const std::vector<std::string>& needed_covariates() const { return needed_covariates_; }
 
-  // Sets the batch's size and what the model decides (fingers, spacing). The caller then fills the given fields.
+  // Sets the batch's size and what the model decides (fingers, spacing). The caller then fills the given
+  // fields.
   void Prepare(int size, TouchBatch* batch) const;
 
   // Stages pose, contact and motion. Fails if a formula gives no finite number or a covariate is missing.
@@ -54,11 +56,11 @@ class TouchSimulator {
 };
 
 // The stages without their effects, one file each.
-void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace);             // pose.cpp: lines in the mesh frame
+void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace);  // pose.cpp: lines in the mesh frame
 void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace);  // contact.cpp
-void FindFirstFingers(TouchBatch* batch);                                        // motion.cpp
-void TravelToTime(TouchBatch* batch);                                            // motion.cpp
-void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace);                  // sensor.cpp
+void FindFirstFingers(TouchBatch* batch);                                         // motion.cpp
+void TravelToTime(TouchBatch* batch);                                             // motion.cpp
+void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace);                   // sensor.cpp
 
 // Contact times relative to the first reporting finger's (the descriptor), seconds; descriptor[finger].
 // Returns false if a finger reported nothing (NaN there).

@@ -54,7 +54,9 @@ void Touch(const std::string& effects, double tilt_rad, Simulated* out, int fing
 
 constexpr double kTilt = 0.2;
 // On the tilted plane finger i travels standoff + x_i tan(tilt).
-double NominalTimeS(double x_m) { return (0.06 + x_m * std::tan(kTilt)) / 0.02; }
+double NominalTimeS(double x_m) {
+  return (0.06 + x_m * std::tan(kTilt)) / 0.02;
+}
 
 TEST(Simulation, OnATiltedPlaneTravelIsTheClosedForm) {
   Simulated s;
@@ -141,10 +143,12 @@ TEST(Simulation, NoiseHasItsSigmaOnEveryFingerAndNothingInCommon) {
 TEST(Simulation, StudentNoiseHasTheQuartilesOfStudentsT) {
   Simulated s;
   const int n = 20000;
-  Touch("  - gaussian_noise: {sigma_us: 5000}\n  - heavy_tail_noise: {degrees_of_freedom: 3}\n", kTilt, &s, 3, n);
+  Touch("  - gaussian_noise: {sigma_us: 5000}\n  - heavy_tail_noise: {degrees_of_freedom: 3}\n", kTilt, &s, 3,
+        n);
   int within = 0;
   for (int k = 0; k < n; ++k)
-    within += std::abs(s.batch.reported_time_s[s.batch.At(1, k)] - NominalTimeS(0)) < 0.005 * 0.76489;  // t_3 quartile
+    within += std::abs(s.batch.reported_time_s[s.batch.At(1, k)] - NominalTimeS(0)) <
+              0.005 * 0.76489;  // t_3 quartile
   EXPECT_NEAR(within / double(n), 0.5, 5 * 0.5 / std::sqrt(n));
 }
 
@@ -153,11 +157,13 @@ TEST(Simulation, PolledTimesLieOnTicksOfOnePhaseATouch) {
   Touch("  - poll_interval: {interval_us: 2000}\n", kTilt, &s, 3, 50);
   for (int k = 0; k < 50; ++k) {
     for (int finger = 0; finger < 3; ++finger) {
-      const double late_s = s.batch.reported_time_s[s.batch.At(finger, k)] - s.batch.contact_time_s[s.batch.At(finger, k)];
+      const double late_s =
+          s.batch.reported_time_s[s.batch.At(finger, k)] - s.batch.contact_time_s[s.batch.At(finger, k)];
       EXPECT_GE(late_s, -1e-12);
       EXPECT_LT(late_s, 0.002);
     }
-    const double ticks = (s.batch.reported_time_s[s.batch.At(2, k)] - s.batch.reported_time_s[s.batch.At(0, k)]) / 0.002;
+    const double ticks =
+        (s.batch.reported_time_s[s.batch.At(2, k)] - s.batch.reported_time_s[s.batch.At(0, k)]) / 0.002;
     EXPECT_NEAR(ticks, std::round(ticks), 1e-9);
   }
 }
@@ -200,13 +206,15 @@ TEST(Simulation, AFingerBesideTheObjectReportsNothingAndTheOthersDo) {
 
 TEST(Simulation, AFormulaWithoutItsCovariateIsAnErrorThatNamesIt) {
   const TouchSimulator simulator(
-      ModelWith("  - formula: {name: warm, adds: travel_mm, expression: \"k * cov_temperature\", parameters: {k: {value: "
+      ModelWith("  - formula: {name: warm, adds: travel_mm, expression: \"k * cov_temperature\", parameters: "
+                "{k: {value: "
                 "1, unit: mm, min: -1, max: 1}}}\n"));
   TouchBatch batch;
   TouchWorkspace workspace;
   simulator.Prepare(1, &batch);
   batch.surface = Plane();
-  EXPECT_THAT(std::string(simulator.Run(&batch, &workspace).message()), testing::HasSubstr("cov_temperature"));
+  EXPECT_THAT(std::string(simulator.Run(&batch, &workspace).message()),
+              testing::HasSubstr("cov_temperature"));
 }
 
 }  // namespace

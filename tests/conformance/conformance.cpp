@@ -10,7 +10,9 @@ std::string& Target() {
 
 }  // namespace
 
-void SetConformanceTarget(const std::string& address) { Target() = address; }
+void SetConformanceTarget(const std::string& address) {
+  Target() = address;
+}
 
 Conformance::Conformance() {
   grpc::ChannelArguments arguments;

@@ -1,7 +1,7 @@
 // What every source must do, virtual or physical, as tests that know nothing but an address.
 //
-// A program links the object library touchstone_conformance, calls SetConformanceTarget and runs gtest. Tests ask
-// Describe what the source offers and skip, saying so, what it does not.
+// A program links the object library touchstone_conformance, calls SetConformanceTarget and runs gtest. Tests
+// ask Describe what the source offers and skip, saying so, what it does not.
 #pragma once
 
 #include <memory>

@@ -97,14 +97,21 @@ struct Mistake {
 
 TEST_F(SourceConformance, MistakesAreRefusedWithFieldValueAndWhatWouldBeRight) {
   const std::vector<Mistake> mistakes = {
-      {"unknown object", [](auto* r) { r->set_object("no-such-object"); }, grpc::NOT_FOUND, "object", "no-such-object"},
+      {"unknown object", [](auto* r) { r->set_object("no-such-object"); }, grpc::NOT_FOUND, "object",
+       "no-such-object"},
       {"no touches", [](auto* r) { r->clear_touches(); }, grpc::INVALID_ARGUMENT, "touches", "at least one"},
-      {"zero approach", [](auto* r) { r->mutable_touches(0)->mutable_approach()->set_z(0); }, grpc::INVALID_ARGUMENT, "touches[0].approach", "unit vector"},
-      {"oblique lateral", [](auto* r) { r->mutable_touches(0)->mutable_lateral()->set_z(0.04); }, grpc::INVALID_ARGUMENT, "touches[0].lateral", "perpendicular"},
-      {"NaN target", [](auto* r) { r->mutable_touches(0)->mutable_target_m()->set_y(NAN); }, grpc::INVALID_ARGUMENT, "touches[0].target_m", "finite"},
-      {"infinite standoff", [](auto* r) { r->mutable_touches(0)->set_standoff_m(INFINITY); }, grpc::INVALID_ARGUMENT, "touches[0].standoff_m", "inf"},
-      {"no speed", [](auto* r) { r->mutable_touches(0)->set_speed_m_s(0); }, grpc::INVALID_ARGUMENT, "touches[0].speed_m_s", "above 0"},
-      {"no target", [](auto* r) { r->mutable_touches(0)->clear_target_m(); }, grpc::INVALID_ARGUMENT, "touches[0].target_m", "missing"},
+      {"zero approach", [](auto* r) { r->mutable_touches(0)->mutable_approach()->set_z(0); },
+       grpc::INVALID_ARGUMENT, "touches[0].approach", "unit vector"},
+      {"oblique lateral", [](auto* r) { r->mutable_touches(0)->mutable_lateral()->set_z(0.04); },
+       grpc::INVALID_ARGUMENT, "touches[0].lateral", "perpendicular"},
+      {"NaN target", [](auto* r) { r->mutable_touches(0)->mutable_target_m()->set_y(NAN); },
+       grpc::INVALID_ARGUMENT, "touches[0].target_m", "finite"},
+      {"infinite standoff", [](auto* r) { r->mutable_touches(0)->set_standoff_m(INFINITY); },
+       grpc::INVALID_ARGUMENT, "touches[0].standoff_m", "inf"},
+      {"no speed", [](auto* r) { r->mutable_touches(0)->set_speed_m_s(0); }, grpc::INVALID_ARGUMENT,
+       "touches[0].speed_m_s", "above 0"},
+      {"no target", [](auto* r) { r->mutable_touches(0)->clear_target_m(); }, grpc::INVALID_ARGUMENT,
+       "touches[0].target_m", "missing"},
   };
   for (const Mistake& mistake : mistakes) {
     v1::TouchRequest request = OneTouch();
@@ -112,7 +119,8 @@ TEST_F(SourceConformance, MistakesAreRefusedWithFieldValueAndWhatWouldBeRight) {
     v1::TouchResponse response;
     const grpc::Status status = Touch(request, &response);
     EXPECT_EQ(status.error_code(), mistake.code) << mistake.name << ": " << status.error_message();
-    EXPECT_THAT(status.error_message(), AllOf(HasSubstr(mistake.field), HasSubstr(mistake.hint))) << mistake.name;
+    EXPECT_THAT(status.error_message(), AllOf(HasSubstr(mistake.field), HasSubstr(mistake.hint)))
+        << mistake.name;
   }
 }
 
@@ -129,7 +137,8 @@ TEST_F(SourceConformance, PlansExpandToValidTouches) {
     v1::ExpandPlanRequest request;
     request.set_object(AnObject().name());
     request.set_count(5);
-    name == "sphere" ? (void)request.mutable_plan()->mutable_sphere() : (void)request.mutable_plan()->mutable_faces();
+    name == "sphere" ? (void)request.mutable_plan()->mutable_sphere()
+                     : (void)request.mutable_plan()->mutable_faces();
     v1::ExpandPlanResponse response;
     grpc::ClientContext context;
     ASSERT_TRUE(source_->ExpandPlan(&context, request, &response).ok());

@@ -58,7 +58,8 @@ TEST_F(StreamConformance, APartIsThatPartOfTheWhole) {
   const std::string poses = ColumnBytes(whole.batches, "approach");
   EXPECT_EQ(ColumnBytes(part.batches, "approach"), poses.substr(3 * 12, 5 * 12));
   if (IsVirtual()) {
-    EXPECT_EQ(ColumnBytes(part.batches, "descriptor_s"), ColumnBytes(whole.batches, "descriptor_s").substr(3 * 12, 5 * 12));
+    EXPECT_EQ(ColumnBytes(part.batches, "descriptor_s"),
+              ColumnBytes(whole.batches, "descriptor_s").substr(3 * 12, 5 * 12));
   }
 }
 
@@ -101,8 +102,8 @@ TEST_F(StreamConformance, ACancelledStreamEndsSoonAndTheSourceGoesOn) {
 }
 
 TEST_F(StreamConformance, MistakesAreRefusedBeforeAnyBatch) {
-  v1::StreamDatasetRequest unknown_object = Request(5, 1), unknown_column = Request(5, 1), no_plan = Request(5, 1),
-                           beyond = Request(5, 1), huge_batch = Request(5, 1);
+  v1::StreamDatasetRequest unknown_object = Request(5, 1), unknown_column = Request(5, 1),
+                           no_plan = Request(5, 1), beyond = Request(5, 1), huge_batch = Request(5, 1);
   unknown_object.mutable_spec()->set_objects(0, "lat99");
   unknown_column.mutable_spec()->add_columns("descripter");
   no_plan.mutable_spec()->clear_plan();

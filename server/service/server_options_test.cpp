@@ -1,0 +1,61 @@
+#include "server/service/server_options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "server/service/server_flags.h"
+
+namespace touchstone {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(MeshSource, ReadsNameFileAndWhatTheFileDoesNotSay) {
+  const auto source = ParseMeshSource("cup=models/cup.off,fit_mm=150,up=y");
+  ASSERT_TRUE(source.ok());
+  EXPECT_EQ(source->name, "cup");
+  EXPECT_EQ(source->path, "models/cup.off");
+  EXPECT_EQ(source->fit_mm, 150);
+  EXPECT_EQ(source->up, "y");
+}
+
+TEST(MeshSource, RefusesMistakesWithAHint) {
+  EXPECT_THAT(std::string(ParseMeshSource("cup.off").status().message()), HasSubstr("NAME=FILE"));
+  EXPECT_THAT(std::string(ParseMeshSource("cup=cup.off,fit=3").status().message()),
+              HasSubstr("did you mean 'fit_mm'"));
+  EXPECT_THAT(std::string(ParseMeshSource("cup=cup.off,scale=-1").status().message()), HasSubstr("above 0"));
+  EXPECT_THAT(std::string(ParseMeshSource("c/up=cup.off").status().message()), HasSubstr("letters, digits"));
+}
+
+TEST(ServerFlags, FlagsWinOverTheFile) {
+  const std::string path = testing::TempDir() + "/server.toml";
+  std::ofstream(path)
+      << "listen = \"127.0.0.1:7\"\nthreads = 3\nrenderer = \"cpu\"\nmesh = [\"a=a.off\", \"b=b.off\"]\n";
+  const char* arguments[] = {"touchstone-server", "--config", path.c_str(), "--threads", "5"};
+  const auto flags = ParseServerFlags(5, arguments);
+  ASSERT_TRUE(flags.ok()) << flags.status();
+  EXPECT_EQ(flags->options.listen, "127.0.0.1:7");
+  EXPECT_EQ(flags->options.threads, 5);
+  EXPECT_EQ(flags->options.renderer.kind, RendererKind::kCpu);
+  EXPECT_EQ(flags->options.meshes.size(), 2u);
+}
+
+TEST(ServerFlags, EveryMistakeNamesItsPlace) {
+  ServerFlags flags;
+  EXPECT_THAT(std::string(ApplyToml("\nthread = 3\n", "server.toml", &flags).message()),
+              testing::AllOf(HasSubstr("server.toml:2"), HasSubstr("did you mean 'threads'")));
+  EXPECT_THAT(std::string(ApplyToml("threads = \"two\"\n", "server.toml", &flags).message()),
+              HasSubstr("whole number"));
+  EXPECT_THAT(std::string(ApplyToml("threads = \n", "server.toml", &flags).message()),
+              HasSubstr("server.toml:1"));
+  EXPECT_THAT(std::string(ApplyToml("renderer = \"gpu\"\n", "server.toml", &flags).message()),
+              HasSubstr("cpu"));
+  const char* arguments[] = {"touchstone-server", "--treads", "3"};
+  EXPECT_THAT(std::string(ParseServerFlags(3, arguments).status().message()),
+              HasSubstr("did you mean '--threads'"));
+}
+
+}  // namespace
+}  // namespace touchstone

@@ -1,0 +1,195 @@
+// The server as a whole, beyond what every source must do (tests/conformance): replicas, slow readers, drain,
+// store.
+#include "server/service/server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "touchstone/v1/control.grpc.pb.h"
+#include "touchstone/v1/models.grpc.pb.h"
+#include "touchstone/v1/source.grpc.pb.h"
+
+namespace touchstone {
+namespace {
+
+using testing::HasSubstr;
+
+ServerOptions SmallServer() {
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.supershape_triangles = 2000;
+  options.threads = 2;
+  return options;
+}
+
+std::unique_ptr<Server> StartServer(const ServerOptions& options) {
+  auto server = Server::Start(options);
+  EXPECT_TRUE(server.ok()) << server.status();
+  return *std::move(server);
+}
+
+v1::StreamDatasetRequest Request(uint64_t samples, uint32_t batch_size) {
+  v1::StreamDatasetRequest request;
+  v1::DatasetSpec* spec = request.mutable_spec();
+  spec->add_objects("lat00");
+  spec->add_objects("lat20");
+  spec->mutable_plan()->mutable_sphere();
+  spec->set_samples(samples);
+  spec->set_seed(3);
+  request.set_batch_size(batch_size);
+  return request;
+}
+
+std::string Descriptors(const std::shared_ptr<grpc::Channel>& channel,
+                        const v1::StreamDatasetRequest& request) {
+  const auto stub = v1::Source::NewStub(channel);
+  grpc::ClientContext context;
+  const auto reader = stub->StreamDataset(&context, request);
+  v1::StreamDatasetResponse response;
+  std::string bytes;
+  while (reader->Read(&response))
+    for (const v1::Column& column : response.batch().columns())
+      if (column.name() == "descriptor_s") bytes += column.data();
+  const grpc::Status status = reader->Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return bytes;
+}
+
+std::shared_ptr<grpc::Channel> ChannelTo(const Server& server) {
+  return grpc::CreateChannel("127.0.0.1:" + std::to_string(server.port()),
+                             grpc::InsecureChannelCredentials());
+}
+
+TEST(Server, TwoReplicasAndTheEmbeddedOneGiveTheSameBytes) {
+  ServerOptions one_thread = SmallServer(), embedded = SmallServer();
+  one_thread.threads = 1;
+  embedded.listen = "";
+  const auto first = StartServer(SmallServer()), second = StartServer(one_thread),
+             third = StartServer(embedded);
+  const std::string whole = Descriptors(ChannelTo(*first), Request(20000, 4096));
+  EXPECT_EQ(whole.size(), 20000u * 12u);
+  EXPECT_EQ(Descriptors(ChannelTo(*second), Request(20000, 1)), whole);
+  EXPECT_EQ(Descriptors(third->InProcessChannel(), Request(20000, 777)), whole);
+  // Lost after the first half, gone on at the other replica: neither gap nor repeat.
+  v1::StreamDatasetRequest head = Request(20000, 4096), tail = Request(20000, 1000);
+  head.set_stop_index(9001);
+  tail.set_start_index(9001);
+  EXPECT_EQ(Descriptors(ChannelTo(*first), head) + Descriptors(ChannelTo(*second), tail), whole);
+}
+
+TEST(Server, ASlowReaderHoldsBackOnlyItself) {
+  const auto server = StartServer(SmallServer());
+  const auto stub = v1::Source::NewStub(ChannelTo(*server));
+  grpc::ClientContext slow_context;
+  const auto slow = stub->StreamDataset(&slow_context, Request(100'000'000, 4096));
+  v1::StreamDatasetResponse response;
+  ASSERT_TRUE(slow->Read(&response));  // and reads no more: its buffers fill
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_EQ(Descriptors(ChannelTo(*server), Request(200000, 4096)).size(), 200000u * 12u);
+  slow_context.TryCancel();
+  while (slow->Read(&response)) {
+  }
+  slow->Finish();
+}
+
+TEST(Server, MoreStreamsThanTheLimitAreRefusedAndSaySo) {
+  ServerOptions options = SmallServer();
+  options.most_streams = 1;
+  const auto server = StartServer(options);
+  const auto stub = v1::Source::NewStub(ChannelTo(*server));
+  grpc::ClientContext first_context, second_context;
+  const auto first = stub->StreamDataset(&first_context, Request(100'000'000, 4096));
+  v1::StreamDatasetResponse response;
+  ASSERT_TRUE(first->Read(&response));
+  const auto second = stub->StreamDataset(&second_context, Request(10, 10));
+  EXPECT_FALSE(second->Read(&response));
+  const grpc::Status status = second->Finish();
+  EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("most_streams"));
+  first_context.TryCancel();
+  first->Finish();
+}
+
+TEST(Server, DrainLetsAStreamFinishAndTakesNoNewCalls) {
+  const auto server = StartServer(SmallServer());
+  const auto stub = v1::Source::NewStub(ChannelTo(*server));
+  grpc::ClientContext context;
+  const auto reader = stub->StreamDataset(&context, Request(500000, 4096));
+  v1::StreamDatasetResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  std::thread drain([&] { server->Drain(); });
+  uint64_t rows = 0;
+  while (reader->Read(&response)) rows += response.batch().rows();
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_EQ(rows, 500000u);
+  drain.join();
+  grpc::ClientContext late;
+  v1::DescribeResponse description;
+  EXPECT_EQ(stub->Describe(&late, {}, &description).error_code(), grpc::UNAVAILABLE);
+}
+
+TEST(Server, KeepsModelsInItsFolderAndNeverChangesOne) {
+  const std::string folder = testing::TempDir() + "/touchstone_models";
+  std::filesystem::remove_all(folder);
+  ServerOptions options = SmallServer();
+  options.models_dir = folder;
+  const std::string yaml = "touchstone: model/1\nname: mine\neffects:\n  - tip_radius: {radius_mm: 1.5}\n";
+  std::string hash;
+  {
+    const auto server = StartServer(options);
+    const auto replica = StartServer(options);
+    const auto stub = v1::Models::NewStub(ChannelTo(*server));
+    v1::CreateModelRequest request;
+    request.set_yaml(yaml);
+    v1::Model model;
+    grpc::ClientContext first, second, third;
+    ASSERT_TRUE(stub->CreateModel(&first, request, &model).ok());
+    hash = model.hash();
+    request.set_yaml("touchstone: model/1\nname: mine\neffects:\n  - tip_radius: {radius_mm: 1.6}\n");
+    const grpc::Status status = stub->CreateModel(&second, request, &model);
+    EXPECT_EQ(status.error_code(), grpc::ALREADY_EXISTS);
+    EXPECT_THAT(status.error_message(), HasSubstr("never changes"));
+    v1::GetModelRequest get;
+    get.mutable_model()->set_name("mine");
+    EXPECT_TRUE(v1::Models::NewStub(ChannelTo(*replica))->GetModel(&third, get, &model).ok());
+    EXPECT_EQ(model.hash(), hash);
+  }
+  const auto again = StartServer(options);
+  v1::GetModelRequest get;
+  get.mutable_model()->set_hash(hash.substr(0, 10));
+  v1::Model model;
+  grpc::ClientContext context;
+  ASSERT_TRUE(v1::Models::NewStub(ChannelTo(*again))->GetModel(&context, get, &model).ok());
+  EXPECT_EQ(model.name(), "mine");
+}
+
+TEST(Server, AnInlineModelNeedsNoStore) {
+  const auto server = StartServer(SmallServer());
+  v1::StreamDatasetRequest with = Request(1000, 1000);
+  with.mutable_spec()->mutable_model()->set_yaml(
+      "touchstone: model/1\nname: x\neffects:\n  - gaussian_noise: {sigma_us: 5000}\n");
+  EXPECT_NE(Descriptors(ChannelTo(*server), with), Descriptors(ChannelTo(*server), Request(1000, 1000)));
+}
+
+TEST(Server, RefusesToStartOnWhatItCannotServe) {
+  ServerOptions absent = SmallServer(), threads = SmallServer(), taken = SmallServer(),
+                truncated = SmallServer();
+  absent.meshes.push_back({"cup", "/no/such/cup.off"});
+  EXPECT_THAT(std::string(Server::Start(absent).status().message()), HasSubstr("/no/such/cup.off"));
+  threads.threads = -1;
+  EXPECT_THAT(std::string(Server::Start(threads).status().message()), HasSubstr("threads = -1"));
+  const std::string path = testing::TempDir() + "/truncated.off";
+  std::ofstream(path) << "OFF\n4 4 0\n0 0 0\n1 0 0\n";
+  truncated.meshes.push_back({"half", path});
+  EXPECT_THAT(std::string(Server::Start(truncated).status().message()), HasSubstr("truncated.off"));
+  const auto server = StartServer(SmallServer());
+  taken.listen = "127.0.0.1:" + std::to_string(server->port());
+  EXPECT_THAT(std::string(Server::Start(taken).status().message()), HasSubstr("listen = '127.0.0.1:"));
+}
+
+}  // namespace
+}  // namespace touchstone
