@@ -131,8 +131,8 @@ absl::StatusOr<EglDevice> ChooseDevice(int wanted) {
 
 absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int device) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const EglDevice chosen, ChooseDevice(device));
-  const char* const env = getenv("TS_CONTEXTS");
-  return EglRenderer::Create(chosen.index, env ? atoi(env) : 1);
+
+  return EglRenderer::Create(chosen.index, 1);
 }
 
 }  // namespace touchstone
