@@ -10,7 +10,7 @@ import numpy as np
 from . import errors, units
 from .v1 import types_pb2
 
-_DTYPES = {
+_DTYPES: dict[int, np.dtype] = {
     types_pb2.DATA_TYPE_FLOAT32: np.dtype("<f4"),
     types_pb2.DATA_TYPE_FLOAT64: np.dtype("<f8"),
     types_pb2.DATA_TYPE_UINT8: np.dtype("u1"),
@@ -83,14 +83,14 @@ class Batch(Mapping[str, Any]):
 
     __slots__ = ("start_index", "rows", "model_hash", "_columns", "_wire_names")
 
-    def __init__(self, start_index: int, rows: int, columns: dict[str, Column], *, model_hash: str = "",
+    def __init__(self, start_index: int, rows: int, columns: Mapping[str, Column], *, model_hash: str = "",
                  si: bool = False):
         self.start_index = start_index
         self.rows = rows
         self.model_hash = model_hash
         # Public name -> name on the wire, as long as the column is not converted yet.
         self._wire_names = {} if si else {units.lab_name(name): name for name in columns}
-        self._columns = columns if si else {units.lab_name(name): values for name, values in columns.items()}
+        self._columns = {name if si else units.lab_name(name): values for name, values in columns.items()}
 
     @classmethod
     def from_columns(cls, start_index: int, rows: int, columns: Sequence[types_pb2.Column], **more) -> Batch:

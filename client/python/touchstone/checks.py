@@ -44,7 +44,7 @@ def positive(name: str, value: Any) -> float:
     return result
 
 
-def choice(name: str, value: str, choices: Mapping[str, int]) -> int:
+def choice(name: str, value: str, choices: Mapping[str, Any]) -> Any:
     """The enum value that a word stands for, or InvalidRequest with the words that there are."""
     if value in choices:
         return choices[value]

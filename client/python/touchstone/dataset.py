@@ -103,22 +103,20 @@ class Dataset:
     @property
     def header(self) -> Header:
         """What the source resolved the specification to; asked for when it is not known yet."""
-        if self._header is None:
-            retry = self._retry()
-            while True:
-                call = self._open(0)
-                try:
-                    self._accept(next(call).header)
-                    break
-                except grpc.RpcError as error:
-                    self._lost(error, retry)
-                finally:
-                    call.cancel()
-        return Header.from_proto(self._header, self.spec.objects, self._si)
+        return Header.from_proto(self.raw_header, self.spec.objects, self._si)
 
     @property
-    def raw_header(self) -> source_pb2.DatasetHeader | None:
-        """The header message, if one was received."""
+    def raw_header(self) -> source_pb2.DatasetHeader:
+        """The header as a message, SI."""
+        retry = self._retry()
+        while self._header is None:
+            call = self._open(0)
+            try:
+                self._accept(next(call).header)
+            except grpc.RpcError as error:
+                self._lost(error, retry)
+            finally:
+                call.cancel()
         return self._header
 
     def __iter__(self) -> Iterator[Batch]:
@@ -151,7 +149,7 @@ class Dataset:
                     )
                 next_index += step
                 yield Batch.from_columns(
-                    message.start_index, rows, message.columns, model_hash=self._header.model_hash, si=self._si
+                    message.start_index, rows, message.columns, model_hash=self.raw_header.model_hash, si=self._si
                 )
         finally:
             # Also on the way out of a broken loop, a closed generator or an interrupt: the source's threads are freed.

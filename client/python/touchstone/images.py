@@ -26,7 +26,7 @@ _RENDERERS = {
 
 def renderer_name(kind: int) -> str:
     """ "egl" or "cpu"; "" if there is none."""
-    return {types_pb2.RENDERER_KIND_EGL: "egl", types_pb2.RENDERER_KIND_CPU: "cpu"}.get(kind, "")
+    return next((name for name, value in _RENDERERS.items() if value == kind and name != "auto"), "")
 
 
 @dataclasses.dataclass(frozen=True)

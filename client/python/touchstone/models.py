@@ -58,9 +58,12 @@ class ObjectInfo:
 
     @classmethod
     def from_proto(cls, m: source_pb2.Object) -> ObjectInfo:
-        corner = lambda v: tuple(units.lab_value("_m", c) for c in (v.x, v.y, v.z))
-        return cls(m.name, m.vertices, m.triangles, corner(m.bounds_min_m), corner(m.bounds_max_m), m.closed,
+        return cls(m.name, m.vertices, m.triangles, _corner_mm(m.bounds_min_m), _corner_mm(m.bounds_max_m), m.closed,
                    m.mesh_hash, m.origin)
+
+
+def _corner_mm(v: types_pb2.Vector3) -> tuple[float, float, float]:
+    return tuple(units.lab_value("_m", c) for c in (v.x, v.y, v.z))  # type: ignore[return-value]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -98,9 +98,9 @@ class Touches:
         """Those rows; a single number gives one touch, still as an array of one row."""
         if isinstance(rows, (int, np.integer)):
             rows = slice(rows, rows + 1 or None)
-        pick = lambda values: None if values is None else values[rows]
-        columns = {name: pick(getattr(self, name)) for name in (*_NEEDED, *_OPTIONAL)}
-        return Touches(**columns, covariates={name: pick(values) for name, values in self.covariates.items()})
+        columns = {name: getattr(self, name) for name in (*_NEEDED, *_OPTIONAL)}
+        picked = {name: values[rows] for name, values in columns.items() if values is not None}
+        return Touches(**picked, covariates={name: values[rows] for name, values in self.covariates.items()})
 
     def samples(self, objects: int) -> int:
         return len(self) * objects
