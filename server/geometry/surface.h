@@ -1,16 +1,15 @@
 // A mesh that fingers can touch: exact first contact of lines (point finger tips) and of swept spheres (ball
 // tips). The only files that include Embree are the ones beside this header.
 //
-// Embree (single precision) proposes a triangle; the distance, normal and point are then computed again in
-// double precision from that triangle, and every line that passes too near an edge for a packet to be trusted
-// is cast again on its own. So a result is a pure function of the line and the mesh, bit for bit, whatever
-// other lines stood in the same call and however many threads called.
+// A contact is defined in double precision: the least travel over all triangles that the line meets (borders
+// included), and among equals the smallest triangle number. Embree, in single precision, only proposes; where it
+// could be wrong (line_triangle.h, ray_cast.cpp) the triangles near the line are searched exactly. So a result
+// is a pure function of the line and the mesh, bit for bit, whatever other lines stood in the same call, however
+// many threads called and whatever instructions the machine has.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -35,7 +34,7 @@ struct Contacts {
 
 class Surface {
  public:
-  // Builds the BVH (all cores). Fails on a mesh without a triangle of positive area, with an index out of
+  // Builds the BVH (all cores). Triangles keep their order. Fails on a mesh without a triangle of positive area, with an index out of
   // range, with a coordinate that is not finite, or with more than kMostTriangles triangles. Degenerate and
   // exactly repeated triangles are dropped first: mesh() is what is left.
   static absl::StatusOr<std::shared_ptr<const Surface>> Create(std::string name, TriangleMesh mesh);
@@ -57,7 +56,9 @@ class Surface {
   // The same for spheres of radius_m (> 0) whose centre runs along the line: travel_m is what the *foremost
   // point* of the ball has gone when the ball first touches, that is, the centre starts radius_m behind the
   // origin: centre(t) = origin + (t - radius_m) * direction. On a plane met at right angles the result equals
-  // CastLines'. Exact to 1 um on faces, edges and vertices. `normal` points from the contact to the centre.
+  // CastLines'. Exact to 1 um on faces, edges and vertices of any mesh. `normal` points from the contact to the
+  // centre. A ball that touches or overlaps the surface where it starts has travel 0, and the point and the
+  // normal of the nearest spot of the surface; so here 0 <= travel_m <= longest_m.
   void SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
                     double radius_m, double longest_m, Contacts* contacts) const;
 
@@ -65,25 +66,22 @@ class Surface {
   // the vertices' cotangent Laplacian (Meyer et al. 2003). Computed for the whole mesh at the first call.
   double MeanCurvaturePerM(uint32_t triangle, const Eigen::Vector3d& point_m) const;
 
-  // Whether the line meets the surface at all: for masks and silhouettes.
-  // Embree's scene handle, for the CPU renderer of image/ alone (an RTCScene).
-  void* embree_scene() const { return scene_; }
+  // Embree's scene handle, for the CPU renderer of image/ alone (an RTCScene). Its vertices stand off the mesh's
+  // by less than a millionth of the mesh's size.
+  void* embree_scene() const;
 
   // Bytes held by mesh and BVH together.
   uint64_t MemoryBytes() const;
 
  private:
-  Surface() = default;
-  struct Embree;
+  Surface();
+  class Search;  // what finds contacts: search.h
 
   std::string name_;
   std::string hash_;
   TriangleMesh mesh_;
   Bounds bounds_;
-  void* device_ = nullptr;
-  void* scene_ = nullptr;
-  mutable std::once_flag curvature_once_;
-  mutable std::vector<float> vertex_curvature_per_m_;
+  std::unique_ptr<Search> search_;
 };
 
 // "AVX2", "AVX512", ... and the packet width used, for `doctor`.

@@ -1,0 +1,95 @@
+// What a Surface finds contacts with: Embree's scene, which proposes quickly, and the tree for exact searches.
+// Internal to geometry/.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/geometry/line_triangle.h"
+#include "server/geometry/surface.h"
+#include "server/geometry/triangle_tree.h"
+
+namespace touchstone {
+
+// A line in the mesh frame; travel counts from the origin.
+struct Line {
+  Eigen::Vector3d origin_m;
+  Eigen::Vector3d direction;
+};
+
+struct Contact {
+  double travel_m = 0;
+  Eigen::Vector3d point_m;
+  Eigen::Vector3d normal;
+  uint32_t triangle = kNoTriangle;
+};
+
+inline void Store(const Contact& contact, size_t i, Contacts* contacts) {
+  contacts->travel_m[i] = contact.travel_m;
+  contacts->point_m[i] = contact.point_m;
+  contacts->normal[i] = contact.normal;
+  contacts->triangle[i] = contact.triangle;
+}
+
+class Surface::Search {
+ public:
+  // `mesh` must outlive the search. Builds Embree's scene.
+  Search(const TriangleMesh& mesh, const Bounds& bounds);
+  ~Search();
+
+  // The line's first contact by definition: every triangle near the line is tested in double precision.
+  Contact CastExactly(const Line& line, double longest_m) const;
+
+  // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most longest_m.
+  // `travel_bound_m`: some contact is known to come no later (infinity: none known).
+  Contact SweepExactly(const Line& line, double radius_m, double longest_m, double travel_bound_m) const;
+
+  // As Surface::CastLines; the arrays have their size.
+  void Cast(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
+            double longest_m, Contacts* contacts) const;
+
+  double MeanCurvaturePerM(uint32_t triangle, const Eigen::Vector3d& point_m) const;
+
+  RTCScene scene() const { return scene_; }
+  uint64_t MemoryBytes() const;
+
+ private:
+  template <int kWidth>
+  void CastPackets(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
+                   double longest_m, Contacts* contacts) const;
+  template <int kWidth>
+  void CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, int count,
+                  double longest_m, size_t at, Contacts* contacts) const;
+
+  const TriangleTree& tree() const;  // built at the first call
+  // Whether another sheet of the surface lies within the reach of rounding, so that Embree may take either.
+  bool Crowded(uint32_t triangle) const;
+  bool ComputeCrowded(uint32_t triangle) const;
+
+  const TriangleMesh& mesh_;
+  const Eigen::Vector3d centre_m_;
+  double reach_m_ = 0;      // radius of a ball round centre_m_ that holds the mesh
+  double rounding_m_ = 0;   // what single precision may be off, anywhere near the mesh
+  std::vector<Eigen::Vector3f> grown_vertices_m_;  // what Embree sees: see GrowVertices
+  RTCScene scene_ = nullptr;
+  uint64_t scene_bytes_ = 0;
+  mutable std::once_flag tree_once_;
+  mutable std::unique_ptr<TriangleTree> tree_;
+  mutable std::unique_ptr<std::atomic<uint8_t>[]> crowded_;  // a triangle: 0 not yet known, 1 no, 2 yes
+  mutable std::once_flag curvature_once_;
+  mutable std::vector<float> vertex_curvature_per_m_;
+  mutable std::atomic<uint64_t> tree_bytes_{0}, curvature_bytes_{0};
+};
+
+// One for the process: Embree keeps its threads and instruction set there.
+RTCDevice EmbreeDevice();
+int EmbreePacketWidth();
+
+// Mean curvature at every vertex, 1/m, positive where convex; 0 on borders and where it cannot be told.
+std::vector<float> VertexMeanCurvaturePerM(const TriangleMesh& mesh);
+
+}  // namespace touchstone
