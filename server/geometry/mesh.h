@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace touchstone {
 
@@ -34,7 +35,7 @@ Bounds ComputeBounds(const TriangleMesh& mesh);
 
 // What a mesh is like, for `mesh info` and for refusing what cannot be touched. Edges, duplicates and
 // degeneracy are judged by position: vertices at exactly the same place are one, so that a seam of textures
-// or a triangle soup does not read as a hole.
+// or a triangle soup does not read as a hole. A triangle with two corners at one place has no edges.
 struct MeshReport {
   uint64_t vertices = 0;
   uint64_t triangles = 0;
