@@ -32,8 +32,8 @@ bool ClearOfPlane(const Corners& base, const Corners& other, const bool* common,
   return least > distance_m || most < -distance_m;
 }
 
-// Whether, seen along the normal of `base`, all of `other` lies outside one of its edges, but for an overlap too
-// narrow to matter: beside it, not on top.
+// Whether, seen along the normal of `base`, all of `other` lies outside one of its edges, but for an overlap
+// too narrow to matter: beside it, not on top.
 bool Beside(const Corners& base, const Corners& other, const bool* common, double overlap_m) {
   for (int edge = 0; edge < 3; ++edge) {
     const Eigen::Vector3d& from = base.at[edge];
@@ -53,7 +53,8 @@ bool Surface::Search::ComputeCrowded(uint32_t triangle) const {
   const double near_m = 8 * rounding_m_;
   const Corners self = CornersOf(mesh_, triangle);
   const Eigen::Vector3f reach = Eigen::Vector3f::Constant(static_cast<float>(near_m));
-  const Eigen::Vector3f a = self.at[0].cast<float>(), b = self.at[1].cast<float>(), c = self.at[2].cast<float>();
+  const Eigen::Vector3f a = self.at[0].cast<float>(), b = self.at[1].cast<float>(),
+                        c = self.at[2].cast<float>();
   bool crowded = false;
   tree().VisitInBox(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach,
                     [&](const uint32_t* ids, int count) {
@@ -68,7 +69,8 @@ bool Surface::Search::ComputeCrowded(uint32_t triangle) const {
                         }
                         crowded = !ClearOfPlane(self, other, common_of_other, near_m) &&
                                   !ClearOfPlane(other, self, common_of_self, near_m) &&
-                                  !Beside(self, other, common_of_other, rounding_m_) && !Beside(other, self, common_of_self, rounding_m_);
+                                  !Beside(self, other, common_of_other, rounding_m_) &&
+                                  !Beside(other, self, common_of_self, rounding_m_);
                       }
                     });
   return crowded;

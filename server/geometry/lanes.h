@@ -1,9 +1,13 @@
-// Eight single-precision numbers that are computed with together (GCC and Clang vector extensions): AVX
-// registers where there are any, narrower ones elsewhere.
+// Numbers that are computed with together (GCC and Clang vector extensions): AVX registers where there are
+// any, narrower ones elsewhere. And three-vectors of such numbers, or of plain ones, whose products have one
+// fixed order of operations: a lane and a plain number give the same bits.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+
+#include <Eigen/Core>
 
 #ifdef __AVX__
 #include <immintrin.h>
@@ -11,20 +15,37 @@
 
 namespace touchstone {
 
-typedef float Lanes __attribute__((vector_size(32)));
-typedef int32_t LaneMask __attribute__((vector_size(32)));  // -1 or 0 a lane, from comparisons
+typedef float Float8 __attribute__((vector_size(32)));
+typedef int32_t Mask8 __attribute__((vector_size(32)));  // -1 or 0 a lane, from comparisons
+typedef double Double4 __attribute__((vector_size(32)));
+typedef int64_t Mask4 __attribute__((vector_size(32)));
 
-inline Lanes LoadLanes(const float* from) {
+template <typename Lanes>
+Lanes LoadLanes(const void* from) {
   Lanes lanes;
   std::memcpy(&lanes, from, sizeof(lanes));
   return lanes;
 }
-inline void StoreLanes(float* to, Lanes lanes) { std::memcpy(to, &lanes, sizeof(lanes)); }
+template <typename Lanes>
+void StoreLanes(void* to, Lanes lanes) {
+  std::memcpy(to, &lanes, sizeof(lanes));
+}
 
-inline Lanes Select(LaneMask mask, Lanes if_true, Lanes if_false) { return mask ? if_true : if_false; }
+template <typename Mask, typename Lanes>
+Lanes Select(Mask mask, Lanes if_true, Lanes if_false) {
+  return mask ? if_true : if_false;
+}
+template <typename Lanes>
+Lanes MaxLanes(Lanes a, Lanes b) {
+  return a > b ? a : b;
+}
+template <typename Lanes>
+Lanes MinLanes(Lanes a, Lanes b) {
+  return a < b ? a : b;
+}
 
 // One bit a lane.
-inline uint32_t MaskOf(LaneMask mask) {
+inline uint32_t BitsOf(Mask8 mask) {
 #ifdef __AVX__
   return static_cast<uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
 #else
@@ -33,28 +54,71 @@ inline uint32_t MaskOf(LaneMask mask) {
   return bits;
 #endif
 }
-
-inline Lanes MaxLanes(Lanes a, Lanes b) { return a > b ? a : b; }
-inline Lanes MinLanes(Lanes a, Lanes b) { return a < b ? a : b; }
-
-inline Lanes SqrtLanes(Lanes a) {
+inline uint32_t BitsOf(Mask4 mask) {
 #ifdef __AVX__
-  return reinterpret_cast<Lanes>(_mm256_sqrt_ps(reinterpret_cast<__m256>(a)));
+  return static_cast<uint32_t>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
 #else
-  for (int lane = 0; lane < 8; ++lane) a[lane] = __builtin_sqrtf(a[lane]);
+  uint32_t bits = 0;
+  for (int lane = 0; lane < 4; ++lane) bits |= (mask[lane] ? 1u : 0u) << lane;
+  return bits;
+#endif
+}
+
+// Correctly rounded, like every operation here.
+inline double SquareRoot(double a) {
+  return std::sqrt(a);
+}
+inline Float8 SquareRoot(Float8 a) {
+#ifdef __AVX__
+  return reinterpret_cast<Float8>(_mm256_sqrt_ps(reinterpret_cast<__m256>(a)));
+#else
+  for (int lane = 0; lane < 8; ++lane) a[lane] = std::sqrt(a[lane]);
+  return a;
+#endif
+}
+inline Double4 SquareRoot(Double4 a) {
+#ifdef __AVX__
+  return reinterpret_cast<Double4>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(a)));
+#else
+  for (int lane = 0; lane < 4; ++lane) a[lane] = std::sqrt(a[lane]);
   return a;
 #endif
 }
 
-// A point or vector a lane.
-struct Lanes3 {
-  Lanes x, y, z;
+// A point or a vector: of numbers, or one a lane.
+template <typename Number>
+struct Triple {
+  Number x, y, z;
 };
-inline Lanes3 operator-(const Lanes3& a, const Lanes3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Lanes3 operator*(const Lanes3& a, Lanes b) { return {a.x * b, a.y * b, a.z * b}; }
-inline Lanes3 operator+(const Lanes3& a, const Lanes3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Lanes Dot(const Lanes3& a, const Lanes3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Lanes3 Cross(const Lanes3& a, const Lanes3& b) {
+using Triple1 = Triple<double>;
+inline Triple1 ToTriple(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+inline Triple<Float8> SameInAllLanes(const Eigen::Vector3f& v) {
+  return {Float8{} + v.x(), Float8{} + v.y(), Float8{} + v.z()};
+}
+inline Eigen::Vector3d ToEigen(const Triple1& v) {
+  return {v.x, v.y, v.z};
+}
+
+template <typename Number>
+Triple<Number> operator-(const Triple<Number>& a, const Triple<Number>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <typename Number>
+Triple<Number> operator+(const Triple<Number>& a, const Triple<Number>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <typename Number>
+Triple<Number> operator*(const Triple<Number>& a, Number b) {
+  return {a.x * b, a.y * b, a.z * b};
+}
+template <typename Number>
+Number Dot(const Triple<Number>& a, const Triple<Number>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <typename Number>
+Triple<Number> Cross(const Triple<Number>& a, const Triple<Number>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 

@@ -1,7 +1,7 @@
-// First contacts of lines. Embree proposes a triangle for sixteen lines at once; travel, point and normal come
-// from that triangle in double precision. A proposal is taken only where rounding cannot have changed it: the
-// line stays clear of the triangle's border by more than all rounding together, and no other sheet of the surface
-// comes that close. Anything else, about one line in a thousand, is searched exactly.
+// First contacts of lines. Embree proposes a triangle for sixteen lines at once; travel, point and normal
+// come from that triangle in double precision. A proposal is taken only where rounding cannot have changed
+// it: the line stays clear of the triangle's border by more than all rounding together, and no other sheet of
+// the surface comes that close. Anything else, about one line in a thousand, is searched exactly.
 #include <cmath>
 #include <limits>
 
@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-Contact NoContact() { return {kNaN, Eigen::Vector3d::Constant(kNaN), Eigen::Vector3d::Zero(), kNoTriangle}; }
+Contact NoContact() {
+  return {kNaN, Eigen::Vector3d::Constant(kNaN), Eigen::Vector3d::Zero(), kNoTriangle};
+}
 
 template <int kWidth>
 struct EmbreePacket;
@@ -45,53 +47,71 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m) const {
   // Only the part of the line near the mesh is searched, so that coordinates stay small.
   const double to_middle = (centre_m_ - line.origin_m).dot(line.direction);
   const double first = std::max(0.0, to_middle - 1.01 * reach_m_);
+  const Triple1 origin = ToTriple(line.origin_m), direction = ToTriple(line.direction);
   double best_travel = longest_m;
-  LineTriangle best_meet;
+  LineTriangle<double> best_meet = {};
   uint32_t best = kNoTriangle;
-  tree().VisitAlong(
-      line.origin_m + first * line.direction, line.direction, rounding_m_, 0,
-      std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
-      [&](const uint32_t* ids, int count, double* last_m) {
-        for (int i = 0; i < count; ++i) {
-          const LineTriangle meet = MeetTriangle(line.direction, mesh_.Corner(ids[i], 0) - line.origin_m,
-                                                 mesh_.Corner(ids[i], 1) - line.origin_m,
-                                                 mesh_.Corner(ids[i], 2) - line.origin_m);
-          if (!meet.Inside() || !(meet.travel_m > 0) || !(meet.travel_m <= best_travel)) continue;
-          if (meet.travel_m == best_travel && best != kNoTriangle && ids[i] > best) continue;
-          best_travel = meet.travel_m;
-          best_meet = meet;
-          best = ids[i];
-        }
-        // Boxes that begin a rounding later may still hold a contact that comes first.
-        if (best != kNoTriangle) *last_m = std::min(*last_m, best_travel - first + 4 * rounding_m_);
-      });
+  tree().VisitAlong(line.origin_m + first * line.direction, line.direction, rounding_m_, 0,
+                    std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
+                    [&](const uint32_t* ids, int count, double* last_m) {
+                      for (int i = 0; i < count; ++i) {
+                        const LineTriangle<double> meet =
+                            MeetTriangle(direction, ToTriple(mesh_.Corner(ids[i], 0)) - origin,
+                                         ToTriple(mesh_.Corner(ids[i], 1)) - origin,
+                                         ToTriple(mesh_.Corner(ids[i], 2)) - origin);
+                        if (!MeetsInside(meet) || !(meet.travel_m > 0) || !(meet.travel_m <= best_travel))
+                          continue;
+                        if (meet.travel_m == best_travel && best != kNoTriangle && ids[i] > best) continue;
+                        best_travel = meet.travel_m;
+                        best_meet = meet;
+                        best = ids[i];
+                      }
+                      // Boxes that begin a rounding later may still hold a contact that comes first.
+                      if (best != kNoTriangle)
+                        *last_m = std::min(*last_m, best_travel - first + 4 * rounding_m_);
+                    });
   if (best == kNoTriangle) return NoContact();
-  return {best_travel, line.origin_m + best_travel * line.direction, NormalAgainst(best_meet), best};
+  return {best_travel, ToEigen(origin + direction * best_travel), ToEigen(NormalAgainst(best_meet)), best};
 }
 
 template <int kWidth>
-void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, int count,
-                                 double longest_m, size_t at, Contacts* contacts) const {
+void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions,
+                                 int count, double longest_m, size_t at, Contacts* contacts) const {
+  // Coordinates by lane; lanes beyond the last line repeat the first one.
+  alignas(64) double origin[3][kWidth], direction[3][kWidth];
+  for (int k = 0; k < kWidth; ++k) {
+    const int line = k < count ? k : 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      origin[axis][k] = origins_m[line][axis];
+      direction[axis][k] = directions[line][axis];
+    }
+  }
+
   // Rays start where the line enters a ball round the mesh: standing far away costs no precision.
   alignas(64) typename EmbreePacket<kWidth>::RayHit rays;
   alignas(64) int valid[kWidth];
+  const double reach = 1.01 * reach_m_, reach2 = reach_m_ * reach_m_;
+  const double centre[3] = {centre_m_.x(), centre_m_.y(), centre_m_.z()};
+  const float farthest = static_cast<float>(2.1 * reach_m_);
   for (int k = 0; k < kWidth; ++k) {
-    const Eigen::Vector3d& origin = origins_m[k < count ? k : 0];
-    const Eigen::Vector3d& direction = directions[k < count ? k : 0];
-    const Eigen::Vector3d to_centre = centre_m_ - origin;
-    const double to_middle = to_centre.dot(direction);
-    const double first = std::max(0.0, to_middle - 1.01 * reach_m_);
-    const bool may_meet = (to_centre - to_middle * direction).squaredNorm() <= reach_m_ * reach_m_ &&
-                          to_middle > -reach_m_ && first <= longest_m;
-    valid[k] = k < count && may_meet ? -1 : 0;
-    rays.ray.org_x[k] = static_cast<float>(origin.x() + first * direction.x());
-    rays.ray.org_y[k] = static_cast<float>(origin.y() + first * direction.y());
-    rays.ray.org_z[k] = static_cast<float>(origin.z() + first * direction.z());
-    rays.ray.dir_x[k] = static_cast<float>(direction.x());
-    rays.ray.dir_y[k] = static_cast<float>(direction.y());
-    rays.ray.dir_z[k] = static_cast<float>(direction.z());
+    const double ox = origin[0][k], oy = origin[1][k], oz = origin[2][k];
+    const double dx = direction[0][k], dy = direction[1][k], dz = direction[2][k];
+    const double cx = centre[0] - ox, cy = centre[1] - oy, cz = centre[2] - oz;
+    const double to_middle = cx * dx + cy * dy + cz * dz;
+    const double start = to_middle - reach;
+    const double first = start > 0 ? start : 0;
+    const double mx = cx - to_middle * dx, my = cy - to_middle * dy, mz = cz - to_middle * dz;
+    const bool may_meet =
+        (mx * mx + my * my + mz * mz <= reach2) & (to_middle > -reach) & (first <= longest_m);
+    valid[k] = may_meet ? -1 : 0;
+    rays.ray.org_x[k] = static_cast<float>(ox + first * dx);
+    rays.ray.org_y[k] = static_cast<float>(oy + first * dy);
+    rays.ray.org_z[k] = static_cast<float>(oz + first * dz);
+    rays.ray.dir_x[k] = static_cast<float>(dx);
+    rays.ray.dir_y[k] = static_cast<float>(dy);
+    rays.ray.dir_z[k] = static_cast<float>(dz);
     rays.ray.tnear[k] = 0;
-    rays.ray.tfar[k] = static_cast<float>(2.1 * reach_m_);
+    rays.ray.tfar[k] = farthest;
     rays.ray.time[k] = 0;
     rays.ray.mask[k] = 0xFFFFFFFFu;
     rays.ray.id[k] = 0;
@@ -99,40 +119,60 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     rays.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.primID[k] = 0;
   }
+  for (int k = count; k < kWidth; ++k) valid[k] = 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   EmbreePacket<kWidth>::Intersect(valid, scene_, &context, &rays);
 
-  const double clear = 2 * rounding_m_;
-  for (int k = 0; k < count; ++k) {
-    if (valid[k] == 0) {
-      Store(NoContact(), at + k, contacts);
-      continue;
+  // The corners of the proposed triangles, by lane.
+  alignas(64) double corner[9][kWidth];
+  for (int k = 0; k < kWidth; ++k) {
+    const auto& vertices = mesh_.triangles[rays.hit.primID[k]];
+    for (int c = 0; c < 3; ++c) {
+      const Eigen::Vector3f& vertex = mesh_.vertices_m[vertices[c]];
+      for (int axis = 0; axis < 3; ++axis) corner[3 * c + axis][k] = static_cast<double>(vertex[axis]);
     }
-    const Eigen::Vector3d& origin = origins_m[k];
-    const Eigen::Vector3d& direction = directions[k];
-    const uint32_t triangle = rays.hit.primID[k];
-    bool certain = rays.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-    if (certain) {
-      const Eigen::Vector3d a = mesh_.Corner(triangle, 0) - origin, b = mesh_.Corner(triangle, 1) - origin,
-                            c = mesh_.Corner(triangle, 2) - origin;
-      const LineTriangle meet = MeetTriangle(direction, a, b, c);
-      // moment / edge length is at most the distance between the line and the edge's line.
-      const double side = meet.facing > 0 ? -1 : 1;
-      const double m0 = side * meet.moment[0], m1 = side * meet.moment[1], m2 = side * meet.moment[2];
-      const double clear2 = clear * clear;
-      certain = m0 > 0 && m1 > 0 && m2 > 0 && m0 * m0 > clear2 * (c - b).squaredNorm() &&
-                m1 * m1 > clear2 * (a - c).squaredNorm() && m2 * m2 > clear2 * (b - a).squaredNorm() &&
-                meet.travel_m > clear && meet.travel_m <= longest_m && !Crowded(triangle);
-      if (certain) {
-        contacts->travel_m[at + k] = meet.travel_m;
-        contacts->point_m[at + k] = origin + meet.travel_m * direction;
-        contacts->normal[at + k] = NormalAgainst(meet);
-        contacts->triangle[at + k] = triangle;
+  }
+
+  // Four lanes at a time: the contact, and whether the line stays clear of the triangle's border.
+  const auto load = [](const double(*from)[kWidth], int k) {
+    return Triple<Double4>{LoadLanes<Double4>(from[0] + k), LoadLanes<Double4>(from[1] + k),
+                           LoadLanes<Double4>(from[2] + k)};
+  };
+  const Double4 clear = Double4{} + 2 * rounding_m_;
+  for (int k = 0; k < count; k += 4) {
+    const Triple<Double4> from = load(origin, k), along = load(direction, k);
+    const Triple<Double4> a = load(corner, k) - from, b = load(corner + 3, k) - from,
+                          c = load(corner + 6, k) - from;
+    const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
+    const Double4 side = meet.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
+    // Moment over edge length is at most the distance between the line and the edge's line.
+    const auto clears = [&](Double4 moment, const Triple<Double4>& edge) {
+      const Double4 inwards = moment * side;
+      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(edge, edge));
+    };
+    const Mask4 certain = clears(meet.moment[0], c - b) & clears(meet.moment[1], a - c) &
+                          clears(meet.moment[2], b - a) & (meet.travel_m > clear) &
+                          (meet.travel_m <= longest_m);
+    const Triple<Double4> normal = NormalAgainst(meet);
+    const Triple<Double4> point = from + along * meet.travel_m;
+    const uint32_t certain_bits = BitsOf(certain);
+    for (int lane = 0; lane < std::min(4, count - k); ++lane) {
+      const uint32_t triangle = rays.hit.primID[k + lane];
+      const size_t to = at + k + lane;
+      if (valid[k + lane] == 0) {
+        Store(NoContact(), to, contacts);
+      } else if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID && (certain_bits >> lane & 1) &&
+                 !Crowded(triangle)) {
+        contacts->travel_m[to] = meet.travel_m[lane];
+        contacts->point_m[to] = {point.x[lane], point.y[lane], point.z[lane]};
+        contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
+        contacts->triangle[to] = triangle;
+      } else {
+        Store(CastExactly({origins_m[k + lane], directions[k + lane]}, longest_m), to, contacts);
       }
     }
-    if (!certain) Store(CastExactly({origin, direction}, longest_m), at + k, contacts);
   }
 }
 

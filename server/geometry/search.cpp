@@ -56,7 +56,8 @@ std::vector<Eigen::Vector3f> GrowVertices(const TriangleMesh& mesh, double dista
   }
   const float distance = static_cast<float>(distance_m);
   std::vector<Eigen::Vector3f> grown;
-  grown.reserve(mesh.vertices_m.size() + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
+  grown.reserve(mesh.vertices_m.size() +
+                2);  // Embree reads vertices in 16 bytes, a little beyond the last one
   for (size_t v = 0; v < mesh.vertices_m.size(); ++v) {
     Eigen::Vector3f move = normal[v].stableNormalized();
     if (loop[v].norm() > 1e-5f * longest_edge) move -= inwards[v].stableNormalized();
@@ -84,14 +85,12 @@ std::string EmbreeDescription() {
   const int width = EmbreePacketWidth();
   const char* const instructions = width == 16 ? "AVX-512" : width == 8 ? "AVX or AVX2" : "SSE or NEON";
   const auto version = rtcGetDeviceProperty(EmbreeDevice(), RTC_DEVICE_PROPERTY_VERSION);
-  return absl::StrCat("Embree ", version / 10000, ".", version / 100 % 100, ".", version % 100, ", ", instructions,
-                      ", packets of ", width);
+  return absl::StrCat("Embree ", version / 10000, ".", version / 100 % 100, ".", version % 100, ", ",
+                      instructions, ", packets of ", width);
 }
 
 Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
-    : mesh_(mesh),
-      centre_m_(bounds.Centre()),
-      crowded_(new std::atomic<uint8_t>[mesh.triangles.size()]()) {
+    : mesh_(mesh), centre_m_(bounds.Centre()), crowded_(new std::atomic<uint8_t>[mesh.triangles.size()]()) {
   reach_m_ = 0.5 * bounds.DiagonalM() * 1.0001;
   // Rounding of a coordinate is 6e-8 of it; sums and products of a few of them follow.
   rounding_m_ = 5e-7 * (bounds.min_m.cwiseAbs().cwiseMax(bounds.max_m.cwiseAbs()).maxCoeff() + reach_m_);
@@ -104,8 +103,8 @@ Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, grown_vertices_m_.data(), 0,
-                             sizeof(Eigen::Vector3f), grown_vertices_m_.size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, grown_vertices_m_.data(),
+                             0, sizeof(Eigen::Vector3f), grown_vertices_m_.size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(mesh.triangles[0]), mesh.triangles.size());
   rtcCommitGeometry(geometry);

@@ -1,8 +1,10 @@
-// What a Surface finds contacts with: Embree's scene, which proposes quickly, and the tree for exact searches.
-// Internal to geometry/.
+// What a Surface finds contacts with: Embree's scene, which proposes quickly, and the tree for exact
+// searches. Internal to geometry/.
 #pragma once
 
 #include <embree3/rtcore.h>
+
+#include <Eigen/Geometry>
 
 #include <atomic>
 #include <memory>
@@ -44,8 +46,8 @@ class Surface::Search {
   // The line's first contact by definition: every triangle near the line is tested in double precision.
   Contact CastExactly(const Line& line, double longest_m) const;
 
-  // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most longest_m.
-  // `travel_bound_m`: some contact is known to come no later (infinity: none known).
+  // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most
+  // longest_m. `travel_bound_m`: some contact is known to come no later (infinity: none known).
   Contact SweepExactly(const Line& line, double radius_m, double longest_m, double travel_bound_m) const;
 
   // As Surface::CastLines; the arrays have their size.
@@ -72,8 +74,8 @@ class Surface::Search {
 
   const TriangleMesh& mesh_;
   const Eigen::Vector3d centre_m_;
-  double reach_m_ = 0;      // radius of a ball round centre_m_ that holds the mesh
-  double rounding_m_ = 0;   // what single precision may be off, anywhere near the mesh
+  double reach_m_ = 0;                             // radius of a ball round centre_m_ that holds the mesh
+  double rounding_m_ = 0;                          // what single precision may be off, anywhere near the mesh
   std::vector<Eigen::Vector3f> grown_vertices_m_;  // what Embree sees: see GrowVertices
   RTCScene scene_ = nullptr;
   uint64_t scene_bytes_ = 0;

@@ -14,34 +14,38 @@ namespace touchstone {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using Lanes = Float8;
+using Lanes3 = Triple<Float8>;
+
 constexpr float kNever = std::numeric_limits<float>::max();
 
-Lanes3 Same(const Eigen::Vector3f& v) { return {Lanes{} + v.x(), Lanes{} + v.y(), Lanes{} + v.z()}; }
-
-// Lower bounds of the travel t at which a ball of radius r, whose centre is t * direction, touches the triangles
-// abc; kNever: not at all. `r` is a little more than the ball's radius, by all that rounding may do.
+// Lower bounds of the travel t at which a ball of radius r, whose centre is t * direction, touches the
+// triangles abc; kNever: not at all. `r` is a little more than the ball's radius, by all that rounding may
+// do.
 Lanes EarliestTouch(const Lanes3& direction, Lanes r, Lanes slack, const Lanes3& a, const Lanes3& b,
                     const Lanes3& c) {
   const Lanes never = Lanes{} + kNever;
   const Lanes r2 = r * r;
-  // Edges as capsules: where the line enters the cylinder round an edge beyond an end, only the end's ball counts.
+  // Edges as capsules: where the line enters the cylinder round an edge beyond an end, only the end's ball
+  // counts.
   const auto capsule = [&](const Lanes3& p, const Lanes3& q) {
     const Lanes3 edge = q - p;
-    const Lanes length = SqrtLanes(Dot(edge, edge));
+    const Lanes length = SquareRoot(Dot(edge, edge));
     const Lanes3 along = edge * (1.0f / length);
     const Lanes direction_along = Dot(direction, along), p_along = Dot(p, along);
     const Lanes across2 = 1.0f - direction_along * direction_along;
     const Lanes turn = Dot(along, Cross(p, direction));
     const Lanes inside = across2 * r2 - turn * turn;
     const Lanes across = Dot(p, direction) - p_along * direction_along;
-    const Lanes at = (across - SqrtLanes(MaxLanes(inside, Lanes{}))) / across2;
+    const Lanes at = (across - SquareRoot(MaxLanes(inside, Lanes{}))) / across2;
     const Lanes spot = at * direction_along - p_along;
     const Lanes3 end = {Select(spot < 0.5f * length, p.x, q.x), Select(spot < 0.5f * length, p.y, q.y),
                         Select(spot < 0.5f * length, p.z, q.z)};
     const Lanes3 miss = Cross(end, direction);
     const Lanes left = r2 - Dot(miss, miss);
-    const Lanes at_end = Select(left >= 0.0f, Dot(end, direction) - SqrtLanes(MaxLanes(left, Lanes{})), never);
-    const LaneMask on_edge = (spot >= -slack) & (spot <= length + slack);
+    const Lanes at_end =
+        Select(left >= 0.0f, Dot(end, direction) - SquareRoot(MaxLanes(left, Lanes{})), never);
+    const Mask8 on_edge = (spot >= -slack) & (spot <= length + slack);
     Lanes entry = Select(inside >= 0.0f, Select(on_edge, MinLanes(at, at_end), at_end), never);
     // Nearly along the edge the cylinder's entry is ill-conditioned; nothing is claimed there, nor of an edge
     // that single precision hardly sees.
@@ -52,32 +56,26 @@ Lanes EarliestTouch(const Lanes3& direction, Lanes r, Lanes slack, const Lanes3&
   // Face: counted where the foot of the ball lies inside, or near enough that rounding may say so.
   const Lanes3 ab = b - a, ac = c - a;
   Lanes3 normal = Cross(ab, ac);
-  const Lanes twice_area = SqrtLanes(Dot(normal, normal));
+  const Lanes twice_area = SquareRoot(Dot(normal, normal));
   const Lanes3 bc = c - b;
-  const Lanes longest = SqrtLanes(MaxLanes(MaxLanes(Dot(ab, ab), Dot(ac, ac)), Dot(bc, bc)));
-  const LaneMask needle = (twice_area < 16 * slack * longest) | (twice_area < 1e-3f * longest * longest);
-  normal = normal * (1.0f / MaxLanes(twice_area, Lanes{} + 1e-30f));
-  Lanes height = Dot(normal, a);
-  const LaneMask behind = height < 0.0f;
-  height = Select(behind, -height, height);
-  normal = {Select(behind, -normal.x, normal.x), Select(behind, -normal.y, normal.y),
-            Select(behind, -normal.z, normal.z)};
+  const Lanes longest = SquareRoot(MaxLanes(MaxLanes(Dot(ab, ab), Dot(ac, ac)), Dot(bc, bc)));
+  const Mask8 needle = (twice_area < 16 * slack * longest) | (twice_area < 1e-3f * longest * longest);
+  // Turned along the direction: the ball comes from the other side.
+  const Lanes ahead = Select(Dot(normal, direction) < 0.0f, Lanes{} - 1.0f, Lanes{} + 1.0f);
+  normal = normal * (ahead / MaxLanes(twice_area, Lanes{} + 1e-30f));
   const Lanes approach = Dot(normal, direction);
-  const Lanes at = (height - r) / approach;
-  // Towards the plane at a very flat angle the foot cannot be told, nor the normal of a needle: no claim.
+  const Lanes at = (Dot(normal, a) - r) / approach;
   const Lanes3 foot = direction * at + normal * r;
   const Lanes3 pa = a - foot, pb = b - foot, pc = c - foot;
-  const Lanes turned = Select(behind, Lanes{} - 1.0f, Lanes{} + 1.0f);
+  const Lanes margin = slack * longest / MaxLanes(approach, Lanes{} + 1e-3f);
   const auto inside = [&](const Lanes3& p, const Lanes3& q) {
-    const Lanes3 edge = q - p;
-    const Lanes margin = slack * SqrtLanes(Dot(edge, edge)) / MaxLanes(approach, Lanes{} + 1e-3f);
-    return turned * Dot(normal, Cross(p, q)) >= -margin;
+    return ahead * Dot(normal, Cross(p, q)) >= -margin;
   };
-  const LaneMask flat = approach < 0.02f;
-  const LaneMask over = (inside(pa, pb) & inside(pb, pc) & inside(pc, pa)) | flat;
-  const LaneMask counts = (height <= r) | (over & (approach > 0.0f));
-  const Lanes face = Select((height <= r) | flat, Lanes{} - kNever, at);
-  return Select(needle, Lanes{} - kNever, Select(counts, MinLanes(face, earliest), earliest));
+  const Lanes face = Select(inside(pa, pb) & inside(pb, pc) & inside(pc, pa), at, never);
+  // Towards the plane at a very flat angle the foot cannot be told, nor the normal of a needle: no claim.
+  const Lanes nothing = Lanes{} - kNever;
+  const Lanes flat = Select(approach < 0.02f, nothing, face);
+  return Select(needle, nothing, MinLanes(flat, earliest));
 }
 
 }  // namespace
@@ -96,7 +94,7 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
   const Eigen::Vector3d place_m = line.origin_m + near_touch * line.direction;
   const Eigen::Vector3f place = place_m.cast<float>();
   const double slack = 4 * (rounding_m_ + 1e-6 * radius_m);
-  const Lanes3 direction = Same(line.direction.cast<float>());
+  const Lanes3 direction = SameInAllLanes(line.direction.cast<float>());
   const Lanes grown = Lanes{} + static_cast<float>(radius_m + slack);
   const Lanes slack_lanes = Lanes{} + static_cast<float>(slack);
 
@@ -105,10 +103,11 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
     Eigen::Vector3d touch;
     const double most = std::min(last, longest_m);
     if (!SweepTriangle(line.direction, radius_m, mesh_.Corner(triangle, 0) - line.origin_m,
-                       mesh_.Corner(triangle, 1) - line.origin_m, mesh_.Corner(triangle, 2) - line.origin_m, most, &t,
-                       &touch))
+                       mesh_.Corner(triangle, 1) - line.origin_m, mesh_.Corner(triangle, 2) - line.origin_m,
+                       most, &t, &touch))
       return;
-    // The sooner contact wins, then (several balls start inside the surface) the nearer spot, then the triangle.
+    // The sooner contact wins, then (several balls start inside the surface) the nearer spot, then the
+    // triangle.
     if (best.triangle != kNoTriangle) {
       if (t > best.travel_m) return;
       if (t == best.travel_m) {
@@ -123,38 +122,40 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
     last = t;
   };
 
-  tree().VisitAlong(
-      line.origin_m + first * line.direction, line.direction, radius_m + slack, 0, last - first + slack,
-      [&](const uint32_t* ids, int count, double* last_from_first) {
-        alignas(32) float corner[9][8];
-        for (int i = 0; i < 8; ++i) {
-          const auto& vertices = mesh_.triangles[ids[i < count ? i : 0]];
-          for (int c = 0; c < 3; ++c) {
-            const Eigen::Vector3f& at = mesh_.vertices_m[vertices[c]];
-            for (int axis = 0; axis < 3; ++axis) corner[3 * c + axis][i] = at[axis];
-          }
-        }
-        const Lanes3 here = Same(place);
-        const auto load = [&](int c) {
-          return Lanes3{LoadLanes(corner[3 * c]), LoadLanes(corner[3 * c + 1]), LoadLanes(corner[3 * c + 2])} - here;
-        };
-        const Lanes bound = EarliestTouch(direction, grown, slack_lanes, load(0), load(1), load(2));
-        alignas(32) float bounds[8];
-        StoreLanes(bounds, bound);
-        // Soonest first: often it settles the others.
-        uint32_t open = (1u << count) - 1;
-        while (open) {
-          int soonest = __builtin_ctz(open);
-          for (uint32_t rest = open; rest; rest &= rest - 1) {
-            const int lane = __builtin_ctz(rest);
-            if (bounds[lane] < bounds[soonest]) soonest = lane;
-          }
-          if (bounds[soonest] > last - near_touch + 4 * slack) break;
-          open &= ~(1u << soonest);
-          consider(ids[soonest]);
-        }
-        *last_from_first = last - first + slack;
-      });
+  tree().VisitAlong(line.origin_m + first * line.direction, line.direction, radius_m + slack, 0,
+                    last - first + slack, [&](const uint32_t* ids, int count, double* last_from_first) {
+                      alignas(32) float corner[9][8];
+                      for (int i = 0; i < 8; ++i) {
+                        const auto& vertices = mesh_.triangles[ids[i < count ? i : 0]];
+                        for (int c = 0; c < 3; ++c) {
+                          const Eigen::Vector3f& at = mesh_.vertices_m[vertices[c]];
+                          for (int axis = 0; axis < 3; ++axis) corner[3 * c + axis][i] = at[axis];
+                        }
+                      }
+                      const Lanes3 here = SameInAllLanes(place);
+                      const auto load = [&](int c) {
+                        return Lanes3{LoadLanes<Lanes>(corner[3 * c]), LoadLanes<Lanes>(corner[3 * c + 1]),
+                                      LoadLanes<Lanes>(corner[3 * c + 2])} -
+                               here;
+                      };
+                      const Lanes bound =
+                          EarliestTouch(direction, grown, slack_lanes, load(0), load(1), load(2));
+                      alignas(32) float bounds[8];
+                      StoreLanes(bounds, bound);
+                      // Soonest first: often it settles the others.
+                      uint32_t open = (1u << count) - 1;
+                      while (open) {
+                        int soonest = __builtin_ctz(open);
+                        for (uint32_t rest = open; rest; rest &= rest - 1) {
+                          const int lane = __builtin_ctz(rest);
+                          if (bounds[lane] < bounds[soonest]) soonest = lane;
+                        }
+                        if (bounds[soonest] > last - near_touch + 4 * slack) break;
+                        open &= ~(1u << soonest);
+                        consider(ids[soonest]);
+                      }
+                      *last_from_first = last - first + slack;
+                    });
   if (best.triangle == kNoTriangle) return best;
   const Eigen::Vector3d away = best.travel_m * line.direction - best.point_m;
   const double distance = std::sqrt(away.squaredNorm());

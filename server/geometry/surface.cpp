@@ -12,22 +12,26 @@ namespace {
 
 absl::Status CheckMesh(const std::string& name, const TriangleMesh& mesh) {
   if (mesh.triangles.empty())
-    return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "' has no triangles; there is nothing to touch"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("mesh '", name, "' has no triangles; there is nothing to touch"));
   if (mesh.triangles.size() > Surface::kMostTriangles)
     return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "' has ", mesh.triangles.size(),
-                                                   " triangles; at most ", Surface::kMostTriangles, " are allowed"));
+                                                   " triangles; at most ", Surface::kMostTriangles,
+                                                   " are allowed"));
   for (size_t v = 0; v < mesh.vertices_m.size(); ++v) {
     const Eigen::Vector3f& p = mesh.vertices_m[v];
     // Squares of coordinates must fit single precision.
     if (!(p.cwiseAbs().maxCoeff() < 1e6f))
-      return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "', vertex ", v, ": (", p.x(), ", ", p.y(), ", ",
-                                                     p.z(), ") m; coordinates must be finite and less than 1e6 m"));
+      return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "', vertex ", v, ": (", p.x(), ", ",
+                                                     p.y(), ", ", p.z(),
+                                                     ") m; coordinates must be finite and less than 1e6 m"));
   }
   for (size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (const uint32_t v : mesh.triangles[t]) {
       if (v >= mesh.vertices_m.size())
         return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "', triangle ", t, ": vertex ", v,
-                                                       " does not exist; there are ", mesh.vertices_m.size()));
+                                                       " does not exist; there are ",
+                                                       mesh.vertices_m.size()));
     }
   }
   return absl::OkStatus();
@@ -66,8 +70,9 @@ absl::StatusOr<std::shared_ptr<const Surface>> Surface::Create(std::string name,
   return surface;
 }
 
-void Surface::CastLines(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
-                        double longest_m, Contacts* contacts) const {
+void Surface::CastLines(absl::Span<const Eigen::Vector3d> origins_m,
+                        absl::Span<const Eigen::Vector3d> directions, double longest_m,
+                        Contacts* contacts) const {
   contacts->Resize(origins_m.size());
   search_->Cast(origins_m, directions, longest_m, contacts);
 }
@@ -76,7 +81,9 @@ double Surface::MeanCurvaturePerM(uint32_t triangle, const Eigen::Vector3d& poin
   return search_->MeanCurvaturePerM(triangle, point_m);
 }
 
-void* Surface::embree_scene() const { return search_->scene(); }
+void* Surface::embree_scene() const {
+  return search_->scene();
+}
 
 uint64_t Surface::MemoryBytes() const {
   return mesh_.vertices_m.capacity() * sizeof(mesh_.vertices_m[0]) +

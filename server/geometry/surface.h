@@ -2,10 +2,10 @@
 // tips). The only files that include Embree are the ones beside this header.
 //
 // A contact is defined in double precision: the least travel over all triangles that the line meets (borders
-// included), and among equals the smallest triangle number. Embree, in single precision, only proposes; where it
-// could be wrong (line_triangle.h, ray_cast.cpp) the triangles near the line are searched exactly. So a result
-// is a pure function of the line and the mesh, bit for bit, whatever other lines stood in the same call, however
-// many threads called and whatever instructions the machine has.
+// included), and among equals the smallest triangle number. Embree, in single precision, only proposes; where
+// it could be wrong (line_triangle.h, ray_cast.cpp) the triangles near the line are searched exactly. So a
+// result is a pure function of the line and the mesh, bit for bit, whatever other lines stood in the same
+// call, however many threads called and whatever instructions the machine has.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
+#include <Eigen/Core>
 
 #include "server/geometry/mesh.h"
 
@@ -25,18 +25,18 @@ inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
 
 // First contacts, one entry a line. Arrays are resized by the call and reused between calls.
 struct Contacts {
-  std::vector<double> travel_m;              // from the line's origin along its direction; NaN: no contact
-  std::vector<Eigen::Vector3d> normal;       // unit, from the surface towards the finger; zero on a miss
-  std::vector<Eigen::Vector3d> point_m;      // on the surface, mesh frame; NaN on a miss
-  std::vector<uint32_t> triangle;            // kNoTriangle on a miss
+  std::vector<double> travel_m;          // from the line's origin along its direction; NaN: no contact
+  std::vector<Eigen::Vector3d> normal;   // unit, from the surface towards the finger; zero on a miss
+  std::vector<Eigen::Vector3d> point_m;  // on the surface, mesh frame; NaN on a miss
+  std::vector<uint32_t> triangle;        // kNoTriangle on a miss
   void Resize(size_t count);
 };
 
 class Surface {
  public:
-  // Builds the BVH (all cores). Triangles keep their order. Fails on a mesh without a triangle of positive area, with an index out of
-  // range, with a coordinate that is not finite, or with more than kMostTriangles triangles. Degenerate and
-  // exactly repeated triangles are dropped first: mesh() is what is left.
+  // Builds the BVH (all cores). Triangles keep their order. Fails on a mesh without a triangle of positive
+  // area, with an index out of range, with a coordinate that is not finite, or with more than kMostTriangles
+  // triangles. Degenerate and exactly repeated triangles are dropped first: mesh() is what is left.
   static absl::StatusOr<std::shared_ptr<const Surface>> Create(std::string name, TriangleMesh mesh);
   ~Surface();
 
@@ -56,9 +56,9 @@ class Surface {
   // The same for spheres of radius_m (> 0) whose centre runs along the line: travel_m is what the *foremost
   // point* of the ball has gone when the ball first touches, that is, the centre starts radius_m behind the
   // origin: centre(t) = origin + (t - radius_m) * direction. On a plane met at right angles the result equals
-  // CastLines'. Exact to 1 um on faces, edges and vertices of any mesh. `normal` points from the contact to the
-  // centre. A ball that touches or overlaps the surface where it starts has travel 0, and the point and the
-  // normal of the nearest spot of the surface; so here 0 <= travel_m <= longest_m.
+  // CastLines'. Exact to 1 um on faces, edges and vertices of any mesh. `normal` points from the contact to
+  // the centre. A ball that touches or overlaps the surface where it starts has travel 0, and the point and
+  // the normal of the nearest spot of the surface; so here 0 <= travel_m <= longest_m.
   void SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
                     double radius_m, double longest_m, Contacts* contacts) const;
 
@@ -66,8 +66,8 @@ class Surface {
   // the vertices' cotangent Laplacian (Meyer et al. 2003). Computed for the whole mesh at the first call.
   double MeanCurvaturePerM(uint32_t triangle, const Eigen::Vector3d& point_m) const;
 
-  // Embree's scene handle, for the CPU renderer of image/ alone (an RTCScene). Its vertices stand off the mesh's
-  // by less than a millionth of the mesh's size.
+  // Embree's scene handle, for the CPU renderer of image/ alone (an RTCScene). Its vertices stand off the
+  // mesh's by less than a millionth of the mesh's size.
   void* embree_scene() const;
 
   // Bytes held by mesh and BVH together.

@@ -24,10 +24,10 @@ Vector3d NearestPointOfTriangle(const Vector3d& a, const Vector3d& b, const Vect
   return a + ab * (vb * scale) + ac * (vc * scale);
 }
 
-bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, const Vector3d& b, const Vector3d& c,
-                   double most, double* t, Vector3d* touch) {
-  // Face: the centre comes within the radius of the plane, above the inside of the triangle. The edges are not
-  // reached before that.
+bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, const Vector3d& b,
+                   const Vector3d& c, double most, double* t, Vector3d* touch) {
+  // Face: the centre comes within the radius of the plane, above the inside of the triangle. The edges are
+  // not reached before that.
   Vector3d normal = (b - a).cross(c - a);
   normal /= std::sqrt(normal.squaredNorm());
   double height = normal.dot(a);  // of the plane, along the normal that points away from the start
@@ -43,7 +43,8 @@ bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, 
     const Vector3d centre = at * direction;
     const Vector3d foot = centre + radius * normal;
     const Vector3d pa = a - foot, pb = b - foot, pc = c - foot;
-    const double side0 = normal.dot(pa.cross(pb)), side1 = normal.dot(pb.cross(pc)), side2 = normal.dot(pc.cross(pa));
+    const double side0 = normal.dot(pa.cross(pb)), side1 = normal.dot(pb.cross(pc)),
+                 side2 = normal.dot(pc.cross(pa));
     if ((side0 >= 0 && side1 >= 0 && side2 >= 0) || (side0 <= 0 && side1 <= 0 && side2 <= 0)) {
       *t = at;
       *touch = foot;

@@ -43,8 +43,8 @@ TriangleTree::Range TriangleTree::Whole(const Primitive* primitives, uint32_t be
   return range;
 }
 
-// Puts the primitives of a range into two parts and returns where the second begins: of sixteen planes along the
-// longest axis the one with the least sum of area times number (Wald, "On fast construction of SAH-based
+// Puts the primitives of a range into two parts and returns where the second begins: of sixteen planes along
+// the longest axis the one with the least sum of area times number (Wald, "On fast construction of SAH-based
 // bounding volume hierarchies", 2007); halves if all middles coincide.
 uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int depth) {
   constexpr int kBins = 16;
@@ -147,7 +147,8 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh, int threads) {
   uint32_t roots[8];
   std::atomic<int> next{0};
   const auto work = [&] {
-    for (int i = next++; i < parts; i = next++) roots[i] = Build(primitives.data(), children[i], 1, &subtrees[i]);
+    for (int i = next++; i < parts; i = next++)
+      roots[i] = Build(primitives.data(), children[i], 1, &subtrees[i]);
   };
   std::vector<std::thread> helpers;
   for (int i = 1; i < (count < 5000 ? 1 : threads); ++i) helpers.emplace_back(work);

@@ -1,7 +1,7 @@
-// An eight-wide tree of boxes over a mesh's triangles: finds every triangle whose box, grown by a radius, meets
-// a line. It errs only towards too many, so what is tested exactly afterwards does not depend on it. It serves
-// swept spheres of any radius and the few lines that single precision cannot decide.
-// About ten bytes a triangle.
+// An eight-wide tree of boxes over a mesh's triangles: finds every triangle whose box, grown by a radius,
+// meets a line. It errs only towards too many, so what is tested exactly afterwards does not depend on it. It
+// serves swept spheres of any radius and the few lines that single precision cannot decide. About ten bytes a
+// triangle.
 #pragma once
 
 #include <algorithm>
@@ -26,22 +26,24 @@ class TriangleTree {
   // every side, meet the points origin + t * direction with first_m <= t <= last_m; roughly nearest first.
   // visit may lower last_m. grow_m must cover the rounding of coordinates to single precision.
   template <typename Visit>
-  void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double grow_m, double first_m,
-                  double last_m, Visit visit) const;
+  void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double grow_m,
+                  double first_m, double last_m, Visit visit) const;
 
   // Calls visit(ids, count) with groups of triangles whose boxes meet the box.
   template <typename Visit>
   void VisitInBox(const Eigen::Vector3f& min_m, const Eigen::Vector3f& max_m, Visit visit) const;
 
-  uint64_t MemoryBytes() const { return nodes_.capacity() * sizeof(Node) + order_.capacity() * sizeof(uint32_t); }
+  uint64_t MemoryBytes() const {
+    return nodes_.capacity() * sizeof(Node) + order_.capacity() * sizeof(uint32_t);
+  }
 
  private:
-  static constexpr int kLeafBits = 4;             // a leaf's reference: first << 4 | count, with the top bit
+  static constexpr int kLeafBits = 4;  // a leaf's reference: first << 4 | count, with the top bit
   static constexpr uint32_t kLeaf = 0x80000000u;
   static constexpr uint32_t kEmpty = 0xFFFFFFFFu;
   static constexpr int kMostInLeaf = 8;
-  // Deeper than this, ranges are halved, whatever the cost: at most 22 more levels for 4 million triangles. Seven
-  // children a level may wait, so the stack never overflows.
+  // Deeper than this, ranges are halved, whatever the cost: at most 22 more levels for 4 million triangles.
+  // Seven children a level may wait, so the stack never overflows.
   static constexpr int kDepthOfHalves = 12;
   static constexpr int kStack = 256;
 
@@ -56,13 +58,13 @@ class TriangleTree {
   static int SplitInEight(Primitive* primitives, const Range& range, int depth, Range* children);
   static uint32_t Build(Primitive* primitives, const Range& range, int depth, std::vector<Node>* nodes);
 
-  std::vector<Node> nodes_;       // the root is the first
-  std::vector<uint32_t> order_;   // triangles, leaf after leaf
+  std::vector<Node> nodes_;      // the root is the first
+  std::vector<uint32_t> order_;  // triangles, leaf after leaf
 };
 
 template <typename Visit>
-void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double grow_m,
-                              double first_m, double last_m, Visit visit) const {
+void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
+                              double grow_m, double first_m, double last_m, Visit visit) const {
   // Slabs: a box is met between the largest entry and the smallest exit. A direction along a slab gets a huge
   // inverse instead of infinity, so that no 0 * infinity arises.
   float origin[3], inverse[3];
@@ -91,17 +93,19 @@ void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vect
       continue;
     }
     const Node& node = nodes_[top.child];
-    Lanes entry = Lanes{} + first;
+    Float8 entry = Float8{} + first;
     // The exit is widened by a few roundings; an entry that is a little late is covered by grow_m.
-    Lanes leave = Lanes{} + static_cast<float>(last_m);
+    Float8 leave = Float8{} + static_cast<float>(last_m);
     for (int axis = 0; axis < 3; ++axis) {
       const float outward = inverse[axis] < 0 ? grow : -grow;
-      const Lanes close = (LoadLanes(node.bounds[near_side[axis]]) + (outward - origin[axis])) * inverse[axis];
-      const Lanes far = (LoadLanes(node.bounds[near_side[axis] ^ 1]) - (outward + origin[axis])) * inverse[axis];
+      const Float8 close =
+          (LoadLanes<Float8>(node.bounds[near_side[axis]]) + (outward - origin[axis])) * inverse[axis];
+      const Float8 far =
+          (LoadLanes<Float8>(node.bounds[near_side[axis] ^ 1]) - (outward + origin[axis])) * inverse[axis];
       entry = MaxLanes(entry, close);
       leave = MinLanes(leave, far);
     }
-    uint32_t met = MaskOf(entry <= leave);
+    uint32_t met = BitsOf(entry <= leave);
     float entries[8];
     StoreLanes(entries, entry);
     const int base = size;
@@ -129,12 +133,12 @@ void TriangleTree::VisitInBox(const Eigen::Vector3f& min_m, const Eigen::Vector3
       continue;
     }
     const Node& node = nodes_[top];
-    Lanes gap = Lanes{} - 1.0f;
+    Float8 gap = Float8{} - 1.0f;
     for (int axis = 0; axis < 3; ++axis) {
-      gap = MaxLanes(gap, LoadLanes(node.bounds[2 * axis]) - max_m[axis]);
-      gap = MaxLanes(gap, min_m[axis] - LoadLanes(node.bounds[2 * axis + 1]));
+      gap = MaxLanes(gap, LoadLanes<Float8>(node.bounds[2 * axis]) - max_m[axis]);
+      gap = MaxLanes(gap, min_m[axis] - LoadLanes<Float8>(node.bounds[2 * axis + 1]));
     }
-    for (uint32_t met = MaskOf(gap <= Lanes{}); met; met &= met - 1) {
+    for (uint32_t met = BitsOf(gap <= Float8{}); met; met &= met - 1) {
       const int lane = __builtin_ctz(met);
       if (node.child[lane] != kEmpty) stack[size++] = node.child[lane];
     }
