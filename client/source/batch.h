@@ -36,6 +36,9 @@ absl::Status ValidateColumn(const v1::Column& column, uint64_t rows);
 
 class Batch {
  public:
+  Batch() = default;
+  explicit Batch(v1::Batch batch) { *message_.mutable_batch() = std::move(batch); }
+
   uint64_t start_index() const { return message_.batch().start_index(); }
   uint64_t rows() const { return message_.batch().rows(); }
   const v1::Batch& message() const { return message_.batch(); }
