@@ -1,4 +1,4 @@
-// The shading model of shading.h in GLSL, statement by statement as in renderer_cpu.cpp.
+// The shading model of shading.h in GLSL, statement by statement as in cpu_shading.cpp.
 #pragma once
 
 namespace touchstone {

@@ -15,8 +15,8 @@ struct Camera {
   Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // need not be perpendicular to the view, nor of unit length
   double vertical_fov_rad = 0.78539816339744831;  // 45 deg
-  double near_m = 0;                              // 0 with far_m = 0: enclose the object
-  double far_m = 0;
+  double near_m = 0;                              // depths of the planes; where 0, chosen so that
+  double far_m = 0;                               // the object is enclosed
 };
 
 // The seed's camera of a touch (DESIGN 4): eye = the middle finger's start, at = target, up = lateral x
@@ -27,7 +27,7 @@ Camera CameraOfTouch(const Eigen::Vector3d& target_m, const Eigen::Vector3d& app
 enum class PixelFormat { kGrey, kRgb };
 enum class Look {
   kShaded,       // white point lights, no shadows, black background
-  kDarkOnWhite,  // the seed's post-processed look: a dark object on a white background
+  kDarkOnWhite,  // the seed's post-processed look: a dark object on a white background (see shading.h)
 };
 
 struct ImageOptions {

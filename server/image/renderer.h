@@ -1,8 +1,8 @@
 // A renderer turns (surface, camera, options) into an image. Two exist: EGL (any OpenGL 3.3 driver, no
-// display) and CPU (Embree packets). Both compute the same picture: the same sampling (pixel centres), the
-// same smooth normals (area-weighted vertex normals, split at creases sharper than kCreaseRad), the same
-// lights; grey levels agree within 1/255 away from silhouettes. One renderer always gives the same bytes for
-// the same request.
+// display) and CPU (triangles drawn into a depth buffer, or Embree packets for fine meshes). Both compute the
+// same picture: the same sampling (pixel centres), the same smooth normals (area-weighted vertex normals,
+// split at creases sharper than kCreaseRad), the same lights; grey levels agree within 1/255 away from
+// silhouettes. One renderer always gives the same bytes for the same request.
 #pragma once
 
 #include <memory>

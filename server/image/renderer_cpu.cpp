@@ -15,8 +15,9 @@
 namespace touchstone {
 namespace {
 
-// Up to this many triangles for a pixel of the object's box, drawing is faster than casting (measured).
-constexpr double kTrianglesAPixel = 2.0;
+// Up to this many triangles for a pixel of the object's box, drawing is faster than casting: measured, 2.7
+// times as fast at one or two, 1.4 times at 27; open meshes, which show both sides, gain less.
+constexpr double kTrianglesAPixel = 20.0;
 
 bool IsCoarse(const CpuFrame& frame) {
   const double pixels = static_cast<double>(frame.box.last_column - frame.box.first_column) *

@@ -1,8 +1,11 @@
 // The EGL renderer: OpenGL 3.3 on any device that EGL finds, no window system, no display variable.
 //
-// A context belongs to a thread of the renderer's own for all its life: callers hand it their requests and
+// The context belongs to a thread of the renderer's own for all its life: callers hand it their requests and
 // wait, so whatever contexts they have themselves stay untouched, and drivers never see a context change
 // threads.
+//
+// There is one context, for two reasons: llvmpipe has one rasteriser a process, so that further contexts wait
+// for it (measured: two drew no more images a second than one), and a GPU has one queue.
 #include <condition_variable>
 #include <deque>
 #include <future>
@@ -24,14 +27,12 @@ namespace {
 
 class EglRenderer final : public Renderer {
  public:
-  static absl::StatusOr<std::shared_ptr<Renderer>> Create(int device, int contexts) {
+  static absl::StatusOr<std::shared_ptr<Renderer>> Create(int device) {
     auto renderer = std::make_shared<EglRenderer>();
-    for (int i = 0; i < contexts; ++i) {
-      std::promise<absl::Status> started;
-      std::future<absl::Status> status = started.get_future();
-      renderer->threads_.emplace_back(&EglRenderer::Run, renderer.get(), device, &started);
-      TOUCHSTONE_RETURN_IF_ERROR(status.get());
-    }
+    std::promise<absl::Status> promise;
+    std::future<absl::Status> started = promise.get_future();
+    renderer->thread_ = std::thread(&EglRenderer::Run, renderer.get(), device, std::move(promise));
+    TOUCHSTONE_RETURN_IF_ERROR(started.get());
     return std::shared_ptr<Renderer>(std::move(renderer));
   }
 
@@ -41,7 +42,7 @@ class EglRenderer final : public Renderer {
       stopping_ = true;
     }
     wake_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
+    thread_.join();
   }
 
   std::string name() const override { return "egl"; }
@@ -69,17 +70,20 @@ class EglRenderer final : public Renderer {
     std::promise<absl::StatusOr<Image>> image;
   };
 
-  // The life of one context's thread.
-  void Run(int device, std::promise<absl::Status>* started) {
+  // The life of the context's thread.
+  void Run(int device, std::promise<absl::Status> started) {
     absl::StatusOr<std::unique_ptr<EglContext>> context = EglContext::Create(EglDisplays()[device]);
-    if (!context.ok()) return started->set_value(context.status());
+    if (!context.ok()) return started.set_value(context.status());
     absl::StatusOr<std::unique_ptr<GlPainter>> painter = GlPainter::Create();
-    if (!painter.ok()) return started->set_value(painter.status());
+    if (!painter.ok()) return started.set_value(painter.status());
     gl_renderer_ = (*painter)->gl_renderer();
-    started->set_value(absl::OkStatus());
+    started.set_value(absl::OkStatus());
 
-    while (Job* job = NextJob())
-      job->image.set_value((*painter)->Paint(job->surface, *job->mesh, job->camera, job->options));
+    while (Job* job = NextJob()) {
+      // Taken out first: as soon as the value is set, the caller may be gone with his job.
+      std::promise<absl::StatusOr<Image>> image = std::move(job->image);
+      image.set_value((*painter)->Paint(job->surface, *job->mesh, job->camera, job->options));
+    }
     painter->reset();  // while its context is still current
   }
 
@@ -99,7 +103,7 @@ class EglRenderer final : public Renderer {
   std::condition_variable wake_;
   std::deque<Job*> jobs_;
   bool stopping_ = false;
-  std::vector<std::thread> threads_;
+  std::thread thread_;
 };
 
 std::string Describe(const EglDevice& device) {
@@ -131,8 +135,7 @@ absl::StatusOr<EglDevice> ChooseDevice(int wanted) {
 
 absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int device) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const EglDevice chosen, ChooseDevice(device));
-
-  return EglRenderer::Create(chosen.index, 1);
+  return EglRenderer::Create(chosen.index);
 }
 
 }  // namespace touchstone

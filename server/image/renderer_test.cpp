@@ -52,41 +52,6 @@ class RendererTest : public testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Both, RendererTest, testing::Values("cpu", "egl"),
                          [](const auto& info) { return std::string(info.param); });
 
-ImageOptions WithAll(int width, int height) {
-  ImageOptions options;
-  options.width = width;
-  options.height = height;
-  options.depth = true;
-  options.mask = true;
-  return options;
-}
-
-struct Scene {
-  const char* name;
-  TriangleMesh mesh;
-  Camera camera;
-};
-
-std::vector<Scene> Scenes() {
-  std::vector<Scene> scenes;
-  scenes.push_back({"letter", LetterMesh(), CameraAt({0.12, -0.26, 0.09})});
-  scenes.push_back({"ball", BallMesh(0.07, 14, 20), CameraAt({0.2, 0.05, 0.1})});
-  scenes.push_back({"bowl from above", BowlMesh(), CameraAt({0.05, 0.08, 0.2})});
-  scenes.push_back({"bowl from below", BowlMesh(), CameraAt({0.15, 0.08, -0.2})});
-  scenes.push_back({"inside out", InsideOut(LetterMesh()), CameraAt({-0.25, -0.1, -0.12})});
-  scenes.push_back({"from within", BallMesh(0.07, 14, 20), CameraAt({0.03, 0.01, 0.02})});
-  // Cut open by the near plane, and cut off by the far one.
-  Camera cut = CameraAt({0.2, -0.1, 0.05});
-  cut.near_m = 0.21;
-  cut.far_m = 0.27;
-  scenes.push_back({"cut", BallMesh(0.07, 14, 20), cut});
-  // A long lens, far away.
-  Camera far = CameraAt({30, -20, 10});
-  far.vertical_fov_rad = 0.005;
-  scenes.push_back({"far away", LetterMesh(), far});
-  return scenes;
-}
-
 TEST_P(RendererTest, MasksAreThoseOfExactRays) {
   for (const Scene& scene : Scenes()) {
     SCOPED_TRACE(scene.name);
@@ -322,77 +287,6 @@ TEST_P(RendererTest, SurvivesTheDeathOfSurfaces) {
     MustRender(MakeSurface("ball", BallMesh(0.05, 8, 12)), CameraAt({0.3, 0, 0}), {});
   EXPECT_EQ(MustRender(MakeSurface("letter", LetterMesh()), CameraAt({0.1, -0.2, 0.1}), {}).pixels,
             before.pixels);
-}
-
-TEST(Renderers, AgreeWithinOneLevel) {
-  std::string reason;
-  const std::shared_ptr<Renderer> cpu = RendererNamed("cpu", &reason);
-  const std::shared_ptr<Renderer> egl = RendererNamed("egl", &reason);
-  if (egl == nullptr) GTEST_SKIP() << "no egl renderer here: " << reason;
-  std::vector<Scene> scenes = Scenes();
-  scenes.push_back({"fine ball", BallMesh(0.07, 100, 100), CameraAt({0.2, 0.1, 0.1})});
-  size_t pixels = 0, beyond = 0, off_edge = 0;
-  for (const Look look : {Look::kShaded, Look::kDarkOnWhite}) {
-    for (const Scene& scene : scenes) {
-      SCOPED_TRACE(scene.name);
-      const auto surface = MakeSurface(scene.name, scene.mesh);
-      ImageOptions options = WithAll(224, 224);
-      options.look = look;
-      const auto a = cpu->Render(surface, scene.camera, options),
-                 b = egl->Render(surface, scene.camera, options);
-      ASSERT_TRUE(a.ok() && b.ok());
-      const View view = MakeView(scene.camera, surface->bounds(), options);
-      for (int i = 0; i < 224 * 224; ++i) {
-        ++pixels;
-        if (std::abs(a->pixels[i] - b->pixels[i]) <= 1) continue;
-        ++beyond;
-        // Every such pixel must lie on a silhouette or an edge.
-        off_edge += IsSteady(surface->mesh(), view, i % 224 + 0.5, i / 224 + 0.5, 0.02, true);
-      }
-    }
-  }
-  RecordProperty("share_beyond_one_level", std::to_string(double(beyond) / pixels));
-  EXPECT_EQ(off_edge, 0u);
-  EXPECT_LT(beyond, pixels / 1000);
-}
-
-TEST(Renderers, AutoDrawsAndSaysWhy) {
-  const auto renderer = CreateRenderer({});
-  ASSERT_TRUE(renderer.ok()) << renderer.status().message();
-  EXPECT_THAT((*renderer)->description(), HasSubstr("chosen"));
-  EXPECT_TRUE((*renderer)->Render(MakeSurface("letter", LetterMesh()), CameraAt({0.3, 0, 0}), {}).ok());
-}
-
-TEST(Renderers, AutoFallsBackToTheCpuWithTheReason) {
-  RendererOptions options;
-  options.egl_device = 63;  // there is none
-  const auto renderer = CreateRenderer(options);
-  ASSERT_TRUE(renderer.ok()) << renderer.status().message();
-  EXPECT_EQ((*renderer)->name(), "cpu");
-  EXPECT_THAT((*renderer)->description(), HasSubstr("EGL is not to be had"));
-}
-
-TEST(EglDevices, AreNamedOrSayWhyTheyDoNotRender) {
-  for (const EglDevice& device : ListEglDevices()) {
-    EXPECT_NE(device.renders, !device.problem.empty());
-    if (!device.renders) continue;
-    EXPECT_FALSE(device.name.empty());
-    RendererOptions options;
-    options.kind = RendererKind::kEgl;
-    options.egl_device = device.index;
-    const auto renderer = CreateRenderer(options);
-    ASSERT_TRUE(renderer.ok()) << renderer.status().message();
-    EXPECT_THAT((*renderer)->description(), HasSubstr(device.name));
-  }
-}
-
-TEST(EglDevices, RefusesAnIndexThatDoesNotExist) {
-  const auto renderer = CreateEglRenderer(1000);
-  ASSERT_FALSE(renderer.ok());
-  EXPECT_FALSE(renderer.status().message().empty());
-  if (renderer.status().code() != absl::StatusCode::kUnimplemented) {
-    EXPECT_THAT(std::string(renderer.status().message()), HasSubstr("1000"));
-  }
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // How a surface point becomes a grey level: one model for both renderers, in words here, in C++ in
-// renderer_cpu.cpp and in GLSL in egl_shader.h. Who changes one changes all three; the image tests compare
+// cpu_shading.cpp and in GLSL in egl_shader.h. Who changes one changes all three; the image tests compare
 // them.
 //
 //   shade = kAmbient + sum over lights of strength * max(0, n . l) / (|n| |l|)
@@ -27,7 +27,7 @@ namespace touchstone {
 // visible.
 inline constexpr double kCreaseRad = 0.61086523819801535;  // 35 deg
 
-inline constexpr float kAmbient = 0.10f;
+inline constexpr float kAmbient = 0.07f;
 inline constexpr float kDarkScale =
     0.42f;  // a white surface in full light is 107 of 255 on a white background
 
@@ -39,8 +39,8 @@ struct LightPlace {
   float strength;
 };
 inline constexpr std::array<LightPlace, 2> kLights = {{
-    {-2.5, 3.0, 4.0, 0.72f},  // key: from above left, so that bulges look like bulges
-    {3.5, -0.5, 2.0, 0.26f},  // fill: from the right, so that no visible side is black
+    {-3.5, 4.0, 4.0, 0.88f},  // key: from above left, so that bulges look like bulges
+    {4.0, -1.0, 2.5, 0.26f},  // fill: from the right, so that no visible side is black
 }};
 
 struct Lighting {

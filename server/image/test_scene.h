@@ -104,6 +104,43 @@ inline Camera CameraAt(const Eigen::Vector3d& eye_m) {
   return camera;
 }
 
+// What renderers are tried on: closed and open meshes, seen from outside, from inside, cut, and from far
+// away.
+struct Scene {
+  const char* name;
+  TriangleMesh mesh;
+  Camera camera;
+};
+
+inline std::vector<Scene> Scenes() {
+  std::vector<Scene> scenes;
+  scenes.push_back({"letter", LetterMesh(), CameraAt({0.12, -0.26, 0.09})});
+  scenes.push_back({"ball", BallMesh(0.07, 14, 20), CameraAt({0.2, 0.05, 0.1})});
+  scenes.push_back({"bowl from above", BowlMesh(), CameraAt({0.05, 0.08, 0.2})});
+  scenes.push_back({"bowl from below", BowlMesh(), CameraAt({0.15, 0.08, -0.2})});
+  scenes.push_back({"inside out", InsideOut(LetterMesh()), CameraAt({-0.25, -0.1, -0.12})});
+  scenes.push_back({"from within", BallMesh(0.07, 14, 20), CameraAt({0.03, 0.01, 0.02})});
+  // Cut open by the near plane, and cut off by the far one.
+  Camera cut = CameraAt({0.2, -0.1, 0.05});
+  cut.near_m = 0.21;
+  cut.far_m = 0.27;
+  scenes.push_back({"cut", BallMesh(0.07, 14, 20), cut});
+  // A long lens, far away.
+  Camera far = CameraAt({30, -20, 10});
+  far.vertical_fov_rad = 0.005;
+  scenes.push_back({"far away", LetterMesh(), far});
+  return scenes;
+}
+
+inline ImageOptions WithAll(int width, int height) {
+  ImageOptions options;
+  options.width = width;
+  options.height = height;
+  options.depth = true;
+  options.mask = true;
+  return options;
+}
+
 // What the ray from the eye through an image point (pixels, fractions allowed) meets first: every triangle is
 // tried, in double precision.
 struct SeenPoint {
