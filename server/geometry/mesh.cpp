@@ -1,6 +1,7 @@
 #include "server/geometry/mesh.h"
 
 #include <absl/container/flat_hash_map.h>
+#include <absl/container/flat_hash_set.h>
 
 #include <Eigen/Geometry>
 
@@ -41,53 +42,54 @@ uint64_t Mix(uint64_t x) {  // the finaliser of SplitMix64
   return x ^ (x >> 31);
 }
 
-// Finds triangles whose corners, in any order, are those of one that was added before. An open-addressing
-// table of triangle numbers, keyed by a sum of the corners' hashes, which does not depend on their order.
-class TriangleSet {
+// A bit for each of many keys; two keys may share one.
+class KeyBits {
  public:
-  explicit TriangleSet(const TriangleMesh& mesh) : mesh_(mesh), vertex_hash_(mesh.vertices_m.size()) {
-    for (size_t v = 0; v < vertex_hash_.size(); ++v) {
-      const PositionBits bits = BitsOf(mesh.vertices_m[v]);
-      vertex_hash_[v] = Mix(Mix((uint64_t{bits[0]} << 32) | bits[1]) + bits[2] + 0x9E3779B97F4A7C15u);
-    }
-    size_t slots = 16;
-    while (slots < 2 * mesh.triangles.size()) slots *= 2;
-    slots_.resize(slots);
+  explicit KeyBits(size_t keys) {
+    size_t bits = 1024;
+    while (bits < 16 * keys) bits *= 2;
+    words_.resize(bits / 64);
+    mask_ = bits - 1;
   }
-
-  // False if an equal triangle is in the set already.
-  bool Add(uint32_t triangle) {
-    const auto& corner = mesh_.triangles[triangle];
-    const uint64_t key = Mix(vertex_hash_[corner[0]] + vertex_hash_[corner[1]] + vertex_hash_[corner[2]]);
-    const uint32_t tag = static_cast<uint32_t>(key >> 32);
-    for (size_t at = key & (slots_.size() - 1);; at = (at + 1) & (slots_.size() - 1)) {
-      Slot& slot = slots_[at];
-      if (slot.triangle == kEmpty) {
-        slot = {triangle, tag};
-        return true;
-      }
-      if (slot.tag == tag && Places(slot.triangle) == Places(triangle)) return false;
-    }
-  }
+  bool Has(uint64_t key) const { return (words_[(key & mask_) / 64] >> (key % 64)) & 1; }
+  void Set(uint64_t key) { words_[(key & mask_) / 64] |= uint64_t{1} << (key % 64); }
 
  private:
-  static constexpr uint32_t kEmpty = 0xFFFFFFFFu;
-  struct Slot {
-    uint32_t triangle = kEmpty;
-    uint32_t tag = 0;
-  };
-
-  std::array<PositionBits, 3> Places(uint32_t triangle) const {
-    std::array<PositionBits, 3> places;
-    for (int c = 0; c < 3; ++c) places[c] = BitsOf(mesh_.vertices_m[mesh_.triangles[triangle][c]]);
-    std::sort(places.begin(), places.end());
-    return places;
-  }
-
-  const TriangleMesh& mesh_;
-  std::vector<uint64_t> vertex_hash_;
-  std::vector<Slot> slots_;
+  std::vector<uint64_t> words_;
+  uint64_t mask_;
 };
+
+std::array<PositionBits, 3> SortedPlaces(const TriangleMesh& mesh, uint32_t triangle) {
+  std::array<PositionBits, 3> places;
+  for (int c = 0; c < 3; ++c) places[c] = BitsOf(mesh.vertices_m[mesh.triangles[triangle][c]]);
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+// Which triangles have the corners, in any order, of an earlier one. Every triangle has a key, a sum of its
+// corners' hashes, which does not depend on their order. A small table of bits, which stays in the cache,
+// clears all triangles but those whose bit another one shares, one in ten; only these are compared in full.
+std::vector<bool> FindRepeated(const TriangleMesh& mesh) {
+  std::vector<uint64_t> vertex_hash(mesh.vertices_m.size());
+  for (size_t v = 0; v < vertex_hash.size(); ++v) {
+    const PositionBits bits = BitsOf(mesh.vertices_m[v]);
+    vertex_hash[v] = Mix(Mix((uint64_t{bits[0]} << 32) | bits[1]) + bits[2] + 0x9E3779B97F4A7C15u);
+  }
+  const size_t count = mesh.triangles.size();
+  std::vector<uint64_t> keys(count);
+  KeyBits seen(count), shared(count);
+  for (size_t t = 0; t < count; ++t) {
+    const auto& corner = mesh.triangles[t];
+    keys[t] = Mix(vertex_hash[corner[0]] + vertex_hash[corner[1]] + vertex_hash[corner[2]]);
+    if (seen.Has(keys[t])) shared.Set(keys[t]);
+    seen.Set(keys[t]);
+  }
+  std::vector<bool> repeated(count);
+  absl::flat_hash_set<std::array<PositionBits, 3>> places;
+  for (uint32_t t = 0; t < count; ++t)
+    if (shared.Has(keys[t])) repeated[t] = !places.insert(SortedPlaces(mesh, t)).second;
+  return repeated;
+}
 
 bool HasNoArea(const TriangleMesh& mesh, uint32_t triangle) {
   return IsDegenerate(mesh.Corner(triangle, 0), mesh.Corner(triangle, 1), mesh.Corner(triangle, 2));
@@ -146,14 +148,14 @@ MeshReport InspectMesh(const TriangleMesh& mesh) {
   report.triangles = mesh.triangles.size();
   CountEdges(mesh, &report);
 
-  TriangleSet seen(mesh);
+  const std::vector<bool> repeated = FindRepeated(mesh);
+  report.duplicate_triangles = std::count(repeated.begin(), repeated.end(), true);
   std::vector<bool> used(mesh.vertices_m.size());
   // Signed volume: tetrahedra from the box's centre, so that a mesh far from the origin loses no digits.
   const Eigen::Vector3d centre =
       mesh.triangles.empty() ? Eigen::Vector3d::Zero() : ComputeBounds(mesh).Centre();
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (HasNoArea(mesh, t)) ++report.degenerate_triangles;
-    if (!seen.Add(t)) ++report.duplicate_triangles;
     const Eigen::Vector3d a = mesh.Corner(t, 0) - centre, b = mesh.Corner(t, 1) - centre,
                           c = mesh.Corner(t, 2) - centre;
     report.signed_volume_m3 += a.dot(b.cross(c)) / 6.0;
@@ -164,14 +166,10 @@ MeshReport InspectMesh(const TriangleMesh& mesh) {
 }
 
 TriangleMesh WithoutDegenerateAndDuplicate(TriangleMesh mesh) {
-  std::vector<bool> keep(mesh.triangles.size());
-  {
-    TriangleSet seen(mesh);
-    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) keep[t] = !HasNoArea(mesh, t) && seen.Add(t);
-  }
+  const std::vector<bool> repeated = FindRepeated(mesh);
   size_t kept = 0;
-  for (size_t t = 0; t < mesh.triangles.size(); ++t)
-    if (keep[t]) mesh.triangles[kept++] = mesh.triangles[t];
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    if (!repeated[t] && !HasNoArea(mesh, t)) mesh.triangles[kept++] = mesh.triangles[t];
   mesh.triangles.resize(kept);
   return mesh;
 }

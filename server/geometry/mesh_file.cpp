@@ -162,7 +162,7 @@ absl::StatusOr<TriangleMesh> ReadMeshFile(const std::string& path, const MeshImp
   if (FindNamed(kFormats, extension) == nullptr)
     return absl::InvalidArgumentError(absl::StrCat(path, ": the extension '", extension,
                                                    "' names no mesh format",
-                                                   DidYouMean(extension, MeshFormatNames())));
+                                                   "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path, import.most_bytes));
   return ReadMeshBytes(path, extension, bytes, import, notes);
 }
@@ -173,8 +173,8 @@ absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string
   TOUCHSTONE_RETURN_IF_ERROR(CheckImport(import));
   const Format* reader = FindNamed(kFormats, format);
   if (reader == nullptr)
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": unknown mesh format '", format, "'", DidYouMean(format, MeshFormatNames())));
+    return absl::InvalidArgumentError(absl::StrCat(name, ": unknown mesh format '", format, "'",
+                                                   "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
   if (bytes.size() > import.most_bytes)
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": has ", bytes.size(), " bytes; at most ", import.most_bytes, " are read"));

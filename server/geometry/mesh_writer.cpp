@@ -89,8 +89,8 @@ absl::StatusOr<std::string> MeshFileText(const TriangleMesh& mesh, absl::string_
     absl::StrAppend(&text, "# unit: mm, up: z\n");
     AppendBody(mesh, "v ", "f", 1, &text);
   } else {
-    return absl::InvalidArgumentError(absl::StrCat("meshes are not written as '", format, "'",
-                                                   DidYouMean(format, WritableMeshFormatNames())));
+    return absl::InvalidArgumentError(absl::StrCat("meshes are not written as '", format, "'", "; known: ",
+                                                   absl::StrJoin(WritableMeshFormatNames(), ", ")));
   }
   return text;
 }

@@ -136,10 +136,16 @@ absl::Status ReadOff(MeshReading* reading) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Counts counts, ReadCounts(*reading, &lines, line));
   TOUCHSTONE_RETURN_IF_ERROR(ReadVertices(counts.vertices, &lines, reading));
   TOUCHSTONE_RETURN_IF_ERROR(ReadFaces(counts.faces, &lines, reading));
-  if (lines.NextWithContent('#'))
+  if (!lines.NextWithContent('#')) return absl::OkStatus();
+  // Some programs leave notes of their own behind the mesh; a number there is one face more than promised.
+  line = lines.line();
+  double number;
+  if (ParseReal(NextWord(&line), &number))
     return reading->ErrorAtLine(
         lines.number(), absl::StrCat("found ", Quoted(lines.line()), " behind the last of ", counts.faces,
                                      " faces; the header's counts are wrong"));
+  reading->Note(absl::StrCat("line ", lines.number(),
+                             ": passed over what stands behind the last face: ", Quoted(lines.line())));
   return absl::OkStatus();
 }
 

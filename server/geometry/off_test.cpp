@@ -60,7 +60,8 @@ TEST(Off, SaysWhatIsWrongAndWhere) {
   EXPECT_THAT(Refusal(head + "0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n"), HasSubstr("corner 3 of 4000000000"));
   EXPECT_THAT(Refusal(head + "0 0 0\n1 0 0\n   \n# nothing more"), HasSubstr("ends after 2 of 3 vertices"));
   EXPECT_THAT(Refusal(head + kTriangle + "3 0 2 1\n"), HasSubstr("behind the last of 1 faces"));
-  EXPECT_THAT(Refusal("OFF\n2 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), HasSubstr("line 5"));
+  EXPECT_THAT(Refusal("OFF\n2 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+              HasSubstr("line 6: found '2' as corner 2 of 3 of face 1"));
   EXPECT_THAT(Refusal("OFF\n4 1 0\n" + std::string(kTriangle)), HasSubstr("four numbers"));
 }
 

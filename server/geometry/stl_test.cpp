@@ -64,7 +64,8 @@ TEST(Stl, TextMayHoldSeveralSolidsInAnyCase) {
 
 TEST(Stl, SaysWhatIsWrongAndWhereInText) {
   EXPECT_THAT(Refusal("solid\nendsolid\n"), HasSubstr("no vertex and no face"));
-  EXPECT_THAT(Refusal(kTwo.substr(0, kTwo.size() - 20)), HasSubstr("cut off"));
+  EXPECT_THAT(Refusal(kTwo.substr(0, kTwo.size() - 20)),
+              HasSubstr("line 15: found 'endfac'; expected endfacet"));
   EXPECT_THAT(Refusal("solid\n" + Facet("0 0 0", "1 0 0", "0 1 0")), HasSubstr("ends before endsolid"));
   EXPECT_THAT(Refusal("solid\n" + Facet("0 0 0", "1 0 zero", "0 1 0")),
               HasSubstr("line 5: found 'zero'; expected a coordinate"));
@@ -75,6 +76,8 @@ TEST(Stl, SaysWhatIsWrongAndWhereInText) {
           "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\n"),
       HasSubstr("line 7: found 'vertex'; expected endloop"));
   EXPECT_THAT(Refusal("solid\nfacet normal 0 0\nouter loop\n"), HasSubstr("three numbers of the normal"));
+  EXPECT_THAT(Refusal(kTwo.substr(0, kTwo.size() - 26)),
+              HasSubstr("ends where endfacet should stand; it is cut off"));
   EXPECT_THAT(Refusal("solid\nendsolid\nrubbish\n"), HasSubstr("line 3: found 'rubbish'; expected solid"));
 }
 

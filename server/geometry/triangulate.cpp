@@ -33,7 +33,7 @@ class EarClipper {
     }
     // Corners that turn left now only turn further left as ears are cut, so this list never grows.
     for (size_t i = 0; i < n; ++i)
-      if (TurnAt(i) <= 0) reflex_.push_back(i);
+      if (TurnAt(i) <= 0) reflex_.push_back({at_[i], i});
   }
 
   // Calls emit(a, b, c) for every triangle.
@@ -53,7 +53,7 @@ class EarClipper {
         --left;
         seen_without_ear = 0;
         patience = 0;
-        if (left % 16 == 0) ForgetReflex();
+        if (++cut_since_forgetting_ > 16 + reflex_.size() / 4) ForgetReflex();
       } else {
         corner = next_[corner];
         if (++seen_without_ear > left) {
@@ -66,6 +66,11 @@ class EarClipper {
   }
 
  private:
+  struct Reflex {
+    Point2 at;
+    size_t corner;
+  };
+
   double TurnAt(size_t i) const { return Turn(at_[previous_[i]], at_[i], at_[next_[i]]); }
 
   bool IsEar(size_t corner, int patience) {
@@ -76,9 +81,12 @@ class EarClipper {
     if (turn < 0 || (turn == 0 && patience == 0)) return false;
     if (turn == 0) return true;
     *work_ += reflex_.size();
-    for (size_t r : reflex_) {
-      const Point2& p = at_[r];
-      if (Cut(r) || p == a || p == b || p == c) continue;
+    const Point2 lower = a.cwiseMin(b).cwiseMin(c), upper = a.cwiseMax(b).cwiseMax(c);
+    for (const Reflex& reflex : reflex_) {
+      const Point2& p = reflex.at;
+      // Nearly all stand outside the triangle's box.
+      if (p.x() < lower.x() || p.x() > upper.x() || p.y() < lower.y() || p.y() > upper.y()) continue;
+      if (Cut(reflex.corner) || p == a || p == b || p == c) continue;
       if (Turn(a, b, p) >= 0 && Turn(b, c, p) >= 0 && Turn(c, a, p) >= 0) return false;
     }
     return true;
@@ -89,15 +97,17 @@ class EarClipper {
   // Drops corners from the list that have been cut off or turn left by now.
   void ForgetReflex() {
     size_t kept = 0;
-    for (size_t r : reflex_)
-      if (!Cut(r) && TurnAt(r) <= 0) reflex_[kept++] = r;
+    for (const Reflex& reflex : reflex_)
+      if (!Cut(reflex.corner) && TurnAt(reflex.corner) <= 0) reflex_[kept++] = reflex;
     reflex_.resize(kept);
+    cut_since_forgetting_ = 0;
   }
 
   std::vector<Point2> at_;
   std::vector<size_t> next_;
   std::vector<size_t> previous_;
-  std::vector<size_t> reflex_;
+  std::vector<Reflex> reflex_;
+  size_t cut_since_forgetting_ = 0;
   uint64_t* work_;
 };
 
