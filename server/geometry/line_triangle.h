@@ -3,16 +3,22 @@
 // bit.
 #pragma once
 
+#include <algorithm>
+
 #include "server/geometry/lanes.h"
 
 namespace touchstone {
 
+// The border counts this far beyond: more than double precision may be off within a kilometre, so that no
+// line slips between triangles that meet in an edge or at a vertex.
+inline constexpr double kBorderM = 1e-11;
+
 template <typename Number>
 struct LineTriangle {
-  // Moments of the line about the edges opposite corners 0, 1, 2: proportional to the barycentric
-  // coordinates. Their sum is `facing`. Exactly antisymmetric in an edge's ends, so two triangles with a
-  // common edge leave no gap between them.
+  // Moments of the line about the edges opposite corners 0, 1, 2: over the edge's length at most the distance
+  // between the line and the edge's line. They have the sign of `facing` where the line passes inside.
   Number moment[3];
+  Triple<Number> edge[3];
   Triple<Number> area_vector;  // twice the area, along the counter-clockwise normal
   Number facing;               // area_vector . direction
   Number travel_m;             // to the triangle's plane; not finite if the line runs along it
@@ -23,20 +29,36 @@ template <typename Number>
 LineTriangle<Number> MeetTriangle(const Triple<Number>& direction, const Triple<Number>& a,
                                   const Triple<Number>& b, const Triple<Number>& c) {
   LineTriangle<Number> meet;
-  meet.moment[0] = Dot(direction, Cross(b, c));
-  meet.moment[1] = Dot(direction, Cross(c, a));
-  meet.moment[2] = Dot(direction, Cross(a, b));
-  meet.area_vector = Cross(b - a, c - a);
+  meet.edge[0] = c - b;
+  meet.edge[1] = a - c;
+  meet.edge[2] = b - a;
+  meet.moment[0] = Dot(direction, Cross(b, meet.edge[0]));
+  meet.moment[1] = Dot(direction, Cross(c, meet.edge[1]));
+  meet.moment[2] = Dot(direction, Cross(a, meet.edge[2]));
+  meet.area_vector = Cross(meet.edge[1], meet.edge[2]);
   meet.facing = Dot(meet.area_vector, direction);
   meet.travel_m = Dot(meet.area_vector, a) / meet.facing;
   return meet;
 }
 
-// Inside or exactly on the border, whichever face is met.
-inline bool MeetsInside(const LineTriangle<double>& meet) {
-  const bool back = meet.moment[0] >= 0 && meet.moment[1] >= 0 && meet.moment[2] >= 0;
-  const bool front = meet.moment[0] <= 0 && meet.moment[1] <= 0 && meet.moment[2] <= 0;
-  return meet.facing != 0 && (front || back);
+// Inside or on the border, whichever face is met.
+inline bool MeetsInside(const LineTriangle<double>& meet, const Triple1& direction, const Triple1& a,
+                        const Triple1& b, const Triple1& c) {
+  // Seen edge-on, the plane says nothing: a line along a face does not touch it.
+  constexpr double kLeastCosine = 1e-8;
+  if (!(meet.facing * meet.facing > kLeastCosine * kLeastCosine * Dot(meet.area_vector, meet.area_vector)))
+    return false;
+  const double side = meet.facing > 0 ? 1 : -1;
+  for (int i = 0; i < 3; ++i) {
+    const double moment = meet.moment[i] * side;
+    if (moment < 0 && moment * moment > kBorderM * kBorderM * Dot(meet.edge[i], meet.edge[i])) return false;
+  }
+  // Seen nearly edge-on, the tolerance reaches far along the plane: the travel must be that of some place on
+  // the triangle.
+  constexpr double kSlackM = 1e-7;
+  const double at_a = Dot(direction, a), at_b = Dot(direction, b), at_c = Dot(direction, c);
+  return meet.travel_m >= std::min(at_a, std::min(at_b, at_c)) - kSlackM &&
+         meet.travel_m <= std::max(at_a, std::max(at_b, at_c)) + kSlackM;
 }
 
 // The normal that contacts report: unit, against the direction.

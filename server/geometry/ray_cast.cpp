@@ -55,11 +55,12 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m) const {
                     std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
                     [&](const uint32_t* ids, int count, double* last_m) {
                       for (int i = 0; i < count; ++i) {
-                        const LineTriangle<double> meet =
-                            MeetTriangle(direction, ToTriple(mesh_.Corner(ids[i], 0)) - origin,
-                                         ToTriple(mesh_.Corner(ids[i], 1)) - origin,
-                                         ToTriple(mesh_.Corner(ids[i], 2)) - origin);
-                        if (!MeetsInside(meet) || !(meet.travel_m > 0) || !(meet.travel_m <= best_travel))
+                        const Triple1 a = ToTriple(mesh_.Corner(ids[i], 0)) - origin,
+                                      b = ToTriple(mesh_.Corner(ids[i], 1)) - origin,
+                                      c = ToTriple(mesh_.Corner(ids[i], 2)) - origin;
+                        const LineTriangle<double> meet = MeetTriangle(direction, a, b, c);
+                        if (!MeetsInside(meet, direction, a, b, c) || !(meet.travel_m > 0) ||
+                            !(meet.travel_m <= best_travel))
                           continue;
                         if (meet.travel_m == best_travel && best != kNoTriangle && ids[i] > best) continue;
                         best_travel = meet.travel_m;
@@ -147,14 +148,12 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
                           c = load(corner + 6, k) - from;
     const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
     const Double4 side = meet.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
-    // Moment over edge length is at most the distance between the line and the edge's line.
-    const auto clears = [&](Double4 moment, const Triple<Double4>& edge) {
-      const Double4 inwards = moment * side;
-      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(edge, edge));
+    const auto clears = [&](int i) {
+      const Double4 inwards = meet.moment[i] * side;
+      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(meet.edge[i], meet.edge[i]));
     };
-    const Mask4 certain = clears(meet.moment[0], c - b) & clears(meet.moment[1], a - c) &
-                          clears(meet.moment[2], b - a) & (meet.travel_m > clear) &
-                          (meet.travel_m <= longest_m);
+    const Mask4 certain =
+        clears(0) & clears(1) & clears(2) & (meet.travel_m > clear) & (meet.travel_m <= longest_m);
     const Triple<Double4> normal = NormalAgainst(meet);
     const Triple<Double4> point = from + along * meet.travel_m;
     const uint32_t certain_bits = BitsOf(certain);

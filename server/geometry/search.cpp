@@ -31,36 +31,53 @@ RTCDevice NewDevice() {
   return device;
 }
 
-// The vertices moved outwards by a hair. Single precision may miss a triangle that a line meets right at its
-// border; where the border is a silhouette, nothing but a surface far behind would be proposed. On the grown
-// mesh the line passes well inside, something near the border is proposed, and the exact search is asked.
+// The vertices moved so that every face, and every border edge in its plane, comes to lie `distance_m`
+// farther out. Single precision may miss a triangle that a line meets right at its border; where the border
+// is a silhouette, nothing but a surface far behind would be proposed. On the grown mesh the line passes well
+// inside, something near the border is proposed, and the exact search is asked.
 std::vector<Eigen::Vector3f> GrowVertices(const TriangleMesh& mesh, double distance_m) {
-  // A border vertex is one whose triangles' opposite edges do not add up to a closed loop; it is moved away
-  // from its triangles too.
-  std::vector<Eigen::Vector3f> normal(mesh.vertices_m.size(), Eigen::Vector3f::Zero());
-  std::vector<Eigen::Vector3f> loop(mesh.vertices_m.size(), Eigen::Vector3f::Zero());
-  std::vector<Eigen::Vector3f> inwards(mesh.vertices_m.size(), Eigen::Vector3f::Zero());
+  const size_t count = mesh.vertices_m.size();
+  const auto corners = [&](const std::array<uint32_t, 3>& triangle, Eigen::Vector3f* corner) {
+    for (int c = 0; c < 3; ++c) corner[c] = mesh.vertices_m[triangle[c]];
+    return (corner[1] - corner[0]).cross(corner[2] - corner[0]).stableNormalized();
+  };
+  std::vector<Eigen::Vector3f> normal(count, Eigen::Vector3f::Zero());
+  // In the faces' planes, away from the edges that meet at the vertex: the two sides of an inner edge cancel.
+  std::vector<Eigen::Vector3f> outwards(count, Eigen::Vector3f::Zero());
+  // The opposite edges: a closed loop, unless the vertex is on a border.
+  std::vector<Eigen::Vector3f> loop(count, Eigen::Vector3f::Zero());
   float longest_edge = 0;
+  Eigen::Vector3f corner[3];
   for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3f* corner[3];
-    for (int c = 0; c < 3; ++c) corner[c] = &mesh.vertices_m[triangle[c]];
-    const Eigen::Vector3f unit = (*corner[1] - *corner[0]).cross(*corner[2] - *corner[0]).stableNormalized();
+    const Eigen::Vector3f unit = corners(triangle, corner);
+    Eigen::Vector3f away[3];
     for (int c = 0; c < 3; ++c) {
-      const Eigen::Vector3f &here = *corner[c], &next = *corner[(c + 1) % 3], &last = *corner[(c + 2) % 3];
-      const float length = (next - last).norm();
-      longest_edge = std::max(longest_edge, length);
-      normal[triangle[c]] += unit;
-      loop[triangle[c]] += last - next;
-      inwards[triangle[c]] += (0.5f * (next + last) - here).stableNormalized();
+      const Eigen::Vector3f edge = corner[(c + 1) % 3] - corner[c];
+      longest_edge = std::max(longest_edge, edge.norm());
+      away[c] = edge.stableNormalized().cross(unit);
     }
+    for (int c = 0; c < 3; ++c) {
+      normal[triangle[c]] += unit;
+      outwards[triangle[c]] += away[c] + away[(c + 2) % 3];
+      loop[triangle[c]] += corner[(c + 2) % 3] - corner[(c + 1) % 3];
+    }
+  }
+  // How much farther a sharp tip must go than the faces round it, within reason.
+  std::vector<float> lift(count, 1.0f);
+  for (size_t v = 0; v < count; ++v) normal[v] = normal[v].stableNormalized();
+  for (const auto& triangle : mesh.triangles) {
+    const Eigen::Vector3f unit = corners(triangle, corner);
+    for (const uint32_t v : triangle) lift[v] = std::min(lift[v], std::max(0.2f, unit.dot(normal[v])));
   }
   const float distance = static_cast<float>(distance_m);
   std::vector<Eigen::Vector3f> grown;
-  grown.reserve(mesh.vertices_m.size() +
-                2);  // Embree reads vertices in 16 bytes, a little beyond the last one
-  for (size_t v = 0; v < mesh.vertices_m.size(); ++v) {
-    Eigen::Vector3f move = normal[v].stableNormalized();
-    if (loop[v].norm() > 1e-5f * longest_edge) move -= inwards[v].stableNormalized();
+  grown.reserve(count + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
+  for (size_t v = 0; v < count; ++v) {
+    // A border seen at a flat angle moves less than its plane's distance; fifty times is enough to 1 degree.
+    const bool border = loop[v].norm() > 1e-5f * longest_edge;
+    const float square = std::max(1e-6f, outwards[v].squaredNorm());
+    const float factor = border ? 50 * 2 / square : 1 / lift[v];
+    const Eigen::Vector3f move = factor * (border ? outwards[v] : normal[v]);
     grown.push_back(mesh.vertices_m[v] + distance * move);
   }
   return grown;

@@ -88,7 +88,8 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
   const double to_middle = (centre_m_ - line.origin_m).dot(line.direction);
   const double around = 1.01 * reach_m_ + radius_m;
   const double first = std::max(0.0, to_middle - around);
-  double last = std::min({longest_m, travel_bound_m, to_middle + around});
+  // The bound is met exactly where a plane is met at right angles; rounding must not make that too late.
+  double last = std::min({longest_m, travel_bound_m + 1e-7, to_middle + around});
   if (last < first) return best;
   const double near_touch = std::isfinite(travel_bound_m) ? travel_bound_m : std::max(0.0, to_middle);
   const Eigen::Vector3d place_m = line.origin_m + near_touch * line.direction;

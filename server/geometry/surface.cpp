@@ -21,7 +21,7 @@ absl::Status CheckMesh(const std::string& name, const TriangleMesh& mesh) {
   for (size_t v = 0; v < mesh.vertices_m.size(); ++v) {
     const Eigen::Vector3f& p = mesh.vertices_m[v];
     // Squares of coordinates must fit single precision.
-    if (!(p.cwiseAbs().maxCoeff() < 1e6f))
+    if (!p.allFinite() || p.cwiseAbs().maxCoeff() >= 1e6f)
       return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "', vertex ", v, ": (", p.x(), ", ",
                                                      p.y(), ", ", p.z(),
                                                      ") m; coordinates must be finite and less than 1e6 m"));

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <thread>
+#include <utility>
 
 #include "server/base/check.h"
 
@@ -52,6 +53,17 @@ uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int dept
   const Eigen::Vector3f extent = range.middle_max - range.middle_min;
   const float length = extent.maxCoeff(&axis);
   const uint32_t half = range.begin + range.size() / 2;
+  // The last parts become full leaves: memory counts, and their boxes are much alike.
+  if (range.size() <= 8 * kMostInLeaf) {
+    const uint32_t first_part = (range.size() / 2 + kMostInLeaf - 1) / kMostInLeaf * kMostInLeaf;
+    Primitive* const middle = primitives + range.begin + first_part;
+    std::nth_element(primitives + range.begin, middle, primitives + range.end,
+                     [&](const Primitive& a, const Primitive& b) {
+                       return std::make_pair(a.Middle(axis), a.triangle) <
+                              std::make_pair(b.Middle(axis), b.triangle);
+                     });
+    return range.begin + first_part;
+  }
   if (!(length > 0) || depth >= kDepthOfHalves) return half;
   const float first = range.middle_min[axis], scale = kBins * 0.9999f / length;
   const auto bin_of = [&](const Primitive& primitive) {
