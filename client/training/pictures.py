@@ -99,7 +99,7 @@ def training_picture(history, confusion, objects, path):
     matrix = cell * len(objects)
     width, plot = 88 + 3 * matrix + 2 * gap + 40, (64, 96, 0, 380)
     plot = (64, 96, width - 150, 380)
-    canvas = _Canvas(width, 380 + 128 + matrix + 36)
+    canvas = _Canvas(width, 380 + 92 + matrix + 36)
     canvas.text(24, 18, "Which object is it?", 19, bold=True)
     canvas.text(24, 48, "Accuracy on held-out examples, against the number of training examples seen, each of them new.",
                 12, _GREY)

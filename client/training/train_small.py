@@ -28,7 +28,8 @@ SUPERSHAPES = ["lat00", "lat05", "lat10", "lat15", "lat20"]
 TOUCHES = 8  # an example
 IMAGE_PX = 64
 TRAINING_SEED, TEST_SEED = 1, 2
-PLAN = touchstone.sphere(step_angle_deg=1, roll_step_deg=1)
+# From so far away that the camera sees the whole object; the hand is turned at random about the approach.
+PLAN = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
 
 
 class TouchEncoder(nn.Module):
@@ -63,18 +64,26 @@ class ImageEncoder(nn.Module):
 
 
 class Classifier(nn.Module):
-    """Recognises an object from the senses that it is given."""
+    """Recognises an object from the senses that it is given; what several senses say is added up."""
 
     def __init__(self, classes, fingers, touch, image):
         super().__init__()
-        self.touch = TouchEncoder(fingers) if touch else None
-        self.image = ImageEncoder() if image else None
-        self.head = nn.Linear(64 * (touch + image), classes)
+        self.touch = nn.Sequential(TouchEncoder(fingers), nn.Linear(64, classes)) if touch else None
+        self.image = nn.Sequential(ImageEncoder(), nn.Linear(64, classes)) if image else None
+
+    def each(self, touches, image):
+        """Logits (N, classes) of each sense."""
+        senses = [(self.touch, touches), (self.image, image)]
+        return [network(values) for network, values in senses if network is not None]
 
     def forward(self, touches, image):
-        features = [] if self.touch is None else [self.touch(touches)]
-        features += [] if self.image is None else [self.image(image)]
-        return self.head(torch.cat(features, 1))
+        return sum(self.each(touches, image))
+
+    def loss(self, touches, image, objects):
+        """Cross entropy; each sense also learns on its own, or the quicker one would keep the other from learning."""
+        each = self.each(touches, image)
+        judged = [sum(each), *each] if len(each) > 1 else each
+        return sum(nn.functional.cross_entropy(logits, objects) for logits in judged)
 
 
 class Examples:
@@ -133,7 +142,7 @@ def train(networks, examples, test, epochs, classes):
         for touches, image, objects in examples:
             for name, network in networks.items():
                 optimizers[name].zero_grad(set_to_none=True)
-                nn.functional.cross_entropy(network(touches, image), objects).backward()
+                network.loss(touches, image, objects).backward()
                 optimizers[name].step()
             for schedule in schedules:
                 schedule.step()

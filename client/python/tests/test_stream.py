@@ -139,7 +139,7 @@ def test_the_catalogue_and_the_store_are_readable(client, tmp_path):
 @pytest.mark.parametrize("kind, change, says", [
     (touchstone.NotFound, dict(objects=["lat21"]), "lat21"),
     (touchstone.NotFound, dict(model="no_such_model"), "no_such_model"),
-    (touchstone.InvalidRequest, dict(model="touchstone: model/1\neffects:\n  - tip_raduis: {}\n"), "tip_raduis"),
+    (touchstone.InvalidRequest, dict(model="touchstone: model/1\nname: a\neffects:\n  - tip_raduis: {}\n"), "tip_raduis"),
     (touchstone.InvalidRequest, dict(columns=["descriptors"]), "descriptors"),
     (touchstone.InvalidRequest, dict(image=touchstone.image(20000, 20000)), "20000"),
     (touchstone.InvalidRequest, dict(plan=touchstone.sphere(step_angle_deg=120)), "step_angle"),

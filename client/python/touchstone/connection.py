@@ -17,17 +17,14 @@ _MIB = 1024 * 1024
 _OPTIONS = (
     ("grpc.max_receive_message_length", 256 * _MIB),
     ("grpc.max_send_message_length", 256 * _MIB),
-    # Window of a stream: the source can work on while one large batch is being used.
-    ("grpc.http2.lookahead_bytes", 8 * _MIB),
     # Every Connection has a socket of its own, and no back-off inherited from another one to the same target.
     ("grpc.use_local_subchannel_pool", 1),
     # Retrying is done here, where it is known which index comes next.
     ("grpc.enable_retries", 0),
-    # A machine that vanished without a word is noticed within two minutes.
-    ("grpc.keepalive_time_ms", 100_000),
+    # A machine that vanished without a word is noticed within six minutes; servers take pings that come more often
+    # than every five minutes for an attack, unless told otherwise.
+    ("grpc.keepalive_time_ms", 310_000),
     ("grpc.keepalive_timeout_ms", 20_000),
-    # The reading thread drives the stream itself: half the time a message of the default hand-over.
-    ("SingleThreadedUnaryStream", 1),
 )
 
 # The processes, this one and those it was forked from, in which a channel was made.
