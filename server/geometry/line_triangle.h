@@ -49,9 +49,15 @@ inline bool MeetsInside(const LineTriangle<double>& meet, const Triple1& directi
   if (!(meet.facing * meet.facing > kLeastCosine * kLeastCosine * Dot(meet.area_vector, meet.area_vector)))
     return false;
   const double side = meet.facing > 0 ? 1 : -1;
+  const Triple1* const start[3] = {&b, &c, &a};
   for (int i = 0; i < 3; ++i) {
     const double moment = meet.moment[i] * side;
-    if (moment < 0 && moment * moment > kBorderM * kBorderM * Dot(meet.edge[i], meet.edge[i])) return false;
+    if (moment >= 0) continue;
+    // The moment is the distance times the edge's length seen along the line.
+    const Triple1 seen = Cross(meet.edge[i], direction);
+    const double border2 = kBorderM * kBorderM * Dot(seen, seen);
+    const double rounding2 = 1e-30 * Dot(*start[i], *start[i]) * Dot(meet.edge[i], meet.edge[i]);
+    if (moment * moment > std::max(border2, rounding2)) return false;
   }
   // Seen nearly edge-on, the tolerance reaches far along the plane: the travel must be that of some place on
   // the triangle.

@@ -120,10 +120,18 @@ TEST(CastLines, AgreesWithEricsonsSegmentOnEveryTriangle) {
       // the surface both before and behind what was found (or not at all).
       const Vector3d side = direction.unitOrthogonal(), up = direction.cross(side);
       double least = expected, most = expected;
+      std::vector<Vector3d> shifts;
       for (int turn = 0; turn < 64; ++turn) {
         const double angle = turn * 6.283185307 / 64;
-        const Vector3d beside = origin + 1e-9 * (std::cos(angle) * side + std::sin(angle) * up);
-        const double there = BruteForceLine(mesh, beside, direction, kLongestM);
+        shifts.push_back(std::cos(angle) * side + std::sin(angle) * up);
+      }
+      if (contacts.triangle[i] != kNoTriangle) {  // into the tip of a needle
+        const uint32_t t = contacts.triangle[i];
+        const Vector3d inwards = (mesh.Corner(t, 0) + mesh.Corner(t, 1) + mesh.Corner(t, 2)) / 3 - origin;
+        shifts.push_back((inwards - inwards.dot(direction) * direction).normalized());
+      }
+      for (const Vector3d& shift : shifts) {
+        const double there = BruteForceLine(mesh, origin + 1e-9 * shift, direction, kLongestM);
         least = std::min(least, there);
         most = std::max(most, there);
       }
