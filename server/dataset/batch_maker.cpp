@@ -34,29 +34,64 @@ class ColumnWriter {
   size_t bytes_;
 };
 
-// What a column takes from an accepted touch.
-using PutColumn = void (*)(const ColumnWriter&, const TouchSampler::Block&, int touch, uint32_t slot);
+// What a column takes from a block of touches.
+using PutColumn = void (*)(const ColumnWriter&, const TouchSampler::Block&);
 
-void PutDescriptor(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
-  double descriptor_s[kMostFingers];
-  Descriptor(block.batch, touch, descriptor_s);
-  for (int finger = 0; finger < block.batch.fingers(); ++finger)
-    writer.Put(slot, finger, static_cast<float>(descriptor_s[finger]));
+// Calls put(touch, slot) for every accepted touch.
+template <typename Put>
+void ForAccepted(const TouchSampler::Block& block, Put put) {
+  for (int touch = 0; touch < block.batch.size(); ++touch)
+    if (block.accepted[touch]) put(touch, block.slots[touch]);
 }
 
-void PutContactTime(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
-  for (int finger = 0; finger < block.batch.fingers(); ++finger)
-    writer.Put(slot, finger, static_cast<float>(block.batch.reported_time_s[block.batch.At(finger, touch)]));
+// Contact times relative to the first, a finger at a time, so that the arithmetic vectorises.
+void PutDescriptor(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  const TouchBatch& batch = block.batch;
+  std::vector<double> first_s(batch.size(), INFINITY);
+  for (int finger = 0; finger < batch.fingers(); ++finger) {
+    const double* time_s = &batch.reported_time_s[batch.At(finger, 0)];
+    for (int touch = 0; touch < batch.size(); ++touch)
+      first_s[touch] = time_s[touch] < first_s[touch] ? time_s[touch] : first_s[touch];
+  }
+  for (int finger = 0; finger < batch.fingers(); ++finger) {
+    const double* time_s = &batch.reported_time_s[batch.At(finger, 0)];
+    ForAccepted(block, [&](int touch, uint32_t slot) {
+      writer.Put(slot, finger, static_cast<float>(time_s[touch] - first_s[touch]));
+    });
+  }
 }
 
-void PutContactPoint(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
-  for (int finger = 0; finger < block.batch.fingers(); ++finger)
-    writer.PutVector(slot, finger, block.batch.contact_m[block.batch.At(finger, touch)]);
+void PutContactTime(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    for (int finger = 0; finger < block.batch.fingers(); ++finger)
+      writer.Put(slot, finger,
+                 static_cast<float>(block.batch.reported_time_s[block.batch.At(finger, touch)]));
+  });
 }
 
-void PutNormal(const ColumnWriter& writer, const TouchSampler::Block& block, int touch, uint32_t slot) {
-  for (int finger = 0; finger < block.batch.fingers(); ++finger)
-    writer.PutVector(slot, finger, block.batch.normal[block.batch.At(finger, touch)]);
+template <std::vector<Eigen::Vector3d> TouchBatch::*kField>
+void PutFingerVectors(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    for (int finger = 0; finger < block.batch.fingers(); ++finger)
+      writer.PutVector(slot, finger, (block.batch.*kField)[block.batch.At(finger, touch)]);
+  });
+}
+
+template <Eigen::Vector3d TouchPose::*kField>
+void PutPoseVector(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int touch, uint32_t slot) { writer.PutVector(slot, 0, block.Pose(touch).*kField); });
+}
+
+void PutStandoff(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    writer.Put(slot, 0, static_cast<float>(block.Pose(touch).standoff_m));
+  });
+}
+
+void PutSpeed(const ColumnWriter& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    writer.Put(slot, 0, static_cast<float>(block.batch.speed_m_s[touch]));
+  });
 }
 
 struct NamedPut {
@@ -66,18 +101,13 @@ struct NamedPut {
 constexpr NamedPut kTouchColumns[] = {
     {"descriptor_s", PutDescriptor},
     {"contact_time_s", PutContactTime},
-    {"target_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
-                    uint32_t s) { w.PutVector(s, 0, b.Pose(t).target_m); }},
-    {"approach", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
-                    uint32_t s) { w.PutVector(s, 0, b.Pose(t).approach); }},
-    {"lateral", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
-                   uint32_t s) { w.PutVector(s, 0, b.Pose(t).lateral); }},
-    {"standoff_m", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
-                      uint32_t s) { w.Put(s, 0, static_cast<float>(b.Pose(t).standoff_m)); }},
-    {"speed_m_s", [](const ColumnWriter& w, const TouchSampler::Block& b, int t,
-                     uint32_t s) { w.Put(s, 0, static_cast<float>(b.batch.speed_m_s[t])); }},
-    {"contact_point_m", PutContactPoint},
-    {"normal", PutNormal},
+    {"target_m", PutPoseVector<&TouchPose::target_m>},
+    {"approach", PutPoseVector<&TouchPose::approach>},
+    {"lateral", PutPoseVector<&TouchPose::lateral>},
+    {"standoff_m", PutStandoff},
+    {"speed_m_s", PutSpeed},
+    {"contact_point_m", PutFingerVectors<&TouchBatch::contact_m>},
+    {"normal", PutFingerVectors<&TouchBatch::normal>},
 };
 
 }  // namespace
@@ -126,9 +156,7 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
   std::vector<TouchPose> poses(specification_->columns.image ? indices.size() : 0);
   TOUCHSTONE_RETURN_IF_ERROR(
       sampler_.Sample(indices, cancelled, workspace, [&](const TouchSampler::Block& block) {
-        for (const auto& [writer, put] : puts)
-          for (int touch = 0; touch < block.batch.size(); ++touch)
-            if (block.accepted[touch]) put(writer, block, touch, block.slots[touch]);
+        for (const auto& [writer, put] : puts) put(writer, block);
         if (!poses.empty())
           for (int touch = 0; touch < block.batch.size(); ++touch)
             if (block.accepted[touch]) poses[block.slots[touch]] = block.Pose(touch);

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace touchstone {
 namespace {
@@ -38,68 +39,69 @@ inline uint64_t Compress(uint64_t value, uint64_t mask) {
 #endif
 }
 
-struct Quantiser {
-  double lower, factor;
-  Quantiser(double least, double most) : lower(least), factor(most > least ? 255.999 / (most - least) : 0) {}
-  uint64_t operator()(double value) const { return static_cast<uint64_t>((value - lower) * factor); }
-};
-
 }  // namespace
 
-void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
-                   std::vector<uint32_t>* order) {
-  const size_t n = poses.size();
-  order->resize(n);
-  std::iota(order->begin(), order->end(), 0);
-  if (n < 32) return;
+// Poses beyond the sample's range share its border: that costs coherence, never a result.
+uint64_t CoherentOrder::Range::Quantise(double value) const {
+  return static_cast<uint64_t>(std::clamp((value - lower) * factor, 0.0, 255.0));
+}
 
-  // Morton keys over the box of starts and targets and the sphere of laterals.
-  Eigen::Array3d start_least, start_most, target_least, target_most;
-  start_least = target_least = Eigen::Array3d::Constant(INFINITY);
-  start_most = target_most = Eigen::Array3d::Constant(-INFINITY);
+void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
+  keys_.clear();
+  for (int axis = 0; axis < 3; ++axis) {
+    double start_least = INFINITY, start_most = -INFINITY, target_least = INFINITY, target_most = -INFINITY;
+    for (const TouchPose& pose : sample) {
+      const double start = pose.target_m[axis] - pose.approach[axis] * pose.standoff_m;
+      start_least = std::min(start_least, start), start_most = std::max(start_most, start);
+      target_least = std::min(target_least, pose.target_m[axis]);
+      target_most = std::max(target_most, pose.target_m[axis]);
+    }
+    start_[axis] = {start_least, start_most > start_least ? 255.999 / (start_most - start_least) : 0};
+    target_[axis] = {target_least, target_most > target_least ? 255.999 / (target_most - target_least) : 0};
+  }
+}
+
+void CoherentOrder::Add(absl::Span<const TouchPose> poses) {
+  const Range lateral = {-1, 127.999};
   for (const TouchPose& pose : poses) {
-    const Eigen::Array3d start = pose.target_m - pose.approach * pose.standoff_m;
-    start_least = start_least.min(start), start_most = start_most.max(start);
-    target_least = target_least.min(pose.target_m.array()),
-    target_most = target_most.max(pose.target_m.array());
+    uint64_t key =
+        Spread(lateral.Quantise(pose.lateral.x())) << 1 | Spread(lateral.Quantise(pose.lateral.z()));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double start = pose.target_m[axis] - pose.approach[axis] * pose.standoff_m;
+      key |= Spread(start_[axis].Quantise(start)) << (7 - axis);
+      key |= Spread(target_[axis].Quantise(pose.target_m[axis])) << (4 - axis);
+    }
+    keys_.push_back(key);
   }
-  const Quantiser sx(start_least[0], start_most[0]), sy(start_least[1], start_most[1]),
-      sz(start_least[2], start_most[2]);
-  const Quantiser tx(target_least[0], target_most[0]), ty(target_least[1], target_most[1]),
-      tz(target_least[2], target_most[2]);
-  const Quantiser unit(-1, 1);
-  std::vector<uint64_t>& keys = scratch->keys;
-  keys.resize(n);
-  uint64_t varying = 0;
-  for (size_t k = 0; k < n; ++k) {
-    const TouchPose& pose = poses[k];
-    const Eigen::Vector3d start = pose.target_m - pose.approach * pose.standoff_m;
-    keys[k] = Spread(sx(start.x())) << 7 | Spread(sy(start.y())) << 6 | Spread(sz(start.z())) << 5 |
-              Spread(tx(pose.target_m.x())) << 4 | Spread(ty(pose.target_m.y())) << 3 |
-              Spread(tz(pose.target_m.z())) << 2 | Spread(unit(pose.lateral.x())) << 1 |
-              Spread(unit(pose.lateral.z()));
-    varying |= keys[k] ^ keys[0];
-  }
+}
+
+absl::Span<const uint32_t> CoherentOrder::Sort() {
+  const size_t n = keys_.size();
+  order_.resize(n);
+  std::iota(order_.begin(), order_.end(), 0);
 
   // Only bits that vary are sorted by, the highest 33 of them, eleven a pass.
+  uint64_t varying = 0;
+  for (uint64_t key : keys_) varying |= key ^ keys_[0];
   const int bits = __builtin_popcountll(varying);
   const int used = std::min(bits, 33);
-  for (uint64_t& key : keys) key = Compress(key, varying) >> (bits - used);
-  scratch->keys_swap.resize(n);
-  scratch->order_swap.resize(n);
+  for (uint64_t& key : keys_) key = Compress(key, varying) >> (bits - used);
+  keys_swap_.resize(n);
+  order_swap_.resize(n);
   for (int shift = 0; shift < used; shift += 11) {
     std::array<uint32_t, 2048> begin{};
-    for (uint64_t key : keys) ++begin[(key >> shift) & 2047];
+    for (uint64_t key : keys_) ++begin[(key >> shift) & 2047];
     uint32_t sum = 0;
     for (uint32_t& count : begin) sum += std::exchange(count, sum);
     for (size_t k = 0; k < n; ++k) {
-      const uint32_t place = begin[(keys[k] >> shift) & 2047]++;
-      scratch->keys_swap[place] = keys[k];
-      scratch->order_swap[place] = (*order)[k];
+      const uint32_t place = begin[(keys_[k] >> shift) & 2047]++;
+      keys_swap_[place] = keys_[k];
+      order_swap_[place] = order_[k];
     }
-    keys.swap(scratch->keys_swap);
-    order->swap(scratch->order_swap);
+    keys_.swap(keys_swap_);
+    order_.swap(order_swap_);
   }
+  return order_;
 }
 
 }  // namespace touchstone

@@ -11,13 +11,23 @@
 
 namespace touchstone {
 
-struct CoherenceScratch {
-  std::vector<uint64_t> keys, keys_swap;
-  std::vector<uint32_t> order_swap;
-};
+class CoherentOrder {
+ public:
+  // Forgets all poses. `sample` are some of those to come: they set the scale of the keys.
+  void Begin(absl::Span<const TouchPose> sample);
+  // Appends poses, in the order of their numbers 0, 1, 2, ...
+  void Add(absl::Span<const TouchPose> poses);
+  // The numbers in the order in which to simulate. Equal poses keep their order. Valid until Begin.
+  absl::Span<const uint32_t> Sort();
 
-// order becomes a permutation of 0 .. poses.size() - 1.
-void CoherentOrder(absl::Span<const TouchPose> poses, CoherenceScratch* scratch,
-                   std::vector<uint32_t>* order);
+ private:
+  struct Range {
+    double lower = 0, factor = 0;
+    uint64_t Quantise(double value) const;
+  };
+  Range start_[3], target_[3];
+  std::vector<uint64_t> keys_, keys_swap_;
+  std::vector<uint32_t> order_, order_swap_;
+};
 
 }  // namespace touchstone

@@ -22,12 +22,18 @@ std::vector<TouchPose> Poses(int count) {
   return poses;
 }
 
+std::vector<uint32_t> Order(const std::vector<TouchPose>& poses) {
+  CoherentOrder order;
+  order.Begin(absl::MakeConstSpan(poses).subspan(0, 100));
+  order.Add(poses);
+  const absl::Span<const uint32_t> sorted = order.Sort();
+  return {sorted.begin(), sorted.end()};
+}
+
 TEST(CoherentOrder, IsAPermutation) {
   for (int count : {0, 1, 31, 32, 5000}) {
     const std::vector<TouchPose> poses = Poses(count);
-    CoherenceScratch scratch;
-    std::vector<uint32_t> order;
-    CoherentOrder(poses, &scratch, &order);
+    std::vector<uint32_t> order = Order(poses);
     std::sort(order.begin(), order.end());
     for (int k = 0; k < count; ++k) ASSERT_EQ(order[k], static_cast<uint32_t>(k));
   }
@@ -35,9 +41,7 @@ TEST(CoherentOrder, IsAPermutation) {
 
 TEST(CoherentOrder, BringsNeighboursTogether) {
   const std::vector<TouchPose> poses = Poses(20000);
-  CoherenceScratch scratch;
-  std::vector<uint32_t> order;
-  CoherentOrder(poses, &scratch, &order);
+  std::vector<uint32_t> order = Order(poses);
   double before = 0, after = 0;
   for (size_t k = 1; k < poses.size(); ++k) {
     before += (poses[k].approach - poses[k - 1].approach).norm();
@@ -48,9 +52,7 @@ TEST(CoherentOrder, BringsNeighboursTogether) {
 
 TEST(CoherentOrder, TakesEqualPosesInTheirOrder) {
   const std::vector<TouchPose> poses(100);
-  CoherenceScratch scratch;
-  std::vector<uint32_t> order;
-  CoherentOrder(poses, &scratch, &order);
+  std::vector<uint32_t> order = Order(poses);
   for (uint32_t k = 0; k < 100; ++k) EXPECT_EQ(order[k], k);
 }
 

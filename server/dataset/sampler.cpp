@@ -24,13 +24,14 @@ TouchSampler::TouchSampler(const DatasetSpecification& specification)
     : specification_(specification), simulator_(specification.model) {
   for (const auto& object : specification.objects)
     generators_.push_back(MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+  plan_ends_ = generators_[0]->Count() != 0;
 }
 
 TouchSampler::~TouchSampler() = default;
 
 // A plan that ends goes through its touches for each object; a random one numbers its draws by the sample.
 uint64_t TouchSampler::NumberOf(uint64_t index) const {
-  return generators_[0]->Count() == 0 ? index : index / specification_.objects.size();
+  return plan_ends_ ? index / specification_.objects.size() : index;
 }
 
 absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled,
@@ -63,7 +64,6 @@ absl::Status TouchSampler::Run(absl::Span<const uint64_t> indices, Until until,
                                absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
                                Workspace* workspace, const Sink& sink) const {
   const size_t objects = specification_.objects.size();
-  workspace->poses.resize(indices.size());
   for (size_t object = 0; object < objects; ++object) {
     workspace->slots.clear();
     for (size_t slot = 0; slot < indices.size(); ++slot)
@@ -78,29 +78,35 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
                                      absl::Span<const double> previous_press_m,
                                      const std::atomic<bool>& cancelled, Workspace* workspace,
                                      const Sink& sink) const {
-  const PoseGenerator& generator = *generators_[object];
   for (uint32_t attempt = 0; !workspace->slots.empty(); ++attempt) {
-    const size_t pending = workspace->slots.size();
-    if (attempt == specification_.most_draws) return Hopeless(object, indices[workspace->slots[0]]);
+    const std::vector<uint32_t>& slots = workspace->slots;
+    const size_t pending = slots.size();
+    if (attempt == specification_.most_draws) return Hopeless(object, indices[slots[0]]);
     if (attempt == kProbeAfter)
-      TOUCHSTONE_RETURN_IF_ERROR(ProbeDraws(object, indices[workspace->slots[0]], attempt, workspace));
+      TOUCHSTONE_RETURN_IF_ERROR(ProbeDraws(object, indices[slots[0]], attempt, workspace));
 
-    // Draw, and put neighbours together.
-    workspace->numbers.resize(pending);
-    workspace->poses.resize(std::max(workspace->poses.size(), pending));
-    for (size_t k = 0; k < pending; ++k) workspace->numbers[k] = NumberOf(indices[workspace->slots[k]]);
-    generator.Draw(workspace->numbers, attempt, workspace->poses.data());
-    CoherentOrder({workspace->poses.data(), pending}, &workspace->coherence, &workspace->order);
+    // Draw all to find the order that keeps neighbours together. Drawing a pose again is cheaper than
+    // fetching it from a large array in that order.
+    std::vector<uint32_t>& block = workspace->block_slots;
+    for (size_t begin = 0; begin < pending; begin += kBlock) {
+      block.assign(slots.begin() + begin, slots.begin() + std::min(pending, begin + kBlock));
+      DrawBlock(object, indices, attempt, workspace);
+      if (begin == 0) workspace->order.Begin(workspace->poses);
+      workspace->order.Add(workspace->poses);
+    }
+    const absl::Span<const uint32_t> order = workspace->order.Sort();
 
     // Simulate block by block; what missed is drawn again.
     workspace->missed.clear();
     for (size_t begin = 0; begin < pending; begin += kBlock) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
-      const absl::Span<const uint32_t> block(&workspace->order[begin], std::min(kBlock, pending - begin));
-      TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, block, until, previous_press_m, workspace));
-      sink({workspace->batch, workspace->block_slots, workspace->accepted, workspace->poses, block});
+      block.clear();
+      for (uint32_t place : order.subspan(begin, kBlock)) block.push_back(slots[place]);
+      DrawBlock(object, indices, attempt, workspace);
+      TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, until, previous_press_m, workspace));
+      sink({workspace->batch, block, workspace->accepted, workspace->poses});
       for (size_t k = 0; k < block.size(); ++k)
-        if (!workspace->accepted[k]) workspace->missed.push_back(workspace->block_slots[k]);
+        if (!workspace->accepted[k]) workspace->missed.push_back(block[k]);
     }
     // In the order of the slots, so that the probe and the error name the lowest index.
     std::sort(workspace->missed.begin(), workspace->missed.end());
@@ -109,15 +115,23 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
   return absl::OkStatus();
 }
 
-// Simulates the drawn poses `block` (places in workspace->slots and ->poses).
-absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices,
-                                    absl::Span<const uint32_t> block, Until until,
+// The poses of workspace->block_slots.
+void TouchSampler::DrawBlock(size_t object, absl::Span<const uint64_t> indices, uint32_t attempt,
+                             Workspace* workspace) const {
+  const size_t size = workspace->block_slots.size();
+  workspace->numbers.resize(size);
+  workspace->poses.resize(size);
+  for (size_t k = 0; k < size; ++k) workspace->numbers[k] = NumberOf(indices[workspace->block_slots[k]]);
+  generators_[object]->Draw(workspace->numbers, attempt, workspace->poses.data());
+}
+
+absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices, Until until,
                                     absl::Span<const double> previous_press_m, Workspace* workspace) const {
-  FillBatch(object, indices, block, previous_press_m, workspace);
+  FillBatch(object, indices, previous_press_m, workspace);
   TouchBatch& batch = workspace->batch;
   TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
   const bool can_redraw = generators_[object]->CanRedraw();
-  workspace->accepted.assign(block.size(), 1);
+  workspace->accepted.assign(batch.size(), 1);
   if (can_redraw)
     for (int finger = 0; finger < batch.fingers(); ++finger)
       for (int touch = 0; touch < batch.size(); ++touch)
@@ -127,18 +141,16 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
 }
 
 void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
-                             absl::Span<const uint32_t> block, absl::Span<const double> previous_press_m,
-                             Workspace* workspace) const {
+                             absl::Span<const double> previous_press_m, Workspace* workspace) const {
   const Plan& plan = specification_.plan;
+  const std::vector<uint32_t>& block = workspace->block_slots;
   TouchBatch& batch = workspace->batch;
   simulator_.Prepare(static_cast<int>(block.size()), &batch);
   batch.surface = specification_.objects[object];
   batch.seed = specification_.seed;
-  workspace->block_slots.resize(block.size());
   for (size_t k = 0; k < block.size(); ++k) {
-    const TouchPose& pose = workspace->poses[block[k]];
-    const uint32_t slot = workspace->slots[block[k]];
-    workspace->block_slots[k] = slot;
+    const TouchPose& pose = workspace->poses[k];
+    const uint32_t slot = block[k];
     batch.index[k] = indices[slot];
     batch.target_m[k] = pose.target_m;
     batch.approach[k] = pose.approach;
@@ -164,8 +176,7 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
   if (!previous_press_m.empty())
     for (int finger = 0; finger < batch.fingers(); ++finger)
       for (size_t k = 0; k < block.size(); ++k)
-        batch.previous_press_m[batch.At(finger, k)] =
-            previous_press_m[workspace->block_slots[k] * batch.fingers() + finger];
+        batch.previous_press_m[batch.At(finger, k)] = previous_press_m[block[k] * batch.fingers() + finger];
 }
 
 absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {

@@ -24,12 +24,14 @@ class TouchSampler {
 
   // Memory that one thread keeps between calls.
   struct Workspace {
-    std::vector<uint32_t> slots, missed, block_slots, order;
-    std::vector<uint64_t> numbers, previous_indices;
-    std::vector<TouchPose> poses;
+    std::vector<uint32_t> slots, missed;  // samples that are still to be accepted
+    std::vector<uint32_t> block_slots;    // the block in hand: its samples,
+    std::vector<uint64_t> numbers;        // their numbers in the plan
+    std::vector<TouchPose> poses;         // and poses as commanded
+    std::vector<uint64_t> previous_indices;
     std::vector<uint8_t> accepted;
     std::vector<double> previous_press_m;
-    CoherenceScratch coherence;
+    CoherentOrder order;
     TouchBatch batch;
     TouchWorkspace touch;
   };
@@ -41,8 +43,7 @@ class TouchSampler {
     absl::Span<const uint32_t> slots;
     absl::Span<const uint8_t> accepted;
     absl::Span<const TouchPose> poses;
-    absl::Span<const uint32_t> order;
-    const TouchPose& Pose(int touch) const { return poses[order[touch]]; }
+    const TouchPose& Pose(int touch) const { return poses[touch]; }
   };
   // Called for every block, in no particular order.
   using Sink = std::function<void(const Block& block)>;
@@ -58,10 +59,12 @@ class TouchSampler {
   absl::Status RunObject(size_t object, absl::Span<const uint64_t> indices, Until until,
                          absl::Span<const double> previous_press_m, const std::atomic<bool>& cancelled,
                          Workspace* workspace, const Sink& sink) const;
-  absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots,
-                        Until until, absl::Span<const double> previous_press_m, Workspace* workspace) const;
-  void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const uint32_t> slots,
-                 absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  void DrawBlock(size_t object, absl::Span<const uint64_t> indices, uint32_t attempt,
+                 Workspace* workspace) const;
+  absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, Until until,
+                        absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const double> previous_press_m,
+                 Workspace* workspace) const;
   absl::Status Hopeless(size_t object, uint64_t index) const;
   absl::Status ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt, Workspace* workspace) const;
   uint64_t NumberOf(uint64_t index) const;
@@ -69,6 +72,7 @@ class TouchSampler {
   const DatasetSpecification& specification_;
   const TouchSimulator simulator_;
   std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one an object
+  bool plan_ends_ = false;
 };
 
 }  // namespace touchstone
