@@ -52,9 +52,9 @@ absl::Status SetParameter(const Effect& effect, const std::string& name, const s
   TOUCHSTONE_ASSIGN_OR_RETURN(const int index, FindParameter(effect, name));
   const std::string what = absl::StrCat(effect.formula ? effect.formula->name : effect.name, ".", name);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> numbers, Numbers(what, text));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> si_values,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> values_si,
                               ValuesFromFile(what, effect.parameters[index], numbers, fingers));
-  std::copy(si_values.begin(), si_values.end(), values->begin() + ValueOffset(effect, index, fingers));
+  std::copy(values_si.begin(), values_si.end(), values->begin() + ValueOffset(effect, index, fingers));
   return absl::OkStatus();
 }
 

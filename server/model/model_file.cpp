@@ -167,10 +167,10 @@ class ModelReader {
           numbers.push_back(number);
         }
       }
-      const absl::StatusOr<std::vector<double>> si_values =
+      const absl::StatusOr<std::vector<double>> values_si =
           ValuesFromFile(what, parameter, numbers, model_.fingers);
-      if (!si_values.ok()) return Error(node, si_values.status().message());
-      std::copy(si_values->begin(), si_values->end(),
+      if (!values_si.ok()) return Error(node, values_si.status().message());
+      std::copy(values_si->begin(), values_si->end(),
                 values->begin() + ValueOffset(effect, *index, model_.fingers));
     }
     return absl::OkStatus();

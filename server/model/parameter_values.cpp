@@ -21,11 +21,11 @@ double Number(const std::string& text) {
 }
 
 // A number of files with at most 17 digits that reads back to the SI value; empty if there is none.
-std::string ExactFileNumber(Unit unit, double si_value) {
-  const double near = FromSi(unit, si_value);
+std::string ExactFileNumber(Unit unit, double value_si) {
+  const double near = FromSi(unit, value_si);
   for (int digits = 15; digits <= 17; ++digits) {
     const std::string text = absl::StrFormat("%.*g", digits, near);
-    if (ToSi(unit, Number(text)) == si_value) return text;
+    if (ToSi(unit, Number(text)) == value_si) return text;
   }
   // Division and multiplication need not undo each other: a neighbour may.
   for (int steps = 1; steps <= 2; ++steps) {
@@ -33,7 +33,7 @@ std::string ExactFileNumber(Unit unit, double si_value) {
       double candidate = near;
       for (int step = 0; step < steps; ++step) candidate = std::nextafter(candidate, end);
       const std::string text = absl::StrFormat("%.17g", candidate);
-      if (ToSi(unit, Number(text)) == si_value) return text;
+      if (ToSi(unit, Number(text)) == value_si) return text;
     }
   }
   return "";
@@ -55,19 +55,19 @@ std::string ShortList(const std::vector<double>& values) {
 
 }  // namespace
 
-std::string FileNumber(Unit unit, double si_value) {
-  if (si_value == 0) return "0";  // also for -0
-  std::string text = ExactFileNumber(unit, si_value);
+std::string FileNumber(Unit unit, double value_si) {
+  if (value_si == 0) return "0";  // also for -0
+  std::string text = ExactFileNumber(unit, value_si);
   if (!text.empty()) return text;
-  const double nearest = ToSi(unit, Number(absl::StrFormat("%.17g", FromSi(unit, si_value))));
+  const double nearest = ToSi(unit, Number(absl::StrFormat("%.17g", FromSi(unit, value_si))));
   text = ExactFileNumber(unit, nearest);
-  return text.empty() ? ShortestNumber(FromSi(unit, si_value)) : text;
+  return text.empty() ? ShortestNumber(FromSi(unit, value_si)) : text;
 }
 
-std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> si_values) {
-  if (parameter.arity == Arity::kScalar) return FileNumber(parameter.unit, si_values.at(0));
+std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> values_si) {
+  if (parameter.arity == Arity::kScalar) return FileNumber(parameter.unit, values_si.at(0));
   return absl::StrCat("[",
-                      absl::StrJoin(si_values, ", ",
+                      absl::StrJoin(values_si, ", ",
                                     [&](std::string* out, double value) {
                                       absl::StrAppend(out, FileNumber(parameter.unit, value));
                                     }),
@@ -91,7 +91,7 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
                                                    file_values.size() == 1 ? " value" : " values",
                                                    "; it needs ", wanted));
   }
-  std::vector<double> si_values;
+  std::vector<double> values_si;
   double sum = 0;
   double largest = 0;
   for (const double value : file_values) {
@@ -100,7 +100,7 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
           absl::StrCat(what, " is ", ShortestNumber(value), "; it must lie in ", RangeInWords(parameter)));
     sum += value;
     largest = std::max(largest, std::fabs(value));
-    si_values.push_back(value == 0 ? 0.0 : ToSi(parameter.unit, value));
+    values_si.push_back(value == 0 ? 0.0 : ToSi(parameter.unit, value));
   }
   if (parameter.sum_zero && std::fabs(sum) > kSumTolerance * largest) {
     std::vector<double> centred = file_values;
@@ -110,7 +110,7 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
         "seen; less their mean they are %s",
         what, sum, ShortList(centred)));
   }
-  return si_values;
+  return values_si;
 }
 
 absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name) {

@@ -16,10 +16,10 @@ namespace touchstone {
 // The SI value as a number of files: the one of fewest digits (15 to 17) that reads back to the same SI
 // value, "30" for 0.030 m. Where no number of files does (a fit may end there), the nearest one; that reads
 // back to the same text.
-std::string FileNumber(Unit unit, double si_value);
+std::string FileNumber(Unit unit, double value_si);
 
 // The values of one parameter: "1.5", or "[0.25, 0, -0.25]".
-std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> si_values);
+std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> values_si);
 
 // Where the values of parameter `index` begin in the flat array.
 int ValueOffset(const Effect& effect, int index, int fingers);
