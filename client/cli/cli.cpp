@@ -32,9 +32,12 @@ class ExamplesFirst : public CLI::Formatter {
     return absl::StrCat(Wrap(app->get_description(), kHelpWidth, 0), "\n\nExamples:\n", examples_, "\n");
   }
 
-  std::string make_usage(const CLI::App* app, std::string name) const override {
-    std::string usage = CLI::Formatter::make_usage(app, name.empty() ? app->get_name() : name);
-    return usage;
+  // One blank line between paragraphs.
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+    std::string help = CLI::Formatter::make_help(app, name, mode);
+    for (size_t at; (at = help.find("\n\n\n")) != std::string::npos;) help.erase(at, 1);
+    while (help.size() > 1 && help.compare(help.size() - 2, 2, "\n\n") == 0) help.pop_back();
+    return help;
   }
 
   // The first sentence is enough in a list of commands.
@@ -102,11 +105,11 @@ Cli::Cli()
     : app_("Touches and photographs objects in simulation, and streams datasets of them to files",
            "touchstone") {
   app_.formatter(std::make_shared<ExamplesFirst>(
-      Indented("touchstone objects                                    what can be touched\n"
-               "touchstone touch lat20 --approach 0,0,-1              one touch from above\n"
-               "touchstone capture lat20 --approach 0,0,-1 -o top.png its photograph\n"
-               "touchstone stream --samples 10000 --out data          a dataset of touches\n"
-               "touchstone doctor                                     is everything in order here?")));
+      Indented("touchstone objects                                      what can be touched\n"
+               "touchstone touch lat20 --approach 0,0,-1                one touch from above\n"
+               "touchstone capture lat20 --approach 0,0,-1 -o top.png   its photograph\n"
+               "touchstone stream --samples 10000 --out data            a dataset of touches\n"
+               "touchstone doctor                                       is everything in order here?")));
   app_.set_help_flag("-h,--help", "This text; also touchstone COMMAND --help");
   app_.set_version_flag("--version", "touchstone " TOUCHSTONE_VERSION, "The version");
   app_.require_subcommand(0, 1);
@@ -122,11 +125,7 @@ CLI::App* Cli::AddCommand(CLI::App* parent, const std::string& name, const std::
   CLI::App* command = (parent == nullptr ? &app_ : parent)->add_subcommand(name, description);
   command->group("Commands");
   command->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
-  command->set_help_flag("-h,--help", "This text")->group("Output");
-  command->add_flag("--json", output_.json, "Machine-readable output; the names of numbers end in their unit")
-      ->group("Output");
-  command->add_flag("-q,--quiet", output_.quiet, "Nothing but errors on stderr")->group("Output");
-  command->add_flag("-v,--verbose", output_.verbose, "More about what happens on stderr")->group("Output");
+  command->footer("");
   runs_[command] = std::move(run);
   return command;
 }
@@ -137,8 +136,17 @@ CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
   group->group("Commands");
   group->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
   group->set_help_flag("-h,--help", "This text");
+  group->footer("");
   group->require_subcommand(0, 1);
   return group;
+}
+
+void Cli::AddOutputOptions(CLI::App* command) {
+  command->add_flag("--json", output_.json, "Machine-readable output; the names of numbers end in their unit")
+      ->group("Output");
+  command->add_flag("-q,--quiet", output_.quiet, "Nothing but errors on stderr")->group("Output");
+  command->add_flag("-v,--verbose", output_.verbose, "More about what happens on stderr")->group("Output");
+  command->set_help_flag("-h,--help", "This text")->group("Output");
 }
 
 void Cli::AddSourceOptions(CLI::App* command) {
@@ -240,13 +248,12 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
 }
 
 int Cli::Run(int argc, char** argv) {
-  // CLI11 stops at the first unknown option of a command with required ones; collect them all first instead.
+  // Last in every help, since they are the same everywhere.
+  for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    const CLI::App* app = &app_;
-    while (!app->get_subcommands().empty()) app = app->get_subcommands()[0];
-    std::printf("%s", app->help(HelpCommand()).c_str());
+    std::printf("%s", app_.help().c_str());
     return kDone;
   } catch (const CLI::CallForVersion&) {
     std::printf("touchstone %s\n", TOUCHSTONE_VERSION);
@@ -259,7 +266,7 @@ int Cli::Run(int argc, char** argv) {
   const auto run = runs_.find(app);
   if (run == runs_.end()) {
     // "touchstone" or "touchstone model" alone: what there is, but not as a success.
-    std::fprintf(stderr, "%s", app->help(HelpCommand()).c_str());
+    std::fprintf(stderr, "%s", app_.help().c_str());
     return kBadInput;
   }
   absl::Status status = run->second();

@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -17,6 +17,8 @@ namespace touchstone::cli {
 namespace {
 
 constexpr uint64_t kMostModelBytes = 16 << 20;
+constexpr size_t kTableWidth = 120;
+constexpr size_t kLeastLastColumn = 40;
 
 }  // namespace
 
@@ -96,10 +98,13 @@ std::string Table::Text() const {
     widths.resize(std::max(widths.size(), row.size()));
     for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
   }
+  size_t indent = 0;
+  for (size_t i = 0; i + 1 < widths.size(); ++i) indent += widths[i] + 2;
+  const size_t width = std::max(kTableWidth, indent + kLeastLastColumn);
   std::string text;
   for (const auto& row : rows_) {
     for (size_t i = 0; i < row.size(); ++i) {
-      text += row[i];
+      text += i + 1 == widths.size() ? Wrap(row[i], width, indent) : row[i];
       if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
     }
     text.erase(text.find_last_not_of(' ') + 1);
@@ -127,8 +132,14 @@ std::string Wrap(absl::string_view text, size_t width, size_t indent) {
 
 std::string Rounded(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
+  constexpr double kWholeFrom = 1000;
+  const bool whole = std::abs(value) >= kWholeFrom && std::abs(value) < 1e15;
+  std::snprintf(text, sizeof text, whole ? "%.0f" : "%.4g", value);
   return text;
+}
+
+std::string Counted(uint64_t count, const std::string& one, const std::string& many) {
+  return absl::StrCat(count, " ", count == 1 ? one : many);
 }
 
 void PrintJson(const Json& json) {

@@ -65,6 +65,7 @@ class Cli {
   int Run(int argc, char** argv);
 
  private:
+  void AddOutputOptions(CLI::App* command);
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
 
@@ -94,7 +95,8 @@ absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& te
 // --- Output
 // ----------------------------------------------------------------------------------------------------
 
-// Columns of text, each as wide as its widest cell, two blanks between them.
+// Columns of text, each as wide as its widest cell, two blanks between them; the last one is broken into
+// lines.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
@@ -108,8 +110,11 @@ class Table {
 // Text broken into lines of at most `width` columns, all but the first indented.
 std::string Wrap(absl::string_view text, size_t width, size_t indent);
 
-// Four significant digits, for people: "0.05", "149.9", "1.2e-06".
+// Four significant digits, for people: "0.05", "149.9", "1.2e-06", "21860".
 std::string Rounded(double value);
+
+// "1 shard", "7 shards".
+std::string Counted(uint64_t count, const std::string& one, const std::string& many);
 
 void PrintJson(const Json& json);
 

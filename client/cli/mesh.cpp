@@ -50,10 +50,6 @@ Json ReportJson(const TriangleMesh& mesh, const MeshReport& report) {
           {"mesh_hash", MeshHash(mesh)}};
 }
 
-std::string Counted(uint64_t count, const char* one, const char* many) {
-  return absl::StrCat(count, " ", count == 1 ? one : many);
-}
-
 // What the numbers of a report mean for touching.
 std::string ReportInWords(const std::string& name, const TriangleMesh& mesh, const MeshReport& report) {
   const Bounds bounds = ComputeBounds(mesh);

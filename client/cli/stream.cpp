@@ -136,13 +136,15 @@ Json ResultJson(const client::DatasetJob& job, const client::DatasetResult& resu
 void Summarise(const Cli& cli, const client::DatasetJob& job, const client::DatasetResult& result,
                double elapsed_s) {
   const std::string place = absl::StrCat(job.folder, "/", client::kManifestName);
+  const std::string found = Counted(result.shards_found, "shard", "shards");
   if (result.shards_written == 0)
-    cli.Log(
-        absl::StrCat("nothing to do: ", result.shards_found, " shards stand in ", job.folder, " already"));
+    cli.Log(absl::StrCat("nothing to do: ", found, " of ", job.folder, " stood already"));
   else
-    cli.Log(absl::StrCat("wrote ", result.samples_written, " samples in ", result.shards_written, " shards (",
-                         result.shards_found, " stood already) in ", Rounded(elapsed_s), " s, ",
-                         Rounded(result.samples_written / elapsed_s), " samples/s"));
+    cli.Log(absl::StrCat("wrote ", Counted(result.samples_written, "sample", "samples"), " in ",
+                         Counted(result.shards_written, "shard", "shards"),
+                         result.shards_found > 0 ? " (" + found + " stood already)" : "", " in ",
+                         Rounded(elapsed_s), " s, ", Rounded(result.samples_written / elapsed_s),
+                         " samples/s"));
   cli.Log(result.dataset_complete ? absl::StrCat(place, ": ", result.samples_in_dataset, " samples, complete")
                                   : absl::StrCat("this job's part is done; ", place,
                                                  " comes with the last of the ", job.job_count, " jobs"));
@@ -181,8 +183,9 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const client::DatasetResult& result = writer.result();
   if (Interrupt::Raised() && absl::IsCancelled(status)) {
-    cli.Log(absl::StrCat("interrupted: ", result.shards_found + result.shards_written,
-                         " whole shards stand in ", job.folder, ". Run the same command again to go on"));
+    const uint64_t whole = result.shards_found + result.shards_written;
+    cli.Log(absl::StrCat("interrupted: ", Counted(whole, "whole shard stands", "whole shards stand"), " in ",
+                         job.folder, ". Run the same command again to go on"));
     return status;
   }
   TOUCHSTONE_RETURN_IF_ERROR(status);

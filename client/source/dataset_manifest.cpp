@@ -97,6 +97,7 @@ Json SpecToJson(const v1::DatasetSpec& spec) {
   bare.clear_model();
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;
+  options.always_print_primitive_fields = true;
   std::string text;
   const auto status = google::protobuf::util::MessageToJsonString(bare, &text, options);
   Json json = status.ok() ? ToLabUnits(Json::parse(text)) : Json::object();
