@@ -109,7 +109,7 @@ absl::Status ParsePoint(const MeshReading& reading, absl::string_view* line, uin
 // where the face is convex or has no area. Always appends polygon.size() - 2 triangles. `work` counts point
 // tests over a whole file; beyond the limit corners are cut off as they come, and the caller refuses the
 // file.
-inline constexpr uint64_t kMostTriangulationWork = 1'000'000'000;
+inline constexpr uint64_t kMostTriangulationWork = 4'000'000'000;
 void Triangulate(const std::vector<Eigen::Vector3d>& points, absl::Span<const uint32_t> polygon,
                  std::vector<std::array<uint32_t, 3>>* triangles, uint64_t* work);
 
