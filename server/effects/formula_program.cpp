@@ -138,7 +138,28 @@ absl::Status CheckCharacters(const std::string& expression) {
     if (c == '=' && after != '=' && std::string("=!<>").find(before) == std::string::npos)
       return Wrong(i, "a formula cannot assign; to compare write '=='");
   }
+  // muParser does not say where a parenthesis is missing.
+  std::vector<size_t> open;
+  for (size_t i = 0; i < expression.size(); ++i) {
+    if (expression[i] == '(') open.push_back(i);
+    if (expression[i] != ')') continue;
+    if (open.empty()) return Wrong(i, "this ')' closes nothing");
+    open.pop_back();
+  }
+  if (!open.empty()) return Wrong(open.back(), "this '(' is never closed");
   return absl::OkStatus();
+}
+
+// muParser's words without its own place, which counts from 0.
+std::string Words(const mu::ParserError& error) {
+  std::string message = error.GetMsg();
+  for (const char* phrase : {" found at position ", " at position "}) {
+    const size_t begin = message.find(phrase);
+    if (begin == std::string::npos) continue;
+    const size_t end = message.find_first_not_of("0123456789", begin + std::string(phrase).size());
+    message.erase(begin, end == std::string::npos ? end : end - begin);
+  }
+  return message;
 }
 
 // The names outside of functions and constants, in order. Numbers such as 1e-3 are not names.
@@ -202,9 +223,9 @@ absl::StatusOr<std::shared_ptr<const FormulaProgram>> FormulaProgram::Compile(co
           absl::StrCat("it has ", results, " results, separated by commas; write one"));
     program->idle_.push_back(std::move(evaluator));
   } catch (const mu::ParserError& error) {
-    const int position = error.GetPos();
-    const bool placed = position >= 0 && position <= static_cast<int>(expression.size());
-    return placed ? Wrong(position, error.GetMsg()) : absl::InvalidArgumentError(error.GetMsg());
+    // The end of the expression is reported one place behind it, an unknown place as -1.
+    if (error.GetPos() < 0) return absl::InvalidArgumentError(Words(error));
+    return Wrong(std::min<size_t>(error.GetPos(), expression.size()), Words(error));
   }
   return std::shared_ptr<const FormulaProgram>(std::move(program));
 }

@@ -124,10 +124,11 @@ effects:
   - formula:
       name: lead_screw
       adds: travel_mm
-      expression: "k * sin(2*pi*travel_mm/lead)" parameters:k
-            : {value : 0, unit : mm, min : -1, max : 1} lead
-            : {value : 4, unit : mm, min : 2, max : 10})
-  ");
+      expression: "k * sin(2*pi*travel_mm/lead)"
+      parameters:
+        k: {value: 0, unit: mm, min: -1, max: 1}
+        lead: {value: 4, unit: mm, min: 2, max: 10}
+)yaml");
 }
 
 TEST(ModelFile, GivesSingleObjectsTheirOwnValues) {
@@ -137,7 +138,7 @@ name: placed
 effects:
   - object_pose: {scope: object, translation_mm: [0, 0, 1], objects: {lat00: {translation_mm: [1, 0, 0]}, lat20: {rotation_deg: [0, 0, 2]}}}
 )yaml",
-            "placed.yaml", Catalogue());
+                                                 "placed.yaml", Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
   const EffectInstance& pose = model->effects[0];
   EXPECT_TRUE(pose.per_object);

@@ -152,9 +152,9 @@ TEST(ModelFile, TakesObjectsOnlyInObjectScope) {
 TEST(ModelFile, SurvivesHostileYaml) {
   EXPECT_THAT(ErrorOf(File("effects: &a [*a]\n")), HasSubstr("anchors"));
   EXPECT_THAT(ErrorOf(File("effects: !!python/object:os.system x\n")), HasSubstr("tags"));
-  EXPECT_THAT(ErrorOf(File(absl::StrCat("effects: ", std::string(100'000, '[')))), HasSubstr("deep"));
-  EXPECT_THAT(ErrorOf(std::string(100'000, '[')),
-              testing::AnyOf(HasSubstr("deep"), HasSubstr("a key must be")));
+  EXPECT_THAT(ErrorOf(File("effects: " + std::string(40, '[') + std::string(40, ']'))),
+              HasSubstr("levels deep"));
+  EXPECT_THAT(ErrorOf(std::string(100'000, '[')), HasSubstr("m.yaml:"));
   EXPECT_THAT(ErrorOf(std::string(100'000, '{')),
               testing::AnyOf(HasSubstr("deep"), HasSubstr("a key must be")));
   EXPECT_THAT(ErrorOf(std::string((1 << 20) + 1, 'a')), HasSubstr("at most 1048576 are read"));
