@@ -26,7 +26,7 @@ struct LineTriangle {
 
 // a, b, c: the corners relative to the line's origin.
 template <typename Number>
-LineTriangle<Number> MeetTriangle(const Triple<Number>& direction, const Triple<Number>& a,
+[[gnu::always_inline]] inline LineTriangle<Number> MeetTriangle(const Triple<Number>& direction, const Triple<Number>& a,
                                   const Triple<Number>& b, const Triple<Number>& c) {
   LineTriangle<Number> meet;
   meet.edge[0] = c - b;

@@ -51,26 +51,49 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m) const {
   double best_travel = longest_m;
   LineTriangle<double> best_meet = {};
   uint32_t best = kNoTriangle;
-  tree().VisitAlong(line.origin_m + first * line.direction, line.direction, rounding_m_, 0,
-                    std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
-                    [&](const uint32_t* ids, int count, double* last_m) {
-                      for (int i = 0; i < count; ++i) {
-                        const Triple1 a = ToTriple(mesh_.Corner(ids[i], 0)) - origin,
-                                      b = ToTriple(mesh_.Corner(ids[i], 1)) - origin,
-                                      c = ToTriple(mesh_.Corner(ids[i], 2)) - origin;
-                        const LineTriangle<double> meet = MeetTriangle(direction, a, b, c);
-                        if (!MeetsInside(meet, direction, a, b, c) || !(meet.travel_m > 0) ||
-                            !(meet.travel_m <= best_travel))
-                          continue;
-                        if (meet.travel_m == best_travel && best != kNoTriangle && ids[i] > best) continue;
-                        best_travel = meet.travel_m;
-                        best_meet = meet;
-                        best = ids[i];
-                      }
-                      // Boxes that begin a rounding later may still hold a contact that comes first.
-                      if (best != kNoTriangle)
-                        *last_m = std::min(*last_m, best_travel - first + 4 * rounding_m_);
-                    });
+  const auto consider = [&](uint32_t triangle) {
+    const Triple1 a = ToTriple(mesh_.Corner(triangle, 0)) - origin,
+                  b = ToTriple(mesh_.Corner(triangle, 1)) - origin,
+                  c = ToTriple(mesh_.Corner(triangle, 2)) - origin;
+    const LineTriangle<double> meet = MeetTriangle(direction, a, b, c);
+    if (!MeetsInside(meet, direction, a, b, c) || !(meet.travel_m > 0) || !(meet.travel_m <= best_travel))
+      return;
+    if (meet.travel_m == best_travel && best != kNoTriangle && triangle > best) return;
+    best_travel = meet.travel_m;
+    best_meet = meet;
+    best = triangle;
+  };
+  const Triple<Double4> from = {Double4{} + origin.x, Double4{} + origin.y, Double4{} + origin.z};
+  const Triple<Double4> along = {Double4{} + direction.x, Double4{} + direction.y, Double4{} + direction.z};
+  tree().VisitAlong(
+      line.origin_m + first * line.direction, line.direction, 2 * rounding_m_,
+      std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
+      [&](const uint32_t* ids, int count, double* last_m) {
+        // Four at a time are looked at roughly: whether the line passes within the rounding.
+        for (int i = 0; i < count; i += 4) {
+          alignas(32) double corner[9][4];
+          for (int k = 0; k < 4; ++k) LoadCorners(ids[std::min(i + k, count - 1)], k, corner);
+          const auto load = [&](int c) {
+            return Triple<Double4>{LoadLanes<Double4>(corner[3 * c]), LoadLanes<Double4>(corner[3 * c + 1]),
+                                   LoadLanes<Double4>(corner[3 * c + 2])} -
+                   from;
+          };
+          const Triple<Double4> a = load(0), b = load(1), c = load(2);
+          const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
+          Mask4 near = meet.facing == meet.facing;
+          for (int e = 0; e < 3; ++e) {
+            const Double4 inwards = meet.facing > 0 ? meet.moment[e] : -meet.moment[e];
+            near &= (inwards >= 0) |
+                    (inwards * inwards <= rounding_m_ * rounding_m_ * Dot(meet.edge[e], meet.edge[e]));
+          }
+          for (uint32_t rest = BitsOf(near); rest; rest &= rest - 1) {
+            const int k = i + __builtin_ctz(rest);
+            if (k < count) consider(ids[k]);
+          }
+        }
+        // Boxes that begin a rounding later may still hold a contact that comes first.
+        if (best != kNoTriangle) *last_m = std::min(*last_m, best_travel - first + 4 * rounding_m_);
+      });
   if (best == kNoTriangle) return NoContact();
   return {best_travel, ToEigen(origin + direction * best_travel), ToEigen(NormalAgainst(best_meet)), best};
 }
@@ -129,11 +152,7 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
   // The corners of the proposed triangles, by lane.
   alignas(64) double corner[9][kWidth];
   for (int k = 0; k < kWidth; ++k) {
-    const auto& vertices = mesh_.triangles[rays.hit.primID[k]];
-    for (int c = 0; c < 3; ++c) {
-      const Eigen::Vector3f& vertex = mesh_.vertices_m[vertices[c]];
-      for (int axis = 0; axis < 3; ++axis) corner[3 * c + axis][k] = static_cast<double>(vertex[axis]);
-    }
+    LoadCorners(rays.hit.primID[k], k, corner);
   }
 
   // Four lanes at a time: the contact, and whether the line stays clear of the triangle's border.

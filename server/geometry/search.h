@@ -47,8 +47,10 @@ class Surface::Search {
   Contact CastExactly(const Line& line, double longest_m) const;
 
   // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most
-  // longest_m. `travel_bound_m`: some contact is known to come no later (infinity: none known).
-  Contact SweepExactly(const Line& line, double radius_m, double longest_m, double travel_bound_m) const;
+  // longest_m. `travel_bound_m`: some contact is known to come no later (infinity: none known); `likely` is
+  // the triangle of that one, or kNoTriangle.
+  Contact SweepExactly(const Line& line, double radius_m, double longest_m, double travel_bound_m,
+                       uint32_t likely) const;
 
   // As Surface::CastLines; the arrays have their size.
   void Cast(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
@@ -66,6 +68,16 @@ class Surface::Search {
   template <int kWidth>
   void CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, int count,
                   double longest_m, size_t at, Contacts* contacts) const;
+
+  // Puts a triangle's coordinates into lane k: corner[3 * corner + axis][k].
+  template <size_t kWidth>
+  void LoadCorners(uint32_t triangle, int k, double (*corner)[kWidth]) const {
+    const auto& vertices = mesh_.triangles[triangle];
+    for (int c = 0; c < 3; ++c) {
+      const Eigen::Vector3f& vertex = mesh_.vertices_m[vertices[c]];
+      for (int axis = 0; axis < 3; ++axis) corner[3 * c + axis][k] = static_cast<double>(vertex[axis]);
+    }
+  }
 
   const TriangleTree& tree() const;  // built at the first call
   // Whether another sheet of the surface lies within the reach of rounding, so that Embree may take either.

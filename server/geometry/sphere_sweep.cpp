@@ -19,6 +19,20 @@ using Lanes3 = Triple<Float8>;
 
 constexpr float kNever = std::numeric_limits<float>::max();
 
+// Whether a ball of radius r may touch triangles abc by travel `latest`: by the box round each, in axes along
+// and across the line. Much cheaper than EarliestTouch.
+Mask8 RoughlyReached(const Lanes3& direction, const Lanes3& across, const Lanes3& upwards, Lanes r,
+                     float latest, const Lanes3& a, const Lanes3& b, const Lanes3& c) {
+  const auto beside = [&](const Lanes3& axis) {
+    const Lanes pa = Dot(axis, a), pb = Dot(axis, b), pc = Dot(axis, c);
+    return MaxLanes(MaxLanes(MinLanes(MinLanes(pa, pb), pc), -MaxLanes(MaxLanes(pa, pb), pc)), Lanes{});
+  };
+  const Lanes u = beside(across), v = beside(upwards);
+  const Lanes left = r * r - u * u - v * v;
+  const Lanes nearest = MinLanes(MinLanes(Dot(direction, a), Dot(direction, b)), Dot(direction, c));
+  return (left >= 0.0f) & (nearest - SquareRoot(MaxLanes(left, Lanes{})) <= latest);
+}
+
 // Lower bounds of the travel t at which a ball of radius r, whose centre is t * direction, touches the
 // triangles abc; kNever: not at all. `r` is a little more than the ball's radius, by all that rounding may
 // do.
@@ -81,7 +95,7 @@ Lanes EarliestTouch(const Lanes3& direction, Lanes r, Lanes slack, const Lanes3&
 }  // namespace
 
 Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double longest_m,
-                                      double travel_bound_m) const {
+                                      double travel_bound_m, uint32_t likely) const {
   Contact best = {kNaN, Eigen::Vector3d::Constant(kNaN), Eigen::Vector3d::Zero(), kNoTriangle};
   // Boxes are searched from where the ball comes near the mesh. Bounds are computed about the place where the
   // contact is expected, so that coordinates there are small.
@@ -96,6 +110,9 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
   const Eigen::Vector3f place = place_m.cast<float>();
   const double slack = 4 * (rounding_m_ + 1e-6 * radius_m);
   const Lanes3 direction = SameInAllLanes(line.direction.cast<float>());
+  const Eigen::Vector3d across_line = line.direction.unitOrthogonal();
+  const Lanes3 across = SameInAllLanes(across_line.cast<float>());
+  const Lanes3 upwards = SameInAllLanes(line.direction.cross(across_line).cast<float>());
   const Lanes grown = Lanes{} + static_cast<float>(radius_m + slack);
   const Lanes slack_lanes = Lanes{} + static_cast<float>(slack);
 
@@ -123,7 +140,10 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
     last = t;
   };
 
-  tree().VisitAlong(line.origin_m + first * line.direction, line.direction, radius_m + slack, 0,
+  // What the foremost point meets is mostly what the ball meets, and its travel leaves little else to look
+  // at.
+  if (likely != kNoTriangle) consider(likely);
+  tree().VisitSwept(line.origin_m + first * line.direction, line.direction, radius_m + slack,
                     last - first + slack, [&](const uint32_t* ids, int count, double* last_from_first) {
                       alignas(32) float corner[9][8];
                       for (int i = 0; i < 8; ++i) {
@@ -139,12 +159,21 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
                                       LoadLanes<Lanes>(corner[3 * c + 2])} -
                                here;
                       };
-                      const Lanes bound =
-                          EarliestTouch(direction, grown, slack_lanes, load(0), load(1), load(2));
+                      const Lanes3 a = load(0), b = load(1), c = load(2);
+                      const float latest = static_cast<float>(last - near_touch + 4 * slack);
+                      uint32_t open =
+                          BitsOf(RoughlyReached(direction, across, upwards, grown, latest, a, b, c)) &
+                          ((1u << count) - 1);
+                      for (int i = 0; i < count; ++i) open &= ~(uint32_t{ids[i] == likely} << i);
+                      if (open == 0) return;
+                      if ((open & (open - 1)) == 0) {  // a single one needs no bound
+                        consider(ids[__builtin_ctz(open)]);
+                        *last_from_first = last - first + slack;
+                        return;
+                      }
                       alignas(32) float bounds[8];
-                      StoreLanes(bounds, bound);
+                      StoreLanes(bounds, EarliestTouch(direction, grown, slack_lanes, a, b, c));
                       // Soonest first: often it settles the others.
-                      uint32_t open = (1u << count) - 1;
                       while (open) {
                         int soonest = __builtin_ctz(open);
                         for (uint32_t rest = open; rest; rest &= rest - 1) {
@@ -175,7 +204,7 @@ void Surface::SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m,
     const double bound = contacts->triangle[i] == kNoTriangle ? std::numeric_limits<double>::infinity()
                                                               : contacts->travel_m[i];
     const Line centre = {origins_m[i] - radius_m * directions[i], directions[i]};
-    Store(search_->SweepExactly(centre, radius_m, longest_m, bound), i, contacts);
+    Store(search_->SweepExactly(centre, radius_m, longest_m, bound, contacts->triangle[i]), i, contacts);
   }
 }
 
