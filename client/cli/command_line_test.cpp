@@ -72,13 +72,14 @@ class CommandLineTest : public ::testing::Test {
 
   Outcome Run(std::vector<std::string> arguments) { return Wait(Start(std::move(arguments))); }
 
-  // Every file under a folder with its bytes.
+  // Every file under a folder with the hash of its bytes; dataset.json with its text, for the message.
   std::map<std::string, std::string> Snapshot(const std::string& name) {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(Path(name)))
       if (entry.is_regular_file())
         files[fs::relative(entry.path(), Path(name)).string()] =
-            ReadFile(entry.path().string()).value_or("?");
+            entry.path().extension() == ".json" ? ReadFile(entry.path().string()).value_or("?")
+                                                : Sha256HexOfFile(entry.path().string()).value_or("?");
     return files;
   }
 

@@ -106,7 +106,7 @@ class Doctor {
       Add("Build", false,
           absl::StrCat("uses instructions that this processor lacks: ", absl::StrJoin(missing, " "),
                        ". Configure with -DTOUCHSTONE_ARCH=native, or with an empty value"));
-    Add("Rays", true, "Embree, " + EmbreeDescription());
+    Add("Rays", true, EmbreeDescription());
     json_["processor"] = {{"model", processor.model}, {"threads", cores}};
     json_["build"] = {
         {"version", TOUCHSTONE_VERSION}, {"instructions", used}, {"instructions_missing", missing}};
@@ -141,9 +141,8 @@ class Doctor {
           "no device: no GPU driver and no Mesa is installed, or this build has no EGL. Images are made "
           "by the CPU renderer");
     if (chosen.ok()) {
-      const char* why =
-          options.kind == RendererKind::kAuto ? " (the faster one of those that work)" : " (asked for)";
-      Add("Images", true, absl::StrCat("made by ", (*chosen)->description(), why));
+      const char* why = options.kind == RendererKind::kAuto ? "" : " (asked for)";
+      Add("Images", true, absl::StrCat((*chosen)->description(), why));
       json_["renderer"] = {{"name", (*chosen)->name()}, {"description", (*chosen)->description()}};
     } else {
       Add("Images", false, std::string(chosen.status().message()));
@@ -153,10 +152,10 @@ class Doctor {
 
   absl::Status CheckSource() {
     const absl::StatusOr<std::unique_ptr<client::Connection>> connection = cli_.Connect();
-    absl::StatusOr<v1::DescribeResponse> response = connection.status();
-    if (connection.ok())
-      response = client::Connection::Call(&v1::Source::Stub::Describe, (*connection)->source(),
-                                          v1::DescribeRequest());
+    const absl::StatusOr<v1::DescribeResponse> response =
+        connection.ok() ? client::Connection::Call(&v1::Source::Stub::Describe, (*connection)->source(),
+                                                   v1::DescribeRequest())
+                        : absl::StatusOr<v1::DescribeResponse>(connection.status());
     if (!response.ok()) {
       Add("Source", false, "the error below says why it cannot be used");
       json_["source"] = {{"reachable", false}, {"problem", std::string(response.status().message())}};

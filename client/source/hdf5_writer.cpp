@@ -96,8 +96,11 @@ class Hdf5Writer : public ShardWriter {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // errors are ours to report
     Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
+    // The root group keeps times of its own unless it is told not to.
+    Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+    H5Pset_obj_track_times(creation, false);
     errno = 0;
-    file_ = Handle(H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
+    file_ = Handle(H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose);
     if (!file_.ok()) return Failed("cannot be written");
     Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose);
     if (!WriteTexts(root, "objects", layout_.objects, false)) return Failed("an attribute cannot be written");

@@ -105,14 +105,14 @@ LabName SiNameOf(const std::string& lab_name) {
   return {lab_name, Unit::kNone};
 }
 
-double LabNumber(Unit unit, double si_value) {
-  const double plain = FromSi(unit, si_value);
+double LabNumber(Unit unit, double value_in_si) {
+  const double plain = FromSi(unit, value_in_si);
   if (unit == Unit::kNone || !std::isfinite(plain)) return plain;
   // A lab's number has few digits: if fifteen come back to the same SI value, they are what was meant.
   char text[64];
   std::snprintf(text, sizeof text, "%.15g", plain);
   const double candidate = std::strtod(text, nullptr);
-  return ToSi(unit, candidate) == si_value ? candidate : plain;
+  return ToSi(unit, candidate) == value_in_si ? candidate : plain;
 }
 
 std::string LabText(const FileColumn& column, const v1::Column& wire, size_t i) {

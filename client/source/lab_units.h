@@ -27,7 +27,7 @@ LabName SiNameOf(const std::string& lab_name);
 
 // The file's number for an SI value: the shortest decimal that ToSi turns into exactly this value again,
 // where there is one within rounding; else FromSi's.
-double LabNumber(Unit unit, double si_value);
+double LabNumber(Unit unit, double value_in_si);
 
 // A JSON object of SI values as protobuf prints it, with names and numbers in the units of files; and back.
 // Goes through nested objects and arrays, but not into "covariates", whose names are the user's.
