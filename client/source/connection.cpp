@@ -81,9 +81,15 @@ absl::Status Connection::Connect(int server_index) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-  if (!channel->WaitForConnected(InSeconds(options_.connect_timeout_s)))
-    return absl::UnavailableError(
-        absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
+  // Refused at once is an answer too: the next server should not wait for the whole time-out.
+  const auto deadline = InSeconds(options_.connect_timeout_s);
+  for (grpc_connectivity_state state; (state = channel->GetState(true)) != GRPC_CHANNEL_READY;) {
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE)
+      return absl::UnavailableError(absl::StrCat("no connection to ", address));
+    if (!channel->WaitForStateChange(state, deadline))
+      return absl::UnavailableError(
+          absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
+  }
   server_index_ = server_index;
   address_ = address;
   channel_ = std::move(channel);
