@@ -76,13 +76,14 @@ bool Surface::Search::ComputeCrowded(uint32_t triangle) const {
   return crowded;
 }
 
-// Asked for the same triangle by two threads at once, both find the same.
+// Two bits a triangle: 0 not yet known, 1 no, 2 yes. Asked by two threads at once, both find the same.
 bool Surface::Search::Crowded(uint32_t triangle) const {
-  std::atomic<uint8_t>& known = crowded_[triangle];
-  uint8_t state = known.load(std::memory_order_relaxed);
+  std::atomic<uint8_t>& known = crowded_[triangle / 4];
+  const int shift = 2 * (triangle % 4);
+  int state = known.load(std::memory_order_relaxed) >> shift & 3;
   if (state == 0) {
     state = ComputeCrowded(triangle) ? 2 : 1;
-    known.store(state, std::memory_order_relaxed);
+    known.fetch_or(static_cast<uint8_t>(state << shift), std::memory_order_relaxed);
   }
   return state == 2;
 }

@@ -107,7 +107,9 @@ std::string EmbreeDescription() {
 }
 
 Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
-    : mesh_(mesh), centre_m_(bounds.Centre()), crowded_(new std::atomic<uint8_t>[mesh.triangles.size()]()) {
+    : mesh_(mesh),
+      centre_m_(bounds.Centre()),
+      crowded_(new std::atomic<uint8_t>[mesh.triangles.size() / 4 + 1]()) {
   reach_m_ = 0.5 * bounds.DiagonalM() * 1.0001;
   // Rounding of a coordinate is 6e-8 of it; sums and products of a few of them follow.
   rounding_m_ = 5e-7 * (bounds.min_m.cwiseAbs().cwiseMax(bounds.max_m.cwiseAbs()).maxCoeff() + reach_m_);
@@ -152,8 +154,9 @@ const TriangleTree& Surface::Search::tree() const {
 }
 
 uint64_t Surface::Search::MemoryBytes() const {
-  return scene_bytes_ + grown_vertices_m_.capacity() * sizeof(grown_vertices_m_[0]) + mesh_.triangles.size() +
-         tree_bytes_.load(std::memory_order_acquire) + curvature_bytes_.load(std::memory_order_acquire);
+  return scene_bytes_ + grown_vertices_m_.capacity() * sizeof(grown_vertices_m_[0]) +
+         mesh_.triangles.size() / 4 + 1 + tree_bytes_.load(std::memory_order_acquire) +
+         curvature_bytes_.load(std::memory_order_acquire);
 }
 
 }  // namespace touchstone

@@ -93,7 +93,7 @@ class Surface::Search {
   uint64_t scene_bytes_ = 0;
   mutable std::once_flag tree_once_;
   mutable std::unique_ptr<TriangleTree> tree_;
-  mutable std::unique_ptr<std::atomic<uint8_t>[]> crowded_;  // a triangle: 0 not yet known, 1 no, 2 yes
+  mutable std::unique_ptr<std::atomic<uint8_t>[]> crowded_;  // see Crowded
   mutable std::once_flag curvature_once_;
   mutable std::vector<float> vertex_curvature_per_m_;
   mutable std::atomic<uint64_t> tree_bytes_{0}, curvature_bytes_{0};

@@ -53,9 +53,10 @@ uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int dept
   const Eigen::Vector3f extent = range.middle_max - range.middle_min;
   const float length = extent.maxCoeff(&axis);
   const uint32_t half = range.begin + range.size() / 2;
-  // The last parts become full leaves: memory counts, and their boxes are much alike.
-  if (range.size() <= 8 * kMostInLeaf) {
-    const uint32_t first_part = (range.size() / 2 + kMostInLeaf - 1) / kMostInLeaf * kMostInLeaf;
+  // The last two levels become full nodes and leaves: memory counts, and their boxes are much alike.
+  if (range.size() <= kFull) {
+    const uint32_t part = range.size() <= kFull / 8 ? kMostInLeaf : kFull / 8;
+    const uint32_t first_part = (range.size() / 2 + part - 1) / part * part;
     Primitive* const middle = primitives + range.begin + first_part;
     std::nth_element(primitives + range.begin, middle, primitives + range.end,
                      [&](const Primitive& a, const Primitive& b) {
@@ -106,7 +107,8 @@ uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int dept
   return static_cast<uint32_t>(second - primitives);
 }
 
-// The children of a node: the part with the largest area is split until there are eight.
+// The children of a node: the part with the largest area (near the leaves, of the largest number) is split
+// until there are eight.
 int TriangleTree::SplitInEight(Primitive* primitives, const Range& range, int depth, Range* children) {
   int count = 1;
   children[0] = range;
@@ -114,7 +116,10 @@ int TriangleTree::SplitInEight(Primitive* primitives, const Range& range, int de
     int widest = -1;
     for (int i = 0; i < count; ++i) {
       if (children[i].size() <= kMostInLeaf) continue;
-      if (widest < 0 || children[i].HalfArea() > children[widest].HalfArea()) widest = i;
+      const bool wider =
+          widest < 0 || (range.size() <= kFull ? children[i].size() > children[widest].size()
+                                               : children[i].HalfArea() > children[widest].HalfArea());
+      if (wider) widest = i;
     }
     if (widest < 0) break;
     const Range parent = children[widest];
