@@ -128,7 +128,9 @@ TEST_P(EffectContract, HangsOnTheTouchAndNotOnItsPlaceInTheBatch) {
       EXPECT_EQ(whole.contact_m[a], part.contact_m[b]);
       EXPECT_EQ(whole.reported_time_s[a], part.reported_time_s[b]);
       EXPECT_EQ(whole.noise_sigma_s[a], part.noise_sigma_s[b]);
-      if (!part.noise_growth.empty()) EXPECT_EQ(whole.noise_growth[a], part.noise_growth[b]);
+      if (!part.noise_growth.empty()) {
+        EXPECT_EQ(whole.noise_growth[a], part.noise_growth[b]);
+      }
     }
   }
 }
@@ -144,7 +146,9 @@ TEST_P(EffectContract, StaysFiniteOverItsBoundsAndKeepsMisses) {
         EXPECT_EQ(std::isfinite(after.travel_m[i]), std::isfinite(before.travel_m[i]));
         EXPECT_EQ(std::isfinite(after.reported_time_s[i]), std::isfinite(before.reported_time_s[i]));
         EXPECT_GE(after.noise_sigma_s[i], 0);
-        if (!after.noise_growth.empty()) EXPECT_GE(after.noise_growth[i], 1);
+        if (!after.noise_growth.empty()) {
+          EXPECT_GE(after.noise_growth[i], 1);
+        }
       }
       EXPECT_GT(after.surface_scale, 0);
       EXPECT_GT(after.speed_factor, 0);
