@@ -13,6 +13,11 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+// A proposal on a triangle met at a cosine above the first is off in travel by less than the second times the
+// mesh's reach: vertices are grown by at most 5e-5 of it, and 5e-5 / 0.02 is 0.0025.
+constexpr double kFlatCosine = 0.02;
+constexpr double kSlackOfReach = 0.02;
+
 Contact NoContact() {
   return {kNaN, Eigen::Vector3d::Constant(kNaN), Eigen::Vector3d::Zero(), kNoTriangle};
 }
@@ -41,12 +46,29 @@ struct EmbreePacket<4> {
   }
 };
 
+// Whether lines are alike enough to be traced as one frustum. Embree 3.13 misses whole faces with a frustum that
+// holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none, too.
+template <int kWidth>
+bool RunTogether(const double (&direction)[3][kWidth]) {
+  constexpr double kLeastComponent = 1.0 / 64, kMostSpread = 1.0 / 8;
+  for (int axis = 0; axis < 3; ++axis) {
+    double least = direction[axis][0], most = least;
+    for (int k = 1; k < kWidth; ++k) {
+      least = std::min(least, direction[axis][k]);
+      most = std::max(most, direction[axis][k]);
+    }
+    const bool one_sign = least >= kLeastComponent || most <= -kLeastComponent;
+    if (!one_sign || most - least > kMostSpread) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-Contact Surface::Search::CastExactly(const Line& line, double longest_m) const {
+Contact Surface::Search::CastExactly(const Line& line, double longest_m, double earliest_m) const {
   // Only the part of the line near the mesh is searched, so that coordinates stay small.
   const double to_middle = (centre_m_ - line.origin_m).dot(line.direction);
-  const double first = std::max(0.0, to_middle - 1.01 * reach_m_);
+  const double first = std::max({0.0, to_middle - 1.01 * reach_m_, earliest_m});
   const Triple1 origin = ToTriple(line.origin_m), direction = ToTriple(line.direction);
   double best_travel = longest_m;
   LineTriangle<double> best_meet = {};
@@ -114,6 +136,7 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
   // Rays start where the line enters a ball round the mesh: standing far away costs no precision.
   alignas(64) typename EmbreePacket<kWidth>::RayHit rays;
   alignas(64) int valid[kWidth];
+  alignas(64) double start_m[kWidth];  // travel at which the ray starts
   const double reach = 1.01 * reach_m_, reach2 = reach_m_ * reach_m_;
   const double centre[3] = {centre_m_.x(), centre_m_.y(), centre_m_.z()};
   const float farthest = static_cast<float>(2.1 * reach_m_);
@@ -125,6 +148,7 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     const double start = to_middle - reach;
     const double first = start > 0 ? start : 0;
     const double mx = cx - to_middle * dx, my = cy - to_middle * dy, mz = cz - to_middle * dz;
+    start_m[k] = first;
     const bool may_meet =
         (mx * mx + my * my + mz * mz <= reach2) & (to_middle > -reach) & (first <= longest_m);
     valid[k] = may_meet ? -1 : 0;
@@ -146,7 +170,8 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
   for (int k = count; k < kWidth; ++k) valid[k] = 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.flags = RunTogether<kWidth>(direction) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                 : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
   EmbreePacket<kWidth>::Intersect(valid, scene_, &context, &rays);
 
   // The corners of the proposed triangles, by lane.
@@ -188,7 +213,16 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
         contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
         contacts->triangle[to] = triangle;
       } else {
-        Store(CastExactly({origins_m[k + lane], directions[k + lane]}, longest_m), to, contacts);
+        // A proposal bounds the search from below: the grown surface that Embree sees is met no later than the
+        // real one, but for a little that matters only at flat angles.
+        double earliest_m = 0;
+        if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID) {
+          const double cosine = std::abs(normal.x[lane] * along.x[lane] + normal.y[lane] * along.y[lane] +
+                                         normal.z[lane] * along.z[lane]);
+          if (cosine > kFlatCosine)
+            earliest_m = start_m[k + lane] + static_cast<double>(rays.ray.tfar[k + lane]) - kSlackOfReach * reach_m_;
+        }
+        Store(CastExactly({origins_m[k + lane], directions[k + lane]}, longest_m, earliest_m), to, contacts);
       }
     }
   }

@@ -44,7 +44,8 @@ class Surface::Search {
   ~Search();
 
   // The line's first contact by definition: every triangle near the line is tested in double precision.
-  Contact CastExactly(const Line& line, double longest_m) const;
+  // `earliest_m`: no contact comes before this travel.
+  Contact CastExactly(const Line& line, double longest_m, double earliest_m = 0) const;
 
   // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most
   // longest_m. `travel_bound_m`: some contact is known to come no later (infinity: none known); `likely` is
