@@ -50,7 +50,7 @@ struct EmbreePacket<4> {
 // holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none, too.
 template <int kWidth>
 bool RunTogether(const double (&direction)[3][kWidth]) {
-  constexpr double kLeastComponent = 1.0 / 64, kMostSpread = 1.0 / 8;
+  constexpr double kLeastComponent = 1.0 / 256, kMostSpread = 1.0 / 8;
   for (int axis = 0; axis < 3; ++axis) {
     double least = direction[axis][0], most = least;
     for (int k = 1; k < kWidth; ++k) {

@@ -178,7 +178,10 @@ absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles) {
     return absl::InvalidArgumentError(absl::StrCat("supershape: ", triangles, " triangles; expected ",
                                                    kLeastSupershapeTriangles, " to ",
                                                    kMostSupershapeTriangles));
-  // Round the axis a multiple of 8, from pole to pole a multiple of 4; squares on a sphere would be 2 to 1.
+  // Round the axis a multiple of 8, from pole to pole a multiple of 4; squares on a sphere would be 2 to 1. No
+  // factor 3 or 5 round the axis: else meridians stand at whole degrees, where plans put their touches, and every
+  // such touch would fall exactly on an edge, where the normal is a matter of rounding.
+  constexpr uint64_t kCoarse = 1000;  // too few choices there
   SupershapeSegments best;
   double least_cost = 1e300;
   for (uint32_t up = 4; up <= 4096; up += 4) {
@@ -186,9 +189,10 @@ absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles) {
     for (uint32_t around = 8 * static_cast<uint32_t>(wanted / 8); around <= wanted + 8; around += 8) {
       const SupershapeSegments candidate = {around, up};
       if (around < 8 || candidate.Triangles() > kMostSupershapeTriangles) continue;
+      if (triangles > kCoarse && (around % 3 == 0 || around % 5 == 0)) continue;
       const double off = std::abs(static_cast<double>(candidate.Triangles()) / triangles - 1.0);
       const double skew = std::abs(std::log(around / (2.0 * up)));
-      if (const double cost = off + 0.02 * skew; cost < least_cost) least_cost = cost, best = candidate;
+      if (const double cost = off + 0.2 * skew; cost < least_cost) least_cost = cost, best = candidate;
     }
   }
   return best;

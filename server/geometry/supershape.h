@@ -54,7 +54,7 @@ struct SupershapeSegments {
 inline constexpr uint64_t kLeastSupershapeTriangles = 48;
 inline constexpr uint64_t kMostSupershapeTriangles = 4'000'000;
 
-// The tessellation nearest to a number of triangles (20,000 gives 20,160), with steps of about the same size
+// The tessellation nearest to a number of triangles (20,000 gives 20,368), with steps of about the same size
 // both ways, lines on the equator, on every quarter and between two quarters, where the seed's shapes have
 // their edges. Never more than kMostSupershapeTriangles.
 absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles);

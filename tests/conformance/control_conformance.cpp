@@ -1,9 +1,7 @@
 // Leases, stop and state, and the standard services.
 #include <gmock/gmock.h>
 
-#include "google/protobuf/descriptor.pb.h"
 #include "grpc/health/v1/health.grpc.pb.h"
-#include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
 #include "tests/conformance/conformance.h"
 
 namespace touchstone {
@@ -108,37 +106,6 @@ TEST_F(ControlConformance, HealthIsServingForTheProcessAndForEachService) {
     ASSERT_TRUE(health->Check(&context, request, &response).ok()) << service;
     EXPECT_EQ(response.status(), grpc::health::v1::HealthCheckResponse::SERVING) << service;
   }
-}
-
-// What a stock client does to list and call every method: names by reflection, then each service's file.
-TEST_F(ControlConformance, ReflectionDescribesEveryServiceThatItNames) {
-  namespace reflection = grpc::reflection::v1alpha;
-  const auto stub = reflection::ServerReflection::NewStub(channel_);
-  grpc::ClientContext context;
-  const auto stream = stub->ServerReflectionInfo(&context);
-  reflection::ServerReflectionRequest request;
-  request.set_list_services("*");
-  reflection::ServerReflectionResponse response;
-  ASSERT_TRUE(stream->Write(request) && stream->Read(&response));
-  std::vector<std::string> names;
-  for (const auto& service : response.list_services_response().service()) names.push_back(service.name());
-  EXPECT_THAT(names, testing::IsSupersetOf(
-                         {"touchstone.v1.Source", "touchstone.v1.Control", "grpc.health.v1.Health"}));
-  for (const std::string& name : names) {
-    request.set_file_containing_symbol(name);
-    ASSERT_TRUE(stream->Write(request) && stream->Read(&response));
-    ASSERT_TRUE(response.has_file_descriptor_response())
-        << name << ": " << response.error_response().error_message();
-    bool described = false;
-    for (const std::string& bytes : response.file_descriptor_response().file_descriptor_proto()) {
-      google::protobuf::FileDescriptorProto file;
-      ASSERT_TRUE(file.ParseFromString(bytes));
-      for (const auto& service : file.service())
-        described |= file.package() + "." + service.name() == name && service.method_size() > 0;
-    }
-    EXPECT_TRUE(described) << name;
-  }
-  stream->WritesDone();
 }
 
 }  // namespace
