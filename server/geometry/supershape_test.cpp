@@ -72,7 +72,7 @@ TEST(Supershape, TheFiveAreClosedAndOutwardAt150Millimetres) {
     SCOPED_TRACE(name);
     const TriangleMesh mesh = Named(name, 20'000);
     ExpectWellMade(mesh);
-    EXPECT_NEAR(mesh.triangles.size(), 20'000, 200);
+    EXPECT_NEAR(mesh.triangles.size(), 20'000, 400);
     const Bounds bounds = ComputeBounds(mesh);
     EXPECT_NEAR(bounds.max_m.x() - bounds.min_m.x(), 0.150, 2e-8);
     EXPECT_NEAR(bounds.max_m.y() - bounds.min_m.y(), 0.150, 2e-8);
@@ -90,13 +90,24 @@ TEST(Supershape, EveryVertexIsOnTheFormula) {
   }
 }
 
+// Plans put touches at whole degrees; a meridian there would put every such touch on an edge.
+TEST(Supershape, MeridiansKeepOffWholeDegreesButForTheShapesOwnEdges) {
+  for (uint64_t triangles : {2'000, 20'000, 200'000, 2'000'000}) {
+    const uint32_t around = SegmentsForTriangles(triangles)->around;
+    for (uint32_t degrees = 0; degrees < 360; ++degrees) {
+      const bool on_meridian = (uint64_t{degrees} * around) % 360 == 0;
+      EXPECT_EQ(on_meridian, degrees % 45 == 0) << triangles << " triangles, " << degrees << " deg";
+    }
+  }
+}
+
 TEST(Supershape, AnyTessellationIsWellMade) {
   for (const std::string& name : SupershapeNames())
     for (uint64_t triangles : {48, 100, 2'000, 7'777, 300'000}) {
       SCOPED_TRACE(name + " " + std::to_string(triangles));
       const TriangleMesh mesh = Named(name, triangles);
       ExpectWellMade(mesh);
-      EXPECT_NEAR(static_cast<double>(mesh.triangles.size()) / triangles, 1, triangles < 1000 ? 0.5 : 0.06);
+      EXPECT_NEAR(static_cast<double>(mesh.triangles.size()) / triangles, 1, triangles < 1000 ? 0.5 : 0.07);
     }
   for (const SupershapeSegments segments :
        {SupershapeSegments{3, 2}, {5, 3}, {7, 1001}, {1999, 4}, {100, 101}}) {
