@@ -72,8 +72,8 @@ TEST(DatasetStream, StridedWorkersTogetherGiveTheWholeInOrder) {
   EXPECT_EQ(descriptors, Whole()[2].substr(0, descriptors.size()));
 }
 
-// With angles in steps of 5 deg many directions have a component of nearly zero; beside others they once made Embree's
-// frustum miss the front of lat00.
+// With angles in steps of 5 deg many directions have a component of nearly zero; beside others they once made
+// Embree's frustum miss the front of lat00.
 TEST(DatasetStream, CoarseAnglesGiveTheSameTouchesInWhateverCompany) {
   DatasetSpecification specification = SmallDataset(3000, "");
   specification.objects = {Supershape("lat00", 20000), Supershape("lat20", 20000)};

@@ -26,8 +26,10 @@ struct LineTriangle {
 
 // a, b, c: the corners relative to the line's origin.
 template <typename Number>
-[[gnu::always_inline]] inline LineTriangle<Number> MeetTriangle(const Triple<Number>& direction, const Triple<Number>& a,
-                                  const Triple<Number>& b, const Triple<Number>& c) {
+[[gnu::always_inline]] inline LineTriangle<Number> MeetTriangle(const Triple<Number>& direction,
+                                                                const Triple<Number>& a,
+                                                                const Triple<Number>& b,
+                                                                const Triple<Number>& c) {
   LineTriangle<Number> meet;
   meet.edge[0] = c - b;
   meet.edge[1] = a - c;

@@ -178,9 +178,9 @@ absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles) {
     return absl::InvalidArgumentError(absl::StrCat("supershape: ", triangles, " triangles; expected ",
                                                    kLeastSupershapeTriangles, " to ",
                                                    kMostSupershapeTriangles));
-  // Round the axis a multiple of 8, from pole to pole a multiple of 4; squares on a sphere would be 2 to 1. No
-  // factor 3 or 5 round the axis: else meridians stand at whole degrees, where plans put their touches, and every
-  // such touch would fall exactly on an edge, where the normal is a matter of rounding.
+  // Round the axis a multiple of 8, from pole to pole a multiple of 4; squares on a sphere would be 2 to 1.
+  // No factor 3 or 5 round the axis: else meridians stand at whole degrees, where plans put their touches,
+  // and every such touch would fall exactly on an edge, where the normal is a matter of rounding.
   constexpr uint64_t kCoarse = 1000;  // too few choices there
   SupershapeSegments best;
   double least_cost = 1e300;

@@ -162,7 +162,8 @@ absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& o
     YAML::Parser parser(stream);
     TreeBuilder builder;
     if (!parser.HandleNextDocument(builder))
-      return absl::InvalidArgumentError(absl::StrCat(origin, ": is empty; a model file begins with 'touchstone: model/1'"));
+      return absl::InvalidArgumentError(
+          absl::StrCat(origin, ": is empty; a model file begins with 'touchstone: model/1'"));
     YamlNode root = builder.TakeRoot();
     TreeBuilder rest;
     if (parser.HandleNextDocument(rest))
