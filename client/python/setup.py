@@ -7,6 +7,7 @@ import sys
 
 from setuptools import setup
 from setuptools.command.build_py import build_py
+from setuptools.command.egg_info import egg_info
 from setuptools.command.sdist import sdist
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -26,6 +27,14 @@ def generate_stubs():
         raise SystemExit(f"touchstone: {error}") from None
 
 
+class EggInfo(egg_info):
+    """Metadata comes first, and setuptools wants to see every package by then: a fresh clone has no stubs yet."""
+
+    def run(self):
+        generate_stubs()
+        super().run()
+
+
 class BuildPy(build_py):
     def run(self):
         generate_stubs()
@@ -38,4 +47,4 @@ class Sdist(sdist):
         super().run()
 
 
-setup(cmdclass={"build_py": BuildPy, "sdist": Sdist})
+setup(cmdclass={"egg_info": EggInfo, "build_py": BuildPy, "sdist": Sdist})
