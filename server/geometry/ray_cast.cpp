@@ -48,9 +48,10 @@ struct EmbreePacket<4> {
 
 // Whether lines are alike enough to be traced as one frustum. Embree 3.13 misses whole faces with a frustum that
 // holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none, too.
+constexpr double kLeastComponent = 1.0 / 256;
 template <int kWidth>
 bool RunTogether(const double (&direction)[3][kWidth]) {
-  constexpr double kLeastComponent = 1.0 / 256, kMostSpread = 1.0 / 8;
+  constexpr double kMostSpread = 1.0 / 8;
   for (int axis = 0; axis < 3; ++axis) {
     double least = direction[axis][0], most = least;
     for (int k = 1; k < kWidth; ++k) {
@@ -122,11 +123,12 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
 
 template <int kWidth>
 void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions,
-                                 int count, double longest_m, size_t at, Contacts* contacts) const {
+                                 const uint32_t* lines, int count, double longest_m,
+                                 Contacts* contacts) const {
   // Coordinates by lane; lanes beyond the last line repeat the first one.
   alignas(64) double origin[3][kWidth], direction[3][kWidth];
   for (int k = 0; k < kWidth; ++k) {
-    const int line = k < count ? k : 0;
+    const uint32_t line = lines[k < count ? k : 0];
     for (int axis = 0; axis < 3; ++axis) {
       origin[axis][k] = origins_m[line][axis];
       direction[axis][k] = directions[line][axis];
@@ -203,7 +205,7 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     const uint32_t certain_bits = BitsOf(certain);
     for (int lane = 0; lane < std::min(4, count - k); ++lane) {
       const uint32_t triangle = rays.hit.primID[k + lane];
-      const size_t to = at + k + lane;
+      const uint32_t to = lines[k + lane];
       if (valid[k + lane] == 0) {
         Store(NoContact(), to, contacts);
       } else if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID && (certain_bits >> lane & 1) &&
@@ -222,7 +224,7 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
           if (cosine > kFlatCosine)
             earliest_m = start_m[k + lane] + static_cast<double>(rays.ray.tfar[k + lane]) - kSlackOfReach * reach_m_;
         }
-        Store(CastExactly({origins_m[k + lane], directions[k + lane]}, longest_m, earliest_m), to, contacts);
+        Store(CastExactly({origins_m[to], directions[to]}, longest_m, earliest_m), to, contacts);
       }
     }
   }
@@ -232,9 +234,34 @@ template <int kWidth>
 void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
                                   absl::Span<const Eigen::Vector3d> directions, double longest_m,
                                   Contacts* contacts) const {
-  for (size_t at = 0; at < origins_m.size(); at += kWidth) {
-    const int count = static_cast<int>(std::min<size_t>(kWidth, origins_m.size() - at));
-    CastPacket<kWidth>(&origins_m[at], &directions[at], count, longest_m, at, contacts);
+  const uint32_t size = static_cast<uint32_t>(origins_m.size());
+  // Lines that no frustum may hold travel apart, so that they do not keep their neighbours from being one.
+  struct Packet {
+    uint32_t lines[kWidth];
+    int count = 0;
+  };
+  Packet packets[2];
+  const auto flush = [&](Packet* packet) {
+    if (packet->count > 0)
+      CastPacket<kWidth>(origins_m.data(), directions.data(), packet->lines, packet->count, longest_m,
+                         contacts);
+    packet->count = 0;
+  };
+  bool any_repeated = false;
+  for (uint32_t line = 0; line < size; ++line) {
+    if (line > 0 && SameLine(origins_m, directions, line - 1, line)) {
+      any_repeated = true;
+      continue;
+    }
+    const bool apart = directions[line].cwiseAbs().minCoeff() < kLeastComponent;
+    Packet& packet = packets[apart];
+    packet.lines[packet.count++] = line;
+    if (packet.count == kWidth) flush(&packet);
+  }
+  for (Packet& packet : packets) flush(&packet);
+  if (!any_repeated) return;
+  for (uint32_t line = 1; line < size; ++line) {
+    if (SameLine(origins_m, directions, line - 1, line)) CopyContact(line - 1, line, contacts);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include <atomic>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -35,6 +36,27 @@ inline void Store(const Contact& contact, size_t i, Contacts* contacts) {
   contacts->point_m[i] = contact.point_m;
   contacts->normal[i] = contact.normal;
   contacts->triangle[i] = contact.triangle;
+}
+
+// Whether two lines are the same, bit for bit. Plans in steps repeat poses, and repeated poses are sorted to
+// stand side by side: their lines are cast once.
+inline bool SameLine(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
+                     size_t a, size_t b) {
+  uint64_t differences = 0;
+  for (const auto& vectors : {origins_m, directions}) {
+    uint64_t p[3], q[3];
+    std::memcpy(p, vectors[a].data(), sizeof(p));
+    std::memcpy(q, vectors[b].data(), sizeof(q));
+    differences |= (p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2]);
+  }
+  return differences == 0;
+}
+
+inline void CopyContact(size_t from, size_t to, Contacts* contacts) {
+  contacts->travel_m[to] = contacts->travel_m[from];
+  contacts->point_m[to] = contacts->point_m[from];
+  contacts->normal[to] = contacts->normal[from];
+  contacts->triangle[to] = contacts->triangle[from];
 }
 
 class Surface::Search {
@@ -67,8 +89,8 @@ class Surface::Search {
   void CastPackets(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
                    double longest_m, Contacts* contacts) const;
   template <int kWidth>
-  void CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, int count,
-                  double longest_m, size_t at, Contacts* contacts) const;
+  void CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, const uint32_t* lines,
+                  int count, double longest_m, Contacts* contacts) const;
 
   // Puts a triangle's coordinates into lane k: corner[3 * corner + axis][k].
   template <size_t kWidth>

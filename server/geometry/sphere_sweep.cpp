@@ -200,6 +200,10 @@ void Surface::SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m,
   TOUCHSTONE_CHECK(radius_m > 0);
   CastLines(origins_m, directions, longest_m, contacts);
   for (size_t i = 0; i < origins_m.size(); ++i) {
+    if (i > 0 && SameLine(origins_m, directions, i - 1, i)) {
+      CopyContact(i - 1, i, contacts);
+      continue;
+    }
     // The foremost point's contact, if any, comes after the ball's.
     const double bound = contacts->triangle[i] == kNoTriangle ? std::numeric_limits<double>::infinity()
                                                               : contacts->travel_m[i];
