@@ -44,21 +44,22 @@ void ForAccepted(const TouchSampler::Block& block, Put put) {
     if (block.accepted[touch]) put(touch, block.slots[touch]);
 }
 
-// Contact times relative to the first, a finger at a time, so that the arithmetic vectorises.
+// Contact times relative to the first.
 void PutDescriptor(const ColumnWriter& writer, const TouchSampler::Block& block) {
-  const TouchBatch& batch = block.batch;
-  std::vector<double> first_s(batch.size(), INFINITY);
-  for (int finger = 0; finger < batch.fingers(); ++finger) {
-    const double* time_s = &batch.reported_time_s[batch.At(finger, 0)];
-    for (int touch = 0; touch < batch.size(); ++touch)
-      first_s[touch] = time_s[touch] < first_s[touch] ? time_s[touch] : first_s[touch];
-  }
-  for (int finger = 0; finger < batch.fingers(); ++finger) {
-    const double* time_s = &batch.reported_time_s[batch.At(finger, 0)];
-    ForAccepted(block, [&](int touch, uint32_t slot) {
-      writer.Put(slot, finger, static_cast<float>(time_s[touch] - first_s[touch]));
-    });
-  }
+  const int size = block.batch.size(), fingers = block.batch.fingers();
+  const double* const times_s = block.batch.reported_time_s.data();
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    double first_s = INFINITY;
+    for (int finger = 0; finger < fingers; ++finger) {
+      const double time_s = times_s[finger * size + touch];
+      first_s = time_s < first_s ? time_s : first_s;
+    }
+    char* const row = writer.At(slot);
+    for (int finger = 0; finger < fingers; ++finger) {
+      const float relative_s = static_cast<float>(times_s[finger * size + touch] - first_s);
+      std::memcpy(row + finger * sizeof(float), &relative_s, sizeof(float));
+    }
+  });
 }
 
 void PutContactTime(const ColumnWriter& writer, const TouchSampler::Block& block) {
@@ -129,6 +130,7 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
   if (batches.empty()) return absl::OkStatus();
   const uint32_t batch_size = batches[0].rows;  // only the last may have fewer
   std::vector<uint64_t> indices;
+  indices.reserve(batches.size() * batch_size);
   for (DatasetBatch& batch : batches) {
     batch.data.resize(columns_.size());
     batch.offsets.resize(columns_.size());
@@ -142,9 +144,12 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
     const std::string& name = columns_[column].name;
     if (name == "index" || name == "object") {
       const ColumnWriter writer(batches, column, batch_size, columns_[column].BytesPerSample());
+      const bool is_index = name == "index";
       for (size_t slot = 0; slot < indices.size(); ++slot) {
-        if (name == "index") writer.Put(slot, 0, indices[slot]);
-        if (name == "object") writer.Put(slot, 0, static_cast<int32_t>(indices[slot] % objects));
+        if (is_index)
+          writer.Put(slot, 0, indices[slot]);
+        else
+          writer.Put(slot, 0, static_cast<int32_t>(indices[slot] % objects));
       }
     }
     for (const NamedPut& named : kTouchColumns)

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace touchstone {
@@ -42,8 +41,9 @@ inline uint64_t Compress(uint64_t value, uint64_t mask) {
 }  // namespace
 
 // Poses beyond the sample's range share its border: that costs coherence, never a result.
-uint64_t CoherentOrder::Range::Quantise(double value) const {
-  return static_cast<uint64_t>(std::clamp((value - lower) * factor, 0.0, 255.0));
+inline uint64_t CoherentOrder::Range::Quantise(double value) const {
+  const double scaled = (value - lower) * factor;
+  return static_cast<uint32_t>(static_cast<int32_t>(std::min(std::max(scaled, 0.0), 255.0)));
 }
 
 void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
@@ -63,7 +63,10 @@ void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
 
 void CoherentOrder::Add(absl::Span<const TouchPose> poses) {
   const Range lateral = {-1, 127.999};
-  for (const TouchPose& pose : poses) {
+  const size_t before = keys_.size();
+  keys_.resize(before + poses.size());
+  for (size_t k = 0; k < poses.size(); ++k) {
+    const TouchPose& pose = poses[k];
     uint64_t key =
         Spread(lateral.Quantise(pose.lateral.x())) << 1 | Spread(lateral.Quantise(pose.lateral.z()));
     for (int axis = 0; axis < 3; ++axis) {
@@ -71,36 +74,34 @@ void CoherentOrder::Add(absl::Span<const TouchPose> poses) {
       key |= Spread(start_[axis].Quantise(start)) << (7 - axis);
       key |= Spread(target_[axis].Quantise(pose.target_m[axis])) << (4 - axis);
     }
-    keys_.push_back(key);
+    keys_[before + k] = key;
   }
 }
 
 absl::Span<const uint32_t> CoherentOrder::Sort() {
   const size_t n = keys_.size();
-  order_.resize(n);
-  std::iota(order_.begin(), order_.end(), 0);
-
-  // Only bits that vary are sorted by, the highest 33 of them, eleven a pass.
+  // Only bits that vary are sorted by, the highest 32 of them, eleven a pass; a pose's number follows them in
+  // the word that is moved.
   uint64_t varying = 0;
   for (uint64_t key : keys_) varying |= key ^ keys_[0];
   const int bits = __builtin_popcountll(varying);
-  const int used = std::min(bits, 33);
-  for (uint64_t& key : keys_) key = Compress(key, varying) >> (bits - used);
-  keys_swap_.resize(n);
-  order_swap_.resize(n);
-  for (int shift = 0; shift < used; shift += 11) {
-    std::array<uint32_t, 2048> begin{};
-    for (uint64_t key : keys_) ++begin[(key >> shift) & 2047];
-    uint32_t sum = 0;
-    for (uint32_t& count : begin) sum += std::exchange(count, sum);
-    for (size_t k = 0; k < n; ++k) {
-      const uint32_t place = begin[(keys_[k] >> shift) & 2047]++;
-      keys_swap_[place] = keys_[k];
-      order_swap_[place] = order_[k];
-    }
-    keys_.swap(keys_swap_);
-    order_.swap(order_swap_);
+  const int used = std::min(bits, 32);
+  constexpr int kPasses = 3, kBitsAPass = 11, kBuckets = 1 << kBitsAPass;
+  std::array<std::array<uint32_t, kBuckets>, kPasses> begin{};
+  for (size_t k = 0; k < n; ++k) {
+    const uint64_t key = Compress(keys_[k], varying) >> (bits - used);
+    for (int pass = 0; pass < kPasses; ++pass) ++begin[pass][(key >> (kBitsAPass * pass)) % kBuckets];
+    keys_[k] = key << 32 | k;
   }
+  keys_swap_.resize(n);
+  for (int pass = 0; kBitsAPass * pass < used; ++pass) {
+    uint32_t sum = 0;
+    for (uint32_t& count : begin[pass]) sum += std::exchange(count, sum);
+    for (uint64_t key : keys_) keys_swap_[begin[pass][(key >> (32 + kBitsAPass * pass)) % kBuckets]++] = key;
+    keys_.swap(keys_swap_);
+  }
+  order_.resize(n);
+  for (size_t k = 0; k < n; ++k) order_[k] = static_cast<uint32_t>(keys_[k]);
   return order_;
 }
 

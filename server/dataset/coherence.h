@@ -27,7 +27,7 @@ class CoherentOrder {
   };
   Range start_[3], target_[3];
   std::vector<uint64_t> keys_, keys_swap_;
-  std::vector<uint32_t> order_, order_swap_;
+  std::vector<uint32_t> order_;
 };
 
 }  // namespace touchstone

@@ -66,8 +66,9 @@ absl::Status TouchSampler::Run(absl::Span<const uint64_t> indices, Until until,
   const size_t objects = specification_.objects.size();
   for (size_t object = 0; object < objects; ++object) {
     workspace->slots.clear();
+    workspace->slots.reserve(indices.size());
     for (size_t slot = 0; slot < indices.size(); ++slot)
-      if (indices[slot] % objects == object) workspace->slots.push_back(slot);
+      if (objects == 1 || indices[slot] % objects == object) workspace->slots.push_back(slot);
     TOUCHSTONE_RETURN_IF_ERROR(
         RunObject(object, indices, until, previous_press_m, cancelled, workspace, sink));
   }

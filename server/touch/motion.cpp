@@ -24,14 +24,28 @@ void FindFirstFingers(TouchBatch* batch) {
 
 void TravelToTime(TouchBatch* batch) {
   const double acceleration = batch->acceleration_m_s2;
-  for (int finger = 0; finger < batch->fingers(); ++finger) {
+  if (!(acceleration > 0)) {
+    const double factor = batch->speed_factor;
+    for (int finger = 0; finger < batch->fingers(); ++finger) {
+      const double* const speeds_m_s = batch->speed_m_s.data();
+      const double* const travels_m = batch->travel_m.data() + batch->At(finger, 0);
+      double* const times_s = batch->contact_time_s.data() + batch->At(finger, 0);
+      double* const slopes_s_m = batch->time_per_travel_s_m.data() + batch->At(finger, 0);
+      for (int touch = 0; touch < batch->size(); ++touch) {
+        const double speed_m_s = speeds_m_s[touch] * factor;
+        times_s[touch] = travels_m[touch] / speed_m_s;
+        slopes_s_m[touch] = 1 / speed_m_s;
+      }
+    }
+  }
+  for (int finger = 0; acceleration > 0 && finger < batch->fingers(); ++finger) {
     const int begin = batch->At(finger, 0);
     for (int touch = 0; touch < batch->size(); ++touch) {
       const double speed_m_s = batch->speed_m_s[touch] * batch->speed_factor;
       const double travel_m = batch->travel_m[begin + touch];
       double time_s = travel_m / speed_m_s;
       double slope_s_m = 1 / speed_m_s;
-      if (acceleration > 0 && travel_m > 0) {
+      if (travel_m > 0) {
         const double ramp_m = speed_m_s * speed_m_s / (2 * acceleration);
         if (travel_m < ramp_m) {
           time_s = std::sqrt(2 * travel_m / acceleration);
@@ -61,15 +75,27 @@ void TravelToTime(TouchBatch* batch) {
     }
   }
 
-  // How far each finger is pressed in when the last one touches.
-  for (int touch = 0; touch < batch->size(); ++touch) {
-    double last_s = -INFINITY;
-    for (int finger = 0; finger < batch->fingers(); ++finger)
-      last_s = std::max(last_s, batch->contact_time_s[batch->At(finger, touch)]);  // max(x, NaN) is x
+  // How far each finger is pressed in when the last one touches. Finger by finger, so that it vectorises.
+  const int size = batch->size();
+  double* const presses_m = batch->press_m.data();
+  const double* const times_s = batch->contact_time_s.data();
+  const double* const speeds_m_s = batch->speed_m_s.data();
+  constexpr int kTile = 256;
+  double last_s[kTile];
+  for (int begin = 0; begin < size; begin += kTile) {
+    const int n = std::min(kTile, size - begin);
+    std::fill(last_s, last_s + n, -INFINITY);
     for (int finger = 0; finger < batch->fingers(); ++finger) {
-      const int k = batch->At(finger, touch);
-      const double press_m = (last_s - batch->contact_time_s[k]) * batch->speed_m_s[touch];
-      batch->press_m[k] = std::isnan(press_m) ? 0 : press_m;
+      const double* const own_s = times_s + batch->At(finger, begin);
+      for (int k = 0; k < n; ++k) last_s[k] = last_s[k] < own_s[k] ? own_s[k] : last_s[k];  // NaN is never last
+    }
+    for (int finger = 0; finger < batch->fingers(); ++finger) {
+      const double* const own_s = times_s + batch->At(finger, begin);
+      double* const own_press_m = presses_m + batch->At(finger, begin);
+      for (int k = 0; k < n; ++k) {
+        const double press_m = (last_s[k] - own_s[k]) * speeds_m_s[begin + k];
+        own_press_m[k] = press_m == press_m ? press_m : 0;
+      }
     }
   }
 }
