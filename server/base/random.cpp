@@ -76,11 +76,23 @@ inline void CosSinTurn(double u, double* cosine, double* sine) {
   *sine = BitsToDouble(y ^ (((quarter >> 1) & 1) << 63));
 }
 
+// The functions of the header, for inlining here.
+inline std::array<uint64_t, 4> Block(uint64_t seed, RandomDomain domain, uint64_t index, uint64_t attempt,
+                                     uint64_t block) {
+  const r123::Philox4x64::ctr_type counter = {{block, index, attempt, 0}};
+  const r123::Philox4x64::key_type key = {{seed, static_cast<uint64_t>(domain)}};
+  const r123::Philox4x64::ctr_type words = r123::Philox4x64()(counter, key);
+  return {words[0], words[1], words[2], words[3]};
+}
+inline double Uniform(uint64_t word) {
+  return BitsToDouble((word >> 12) | 0x3FF0000000000000ull) - 1.0;
+}
+
 // Two deviates from two words (Box-Muller). 1 - u lies in (0, 1], so the logarithm is finite.
 inline void NormalPair(uint64_t first, uint64_t second, double* a, double* b) {
-  const double radius = std::sqrt(-2.0 * Log(1.0 - UniformFromWord(first)));
+  const double radius = std::sqrt(-2.0 * Log(1.0 - Uniform(first)));
   double cosine, sine;
-  CosSinTurn(UniformFromWord(second), &cosine, &sine);
+  CosSinTurn(Uniform(second), &cosine, &sine);
   *a = radius * cosine;
   *b = radius * sine;
 }
@@ -89,14 +101,11 @@ inline void NormalPair(uint64_t first, uint64_t second, double* a, double* b) {
 
 std::array<uint64_t, 4> RandomBlock(uint64_t seed, RandomDomain domain, uint64_t index, uint64_t attempt,
                                     uint64_t block) {
-  const r123::Philox4x64::ctr_type counter = {{block, index, attempt, 0}};
-  const r123::Philox4x64::key_type key = {{seed, static_cast<uint64_t>(domain)}};
-  const r123::Philox4x64::ctr_type words = r123::Philox4x64()(counter, key);
-  return {words[0], words[1], words[2], words[3]};
+  return Block(seed, domain, index, attempt, block);
 }
 
 double UniformFromWord(uint64_t word) {
-  return BitsToDouble((word >> 12) | 0x3FF0000000000000ull) - 1.0;
+  return Uniform(word);
 }
 
 void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, int count, int width,
@@ -111,7 +120,7 @@ void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, in
       // One block serves two pairs; the scalar generator runs first, then the vector arithmetic.
       uint64_t third[kTile], fourth[kTile];
       for (int k = 0; k < n; ++k) {
-        const auto words = RandomBlock(seed, domain, indices[begin + k], 0, pair / 2);
+        const auto words = Block(seed, domain, indices[begin + k], 0, pair / 2);
         first[k] = words[0], second[k] = words[1], third[k] = words[2], fourth[k] = words[3];
       }
       for (int half = 0; half < 2 && pair + half < pairs; ++half) {
@@ -129,7 +138,7 @@ void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, in
 
 uint64_t RandomStream::Word() {
   if (used_ == 4) {
-    words_ = RandomBlock(seed_, domain_, index_, attempt_, next_block_++);
+    words_ = Block(seed_, domain_, index_, attempt_, next_block_++);
     used_ = 0;
   }
   return words_[used_++];

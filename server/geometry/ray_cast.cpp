@@ -93,6 +93,7 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
       std::min(longest_m - first, 2.02 * reach_m_) + rounding_m_,
       [&](const uint32_t* ids, int count, double* last_m) {
         // Four at a time are looked at roughly: whether the line passes within the rounding.
+        // Lanes compute what plain numbers would, so a travel that comes too late needs no second look.
         for (int i = 0; i < count; i += 4) {
           alignas(32) double corner[9][4];
           for (int k = 0; k < 4; ++k) LoadCorners(ids[std::min(i + k, count - 1)], k, corner);
@@ -103,7 +104,7 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
           };
           const Triple<Double4> a = load(0), b = load(1), c = load(2);
           const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
-          Mask4 near = meet.facing == meet.facing;
+          Mask4 near = (meet.travel_m > 0) & (meet.travel_m <= best_travel);
           for (int e = 0; e < 3; ++e) {
             const Double4 inwards = meet.facing > 0 ? meet.moment[e] : -meet.moment[e];
             near &= (inwards >= 0) |
@@ -111,7 +112,9 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
           }
           for (uint32_t rest = BitsOf(near); rest; rest &= rest - 1) {
             const int k = i + __builtin_ctz(rest);
-            if (k < count) consider(ids[k]);
+            if (k >= count || meet.travel_m[k - i] > best_travel) continue;
+            if (meet.travel_m[k - i] == best_travel && best != kNoTriangle && ids[k] > best) continue;
+            consider(ids[k]);
           }
         }
         // Boxes that begin a rounding later may still hold a contact that comes first.
@@ -235,34 +238,29 @@ void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
                                   absl::Span<const Eigen::Vector3d> directions, double longest_m,
                                   Contacts* contacts) const {
   const uint32_t size = static_cast<uint32_t>(origins_m.size());
+  if (size == 0) return;
   // Lines that no frustum may hold travel apart, so that they do not keep their neighbours from being one.
-  struct Packet {
-    uint32_t lines[kWidth];
-    int count = 0;
-  };
-  Packet packets[2];
-  const auto flush = [&](Packet* packet) {
-    if (packet->count > 0)
-      CastPacket<kWidth>(origins_m.data(), directions.data(), packet->lines, packet->count, longest_m,
-                         contacts);
-    packet->count = 0;
-  };
-  bool any_repeated = false;
+  // Whether a line repeats the one before cannot be foreseen, so nothing branches on it.
+  std::vector<uint32_t> together(size), apart(size);
+  uint32_t together_count = 0, apart_count = 0;
   for (uint32_t line = 0; line < size; ++line) {
-    if (line > 0 && SameLine(origins_m, directions, line - 1, line)) {
-      any_repeated = true;
-      continue;
-    }
-    const bool apart = directions[line].cwiseAbs().minCoeff() < kLeastComponent;
-    Packet& packet = packets[apart];
-    packet.lines[packet.count++] = line;
-    if (packet.count == kWidth) flush(&packet);
+    const bool first = line == 0 || !SameLine(origins_m, directions, line - 1, line);
+    const bool flat = directions[line].cwiseAbs().minCoeff() < kLeastComponent;
+    together[together_count] = line;
+    together_count += first & !flat;
+    apart[apart_count] = line;
+    apart_count += first & flat;
   }
-  for (Packet& packet : packets) flush(&packet);
-  if (!any_repeated) return;
-  for (uint32_t line = 1; line < size; ++line) {
-    if (SameLine(origins_m, directions, line - 1, line)) CopyContact(line - 1, line, contacts);
-  }
+  const auto cast = [&](const std::vector<uint32_t>& lines, uint32_t count) {
+    for (uint32_t at = 0; at < count; at += kWidth)
+      CastPacket<kWidth>(origins_m.data(), directions.data(), &lines[at],
+                         static_cast<int>(std::min<uint32_t>(kWidth, count - at)), longest_m, contacts);
+  };
+  cast(together, together_count);
+  cast(apart, apart_count);
+  if (together_count + apart_count == size) return;
+  for (uint32_t line = 1; line < size; ++line)
+    CopyContact(line - SameLine(origins_m, directions, line - 1, line), line, contacts);
 }
 
 void Surface::Search::Cast(absl::Span<const Eigen::Vector3d> origins_m,
