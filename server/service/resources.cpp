@@ -139,8 +139,10 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::s
       if (absl::StartsWith(model->Hash(), prefix)) return model;
     Refresh();
   }
+  std::vector<std::string> known;
+  for (const auto& [name, model] : models_) known.push_back(model->Hash().substr(0, 12));
   return absl::NotFoundError(
-      absl::StrCat("model: no model has the hash ", prefix, "; `touchstone model list` shows them"));
+      absl::StrCat("model.hash: no model has the hash '", prefix, "'", DidYouMean(prefix, known)));
 }
 
 absl::Status ModelStore::Create(const Model& model) {
