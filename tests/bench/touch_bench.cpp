@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 #include <embree3/rtcore.h>
 
+#include "server/base/units.h"
 #include "tests/bench/brute_force.h"
 #include "tests/bench/scene.h"
 
@@ -11,8 +12,11 @@ namespace {
 constexpr uint32_t kBatch = 4096;
 
 // Poses, casting, effects, noise and output of whole chunks, as the stream's tasks make them.
-void MakeChunks(benchmark::State& state, const std::string& effects, uint64_t triangles, uint32_t batches) {
-  const BatchMaker maker(Touches(Lat20(triangles), effects));
+void MakeChunks(benchmark::State& state, const std::string& effects, uint64_t triangles, uint32_t batches,
+                double step_angle_deg = 1) {
+  const auto specification = Touches(Lat20(triangles), effects);
+  specification->plan.sphere.step_angle_rad = step_angle_deg * kPi / 180;
+  const BatchMaker maker(specification);
   TouchSampler::Workspace workspace;
   const std::atomic<bool> cancelled{false};
   uint64_t index = 0;
@@ -38,6 +42,16 @@ BENCHMARK(Touches20k)
     ->Arg(2)
     ->Arg(8)
     ->Arg(16)
+    ->Arg(32)
+    ->Arg(64)
+    ->Unit(benchmark::kMillisecond);
+
+// Steps so fine that no pose comes twice: what the default plan's 65,160 poses, cast once a chunk, save.
+void TouchesWithoutRepeats(benchmark::State& state) {
+  MakeChunks(state, kNoise, kTriangles, state.range(0), 0.01);
+}
+BENCHMARK(TouchesWithoutRepeats)
+    ->Name("touches/without_repeats")
     ->Arg(32)
     ->Arg(64)
     ->Unit(benchmark::kMillisecond);
