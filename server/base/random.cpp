@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <vector>
+
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
 
 #include "server/base/units.h"
 
@@ -68,7 +71,7 @@ inline void CosSinTurn(double u, double* cosine, double* sine) {
                                                                     w * (-1.0 / 87178291200.0 +
                                                                          w * (1.0 / 20922789888000.0))))))));
   // Quarter turn q: (c, s), (-s, c), (-c, -s), (s, -c); signs and the swap by bits, without a branch.
-  const uint64_t swap = (quarter & 1) ? ~0ull : 0ull;
+  const uint64_t swap = 0 - (quarter & 1);
   const uint64_t c_bits = DoubleToBits(c), s_bits = DoubleToBits(s);
   const uint64_t x = (s_bits & swap) | (c_bits & ~swap);
   const uint64_t y = (c_bits & swap) | (s_bits & ~swap);
@@ -88,13 +91,29 @@ inline double Uniform(uint64_t word) {
   return BitsToDouble((word >> 12) | 0x3FF0000000000000ull) - 1.0;
 }
 
-// Two deviates from two words (Box-Muller). 1 - u lies in (0, 1], so the logarithm is finite.
-inline void NormalPair(uint64_t first, uint64_t second, double* a, double* b) {
-  const double radius = std::sqrt(-2.0 * Log(1.0 - Uniform(first)));
-  double cosine, sine;
-  CosSinTurn(Uniform(second), &cosine, &sine);
-  *a = radius * cosine;
-  *b = radius * sine;
+// Square roots in place. The C library's may set errno, which keeps a loop from being vectorised.
+inline void SquareRoots(double* values, int count) {
+  int k = 0;
+#ifdef __AVX__
+  for (; k + 4 <= count; k += 4) _mm256_storeu_pd(values + k, _mm256_sqrt_pd(_mm256_loadu_pd(values + k)));
+#endif
+  for (; k < count; ++k) values[k] = std::sqrt(values[k]);
+}
+
+// Deviates that are computed together.
+constexpr int kTile = 256;
+
+// Two deviates from two words (Box-Muller), for `count` <= kTile pairs. 1 - u lies in (0, 1], so the logarithm is
+// finite.
+inline void NormalPairs(const uint64_t* first, const uint64_t* second, int count, double* a, double* b) {
+  double radius[kTile];
+  for (int k = 0; k < count; ++k) radius[k] = -2.0 * Log(1.0 - Uniform(first[k]));
+  SquareRoots(radius, count);
+  for (int k = 0; k < count; ++k) CosSinTurn(Uniform(second[k]), &a[k], &b[k]);
+  for (int k = 0; k < count; ++k) {
+    a[k] = radius[k] * a[k];
+    b[k] = radius[k] * b[k];
+  }
 }
 
 }  // namespace
@@ -110,7 +129,6 @@ double UniformFromWord(uint64_t word) {
 
 void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, int count, int width,
                  double* normals) {
-  constexpr int kTile = 256;
   const int pairs = (width + 1) / 2;
   double a[kTile], b[kTile];
   uint64_t first[kTile], second[kTile];
@@ -126,7 +144,7 @@ void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, in
       for (int half = 0; half < 2 && pair + half < pairs; ++half) {
         const uint64_t* u = half == 0 ? first : third;
         const uint64_t* v = half == 0 ? second : fourth;
-        for (int k = 0; k < n; ++k) NormalPair(u[k], v[k], &a[k], &b[k]);
+        NormalPairs(u, v, n, a, b);
         const int j = 2 * (pair + half);
         for (int k = 0; k < n; ++k) normals[(begin + k) * width + j] = a[k];
         if (j + 1 < width)
@@ -152,7 +170,7 @@ uint64_t RandomStream::Below(uint64_t bound) {
 double RandomStream::Normal() {
   double a, b;
   const uint64_t first = Word(), second = Word();
-  NormalPair(first, second, &a, &b);
+  NormalPairs(&first, &second, 1, &a, &b);
   return a;
 }
 
