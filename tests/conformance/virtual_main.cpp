@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   touchstone::ServerOptions options;
   options.listen = "127.0.0.1:0";
   options.supershape_triangles = 2000;
-  options.lease_window_s = 0.3;
+  options.lease_window_s = 2;
   auto server = touchstone::Server::Start(options);
   if (!server.ok()) {
     std::fprintf(stderr, "%s\n", std::string(server.status().message()).c_str());
