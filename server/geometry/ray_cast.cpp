@@ -242,9 +242,11 @@ void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
   // Lines that no frustum may hold travel apart, so that they do not keep their neighbours from being one.
   // Whether a line repeats the one before cannot be foreseen, so nothing branches on it.
   std::vector<uint32_t> together(size), apart(size);
+  std::vector<uint8_t> repeats(size);
   uint32_t together_count = 0, apart_count = 0;
   for (uint32_t line = 0; line < size; ++line) {
     const bool first = line == 0 || !SameLine(origins_m, directions, line - 1, line);
+    repeats[line] = !first;
     const bool flat = directions[line].cwiseAbs().minCoeff() < kLeastComponent;
     together[together_count] = line;
     together_count += first & !flat;
@@ -260,7 +262,7 @@ void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
   cast(apart, apart_count);
   if (together_count + apart_count == size) return;
   for (uint32_t line = 1; line < size; ++line)
-    CopyContact(line - SameLine(origins_m, directions, line - 1, line), line, contacts);
+    CopyContact(line - repeats[line], line, contacts);
 }
 
 void Surface::Search::Cast(absl::Span<const Eigen::Vector3d> origins_m,
