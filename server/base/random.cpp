@@ -103,8 +103,8 @@ inline void SquareRoots(double* values, int count) {
 // Deviates that are computed together.
 constexpr int kTile = 256;
 
-// Two deviates from two words (Box-Muller), for `count` <= kTile pairs. 1 - u lies in (0, 1], so the logarithm is
-// finite.
+// Two deviates from two words (Box-Muller), for `count` <= kTile pairs. 1 - u lies in (0, 1], so the
+// logarithm is finite.
 inline void NormalPairs(const uint64_t* first, const uint64_t* second, int count, double* a, double* b) {
   double radius[kTile];
   for (int k = 0; k < count; ++k) radius[k] = -2.0 * Log(1.0 - Uniform(first[k]));

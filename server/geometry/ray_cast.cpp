@@ -46,8 +46,9 @@ struct EmbreePacket<4> {
   }
 };
 
-// Whether lines are alike enough to be traced as one frustum. Embree 3.13 misses whole faces with a frustum that
-// holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none, too.
+// Whether lines are alike enough to be traced as one frustum. Embree 3.13 misses whole faces with a frustum
+// that holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none,
+// too.
 constexpr double kLeastComponent = 1.0 / 256;
 template <int kWidth>
 bool RunTogether(const double (&direction)[3][kWidth]) {
@@ -218,14 +219,15 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
         contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
         contacts->triangle[to] = triangle;
       } else {
-        // A proposal bounds the search from below: the grown surface that Embree sees is met no later than the
-        // real one, but for a little that matters only at flat angles.
+        // A proposal bounds the search from below: the grown surface that Embree sees is met no later than
+        // the real one, but for a little that matters only at flat angles.
         double earliest_m = 0;
         if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID) {
           const double cosine = std::abs(normal.x[lane] * along.x[lane] + normal.y[lane] * along.y[lane] +
                                          normal.z[lane] * along.z[lane]);
           if (cosine > kFlatCosine)
-            earliest_m = start_m[k + lane] + static_cast<double>(rays.ray.tfar[k + lane]) - kSlackOfReach * reach_m_;
+            earliest_m =
+                start_m[k + lane] + static_cast<double>(rays.ray.tfar[k + lane]) - kSlackOfReach * reach_m_;
         }
         Store(CastExactly({origins_m[to], directions[to]}, longest_m, earliest_m), to, contacts);
       }
@@ -261,8 +263,7 @@ void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
   cast(together, together_count);
   cast(apart, apart_count);
   if (together_count + apart_count == size) return;
-  for (uint32_t line = 1; line < size; ++line)
-    CopyContact(line - repeats[line], line, contacts);
+  for (uint32_t line = 1; line < size; ++line) CopyContact(line - repeats[line], line, contacts);
 }
 
 void Surface::Search::Cast(absl::Span<const Eigen::Vector3d> origins_m,

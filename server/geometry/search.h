@@ -40,8 +40,8 @@ inline void Store(const Contact& contact, size_t i, Contacts* contacts) {
 
 // Whether two lines are the same, bit for bit. Plans in steps repeat poses, and repeated poses are sorted to
 // stand side by side: their lines are cast once.
-inline bool SameLine(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
-                     size_t a, size_t b) {
+inline bool SameLine(absl::Span<const Eigen::Vector3d> origins_m,
+                     absl::Span<const Eigen::Vector3d> directions, size_t a, size_t b) {
   uint64_t differences = 0;
   for (const auto& vectors : {origins_m, directions}) {
     uint64_t p[3], q[3];

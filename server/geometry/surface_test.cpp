@@ -179,6 +179,10 @@ TEST(CastLines, HangsOnNothingButTheLine) {
     std::sort(order.begin(), order.end(),
               [&](size_t a, size_t b) { return lines.directions[a].x() < lines.directions[b].x(); });
     EXPECT_EQ(same(order, 4096), 0u);
+    // Lines that come several times in a row, which are cast once.
+    std::vector<size_t> repeated;
+    for (const size_t i : order) repeated.insert(repeated.end(), 1 + random() % 4, i);
+    EXPECT_EQ(same(repeated, 1000), 0u);
     // A fresh surface, so that four threads also race for everything that is built at the first call.
     const auto fresh = Make(c.surface->mesh());
     std::vector<std::thread> threads;

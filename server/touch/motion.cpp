@@ -87,7 +87,8 @@ void TravelToTime(TouchBatch* batch) {
     std::fill(last_s, last_s + n, -INFINITY);
     for (int finger = 0; finger < batch->fingers(); ++finger) {
       const double* const own_s = times_s + batch->At(finger, begin);
-      for (int k = 0; k < n; ++k) last_s[k] = last_s[k] < own_s[k] ? own_s[k] : last_s[k];  // NaN is never last
+      for (int k = 0; k < n; ++k)
+        last_s[k] = last_s[k] < own_s[k] ? own_s[k] : last_s[k];  // NaN is never last
     }
     for (int finger = 0; finger < batch->fingers(); ++finger) {
       const double* const own_s = times_s + batch->At(finger, begin);
