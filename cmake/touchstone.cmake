@@ -38,6 +38,12 @@ file(CONFIGURE OUTPUT ${TOUCHSTONE_TEST_PATHS} CONTENT [[
 #define TOUCHSTONE_SHARED_DATA "@CMAKE_SOURCE_DIR@/../shared/data"
 ]] @ONLY)
 
+# Sanitizers cost a factor of ten and more.
+set(TOUCHSTONE_TEST_TIMEOUT_S 600)
+if(TOUCHSTONE_SANITIZE)
+  set(TOUCHSTONE_TEST_TIMEOUT_S 1800)
+endif()
+
 # touchstone_test(NAME SOURCES a_test.cpp ... LINKS ...): one test binary a folder, NAME_test.
 function(touchstone_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
@@ -45,7 +51,7 @@ function(touchstone_test name)
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
   target_compile_options(${name}_test PRIVATE -include ${TOUCHSTONE_TEST_PATHS})
   add_test(NAME ${name} COMMAND ${name}_test)
-  set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S})
 endfunction()
 
 # touchstone_link(TARGET PUBLIC|PRIVATE links...)
