@@ -17,7 +17,7 @@ BATCH, SECONDS, SPACING_M, SPEED_M_S, SIGMA_S = 131072, 4.0, 0.03, 0.02, 0.005
 
 def load(path):
     """Vertices in metres and triangles of an OFF file in millimetres."""
-    tokens = path.read_text().split()
+    tokens = " ".join(line.split("#")[0] for line in path.read_text().splitlines()).split()
     vertices, faces = int(tokens[1]), int(tokens[2])
     xyz = np.array(tokens[4:4 + 3 * vertices], dtype=np.float32).reshape(-1, 3) * 1e-3
     return xyz, np.array(tokens[4 + 3 * vertices:4 + 3 * vertices + 4 * faces], dtype=np.uint32).reshape(-1, 4)[:, 1:]
@@ -44,6 +44,8 @@ def main():
         time_s = travel / SPEED_M_S + random.normal(0, SIGMA_S, travel.shape)
         descriptor = time_s - time_s.min(1, keepdims=True)
         touches += int(np.isfinite(descriptor).all(1).sum())
+    if touches == 0:
+        sys.exit("this Open3D finds no hit, on this mesh or any (seen with Debian 0.16.1 under AVX-512)")
     print(json.dumps({"touches_per_s": touches / (time.perf_counter() - begin), "version": f"Open3D {o3d.__version__}"}))
 
 
