@@ -113,11 +113,29 @@ constexpr NamedPut kTouchColumns[] = {
 
 }  // namespace
 
-absl::StatusOr<std::string> EncodeImage(const Image& picture, const DatasetImage& image) {
-  if (image.encoding == ImageEncoding::kPng)
-    return EncodePng(picture.pixels.data(), picture.width, picture.height, picture.channels);
-  return EncodeJpeg(picture.pixels.data(), picture.width, picture.height, picture.channels,
-                    image.jpeg_quality);
+absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
+                           std::string* data, std::vector<uint64_t>* offsets) {
+  const auto append = [data](const auto& values) {
+    data->append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+  };
+  if (column == "depth_m") {
+    append(picture.depth_m);
+  } else if (column == "mask") {
+    append(picture.mask);
+  } else if (column == "image" && image.encoding == ImageEncoding::kRaw) {
+    append(picture.pixels);
+  } else if (column == "image") {
+    const uint8_t* pixels = picture.pixels.data();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::string file,
+        image.encoding == ImageEncoding::kPng
+            ? EncodePng(pixels, picture.width, picture.height, picture.channels)
+            : EncodeJpeg(pixels, picture.width, picture.height, picture.channels, image.jpeg_quality));
+    if (offsets->empty()) offsets->push_back(0);
+    data->append(file);
+    offsets->push_back(data->size());
+  }
+  return absl::OkStatus();
 }
 
 BatchMaker::BatchMaker(std::shared_ptr<const DatasetSpecification> specification)
@@ -187,24 +205,9 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, absl::Span
       const auto& object =
           specification_->objects[(batch.start_index + row) % specification_->objects.size()];
       TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, image.renderer->Render(object, camera, image.options));
-      for (size_t column = 0; column < columns_.size(); ++column) {
-        std::string& data = batch.data[column];
-        if (columns_[column].name == "image") {
-          if (image.encoding == ImageEncoding::kRaw) {
-            data.append(reinterpret_cast<const char*>(picture.pixels.data()), picture.pixels.size());
-            continue;
-          }
-          TOUCHSTONE_ASSIGN_OR_RETURN(const std::string file, EncodeImage(picture, image));
-          batch.offsets[column].push_back(data.size());
-          data += file;
-          if (row + 1 == batch.rows) batch.offsets[column].push_back(data.size());
-        } else if (columns_[column].name == "depth_m") {
-          data.append(reinterpret_cast<const char*>(picture.depth_m.data()),
-                      picture.depth_m.size() * sizeof(float));
-        } else if (columns_[column].name == "mask") {
-          data.append(reinterpret_cast<const char*>(picture.mask.data()), picture.mask.size());
-        }
-      }
+      for (size_t column = 0; column < columns_.size(); ++column)
+        TOUCHSTONE_RETURN_IF_ERROR(AppendPicture(picture, image, columns_[column].name, &batch.data[column],
+                                                 &batch.offsets[column]));
     }
   }
   return absl::OkStatus();

@@ -35,8 +35,10 @@ struct DatasetBatch {
   std::vector<std::vector<uint64_t>> offsets;  // one a column: rows + 1 entries for kBytes, else empty
 };
 
-// The file of a picture in the encoding that `image` asks for (kPng or kJpeg).
-absl::StatusOr<std::string> EncodeImage(const Image& picture, const DatasetImage& image);
+// Appends what a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
+// values, or an encoded file and the offset of its end, the first one after a 0.
+absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
+                           std::string* data, std::vector<uint64_t>* offsets);
 
 // Fills one contiguous run of batches, by the calling thread alone. Sample i is the same in whatever run.
 class BatchMaker {

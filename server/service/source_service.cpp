@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "server/base/status.h"
-#include "server/image/encode.h"
 #include "server/service/convert.h"
 
 namespace touchstone {
@@ -244,28 +243,20 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
   columns_of.columns.image = true;
   columns_of.image = image;
   for (const ColumnInfo& info : ColumnsOf(columns_of)) *response->add_columns() = ColumnToProto(info);
+  std::vector<std::vector<uint64_t>> offsets(response->columns_size());
   for (const Camera& camera : cameras) {
     if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
     TOUCHSTONE_RETURN_IF_ERROR(Ready(stops_before));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
                                 image.renderer->Render(object->surface, camera, image.options));
-    for (v1::Column& column : *response->mutable_columns()) {
-      std::string* data = column.mutable_data();
-      if (column.name() == "depth_m") {
-        data->append(reinterpret_cast<const char*>(picture.depth_m.data()),
-                     picture.depth_m.size() * sizeof(float));
-      } else if (column.name() == "mask") {
-        data->append(reinterpret_cast<const char*>(picture.mask.data()), picture.mask.size());
-      } else if (image.encoding == ImageEncoding::kRaw) {
-        data->append(reinterpret_cast<const char*>(picture.pixels.data()), picture.pixels.size());
-      } else {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const std::string file, EncodeImage(picture, image));
-        if (column.offsets_size() == 0) column.add_offsets(0);
-        data->append(file);
-        column.add_offsets(data->size());
-      }
+    for (int k = 0; k < response->columns_size(); ++k) {
+      v1::Column* column = response->mutable_columns(k);
+      TOUCHSTONE_RETURN_IF_ERROR(
+          AppendPicture(picture, image, column->name(), column->mutable_data(), &offsets[k]));
     }
   }
+  for (int k = 0; k < response->columns_size(); ++k)
+    response->mutable_columns(k)->mutable_offsets()->Add(offsets[k].begin(), offsets[k].end());
   response->set_rows(request.views_size());
   resources_->images += request.views_size();
   return absl::OkStatus();
