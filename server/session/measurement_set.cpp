@@ -1,0 +1,404 @@
+#include "server/session/measurement_set.h"
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/session/measurement_columns.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr size_t kLongestName = 256;
+constexpr size_t kMostColumns = 4096;
+constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
+
+// Vectors a thousandth away from unit length or from the right angle are made exact, as the simulation does;
+// those that are exact to rounding stay as they are, so that what is written is read back bit for bit.
+constexpr double kVectorTolerance = 1e-3;
+constexpr double kRounding = 4e-16;
+
+// What touch/commanded_touch.h accepts, told in the units of files.
+constexpr double kFarthestM = 100;
+constexpr double kLongestStandoffM = 10;
+constexpr double kFastestMS = 10;
+constexpr double kLongestSessionS = 1e9;
+
+// Valid UTF-8 without control characters: names go into messages and reports.
+bool IsText(absl::string_view text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const int more = byte < 0x80         ? 0
+                     : (byte >> 5) == 6  ? 1
+                     : (byte >> 4) == 14 ? 2
+                     : (byte >> 3) == 30 ? 3
+                                         : -1;
+    if (more < 0 || byte < 0x20 || byte == 0x7F || i + more >= text.size() + (more == 0)) return false;
+    uint32_t code = more == 0 ? byte : byte & (0x3F >> more);
+    for (int k = 1; k <= more; ++k) {
+      const auto next = static_cast<unsigned char>(text[i + k]);
+      if ((next >> 6) != 2) return false;
+      code = code << 6 | (next & 0x3F);
+    }
+    constexpr uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kSmallest[more] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
+// Cuts a line at its commas. A field in quotes may hold commas and doubled quotes (RFC 4180), but no line
+// end.
+class Fields {
+ public:
+  // Views into `line`, or into this object where a field was quoted; they last until the next call.
+  absl::Status Cut(absl::string_view line) {
+    fields_.clear();
+    size_t quoted = 0;
+    for (size_t begin = 0;;) {
+      size_t start = begin;
+      while (start < line.size() && (line[start] == ' ' || line[start] == '\t')) ++start;
+      if (start < line.size() && line[start] == '"') {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const size_t end, CutQuoted(line, start, quoted++));
+        if (end == line.size()) break;
+        begin = end + 1;
+        continue;
+      }
+      const size_t comma = std::min(line.find(',', begin), line.size());
+      fields_.push_back(absl::StripAsciiWhitespace(line.substr(begin, comma - begin)));
+      if (comma == line.size()) break;
+      begin = comma + 1;
+    }
+    return absl::OkStatus();
+  }
+  const std::vector<absl::string_view>& all() const { return fields_; }
+
+ private:
+  // Returns where the comma behind the field stands, or the end of the line.
+  absl::StatusOr<size_t> CutQuoted(absl::string_view line, size_t start, size_t number) {
+    if (number == unquoted_.size()) unquoted_.push_back(std::make_unique<std::string>());
+    std::string& text = *unquoted_[number];
+    text.clear();
+    size_t i = start + 1;
+    for (;; ++i) {
+      if (i >= line.size())
+        return absl::InvalidArgumentError(absl::StrCat(
+            "field ", fields_.size() + 1, " begins with a quote (\") and has no closing one on its line"));
+      if (line[i] != '"') {
+        text += line[i];
+      } else if (i + 1 < line.size() && line[i + 1] == '"') {
+        text += line[i++];
+      } else {
+        break;
+      }
+    }
+    const size_t comma = std::min(line.find(',', i + 1), line.size());
+    if (!absl::StripAsciiWhitespace(line.substr(i + 1, comma - i - 1)).empty())
+      return absl::InvalidArgumentError(
+          absl::StrCat("field ", fields_.size() + 1, " goes on after its closing quote with '",
+                       Shown(line.substr(i + 1, comma - i - 1)), "'; a comma was expected"));
+    fields_.push_back(absl::StripAsciiWhitespace(text));
+    return comma;
+  }
+
+  std::vector<absl::string_view> fields_;
+  std::vector<std::unique_ptr<std::string>> unquoted_;
+};
+
+// Reads rows into the columns of a set. One object a file.
+class RowReader {
+ public:
+  RowReader(const Columns& columns, MeasurementSet* set) : columns_(columns), set_(*set) {
+    covariates_.reserve(columns.covariates.size());
+    for (const std::string& name : columns.covariates) covariates_.push_back(&set_.covariates[name]);
+  }
+
+  absl::Status Read(const std::vector<absl::string_view>& fields, int line) {
+    line_ = line;
+    fields_ = &fields;
+    if (fields.size() != columns_.all.size())
+      return Wrong(absl::StrCat("has ", fields.size(), " columns, the header has ", columns_.all.size()));
+    set_.line.push_back(line);
+    if (!columns_.has_touch) set_.touch.push_back(set_.touch.size());
+    if (columns_.has_poses) {
+      set_.target_m.emplace_back();
+      set_.approach.emplace_back();
+      set_.lateral.emplace_back();
+    }
+    if (!columns_.has_session_time) set_.session_time_s.push_back(0);
+    const size_t row = set_.line.size() - 1;
+    if (columns_.fingers > 0) set_.time_s.resize((row + 1) * columns_.fingers, kNan);
+    for (size_t i = 0; i < fields.size(); ++i) TOUCHSTONE_RETURN_IF_ERROR(ReadField(i, row));
+    return columns_.has_poses ? MakeExact(row) : absl::OkStatus();
+  }
+
+ private:
+  absl::Status ReadField(size_t i, size_t row) {
+    const Column& column = columns_.all[i];
+    const absl::string_view field = (*fields_)[i];
+    const auto number = [&] { return Number(i); };
+    switch (column.kind) {
+      case ColumnKind::kTouch: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value,
+                                    Whole(i, 0, kLargestCount, "a whole number from 0 on"));
+        set_.touch.push_back(static_cast<uint64_t>(value));
+        break;
+      }
+      case ColumnKind::kObject:
+        return ReadObject(i, field);
+      case ColumnKind::kSpeed: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
+        set_.speed_m_s.push_back(ToSi(Unit::kMillimetrePerSecond, value));
+        if (!(set_.speed_m_s.back() > 0 && set_.speed_m_s.back() <= kFastestMS))
+          return OutOfRange(i, "a speed above 0 and at most 10000 mm/s was expected");
+        break;
+      }
+      case ColumnKind::kStandoff: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
+        set_.standoff_m.push_back(ToSi(Unit::kMillimetre, value));
+        if (!(set_.standoff_m.back() >= 0 && set_.standoff_m.back() <= kLongestStandoffM))
+          return OutOfRange(i, "a distance from 0 to 10000 mm was expected");
+        break;
+      }
+      case ColumnKind::kTarget: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
+        set_.target_m[row][column.index] = ToSi(Unit::kMillimetre, value);
+        if (!(std::abs(set_.target_m[row][column.index]) <= kFarthestM))
+          return OutOfRange(i, "a coordinate within 100000 mm of the object's origin was expected");
+        break;
+      }
+      case ColumnKind::kApproach: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(set_.approach[row][column.index], number());
+        break;
+      }
+      case ColumnKind::kLateral: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(set_.lateral[row][column.index], number());
+        break;
+      }
+      case ColumnKind::kTime: {
+        if (field.empty()) break;  // the finger reported nothing
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
+        if (value < 0)
+          return OutOfRange(i, "a time from 0 on was expected, or nothing where the finger reported nothing");
+        set_.time_s[row * columns_.fingers + column.index] = ToSi(Unit::kMicrosecond, value);
+        break;
+      }
+      case ColumnKind::kSessionTime: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
+        if (!(value >= 0 && value <= kLongestSessionS))
+          return OutOfRange(i, "seconds from 0 to 1e9 since the session began were expected");
+        set_.session_time_s.push_back(value);
+        break;
+      }
+      case ColumnKind::kRound:
+      case ColumnKind::kFace: {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double value, Whole(i, 0, INT32_MAX, "a whole number from 0 on"));
+        (column.kind == ColumnKind::kRound ? set_.round : set_.face).push_back(static_cast<int>(value));
+        break;
+      }
+      case ColumnKind::kCovariate: {
+        double value = kNan;
+        if (!field.empty()) {
+          TOUCHSTONE_ASSIGN_OR_RETURN(value, number());
+        }
+        covariates_[column.index]->push_back(value);
+        break;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadObject(size_t i, absl::string_view name) {
+    // Rows of one object mostly follow each other.
+    if (set_.object.empty() || set_.objects[set_.object.back()] != name) {
+      if (name.empty()) return WrongField(i, "is empty; a name was expected");
+      if (name.size() > kLongestName || !IsText(name))
+        return WrongField(i, absl::StrCat("'", Shown(name), "' is no name: at most ", kLongestName,
+                                          " bytes of UTF-8 without control characters were expected"));
+      const auto [found, is_new] = objects_.try_emplace(std::string(name), static_cast<int>(objects_.size()));
+      if (is_new) set_.objects.emplace_back(name);
+      set_.object.push_back(found->second);
+    } else {
+      set_.object.push_back(set_.object.back());
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<double> Number(size_t i) const {
+    absl::string_view field = (*fields_)[i];
+    if (field.empty()) return WrongField(i, "is empty; a number was expected");
+    absl::string_view digits = field;
+    if (digits[0] == '+') digits.remove_prefix(1);
+    double value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::result_out_of_range && end == digits.data() + digits.size())
+      return WrongField(i, absl::StrCat("'", Shown(field), "' is beyond what a double holds"));
+    const bool doubled_sign = field[0] == '+' && !digits.empty() && (digits[0] == '-' || digits[0] == '+');
+    if (error != std::errc() || end != digits.data() + digits.size() || doubled_sign)
+      return WrongField(i, absl::StrCat("'", Shown(field), "' is not a number; one like 12.5 was expected"));
+    if (!std::isfinite(value))
+      return WrongField(i, absl::StrCat("'", Shown(field), "' is not a finite number",
+                                        columns_.all[i].kind == ColumnKind::kTime
+                                            ? "; where a finger reported nothing, an empty field was expected"
+                                            : ""));
+    return value;
+  }
+
+  absl::StatusOr<double> Whole(size_t i, double lowest, double highest, const char* expected) const {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double value, Number(i));
+    if (value >= lowest && value <= highest && value == std::floor(value)) return value;
+    return WrongField(i, absl::StrCat(Shown((*fields_)[i]), " is not ", expected));
+  }
+
+  absl::Status MakeExact(size_t row) {
+    Eigen::Vector3d& approach = set_.approach[row];
+    Eigen::Vector3d& lateral = set_.lateral[row];
+    for (const auto& [vector, name] : {std::pair(&approach, "approach"), std::pair(&lateral, "lateral")}) {
+      const double length = vector->norm();
+      if (!(std::abs(length - 1) <= kVectorTolerance))
+        return Wrong(absl::StrCat("columns ", name, "_x, ", name, "_y, ", name, "_z: ", Text(*vector),
+                                  " has length ", ShortestNumber(length),
+                                  "; a unit vector was expected (within 0.001)"));
+      if (std::abs(length - 1) > kRounding) *vector /= length;
+    }
+    const double cosine = approach.dot(lateral);
+    if (!(std::abs(cosine) <= kVectorTolerance))
+      return Wrong(absl::StrCat("columns lateral_x, lateral_y, lateral_z: ", Text(lateral),
+                                " is not perpendicular to the approach ", Text(approach),
+                                ": their dot product is ", ShortestNumber(cosine),
+                                "; 0 was expected (within 0.001)"));
+    if (std::abs(cosine) > kRounding) lateral = (lateral - cosine * approach).normalized();
+    return absl::OkStatus();
+  }
+
+  static std::string Text(const Eigen::Vector3d& v) {
+    return absl::StrCat("(", ShortestNumber(v.x()), ", ", ShortestNumber(v.y()), ", ", ShortestNumber(v.z()),
+                        ")");
+  }
+
+  absl::Status OutOfRange(size_t i, const std::string& expected) const {
+    return WrongField(i, absl::StrCat(Shown((*fields_)[i]), " is out of range; ", expected));
+  }
+  absl::Status WrongField(size_t i, const std::string& what) const {
+    return Wrong(
+        absl::StrCat("column ", columns_.all[i].name, ": ", what, " (field ", i + 1, " of the row)"));
+  }
+  absl::Status Wrong(const std::string& what) const {
+    return absl::InvalidArgumentError(absl::StrCat(set_.origin, ":", line_, ": ", what));
+  }
+
+  const Columns& columns_;
+  MeasurementSet& set_;
+  std::vector<std::vector<double>*> covariates_;
+  absl::flat_hash_map<std::string, int> objects_;
+  const std::vector<absl::string_view>* fields_ = nullptr;
+  int line_ = 0;
+};
+
+// A touch number that stands twice would make "touch 17" ambiguous, and hints at a file pasted twice.
+absl::Status CheckTouchNumbers(const MeasurementSet& set) {
+  bool increasing = true;
+  for (int k = 1; k < set.size() && increasing; ++k) increasing = set.touch[k - 1] < set.touch[k];
+  if (increasing) return absl::OkStatus();
+  std::vector<int> order(set.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return set.touch[a] < set.touch[b]; });
+  // The first line that repeats a number.
+  int repeated = set.size(), first = 0;
+  for (int k = 1; k < set.size(); ++k)
+    if (set.touch[order[k - 1]] == set.touch[order[k]] && order[k] < repeated) {
+      repeated = order[k];
+      first = order[k - 1];
+    }
+  if (repeated == set.size()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(set.origin, ":", set.line[repeated], ": column touch: ", set.touch[repeated],
+                   " stands on line ", set.line[first], " already; every touch needs a number of its own"));
+}
+
+void Reserve(size_t rows, const Columns& columns, MeasurementSet* set) {
+  set->line.reserve(rows);
+  set->touch.reserve(rows);
+  set->object.reserve(rows);
+  set->session_time_s.reserve(rows);
+  set->time_s.reserve(rows * columns.fingers);
+  if (!columns.has_poses) return;
+  set->target_m.reserve(rows);
+  set->approach.reserve(rows);
+  set->lateral.reserve(rows);
+  set->standoff_m.reserve(rows);
+  set->speed_m_s.reserve(rows);
+}
+
+}  // namespace
+
+absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin) {
+  MeasurementSet set;
+  set.origin = origin;
+  const auto wrong = [&](int line, absl::string_view what) {
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":", line, ": ", what));
+  };
+  if (absl::ConsumePrefix(&csv, "\xEF\xBB\xBF")) {
+    // A file from a spreadsheet may begin with a byte-order mark.
+  } else if (absl::StartsWith(csv, "\xFF\xFE") || absl::StartsWith(csv, "\xFE\xFF")) {
+    return wrong(1, "is UTF-16; UTF-8 was expected (CSV UTF-8 in spreadsheets)");
+  }
+
+  const auto next_line = [&csv] {
+    const size_t end = std::min(csv.find('\n'), csv.size());
+    const absl::string_view line = csv.substr(0, end);
+    csv.remove_prefix(std::min(end + 1, csv.size()));
+    return line;
+  };
+  Fields fields;
+  const absl::string_view header = next_line();
+  if (absl::StripAsciiWhitespace(header).empty())
+    return wrong(1, "a header line was expected (touch,object,...)");
+  if (absl::Status status = fields.Cut(header); !status.ok()) return wrong(1, status.message());
+  if (fields.all().size() > kMostColumns)
+    return wrong(1,
+                 absl::StrCat("has ", fields.all().size(), " columns; at most ", kMostColumns, " are read"));
+  const std::vector<std::string> names(fields.all().begin(), fields.all().end());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Columns columns, ReadColumns(names, origin));
+  set.fingers = columns.fingers;
+  set.has_poses = columns.has_poses;
+  set.has_session_time = columns.has_session_time;
+  const size_t rows = std::count(csv.begin(), csv.end(), '\n') + 1;
+  if (rows >= std::numeric_limits<int>::max())
+    return absl::InvalidArgumentError(
+        absl::StrCat(origin, ": has ", rows, " lines; at most 2^31 - 2 are read"));
+  Reserve(rows, columns, &set);
+
+  RowReader reader(columns, &set);
+  for (int line = 2; !csv.empty(); ++line) {
+    const absl::string_view row = next_line();
+    if (absl::StripAsciiWhitespace(row).empty()) continue;
+    if (absl::Status status = fields.Cut(row); !status.ok()) return wrong(line, status.message());
+    TOUCHSTONE_RETURN_IF_ERROR(reader.Read(fields.all(), line));
+  }
+  if (set.size() == 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat(origin, ":2: the file has a header but no touch; rows were expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouchNumbers(set));
+  return set;
+}
+
+absl::StatusOr<MeasurementSet> ReadMeasurementSet(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  return ParseMeasurementSet(text, path);
+}
+
+}  // namespace touchstone
