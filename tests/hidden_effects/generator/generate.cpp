@@ -1,0 +1,252 @@
+#include "tests/hidden_effects/generator/generate.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <stdexcept>
+
+#include "tests/hidden_effects/generator/rig.h"
+
+namespace touchstone::hidden {
+namespace {
+
+using Vec = Eigen::Vector3d;
+
+// Poses as the seed's real protocol has them: round each face of the bounding box, targets on the surface,
+// approaches up to 32 degrees from the face's inward normal, any roll; drawn again until all fingers hit.
+constexpr double kMostTilt = 32 * M_PI / 180;
+constexpr double kSpread = 0.62;
+constexpr double kMostGapMm = 55;
+
+Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(-1, 1), part(0, 1);
+  const Solid& solid = *scenario.objects[object];
+  const Vec half = 0.5 * (solid.high_mm() - solid.low_mm()),
+            centre = 0.5 * (solid.high_mm() + solid.low_mm());
+  const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+  for (int attempt = 0; attempt < 10'000; ++attempt) {
+    Vec inward = Vec::Zero();
+    inward[axis] = face % 2 == 0 ? -1 : 1;
+    Vec outside = centre - inward * (half[axis] + 10);
+    outside[u] += kSpread * half[u] * unit(random);
+    outside[v] += kSpread * half[v] * unit(random);
+    const Contact target = solid.FirstContact(outside, inward, 0);
+    const double cosine = 1 - part(random) * (1 - std::cos(kMostTilt));
+    const double around = 2 * M_PI * part(random), roll = 2 * M_PI * part(random);
+    if (!target.hit) continue;
+    Vec e = Vec::Zero();
+    e[u] = 1;
+    const Vec lean = std::cos(around) * e + std::sin(around) * inward.cross(e);
+    Command command;
+    command.object = object, command.face = face, command.target_mm = target.point_mm;
+    command.approach = (cosine * inward + std::sqrt(1 - cosine * cosine) * lean).normalized();
+    const Vec p = (e - command.approach * command.approach.dot(e)).normalized();
+    command.lateral = std::cos(roll) * p + std::sin(roll) * command.approach.cross(p);
+    double least = 1e300, most = -1e300;
+    bool all = true;
+    for (int i = 0; i < scenario.fingers && all; ++i) {
+      const double x = (i - 0.5 * (scenario.fingers - 1)) * scenario.spacing_mm;
+      const Contact contact = solid.FirstContact(
+          command.target_mm - command.approach * scenario.standoff_mm + command.lateral * x, command.approach,
+          0);
+      all = contact.hit;
+      least = std::min(least, contact.travel_mm), most = std::max(most, contact.travel_mm);
+    }
+    if (all && most - least < kMostGapMm) return command;
+  }
+  throw std::runtime_error("no pose found where all fingers hit " + solid.name());
+}
+
+// The protocol: everything that does not depend on what is hidden.
+struct Protocol {
+  std::vector<Command> commands;
+  std::vector<int> round;
+  std::vector<double> session_time_s, speed_mm_s, temperature;
+};
+
+Protocol DrawProtocol(const Scenario& scenario, uint64_t seed) {
+  auto poses = Stream(seed, "pose"), clock = Stream(seed, "clock"), room = Stream(seed, "room");
+  std::uniform_real_distribution<double> pause_s(6.3, 11.7), phase(0, 2 * M_PI);
+  const double room_phase = phase(room);
+  std::normal_distribution<double> draught(0, 0.2);
+  Protocol out;
+  double now_s = 0;
+  for (size_t object = 0; object < scenario.objects.size(); ++object) {
+    std::vector<Command> drawn;
+    for (int k = 0; k < scenario.poses; ++k) {
+      drawn.push_back(DrawCommand(scenario, object, 6 * k / scenario.poses, poses));
+      drawn.back().pose = object * scenario.poses + k;
+    }
+    for (int round = 0; round < scenario.rounds; ++round) {
+      for (int k = 0; k < scenario.poses; ++k) {
+        now_s += pause_s(clock);
+        out.commands.push_back(drawn[k]);
+        out.round.push_back(round);
+        out.session_time_s.push_back(now_s);
+        const int speed = (scenario.speed_by_round ? round : k) % scenario.speeds_mm_s.size();
+        out.speed_mm_s.push_back(scenario.speeds_mm_s[speed]);
+        const double degrees = 23 + 2 * std::sin(2 * M_PI * now_s / 3000 + room_phase) + draught(room);
+        out.temperature.push_back(std::round(degrees * 100) / 100);
+      }
+    }
+  }
+  return out;
+}
+
+std::string Number(double value) {
+  char text[32];
+  snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
+
+std::string FingerColumn(int finger, int fingers) {
+  return fingers == 3 ? std::string(1, "lmr"[finger]) : std::to_string(finger);
+}
+
+std::string Csv(const Scenario& scenario, const Protocol& protocol, const std::vector<double>& reported_us) {
+  const int fingers = scenario.fingers;
+  std::string csv;
+  if (scenario.with_poses) {
+    csv = "touch,object,round,face,session_time_s,speed_mm_s,standoff_mm";
+    for (const char* vector : {"target_%c_mm", "approach_%c", "lateral_%c"})
+      for (const char axis : {'x', 'y', 'z'}) {
+        char name[32];
+        snprintf(name, sizeof name, vector, axis);
+        csv += std::string(",") + name;
+      }
+    if (scenario.with_temperature) csv += ",cov_temperature";
+  } else {
+    csv = "object";
+  }
+  for (int i = 0; i < fingers; ++i) csv += ",t_" + FingerColumn(i, fingers) + "_us";
+  csv += '\n';
+  for (size_t k = 0; k < protocol.commands.size(); ++k) {
+    const Command& command = protocol.commands[k];
+    const std::string& object = scenario.objects[command.object]->name();
+    if (scenario.with_poses) {
+      csv += std::to_string(k) + ',' + object + ',' + std::to_string(protocol.round[k]) + ',' +
+             std::to_string(command.face) + ',' + Number(protocol.session_time_s[k]) + ',' +
+             Number(protocol.speed_mm_s[k]) + ',' + Number(scenario.standoff_mm);
+      for (const Vec* vector : {&command.target_mm, &command.approach, &command.lateral})
+        for (int axis = 0; axis < 3; ++axis) csv += ',' + Number((*vector)[axis]);
+      if (scenario.with_temperature) csv += ',' + Number(protocol.temperature[k]);
+    } else {
+      csv += object;
+    }
+    // Relative to the first that reports, whole microseconds.
+    double least = 1e300;
+    for (int i = 0; i < fingers; ++i)
+      if (reported_us[k * fingers + i] < least) least = reported_us[k * fingers + i];
+    for (int i = 0; i < fingers; ++i) {
+      const double time_us = reported_us[k * fingers + i];
+      csv += ',';
+      if (time_us == time_us) csv += std::to_string(std::llround(time_us - least));
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+std::string NominalYaml(const Scenario& scenario) {
+  static const std::map<std::string, std::vector<const char*>> kNames = {
+      {"tip_radius", {"radius_mm"}},       {"oblique_slip", {"travel_mm"}}, {"object_push", {"shift_mm"}},
+      {"finger_spacing", {"delta_mm"}},    {"tool_tilt", {"angle_deg"}},    {"tool_yaw", {"angle_deg"}},
+      {"return_hysteresis", {"fraction"}}, {"speed_error", {"relative"}},   {"gravity_sag", {"drop_mm"}},
+      {"object_scale", {"relative"}}};
+  std::string yaml =
+      "touchstone: model/1\nname: nominal\nend_effector: {fingers: " + std::to_string(scenario.fingers) +
+      ", spacing_mm: " + Number(scenario.spacing_mm) + "}\n";
+  if (scenario.noise_in_model || !scenario.in_model.empty()) yaml += "effects:\n";
+  for (const Hidden& hidden : scenario.in_model)
+    yaml += "  - " + hidden.effect + ": {" + kNames.at(hidden.effect)[0] + ": " + Number(hidden.values[0]) +
+            "}\n";
+  if (scenario.noise_in_model) yaml += "  - gaussian_noise: {sigma_us: " + Number(scenario.sigma_us) + "}\n";
+  return yaml;
+}
+
+// Times without chance; tangents for the noise that grows with the incidence.
+void Play(const Scenario& scenario, const Protocol& protocol, uint64_t seed, std::vector<double>* exact_us,
+          std::vector<double>* tangents) {
+  Rig rig(scenario, seed);
+  for (size_t k = 0; k < protocol.commands.size(); ++k)
+    for (const Rig::Finger& finger : rig.Touch(protocol.commands[k], protocol.speed_mm_s[k],
+                                               protocol.session_time_s[k], protocol.temperature[k])) {
+      exact_us->push_back(finger.hit ? finger.reported_s * rig.clock_factor() * 1e6 : NAN);
+      if (tangents != nullptr) tangents->push_back(finger.tan_incidence);
+    }
+}
+
+// Noise, polling, outliers, losses.
+std::vector<double> Report(const Scenario& scenario, uint64_t seed, const std::vector<double>& exact_us,
+                           const std::vector<double>& tangents) {
+  Rig rig(scenario, seed);
+  auto scatter = Stream(seed, "noise"), ticks = Stream(seed, "ticks"), losses = Stream(seed, "loss"),
+       wild = Stream(seed, "wild");
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> part(0, 1);
+  const double degrees = rig.Value("heavy_tail_noise", 0, 1000);
+  const double slope = rig.Value("incidence_noise"), interval_us = rig.Value("poll_interval");
+  const double lost = 1 - (1 - rig.Value("missed_contact")) * (1 - scenario.missing_share);
+  std::vector<double> out(exact_us.size());
+  double phase_us = 0;
+  for (size_t k = 0; k < exact_us.size(); ++k) {
+    double deviate = normal(scatter);
+    if (degrees < 1000)
+      deviate /= std::sqrt(std::gamma_distribution<double>(degrees / 2, 2 / degrees)(scatter));
+    double time_us =
+        exact_us[k] + scenario.sigma_us * (1 + slope * tangents[k]) * deviate * rig.clock_factor();
+    if (part(wild) < scenario.outlier_share)
+      time_us += scenario.outlier_us * (0.3 + 0.7 * part(wild)) * (part(wild) < 0.5 ? -1 : 1);
+    if (k % scenario.fingers == 0) phase_us = interval_us * part(ticks);
+    if (interval_us > 0) time_us = std::ceil((time_us - phase_us) / interval_us) * interval_us + phase_us;
+    out[k] = part(losses) < lost ? NAN : time_us;
+  }
+  return out;
+}
+
+}  // namespace
+
+Set Generate(const Scenario& scenario, uint64_t seed) {
+  const Protocol protocol = DrawProtocol(scenario, seed);
+  Set set;
+  set.truth = scenario;
+  set.touches = protocol.commands.size();
+  set.commands = protocol.commands;
+  set.speed_mm_s = protocol.speed_mm_s;
+  set.session_time_s = protocol.session_time_s;
+  set.temperature = protocol.temperature;
+  std::vector<double> tangents;
+  Play(scenario, protocol, seed, &set.exact_time_us, &tangents);
+  set.reported_us = Report(scenario, seed, set.exact_time_us, tangents);
+  set.csv = Csv(scenario, protocol, set.reported_us);
+  set.model_yaml = NominalYaml(scenario);
+  return set;
+}
+
+std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed) {
+  const Protocol protocol{like.commands, {}, like.session_time_s, like.speed_mm_s, like.temperature};
+  std::vector<double> exact_us;
+  Play(scenario, protocol, seed, &exact_us, nullptr);
+  return exact_us;
+}
+
+double SignalInStandardErrors(const std::vector<double>& a_us, const std::vector<double>& b_us, int fingers,
+                              double sigma_us) {
+  double sum = 0;
+  for (size_t begin = 0; begin < a_us.size(); begin += fingers) {
+    double mean = 0, squares = 0;
+    int count = 0;
+    for (int i = 0; i < fingers; ++i) {
+      const double difference = a_us[begin + i] - b_us[begin + i];
+      if (difference != difference) continue;
+      mean += difference, squares += difference * difference, ++count;
+    }
+    if (count > 1) sum += squares - mean * mean / count;
+  }
+  return std::sqrt(std::max(0.0, sum)) / sigma_us;
+}
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,42 @@
+// The oracle: a second, independent simulation of the rig, written from the table of DESIGN 5.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "tests/hidden_effects/generator/scenario.h"
+
+namespace touchstone::hidden {
+
+struct Command {
+  int object = 0, face = 0;
+  int pose = -1;  // equal numbers, equal commands; -1: alone
+  Eigen::Vector3d target_mm, approach, lateral;
+};
+
+struct Set {
+  std::string csv;         // a measurement file (DESIGN 7)
+  std::string model_yaml;  // the nominal model, as the lab believes in it
+  Scenario truth;          // what was asked for
+  int touches = 0;
+  std::vector<Command> commands;                                // one a touch
+  std::vector<double> speed_mm_s, session_time_s, temperature;  // one a touch
+  std::vector<double> exact_time_us;  // [touch * fingers + finger]: everything hidden but chance
+  std::vector<double> reported_us;    // the same with noise and all; NaN: nothing reported
+};
+
+// A pure function. Draws of poses, session times, noise, bumps and losses come from separate streams of the
+// seed, so that two scenarios that differ in one thing differ in that thing only.
+Set Generate(const Scenario& scenario, uint64_t seed);
+
+// Only exact_time_us, for poses that Generate has drawn: what the effects do without chance.
+std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed);
+
+// sqrt(sum ||P (a - b)||^2) / sigma over all touches: how many standard errors an effect is strong.
+double SignalInStandardErrors(const std::vector<double>& a_us, const std::vector<double>& b_us, int fingers,
+                              double sigma_us);
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,54 @@
+// The rig with everything hidden in it, touch by touch, without chance: pose, contact, motion, and the part
+// of the sensor that is not random. Millimetres, seconds.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/hidden_effects/generator/bumps.h"
+#include "tests/hidden_effects/generator/generate.h"
+
+namespace touchstone::hidden {
+
+// Independent random numbers for each purpose.
+std::mt19937_64 Stream(uint64_t seed, const char* purpose);
+
+class Rig {
+ public:
+  // `seed` draws the bumps.
+  Rig(const Scenario& scenario, uint64_t seed);
+
+  struct Finger {
+    bool hit = false;
+    double time_s = 0;      // of the contact, since the start
+    double reported_s = 0;  // with latency, slip, drift, hysteresis; before noise and the clock
+    double tan_incidence = 0;
+  };
+
+  // The session's next touch. Touches must come in the order of the session: fingers remember.
+  std::vector<Finger> Touch(const Command& command, double speed_mm_s, double session_time_s,
+                            double temperature);
+
+  double clock_factor() const { return 1 + Value("clock_skew"); }
+  // A value of a hidden effect; `neutral` if it is not there.
+  double Value(const std::string& effect, int index = 0, double neutral = 0) const;
+
+ private:
+  // Where each finger touches: what the rounds of a pose have in common.
+  struct Landing {
+    bool hit;
+    double travel_mm, cosine, tangent;
+    Eigen::Vector3d contact_mm;
+  };
+  std::vector<Landing> Land(const Command& command) const;
+  std::map<int, std::vector<Landing>> landed_;  // by pose
+
+  Scenario scenario_;
+  std::map<std::string, std::vector<double>> values_;
+  std::vector<Bumps> bumps_;        // one an object
+  std::vector<double> pressed_mm_;  // by the touch before, a finger
+};
+
+}  // namespace touchstone::hidden
