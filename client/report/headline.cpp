@@ -1,0 +1,86 @@
+// The verdict in one sentence.
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+std::string Steps(const v1::Report& report) {
+  std::vector<std::string> names;
+  for (const v1::Step& step : report.steps()) {
+    // "a (or b) and c": brackets keep the two apart.
+    const std::vector<std::string> others(step.equivalent().begin(), step.equivalent().end());
+    const bool alone = report.steps_size() == 1 || others.empty();
+    names.push_back(alone ? StepName(step) : absl::StrCat(step.effect(), " (or ", Join(others, "or"), ")"));
+  }
+  return Join(names, "and");
+}
+
+std::string Falls(double from_us, double to_us) {
+  return absl::StrCat("the error falls from ", Time(from_us), " to ", Time(to_us));
+}
+
+std::string Compared(const v1::Report& report) {
+  if (report.has_distributions()) {
+    const double p = report.distributions().p();
+    return absl::StrCat(p < 0.01 ? "Measured and simulated touches differ as distributions"
+                                 : "Measured and simulated touches cannot be told apart as distributions",
+                        " (p ", p < 1e-15 ? "" : "= ", Probability(p), ").");
+  }
+  if (!(report.initial().rmse_us() > 0)) return "Nothing could be compared.";
+  const Floor floor = NoiseFloorOf(report);
+  if (!(floor.sigma_us > 0))
+    return absl::StrCat("The model is off by ", Time(report.initial().rmse_us()), ".");
+  return absl::StrCat("The model is off by ", Time(report.initial().rmse_us()), ", ",
+                      Number(report.initial().rmse_us() / floor.sigma_us, 2), " times the noise floor.");
+}
+
+std::string Unexplained(const v1::Report& report) {
+  std::string on;
+  if (!report.unexplained().covariates().empty()) {
+    on = absl::StrCat(" It hangs on ", report.unexplained().covariates(0).name(), ".");
+  }
+  if (report.steps().empty()) {
+    return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
+  }
+  return absl::StrCat("The model lacks ", Steps(report),
+                      ", and something more that no built-in effect explains.", on);
+}
+
+}  // namespace
+
+std::string Headline(const v1::Report& report) {
+  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
+  const std::string model = report.model_name().empty() ? "the model" : report.model_name();
+  switch (report.verdict()) {
+    case v1::Report::ADEQUATE:
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(report.touches()),
+                          " touches can tell.");
+    case v1::Report::WRONG_VALUES: {
+      std::vector<std::string> names;
+      // Noise alone changes no verdict, so it is not the news.
+      for (const v1::Refit& refit : report.refitted()) {
+        if (!absl::StrContains(refit.effect(), "noise")) names.push_back(refit.effect());
+      }
+      if (names.empty())
+        return absl::StrCat("No effect is missing, but values must change: ", Falls(from, to), ".");
+      return absl::StrCat("No effect is missing, but the values of ", Join(names, "and"),
+                          " are off: put right, ", Falls(from, to), ".");
+    }
+    case v1::Report::MISSING_EFFECTS: {
+      const Floor floor = NoiseFloorOf(report);
+      const bool reached = floor.sigma_us > 0 && to <= 1.05 * floor.sigma_us;
+      return absl::StrCat("The model lacks ", Steps(report), "; with ",
+                          report.steps_size() > 1 ? "them " : "it ", Falls(from, to),
+                          reached ? ", the noise floor." : ".");
+    }
+    case v1::Report::UNEXPLAINED:
+      return Unexplained(report);
+    default:
+      return Compared(report);
+  }
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,148 @@
+// Next touches, drawn on the objects and listed; sets without poses.
+#include <cmath>
+#include <map>
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/html_page.h"
+#include "client/report/svg_object.h"
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+Vector Of(const v1::Vector3& v, double scale) {
+  return {v.x() * scale, v.y() * scale, v.z() * scale};
+}
+
+Vector Along(const Vector& from, const Vector& direction, double distance) {
+  return {from[0] + distance * direction[0], from[1] + distance * direction[1],
+          from[2] + distance * direction[2]};
+}
+
+// An arrow that ends where the middle finger meets the surface, its tail a bar along the row of fingers.
+std::string Arrow(const ObjectPicture& picture, const View& view, const v1::CommandedTouch& touch,
+                  int number) {
+  const Vector target = Of(touch.target_m(), 1000), approach = Of(touch.approach(), 1),
+               lateral = Of(touch.lateral(), 1);
+  const Vector start = Along(target, approach, -std::max(touch.standoff_m() * 1000, picture.size_mm()));
+  Vector tip;
+  if (!picture.Hit(start, approach, &tip)) tip = target;
+  const double length = 0.2 * picture.size_mm(), bar = 0.06 * picture.size_mm();
+  const Vector tail = Along(tip, approach, -length);
+  const auto px = [&](const Vector& point) {
+    const auto p = picture.Project(view, point);
+    return absl::StrCat(std::lround(p.x), " ", std::lround(p.y));
+  };
+  const auto from = picture.Project(view, tail), to = picture.Project(view, tip);
+  const double dx = to.x - from.x, dy = to.y - from.y, size = std::max(1.0, std::hypot(dx, dy));
+  // The head: two short strokes back from the tip, in the picture's plane.
+  std::string head;
+  for (const double side : {0.5, -0.5}) {
+    absl::StrAppend(&head, "M", px(tip), "L", std::lround(to.x - 11 * dx / size + side * 12 * dy / size), " ",
+                    std::lround(to.y - 11 * dy / size - side * 12 * dx / size));
+  }
+  return absl::StrCat("<path class=\"arrow\" d=\"M", px(Along(tail, lateral, -bar)), "L",
+                      px(Along(tail, lateral, bar)), "M", px(tail), "L", px(tip), head,
+                      "\"/><text class=\"label\" text-anchor=\"middle\" x=\"",
+                      std::lround(from.x - 16 * dx / size), "\" y=\"",
+                      std::lround(from.y - 16 * dy / size + 8), "\">", number, "</text>");
+}
+
+std::string Pictures(const v1::Report& report) {
+  std::map<std::string, std::vector<int>> touches;
+  for (int i = 0; i < report.next_touches_size(); ++i) touches[report.next_touches(i).object()].push_back(i);
+  std::string grid;
+  for (const v1::ObjectOutline& outline : report.outlines()) {
+    const auto found = touches.find(outline.object());
+    if (found == touches.end()) continue;
+    const ObjectPicture picture(outline, {});
+    for (const bool back : {false, true}) {
+      const View view = back ? kBackView : kFrontView;
+      std::string arrows;
+      for (const int i : found->second) {
+        const v1::CommandedTouch& touch = report.next_touches(i).touch();
+        // From the side on which the finger can be seen to come in.
+        if (Dot(Of(touch.approach(), 1), Towards(view)) < 0) arrows += Arrow(picture, view, touch, i + 1);
+      }
+      if (arrows.empty()) continue;
+      const std::string words = absl::StrCat(Escape(outline.object()), ", from ",
+                                             back ? "behind and below" : "the front and above");
+      grid += Figure(
+          absl::StrCat("<svg class=\"map\" viewBox=\"-50 -50 500 500\" role=\"img\" aria-label=\"Proposed "
+                       "touches on ",
+                       words, "\">", picture.Faces(view), arrows, "</svg>"),
+          words);
+    }
+  }
+  return grid.empty() ? "" : absl::StrCat("<div class=\"grid arrows\">", grid, "</div>\n");
+}
+
+std::string Direction(const v1::Vector3& v) {
+  return absl::StrCat(Fixed(v.x(), 2), " ", Fixed(v.y(), 2), " ", Fixed(v.z(), 2));
+}
+
+}  // namespace
+
+std::string HtmlNextTouches(const v1::Report& report) {
+  if (report.next_touches().empty()) return "";
+  std::string table = absl::StrCat("<div class=\"scroll\"><table>",
+                                   HeaderRow({">No.", "Object", ">Target x y z (mm)", ">Approach",
+                                              ">Speed (mm/s)", ">Apart (sigmas)", "What it is for"}),
+                                   "<tbody>");
+  for (int i = 0; i < report.next_touches_size(); ++i) {
+    const v1::ProposedTouch& next = report.next_touches(i);
+    const v1::Vector3& t = next.touch().target_m();
+    absl::StrAppend(&table, "<tr>", NumberCell(absl::StrCat(i + 1)), Cell(Escape(next.object())),
+                    NumberCell(absl::StrCat(Fixed(1000 * t.x(), 1), " ", Fixed(1000 * t.y(), 1), " ",
+                                            Fixed(1000 * t.z(), 1))),
+                    NumberCell(Direction(next.touch().approach())),
+                    NumberCell(Tick(1000 * next.touch().speed_m_s())),
+                    NumberCell(Number(next.separation(), 2)), Cell(Typeset(next.purpose())), "</tr>\n");
+  }
+  return Section(
+      "next", "Next touches", "Touches that would tell the explanations that are left apart.",
+      absl::StrCat(
+          Pictures(report),
+          Figure(absl::StrCat(table, "</tbody></table></div>"),
+                 "Arrows end where the middle finger should meet the surface; the bar at the tail lies "
+                 "along the row of fingers. Apart: the expected difference between the explanations, in "
+                 "standard deviations of the noise.")));
+}
+
+std::string HtmlDistributions(const v1::Report& report) {
+  if (!report.has_distributions()) return "";
+  const v1::DistributionComparison& comparison = report.distributions();
+  std::string body = absl::StrCat(
+      "<p>Energy distance ", Typeset(Number(comparison.energy_distance())), ", p ",
+      Typeset(Probability(comparison.p())), ", against ", Typeset(Count(comparison.simulated_touches())),
+      " simulated touches",
+      comparison.plan().empty() ? "" : absl::StrCat(" (", Typeset(comparison.plan()), ")"), ".</p>\n");
+  if (!comparison.statistics().empty()) {
+    absl::StrAppend(&body, "<div class=\"scroll\"><table>",
+                    HeaderRow({"Statistic", ">measured", ">simulated", ">p"}), "<tbody>");
+    for (const v1::StatisticTest& test : comparison.statistics()) {
+      const auto shown = [&](double value) {
+        return test.unit() == "us" ? Time(value)
+                                   : absl::StrCat(Number(value), test.unit().empty() ? "" : " ", test.unit());
+      };
+      absl::StrAppend(&body, test.p() < 0.01 ? "<tr>" : "<tr class=\"dim\">",
+                      Cell(Escape(test.name()), "name"), NumberCell(shown(test.measured())),
+                      NumberCell(shown(test.simulated())), NumberCell(Probability(test.p())), "</tr>");
+    }
+    body += "</tbody></table></div>\n";
+  }
+  if (!comparison.compatible_effects().empty()) {
+    const std::vector<std::string> effects(comparison.compatible_effects().begin(),
+                                           comparison.compatible_effects().end());
+    absl::StrAppend(&body, "<h3>Compatible effects</h3>\n<p>The difference would be as it is with ",
+                    Escape(Join(effects, "or")), ". Touches with poses would tell which.</p>\n");
+  }
+  body +=
+      "<p class=\"note\">p of the energy distance between descriptors by permutation; of each statistic by a "
+      "Kolmogorov-Smirnov test with permutations.</p>\n";
+  return Section("distributions", "Distributions",
+                 "The set has no poses, so touches cannot be compared one by one.", body);
+}
+
+}  // namespace touchstone::client

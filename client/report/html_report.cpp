@@ -1,0 +1,31 @@
+// The page: the verdict first, then what to do, then the evidence for it.
+#include <absl/strings/str_cat.h>
+
+#include "client/report/html_page.h"
+#include "client/report/report.h"
+#include "client/report/words.h"
+
+namespace touchstone::client {
+
+std::string HtmlReport(const v1::Report& report) {
+  std::string page = absl::StrCat(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+      "script-src 'unsafe-inline'\">\n<title>",
+      Escape(report.model_name().empty() ? "Touchstone report"
+                                         : absl::StrCat("Touchstone report: ", report.model_name())),
+      "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
+  for (const auto part : {HtmlHead, HtmlWhatToDo, HtmlWhy, HtmlUnexplained, HtmlWhere, HtmlObjects, HtmlFit,
+                          HtmlDistributions, HtmlNextTouches, HtmlData, HtmlMethods}) {
+    page += part(report);
+  }
+  absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",
+                  Escape(report.version()));
+  if (report.duration_s() > 0) absl::StrAppend(&page, " in ", Typeset(Time(report.duration_s() * 1e6)));
+  absl::StrAppend(&page, ". This file is whole: it fetches nothing.</footer>\n</main>\n<script>",
+                  HtmlScript(), "</script>\n</body>\n</html>\n");
+  return page;
+}
+
+}  // namespace touchstone::client

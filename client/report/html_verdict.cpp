@@ -1,0 +1,115 @@
+// The head of the page: the verdict in one sentence, the ladder right below, what limits the report.
+#include <cmath>
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/html_page.h"
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+std::string Pill(const v1::Report& report) {
+  switch (report.verdict()) {
+    case v1::Report::ADEQUATE:
+      return "<span class=\"pill good\">Adequate</span>";
+    case v1::Report::WRONG_VALUES:
+      return "<span class=\"pill\">Wrong values</span>";
+    case v1::Report::MISSING_EFFECTS:
+      return absl::StrCat("<span class=\"pill\">Missing effect", report.steps_size() > 1 ? "s" : "",
+                          "</span>");
+    case v1::Report::UNEXPLAINED:
+      return "<span class=\"pill\">Unexplained</span>";
+    default:
+      return "<span class=\"pill plain\">Comparison</span>";
+  }
+}
+
+std::string Facts(const v1::Report& report) {
+  const v1::DataSummary& data = report.data();
+  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
+  if (data.objects_size() > 0) {
+    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
+  }
+  if (data.poses() > 0)
+    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
+  if (data.poses() > 0 && data.rounds() > 1) absl::StrAppend(&text, " \u00d7 ", data.rounds(), " rounds");
+  text += ".";
+  const Floor floor = NoiseFloorOf(report);
+  if (floor.sigma_us > 0) {
+    const std::string length = LengthOf(floor.sigma_us, report);
+    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
+                    length.empty() ? "" : absl::StrCat(" (", length, ")"));
+    if (floor.bound) absl::StrAppend(&text, ", an upper bound: no touch was repeated");
+    if (!floor.bound && data.repeats() > 0)
+      absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats");
+    text += ".";
+  }
+  if (report.initial().rmse_us() > 0 && floor.sigma_us > 0) {
+    const double ratio = report.initial().rmse_us() / floor.sigma_us;
+    if (ratio > 1.02) {
+      absl::StrAppend(&text, " The given model's error is ", Number(ratio, 2),
+                      " times the floor: ", floor.bound ? "at least " : "", Share(report.reducible_share()),
+                      " of its mean square is the model's, not noise.");
+    }
+  }
+  return Typeset(text);
+}
+
+std::string LadderTable(const v1::Report& report) {
+  const std::vector<Rung> rungs = Ladder(report);
+  if (rungs.empty()) return "";
+  static const char* const kClasses[] = {"given", "better", "better", "suggested", "floor"};
+  double largest = 0, floor = -1;
+  for (const Rung& rung : rungs) {
+    largest = std::max(largest, rung.rmse_us);
+    if (rung.kind == Rung::kFloor) floor = rung.rmse_us;
+  }
+  std::string table = absl::StrCat(
+      "<table class=\"ladder\"><caption class=\"vh\">Error of the model after each change</caption>",
+      HeaderRow({"Model", "", ">RMSE", ">on unseen touches", ">lack-of-fit p"}), "<tbody>");
+  for (size_t i = 0; i < rungs.size(); ++i) {
+    const Rung& rung = rungs[i];
+    const bool is_floor = rung.kind == Rung::kFloor;
+    absl::StrAppend(
+        &table, is_floor ? "<tr class=\"dim last\">" : "<tr>", "<td class=\"name\">", Escape(rung.name),
+        "</td>",
+        Cell(Bar(rung.rmse_us / largest, kClasses[rung.kind], is_floor ? -1 : floor / largest), "barcell"),
+        NumberCell(Time(rung.rmse_us)), "<td class=\"num more\" data-label=\"on unseen touches\">",
+        std::isnan(rung.heldout_rmse_us) ? "" : Typeset(Time(rung.heldout_rmse_us)),
+        "</td><td class=\"num more\" data-label=\"lack-of-fit p\">",
+        std::isnan(rung.lack_of_fit_p) ? "" : Typeset(Probability(rung.lack_of_fit_p)), "</td></tr>\n");
+  }
+  return Figure(
+      absl::StrCat(table, "</tbody></table>"),
+      "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), a finger. "
+      "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much misfit "
+      "beyond noise is if nothing were missing. Dashed: the noise floor.");
+}
+
+}  // namespace
+
+std::string HtmlHead(const v1::Report& report) {
+  std::string head = absl::StrCat("<header>\n<p class=\"kicker\">", Pill(report), "<span>Touchstone");
+  if (!report.model_name().empty()) {
+    absl::StrAppend(&head, " \u00b7 model ", Escape(report.model_name()));
+    if (!report.model_hash().empty()) {
+      absl::StrAppend(&head, " <code title=\"", Escape(report.model_hash()), "\">",
+                      Escape(report.model_hash().substr(0, 12)), "</code>");
+    }
+  }
+  if (!report.data().origin().empty()) absl::StrAppend(&head, " \u00b7 ", Escape(report.data().origin()));
+  absl::StrAppend(&head, "</span></p>\n<h1>", Typeset(Headline(report)), "</h1>\n");
+  if (!report.summary().empty())
+    absl::StrAppend(&head, "<p class=\"lead\">", Typeset(report.summary()), "</p>\n");
+  absl::StrAppend(&head, LadderTable(report), "<p class=\"facts\">", Facts(report), "</p>\n");
+  if (!report.warnings().empty()) {
+    head += "<aside class=\"warnings\"><p>What limits this report</p><ul>";
+    for (const std::string& warning : report.warnings())
+      absl::StrAppend(&head, "<li>", Typeset(warning), "</li>");
+    head += "</ul></aside>\n";
+  }
+  return head + "</header>\n";
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,144 @@
+// Where: slices, groups, residual against every covariate.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/html_page.h"
+#include "client/report/svg_chart.h"
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+std::string Slices(const v1::Report& report) {
+  if (report.where().empty()) return "";
+  std::string table = absl::StrCat(
+      "<div class=\"scroll\"><table>",
+      HeaderRow({"Part of the data", ">Touches", ">Share of the excess", "", ">Mean residual", "In words"}),
+      "<tbody>");
+  for (const v1::Slice& slice : report.where()) {
+    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"), NumberCell(Count(slice.touches())),
+                    NumberCell(Share(slice.share_of_excess_error())),
+                    Cell(Bar(slice.share_of_excess_error(), "given"), "barcell narrow"),
+                    NumberCell(SignedTime(slice.mean_residual_us())), Cell(Typeset(slice.words())),
+                    "</tr>\n");
+  }
+  return Figure(
+      absl::StrCat(table, "</tbody></table></div>"),
+      "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured minus "
+      "simulated: positive means that the real contact came later than the model says.");
+}
+
+std::string Groups(const v1::Report& report) {
+  static const std::pair<const char*, const char*> kKinds[] = {
+      {"object", "Object"}, {"face", "Face"},   {"finger", "Finger"},
+      {"speed", "Speed"},   {"round", "Round"}, {"time", "Time in the session"}};
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<const v1::GroupError*>> kinds;
+  double largest = 0;
+  for (const v1::GroupError& group : report.groups()) {
+    if (kinds[group.kind()].empty()) order.push_back(group.kind());
+    kinds[group.kind()].push_back(&group);
+    largest = std::max(largest, group.rmse_us());
+  }
+  if (order.empty()) return "";
+  const double floor = NoiseFloorOf(report).sigma_us;
+  std::string grid;
+  for (const std::string& kind : order) {
+    std::string title = kind;
+    for (const auto& [name, shown] : kKinds) title = name == kind ? shown : title;
+    std::string table = absl::StrCat("<table>", HeaderRow({title, ">RMSE", "", ">of excess"}), "<tbody>");
+    for (const v1::GroupError* group : kinds[kind]) {
+      absl::StrAppend(
+          &table, "<tr title=\"",
+          Escape(absl::StrCat(Count(group->touches()), " touches, mean residual ",
+                              SignedTime(group->mean_residual_us()))),
+          "\">", Cell(Escape(group->name())), NumberCell(Time(group->rmse_us())),
+          Cell(Bar(group->rmse_us() / largest, "given", floor > 0 ? floor / largest : -1), "barcell"),
+          NumberCell(Share(group->share_of_excess_error())), "</tr>");
+    }
+    absl::StrAppend(&grid, "<figure>", table, "</tbody></table></figure>\n");
+  }
+  return absl::StrCat(
+      "<h3>By group</h3>\n<div class=\"grid\">", grid,
+      "</div>\n<p class=\"note\">RMSE of the given model within each group, all on one scale; dashed the "
+      "noise floor. Last column: the group\u2019s share of the error beyond the floor.</p>\n");
+}
+
+// Before and after share the vertical axis, in the unit that fits the larger.
+std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve) {
+  RangeFinder x, y;
+  y.Add(0);
+  double size = 0;
+  for (const v1::CurveBin& bin : curve.bins()) {
+    const double error = std::isfinite(bin.std_error_us()) ? bin.std_error_us() : 0;
+    size = std::max({size, std::abs(bin.mean_residual_us()), std::abs(bin.after_us())});
+    x.Add(bin.centre());
+    for (const double value :
+         {bin.mean_residual_us() - error, bin.mean_residual_us() + error, bin.after_us()})
+      y.Add(value);
+  }
+  const TimeUnit unit = UnitOfTime(size);
+  const Range us = y.Get();
+  const Chart::Axis x_axis = {Covariate(curve.covariate(), curve.unit()), x.Get()};
+  const Chart::Axis y_axis = {absl::StrCat("mean residual (", unit.symbol, ")"),
+                              {us.low * unit.per_us, us.high * unit.per_us}};
+  std::string pair;
+  for (const bool after : {false, true}) {
+    if (after && report.improved_model_yaml().empty()) break;
+    Chart chart(310, 210, after ? "improved model" : "given model", x_axis, y_axis);
+    chart.ZeroLine();
+    std::vector<std::string> fingers;
+    for (const v1::CurveBin& bin : curve.bins()) {
+      if (std::find(fingers.begin(), fingers.end(), bin.finger()) == fingers.end())
+        fingers.push_back(bin.finger());
+    }
+    for (size_t f = 0; f < fingers.size(); ++f) {
+      std::vector<ChartPoint> points;
+      std::vector<double> errors;
+      for (const v1::CurveBin& bin : curve.bins()) {
+        if (bin.finger() != fingers[f]) continue;
+        points.push_back({bin.centre(), (after ? bin.after_us() : bin.mean_residual_us()) * unit.per_us});
+        errors.push_back(bin.std_error_us() * unit.per_us);
+      }
+      const std::string css = absl::StrCat("f", f % 6);
+      if (!after) chart.Whiskers(points, errors, css);
+      chart.Line(points, css);
+    }
+    pair += chart.Svg(absl::StrCat("Mean residual of each finger against ", x_axis.title, ", ",
+                                   after ? "improved model" : "given model"));
+  }
+  return Figure(absl::StrCat("<div class=\"pair\">", pair, "</div>"),
+                Typeset(absl::StrCat("p ", Probability(curve.p()),
+                                     curve.p() < 0.01 ? ": the residual hangs on it" : "")));
+}
+
+std::string Curves(const v1::Report& report) {
+  std::string grid;
+  std::vector<std::pair<std::string, std::string>> keys;
+  for (const v1::CovariateCurve& curve : report.curves()) {
+    if (curve.bins().empty()) continue;
+    grid += CurvePair(report, curve);
+    for (const v1::CurveBin& bin : curve.bins()) {
+      const auto same = [&](const auto& key) { return key.second == absl::StrCat("finger ", bin.finger()); };
+      if (bin.finger().empty() || std::any_of(keys.begin(), keys.end(), same)) continue;
+      keys.push_back({absl::StrCat("f", keys.size() % 6), absl::StrCat("finger ", bin.finger())});
+    }
+  }
+  if (grid.empty()) return "";
+  return absl::StrCat("<h3>Residual against every covariate</h3>\n", Legend(keys),
+                      "<div class=\"grid wide\">", grid,
+                      "</div>\n<p class=\"note\">Means within bins, whiskers one standard error. p: of any "
+                      "dependence, by permutation, corrected for the number of covariates.</p>\n");
+}
+
+}  // namespace
+
+std::string HtmlWhere(const v1::Report& report) {
+  return Section("where", "Where", "The parts of the data in which the given model is wrong.",
+                 absl::StrCat(Slices(report), Groups(report), Curves(report)));
+}
+
+}  // namespace touchstone::client

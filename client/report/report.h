@@ -1,0 +1,26 @@
+// A diagnosis report (proto/touchstone/v1/diagnosis.proto) for people and for programs. All three are pure
+// functions of the report; a field that is empty leaves its part out.
+#pragma once
+
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone::client {
+
+// What a person reads in the terminal (DESIGN 9): plain ASCII apart from the names in the report, no line
+// longer than `width` columns (at least 60) unless a single word is. `colour`: ANSI escapes for emphasis,
+// which take no columns.
+std::string TerminalReport(const v1::Report& report, int width, bool colour);
+
+// One HTML file that opens offline: styles, pictures and the script are inside, nothing is fetched.
+std::string HtmlReport(const v1::Report& report);
+
+// Protobuf JSON with the names of the proto file. Every primitive and repeated field is there, and `initial`,
+// `final` and `unexplained` too, so that a reader need not ask. As everywhere in protobuf JSON, a number that
+// is not known is the string "NaN", and 64-bit integers are strings.
+absl::StatusOr<std::string> JsonReport(const v1::Report& report);
+
+}  // namespace touchstone::client

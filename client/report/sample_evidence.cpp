@@ -1,0 +1,188 @@
+#include "client/report/sample_evidence.h"
+
+#include <array>
+#include <cmath>
+
+#include <absl/strings/str_cat.h>
+
+#include "server/base/random.h"
+#include "server/base/units.h"
+
+namespace touchstone::client {
+namespace {
+
+using Point = std::array<double, 3>;
+
+// A bumpy ball with `lobes` lobes, about 80 mm across: the point in direction (latitude, longitude).
+Point OnObject(int lobes, double latitude, double longitude) {
+  const double r = 38 + 6 * std::cos(lobes * longitude) * std::cos(latitude) * std::cos(latitude);
+  return {r * std::cos(latitude) * std::cos(longitude), r * std::cos(latitude) * std::sin(longitude),
+          0.8 * r * std::sin(latitude)};
+}
+
+void AddOutline(const std::string& name, int lobes, v1::Report* report) {
+  constexpr int kRings = 9, kSectors = 20;
+  v1::ObjectOutline* outline = report->add_outlines();
+  outline->set_object(name);
+  for (int i = 0; i <= kRings; ++i) {
+    for (int j = 0; j < kSectors; ++j) {
+      const Point p = OnObject(lobes, kPi * (static_cast<double>(i) / kRings - 0.5), 2 * kPi * j / kSectors);
+      for (double x : p) outline->add_vertices_mm(static_cast<float>(x));
+    }
+  }
+  for (int i = 0; i < kRings; ++i) {
+    for (int j = 0; j < kSectors; ++j) {
+      const int a = i * kSectors + j, b = i * kSectors + (j + 1) % kSectors;
+      for (int corner : {a, b, b + kSectors, a, b + kSectors, a + kSectors}) outline->add_triangles(corner);
+    }
+  }
+}
+
+void AddHistogram(const std::string& quantity, const std::string& object, double spread, double shift,
+                  v1::Report* report) {
+  v1::Histogram* histogram = report->add_histograms();
+  histogram->set_quantity(quantity);
+  histogram->set_object(object);
+  constexpr int kBins = 24;
+  const auto density = [&](double x, double centre, double width) {
+    return std::exp(-0.5 * std::pow((x - centre) / width, 2)) / (width * std::sqrt(2 * kPi));
+  };
+  for (int i = 0; i <= kBins; ++i) histogram->add_edges(spread * (6.0 * i / kBins - 1));
+  for (int i = 0; i < kBins; ++i) {
+    const double x = spread * (6.0 * (i + 0.5) / kBins - 1);
+    histogram->add_measured(density(x, spread * 1.6, spread) * (1 + 0.15 * std::sin(3.0 * i)));
+    histogram->add_simulated(density(x, spread * (1.6 + shift), spread * 0.8));
+    histogram->add_improved(density(x, spread * 1.6, spread * 0.98));
+  }
+  histogram->set_p_simulated(0.0002);
+  histogram->set_p_improved(0.47);
+}
+
+void AddCurve(const char* covariate, const char* unit, double from, double to, double size_us,
+              double floor_us, double p, v1::Report* report) {
+  v1::CovariateCurve* curve = report->add_curves();
+  curve->set_covariate(covariate);
+  curve->set_unit(unit);
+  curve->set_p(p);
+  RandomStream random(11, RandomDomain::kTest, report->curves_size());
+  for (int finger = 0; finger < report->fingers_size(); ++finger) {
+    for (int i = 0; i < 12; ++i) {
+      const double u = (i + 0.5) / 12;
+      v1::CurveBin* bin = curve->add_bins();
+      bin->set_centre(from + (to - from) * u);
+      bin->set_mean_residual_us(size_us * (finger - 1) * (p < 0.01 ? u * u : 0) +
+                                floor_us * 0.1 * random.Normal());
+      bin->set_std_error_us(floor_us * 0.12);
+      bin->set_after_us(floor_us * 0.12 * random.Normal());
+      bin->set_count(80);
+      bin->set_finger(report->fingers(finger));
+    }
+  }
+}
+
+void AddGroup(const char* kind, const std::string& name, uint32_t touches, double rmse_us, double share,
+              v1::Report* report) {
+  v1::GroupError* group = report->add_groups();
+  group->set_kind(kind);
+  group->set_name(name);
+  group->set_touches(touches);
+  group->set_rmse_us(rmse_us);
+  group->set_mean_residual_us(rmse_us * 0.3);
+  group->set_share_of_excess_error(share);
+}
+
+void AddGroups(double initial_us, v1::Report* report) {
+  const int objects = report->data().objects_size();
+  for (int i = 0; i < objects; ++i) {
+    AddGroup("object", report->data().objects(i), 960 / objects, initial_us * (0.7 + 0.3 * i), 1.0 / objects,
+             report);
+  }
+  for (const char* face : {"front", "back", "left", "right", "top", "bottom"}) {
+    AddGroup("face", face, 160, initial_us * (face[0] == 't' ? 0.4 : 1.05), face[0] == 't' ? 0.05 : 0.19,
+             report);
+  }
+  for (const std::string& finger : report->fingers()) {
+    AddGroup("finger", finger, 960, finger == "m" ? initial_us * 1.2 : initial_us * 0.9, 1.0 / 3, report);
+  }
+  for (int round = 1; round <= 4; ++round) {
+    AddGroup("round", absl::StrCat(round), 240, initial_us * (1 + 0.01 * round), 0.25, report);
+  }
+  for (int i = 0; i < 8; ++i) {
+    v1::TouchError* touch = report->add_worst_touches();
+    touch->set_touch(900 - 37 * i);
+    touch->set_object(report->data().objects(i % objects));
+    const double size = 3.4 * initial_us - 0.1 * initial_us * i;
+    touch->add_residual_us(-0.4 * size);
+    touch->add_residual_us(i == 3 ? std::nan("") : 0.8 * size);
+    touch->add_residual_us(-0.4 * size);
+    touch->set_norm_us(size);
+  }
+}
+
+}  // namespace
+
+void AddHistograms(double spread_us, v1::Report* report) {
+  AddHistogram("descriptor_us", "", spread_us, 0.4, report);
+  AddHistogram("curvature_per_m", "", 6, -0.5, report);
+  for (const std::string& object : report->data().objects()) {
+    AddHistogram("descriptor_us", object, spread_us, 0.3, report);
+    AddHistogram("curvature_per_m", object, 6, -0.4, report);
+  }
+}
+
+void AddEvidence(double initial_us, double floor_us, v1::Report* report) {
+  RandomStream random(7, RandomDomain::kTest);
+  const int objects = report->data().objects_size();
+  for (int i = 0; i < objects; ++i) AddOutline(report->data().objects(i), 2 + 2 * i, report);
+  for (int touch = 0; touch < 960; ++touch) {
+    const int object = touch % objects;
+    const double latitude = 1.3 * (2 * random.Uniform() - 1), longitude = 2 * kPi * random.Uniform();
+    for (uint32_t finger = 0; finger < 3; ++finger) {
+      const double around = longitude + 0.3 * (static_cast<int>(finger) - 1);
+      const Point point = OnObject(2 + 2 * object, latitude, around);
+      const double structure = initial_us * 1.4 * std::sin((2 + 2 * object) * around) * std::cos(latitude);
+      const double noise = floor_us * random.Normal();
+      v1::SurfacePoint* surface = report->add_surface_points();
+      surface->set_object(report->data().objects(object));
+      surface->set_x_mm(point[0]);
+      surface->set_y_mm(point[1]);
+      surface->set_z_mm(point[2]);
+      surface->set_residual_us((initial_us > 1.1 * floor_us ? structure : 0) + noise);
+      surface->set_after_us(noise);
+      surface->set_finger(finger);
+      v1::ParityPoint* parity = report->add_parity();
+      parity->set_finger(finger);
+      parity->set_simulated_us(400000 * std::pow(random.Uniform(), 2));
+      parity->set_measured_us(parity->simulated_us() + surface->residual_us());
+      parity->set_improved_us(parity->measured_us() - noise);
+    }
+  }
+  AddCurve("incidence_deg", "deg", 0, 40, initial_us, floor_us, 1e-9, report);
+  AddCurve("travel_mm", "mm", 20, 120, initial_us, floor_us, 0.002, report);
+  AddCurve("curvature_per_m", "1/m", -10, 60, initial_us, floor_us, 0.31, report);
+  AddCurve("session_time_s", "s", 0, 5400, initial_us, floor_us, 0.8, report);
+  AddGroups(initial_us, report);
+  AddHistograms(initial_us, report);
+}
+
+void AddProposals(int touches, const char* purpose, v1::Report* report) {
+  RandomStream random(9, RandomDomain::kTest);
+  for (int i = 0; i < touches; ++i) {
+    v1::ProposedTouch* proposed = report->add_next_touches();
+    proposed->set_object(report->data().objects(i % report->data().objects_size()));
+    proposed->set_purpose(purpose);
+    proposed->set_separation(6.2 - 0.2 * i);
+    const double latitude = 0.9 * (2 * random.Uniform() - 1), longitude = 2 * kPi * random.Uniform();
+    v1::CommandedTouch* touch = proposed->mutable_touch();
+    touch->mutable_target_m();
+    touch->mutable_approach()->set_x(-std::cos(latitude) * std::cos(longitude));
+    touch->mutable_approach()->set_y(-std::cos(latitude) * std::sin(longitude));
+    touch->mutable_approach()->set_z(-std::sin(latitude));
+    touch->mutable_lateral()->set_x(-std::sin(longitude));
+    touch->mutable_lateral()->set_y(std::cos(longitude));
+    touch->set_standoff_m(0.12);
+    touch->set_speed_m_s(i % 2 == 0 ? 0.01 : 0.04);
+  }
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,284 @@
+#include "client/report/sample_reports.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/sample_evidence.h"
+
+namespace touchstone::client {
+namespace {
+
+void SetQuality(double rmse_us, double heldout_us, double p, v1::Quality* quality) {
+  quality->set_rmse_us(rmse_us);
+  quality->set_heldout_rmse_us(heldout_us);
+  quality->set_lack_of_fit_p(p);
+}
+
+template <typename Owner>
+v1::ParameterValue* AddParameter(const char* name, const char* unit, double value, double error,
+                                 Owner* owner) {
+  v1::ParameterValue* parameter = owner->add_parameters();
+  parameter->set_name(name);
+  parameter->set_unit(unit);
+  parameter->set_value(value);
+  parameter->set_std_error(error);
+  parameter->set_lower(value - 1.96 * error);
+  parameter->set_upper(value + 1.96 * error);
+  return parameter;
+}
+
+v1::Candidate* AddCandidate(const char* effect, double probability, double rmse_us, double gain,
+                            v1::Report* report) {
+  v1::Candidate* candidate = report->add_candidates();
+  candidate->set_effect(effect);
+  candidate->set_probability(probability);
+  candidate->set_rmse_us(rmse_us);
+  candidate->set_heldout_rmse_us(rmse_us * 1.004);
+  candidate->set_gain_nats(gain);
+  candidate->set_scope("rig");
+  return candidate;
+}
+
+void AddSlice(const char* slice, uint32_t touches, double mean_us, double share, const char* words,
+              v1::Report* report) {
+  v1::Slice* part = report->add_where();
+  part->set_slice(slice);
+  part->set_touches(touches);
+  part->set_mean_residual_us(mean_us);
+  part->set_share_of_excess_error(share);
+  part->set_words(words);
+  part->set_rmse_us(std::abs(mean_us) * 1.3);
+}
+
+// What every report of a set with poses has.
+v1::Report Base(double initial_us, double floor_us) {
+  v1::Report report;
+  report.set_touches(960);
+  report.set_noise_floor_us(floor_us);
+  SetQuality(initial_us, initial_us * 1.002, initial_us > 1.1 * floor_us ? 0 : 0.41,
+             report.mutable_initial());
+  *report.mutable_final() = report.initial();
+  report.set_reducible_share(std::max(0.0, 1 - floor_us * floor_us / initial_us / initial_us));
+  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
+  for (double bias : {2100.0, -3900.0, 1800.0}) report.add_finger_bias_us(bias * initial_us / 41000);
+  report.set_model_name("nominal");
+  report.set_model_hash("7f1c09e3b2a84d55c0ffee00112233445566778899aabbccddeeff0011223344");
+  report.set_version("0.1.0");
+  report.set_duration_s(3.4);
+  v1::DataSummary& data = *report.mutable_data();
+  data.set_rows(1000);
+  data.set_poses(240);
+  data.set_rounds(4);
+  data.set_repeats(720);
+  data.add_speeds_mm_s(20);
+  data.set_missed_contacts(7);
+  data.set_origin("measurements/lab-2026-03.csv");
+  for (const char* object : {"lat10", "lat20", "box_rounded"}) data.add_objects(object);
+  v1::UnusedRows* edge = data.add_unused();
+  edge->set_rows(33);
+  edge->set_reason("a finger within 0.3 mm of an edge");
+  for (int touch : {12, 77, 103, 240, 391, 402}) edge->add_examples(touch);
+  v1::UnusedRows* lone = data.add_unused();
+  lone->set_rows(7);
+  lone->set_reason("fewer than two fingers reported");
+  for (int touch : {8, 19}) lone->add_examples(touch);
+  v1::NoiseFloor& floor = *report.mutable_noise_floor();
+  floor.set_sigma_us(floor_us);
+  floor.set_degrees_of_freedom(1440);
+  floor.set_lower_us(floor_us * 0.964);
+  floor.set_upper_us(floor_us * 1.038);
+  floor.set_from_repeats(true);
+  AddEvidence(initial_us, floor_us, &report);
+  return report;
+}
+
+void AddModel(const char* text, v1::Report* report) {
+  report->set_improved_model_yaml(text);
+  report->set_improved_model_hash("3f9c2ad1b2a84d55c0ffee00112233445566778899aabbccddeeff0055667788");
+}
+
+}  // namespace
+
+v1::Report MissingEffectsReport() {
+  v1::Report report = Base(41000, 5003);
+  report.set_verdict(v1::Report::MISSING_EFFECTS);
+  report.set_summary(
+      "The fingers end in balls, the model has points; and the left finger reports late. Both together bring "
+      "the "
+      "error down to what repeats of the same touch have among themselves.");
+  AddSlice("incidence > 12 deg", 412, -9100, 0.71, "contact too early by 9.1 ms", &report);
+  AddSlice("object = lat20 and face = side", 96, 6200, 0.18, "outer fingers too late by 6.2 ms", &report);
+  AddSlice("curvature > 20 1/m and finger = m", 40, -850, 0.04, "contact too early by 850 us", &report);
+
+  v1::Step* radius = report.add_steps();
+  radius->set_effect("tip_radius");
+  radius->add_equivalent("surface_offset");
+  radius->set_probability(0.994);
+  AddParameter("radius_mm", "mm", 2.981, 0.021, radius);
+  radius->set_rmse_us(7900);
+  radius->set_heldout_rmse_us(7950);
+  radius->set_lack_of_fit_p(3e-12);
+  radius->set_gain_nats(2210);
+  radius->set_meaning("The fingers end in balls; the model has points.");
+  radius->set_remedy("Keep the radius in the model, or fit pointed tips.");
+  radius->set_check_on_rig(
+      "Measure the tips, or touch one flat face at 0 and 25 deg: only the second shifts.");
+  radius->set_decided_by("touches on the edge of a box: a ball rolls over it, an offset does not");
+  radius->set_scope("rig");
+  v1::Step* latency = report.add_steps();
+  latency->set_effect("channel_latency");
+  latency->set_probability(0.97);
+  for (const auto& [finger, value] :
+       {std::pair<const char*, double>{"l", 8200}, {"m", -3900}, {"r", -4300}}) {
+    AddParameter("latency_us", "us", value, 190, latency)->set_finger(finger);
+  }
+  latency->set_rmse_us(5010);
+  latency->set_heldout_rmse_us(5030);
+  latency->set_lack_of_fit_p(0.44);
+  latency->set_gain_nats(318);
+  latency->set_meaning("One channel reports later than the others.");
+  latency->set_remedy("Keep the latencies in the model, or poll the channels at once.");
+  latency->set_check_on_rig("Swap the cables of two fingers: the delay moves with the channel.");
+  latency->set_scope("rig");
+  *report.mutable_final() = report.initial();
+  SetQuality(5010, 5030, 0.44, report.mutable_final());
+
+  AddParameter("radius_mm", "mm", 2.975, 0.034, AddCandidate("tip_radius", 0.994, 7900, 2210, &report));
+  AddParameter("travel_mm", "mm", 0.71, 0.031, AddCandidate("oblique_slip", 0.006, 12700, 1720, &report));
+  AddParameter("relative", "", 0.0131, 0.0012, AddCandidate("object_scale", 1e-7, 29000, 940, &report));
+  AddParameter("rms_mm", "mm", 0.31, 0.05, AddCandidate("surface_error", 1e-9, 31000, 610, &report));
+  AddParameter("angle_deg", "deg", -0.42, 0.11, AddCandidate("tool_tilt", 1e-12, 38800, 120, &report));
+  AddParameter("shift_mm", "mm", 0.004, 0.013, AddCandidate("object_push", 0, 40990, 0, &report));
+  AddCandidate("speed_error", 0, 41000, 0, &report)
+      ->set_note("this experiment cannot see it: one speed only");
+  v1::Ambiguity* pair = report.add_ambiguities();
+  pair->add_effects("channel_latency");
+  pair->add_effects("finger_length");
+  pair->set_decided_by(
+      "the same touches at a second speed: a latency keeps its time, a length keeps its distance");
+  AddModel(
+      "touchstone: model/1\nname: nominal-improved\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
+      "  - tip_radius: {radius_mm: 2.981}\n  - channel_latency: {latency_us: [8200, -3900, -4300]}\n"
+      "  - gaussian_noise: {sigma_us: 5010}\n",
+      &report);
+  AddProposals(24, "tells channel_latency from finger_length", &report);
+  return report;
+}
+
+v1::Report WrongValuesReport() {
+  v1::Report report = Base(9100, 812);
+  report.set_verdict(v1::Report::WRONG_VALUES);
+  report.set_summary(
+      "No effect is missing. The slowdown after the first contact is stronger than the model says.");
+  AddSlice("gap to the first finger > 40 ms", 310, 7700, 0.83, "later fingers too late by 7.7 ms", &report);
+  v1::Refit* slowdown = report.add_refitted();
+  slowdown->set_effect("contact_slowdown");
+  AddParameter("fraction", "", 0.183, 0.0042, slowdown)->set_before(0.05);
+  v1::Refit* noise = report.add_refitted();
+  noise->set_effect("gaussian_noise");
+  AddParameter("sigma_us", "us", 812, 12, noise)->set_before(2000);
+  SetQuality(815, 818, 0.63, report.mutable_final());
+  v1::Ambiguity* pair = report.add_ambiguities();
+  for (const char* effect : {"contact_slowdown", "speed_error", "clock_skew"}) pair->add_effects(effect);
+  pair->set_decided_by("the arm's encoders: only a speed error shows before the first contact");
+  AddModel(
+      "touchstone: model/1\nname: nominal-improved\neffects:\n  - contact_slowdown: {fraction: 0.183}\n"
+      "  - gaussian_noise: {sigma_us: 812}\n",
+      &report);
+  return report;
+}
+
+v1::Report AdequateReport() {
+  v1::Report report = Base(5100, 5100);
+  report.set_verdict(v1::Report::ADEQUATE);
+  report.set_summary("What is left between model and measurements is noise.");
+  report.mutable_noise_floor()->set_from_repeats(false);
+  report.mutable_data()->set_repeats(0);
+  report.mutable_data()->set_rounds(1);
+  report.mutable_data()->clear_unused();
+  report.mutable_data()->set_rows(960);
+  report.add_warnings(
+      "no touch was repeated, so the noise floor is an upper bound from the model's own residuals");
+  AddParameter("radius_mm", "mm", 0.02, 0.04, AddCandidate("tip_radius", 0.02, 5099, -2.1, &report));
+  AddParameter("relative", "", 0.0004, 0.0005, AddCandidate("object_scale", 0.01, 5099.5, -2.9, &report));
+  return report;
+}
+
+v1::Report UnexplainedReport() {
+  v1::Report report = Base(23500, 5003);
+  report.set_verdict(v1::Report::UNEXPLAINED);
+  report.set_summary(
+      "The rest swings with the travel, four millimetres a period; no built-in effect does that.");
+  AddSlice("travel > 60 mm and finger = r", 201, 6100, 0.41, "contact too late by 6.1 ms", &report);
+  v1::Unexplained& rest = *report.mutable_unexplained();
+  for (const auto& [name, p] :
+       {std::pair<const char*, double>{"travel_mm", 1e-9}, {"previous_press_mm", 0.003}}) {
+    v1::CovariateTest* test = rest.add_covariates();
+    test->set_name(name);
+    test->set_p(p);
+    test->set_gain_nats(p < 1e-6 ? 410 : 6);
+  }
+  rest.set_formula("k * sin(2*pi*travel_mm/lead)");
+  rest.set_formula_yaml(
+      "- formula:\n    name: suggested\n    adds: travel_mm\n    expression: \"k * "
+      "sin(2*pi*travel_mm/lead)\"\n"
+      "    parameters: {k: {value: 0.44, unit: mm, min: -1, max: 1}, lead: {value: 4.01, unit: mm, min: 2, "
+      "max: 10}}\n");
+  AddParameter("k", "mm", 0.44, 0.012, &rest);
+  AddParameter("lead", "mm", 4.01, 0.004, &rest);
+  rest.set_rmse_us(6200);
+  rest.set_heldout_rmse_us(6350);
+  rest.set_heldout_gain(0.96);
+  rest.set_nearest_effect("speed_error");
+  rest.set_nearest_cosine(0.21);
+  AddParameter("relative", "", 0.011, 0.004, AddCandidate("speed_error", 0.2, 23300, 3.1, &report));
+  return report;
+}
+
+v1::Report CompareReport() {
+  v1::Report report = Base(41000, 5003);
+  AddSlice("incidence > 12 deg", 412, -9100, 0.71, "contact too early by 9.1 ms", &report);
+  return report;
+}
+
+v1::Report WithoutPosesReport() {
+  v1::Report report;
+  report.set_touches(800);
+  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
+  report.set_model_name("nominal");
+  v1::DataSummary& data = *report.mutable_data();
+  data.set_rows(800);
+  data.add_objects("cross");
+  data.add_objects("star");
+  v1::DistributionComparison& comparison = *report.mutable_distributions();
+  comparison.set_energy_distance(0.213);
+  comparison.set_p(0.0005);
+  comparison.set_simulated_touches(8000);
+  comparison.set_plan("faces, 6 x 40, speed 20 mm/s");
+  for (const auto& [name, measured, simulated, unit, p] :
+       {std::tuple<const char*, double, double, const char*, double>{"median gap", 41200, 38800, "us", 0.002},
+        {"90 % gap", 188000, 190500, "us", 0.31},
+        {"mean curvature", 4.1, 2.2, "1/m", 0.0004}}) {
+    v1::StatisticTest* test = comparison.add_statistics();
+    test->set_name(name);
+    test->set_measured(measured);
+    test->set_simulated(simulated);
+    test->set_unit(unit);
+    test->set_p(p);
+  }
+  for (const char* effect : {"gaussian_noise", "tip_radius"}) comparison.add_compatible_effects(effect);
+  report.add_warnings("the set has no poses; two orders of magnitude weaker than touches with poses");
+  AddHistograms(30000, &report);
+  return report;
+}
+
+std::vector<NamedReport> AllSampleReports() {
+  return {{"missing_effects", MissingEffectsReport()},
+          {"wrong_values", WrongValuesReport()},
+          {"adequate", AdequateReport()},
+          {"unexplained", UnexplainedReport()},
+          {"compare", CompareReport()},
+          {"without_poses", WithoutPosesReport()},
+          {"empty", v1::Report()}};
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,239 @@
+#include "client/report/terminal_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
+
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+using Cell = TextLayout::Cell;
+constexpr int kMostParameters = 6;  // of one effect
+constexpr int kMostRivals = 3;
+
+// "2.98 +- 0.02 mm", with the name where it does not go without saying.
+std::string Parameter(const v1::ParameterValue& parameter, bool named) {
+  std::string text = ValueWithError(parameter);
+  if (parameter.has_before()) {
+    v1::ParameterValue before;
+    before.set_value(parameter.before());
+    before.set_unit(parameter.unit());
+    absl::StrAppend(&text, ", was ", ValueWithError(before));
+  }
+  return named ? absl::StrCat(ParameterName(parameter), " ", text) : text;
+}
+
+// One row an effect, and one more for each further parameter.
+template <typename Effect>
+void AddEffect(const Effect& effect, const std::string& name, double probability, const std::string& change,
+               const std::string& note, TextLayout::Style style, std::vector<std::vector<Cell>>* rows) {
+  const auto& parameters = effect.parameters();
+  const bool named =
+      parameters.size() > 1 ||
+      (parameters.size() == 1 && (!parameters[0].finger().empty() || !parameters[0].object().empty()));
+  const std::string first = parameters.empty() ? "" : Parameter(parameters[0], named);
+  const std::string p = std::isnan(probability) ? "" : probability < 0.005 ? "< 0.01" : Fixed(probability, 2);
+  rows->push_back({{name, false, style},
+                   {first, false, style},
+                   {p, true, style},
+                   {change, true, style},
+                   {note, false, TextLayout::kDim}});
+  for (int i = 1; i < std::min<int>(parameters.size(), kMostParameters); ++i) {
+    rows->push_back({{""}, {Parameter(parameters[i], true), false, style}, {""}, {""}, {""}});
+  }
+  if (parameters.size() > kMostParameters) {
+    rows->push_back(
+        {{""},
+         {absl::StrCat("... ", parameters.size() - kMostParameters, " more values"), false, TextLayout::kDim},
+         {""},
+         {""},
+         {""}});
+  }
+}
+
+double Unseen(double heldout_us, double rmse_us) {
+  return heldout_us > 0 ? heldout_us : rmse_us;
+}
+
+}  // namespace
+
+void AddDistributions(const v1::Report& report, TextLayout* out) {
+  if (!report.has_distributions()) return;
+  const v1::DistributionComparison& comparison = report.distributions();
+  out->Label("How wrong");
+  out->Paragraph(absl::StrCat("The set has no poses, so only distributions can be compared: energy distance ",
+                              Number(comparison.energy_distance()), ", p ", Probability(comparison.p()),
+                              ", against ", Count(comparison.simulated_touches()), " simulated touches",
+                              comparison.plan().empty() ? "" : absl::StrCat(" (", comparison.plan(), ")"),
+                              "."));
+  if (comparison.statistics_size() > 0) {
+    std::vector<std::vector<Cell>> rows = {{{"", false},
+                                            {"measured", true, TextLayout::kDim},
+                                            {"simulated", true, TextLayout::kDim},
+                                            {"p", true, TextLayout::kDim}}};
+    for (const v1::StatisticTest& test : comparison.statistics()) {
+      const bool time = test.unit() == "us";
+      const std::string unit = test.unit().empty() ? "" : absl::StrCat(" ", test.unit());
+      rows.push_back({{test.name()},
+                      {time ? Time(test.measured()) : absl::StrCat(Number(test.measured()), unit), true},
+                      {time ? Time(test.simulated()) : absl::StrCat(Number(test.simulated()), unit), true},
+                      {Probability(test.p()), true}});
+    }
+    out->Rows(rows);
+  }
+  if (comparison.compatible_effects_size() > 0) {
+    out->Label("Why");
+    out->Paragraph(absl::StrCat("It would be so with ", absl::StrJoin(comparison.compatible_effects(), ", "),
+                                "; touches with poses would tell which."));
+  }
+}
+
+void AddWhy(const v1::Report& report, TextLayout* out) {
+  std::vector<std::vector<Cell>> rows;
+  double before = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+  bool note = true;
+  std::set<std::string> named;
+  for (const v1::Refit& refit : report.refitted()) {
+    AddEffect(refit, refit.effect(), std::nan(""), "", "value in the model put right", TextLayout::kPlain,
+              &rows);
+    named.insert(refit.effect());
+  }
+  for (const v1::Step& step : report.steps()) {
+    const double after = Unseen(step.heldout_rmse_us(), step.rmse_us());
+    AddEffect(step, step.effect(), step.probability(), TimeChange(before, after),
+              note ? "on touches the fit did not see" : "then", TextLayout::kPlain, &rows);
+    note = false;
+    before = after;
+    named.insert(step.effect());
+    named.insert(step.equivalent().begin(), step.equivalent().end());
+  }
+  // What else could stand in the place of the first step.
+  if (report.steps_size() > 0) {
+    const double initial = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+    int rivals = 0;
+    for (const v1::Candidate& candidate : report.candidates()) {
+      if (rivals == kMostRivals || !(candidate.gain_nats() > 0)) break;
+      if (!named.insert(candidate.effect()).second) continue;
+      AddEffect(candidate, candidate.effect(), candidate.probability(),
+                TimeChange(initial, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())),
+                candidate.note().empty() ? "in its place" : candidate.note(), TextLayout::kDim, &rows);
+      ++rivals;
+    }
+  }
+  if (!rows.empty()) out->Label("Why");
+  out->Rows(rows);
+  std::set<std::string> told;
+  for (const v1::Step& step : report.steps()) {
+    if (step.equivalent().empty()) continue;
+    told.insert(step.decided_by());
+    out->Paragraph(
+        absl::StrCat(StepName(step), ": these data cannot tell them apart.",
+                     step.decided_by().empty() ? "" : absl::StrCat(" To decide: ", step.decided_by())));
+  }
+  for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
+    if (ambiguity.effects_size() < 2 || told.count(ambiguity.decided_by()) > 0) continue;
+    const std::vector<std::string> effects(ambiguity.effects().begin(), ambiguity.effects().end());
+    out->Paragraph(absl::StrCat(Join(effects, "or"),
+                                ": these data cannot tell them apart. To decide: ", ambiguity.decided_by()));
+  }
+}
+
+void AddUnexplained(const v1::Report& report, TextLayout* out) {
+  const v1::Unexplained& rest = report.unexplained();
+  if (rest.covariates().empty() && rest.formula().empty()) return;
+  out->Label("Unexplained");
+  if (!rest.covariates().empty()) {
+    std::vector<std::string> names;
+    for (int i = 0; i < std::min(rest.covariates_size(), 4); ++i) {
+      const double p = rest.covariates(i).p();
+      names.push_back(absl::StrCat(rest.covariates(i).name(), " (p ", Probability(p), ")"));
+    }
+    out->Paragraph(absl::StrCat("The rest hangs on ", absl::StrJoin(names, ", "), "."));
+  }
+  if (rest.formula().empty()) return;
+  std::string text = absl::StrCat("A suggestion, not a cause: ", rest.formula());
+  if (rest.heldout_gain() > 0) {
+    absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen touches");
+  }
+  if (!rest.nearest_effect().empty()) {
+    absl::StrAppend(&text, "; it looks most like ", rest.nearest_effect(), " (cosine ",
+                    Fixed(rest.nearest_cosine(), 2), ")");
+  }
+  out->Paragraph(text + ".");
+  for (const v1::ParameterValue& parameter : rest.parameters()) out->Paragraph(Parameter(parameter, true));
+  if (rest.formula_yaml().empty()) return;
+  out->Paragraph("To add it, put this under effects in the model file:");
+  out->Verbatim(rest.formula_yaml());
+}
+
+void AddWhatToDo(const v1::Report& report, TextLayout* out) {
+  out->Label("What to do");
+  if (!report.summary().empty()) out->Paragraph(report.summary());
+  for (const v1::Step& step : report.steps()) {
+    std::string text = step.meaning();
+    if (!step.remedy().empty()) absl::StrAppend(&text, text.empty() ? "" : " ", step.remedy());
+    if (!text.empty()) out->Paragraph(absl::StrCat(step.effect(), ": ", text));
+    if (!step.check_on_rig().empty()) {
+      out->Paragraph(absl::StrCat("To check on the rig: ", step.check_on_rig()));
+    }
+  }
+  if (!report.improved_model_hash().empty()) {
+    out->Paragraph(absl::StrCat("The improved model has the hash ",
+                                report.improved_model_hash().substr(0, 12), "... (--save-model writes it)."));
+  }
+  out->Label("");
+}
+
+void AddNextTouches(const v1::Report& report, TextLayout* out) {
+  if (report.next_touches().empty()) return;
+  struct Purpose {
+    std::set<std::string> objects;
+    int touches = 0;
+    double separation = 0;
+  };
+  std::vector<std::string> order;
+  std::map<std::string, Purpose> purposes;
+  for (const v1::ProposedTouch& touch : report.next_touches()) {
+    if (purposes.count(touch.purpose()) == 0) order.push_back(touch.purpose());
+    Purpose& purpose = purposes[touch.purpose()];
+    purpose.objects.insert(touch.object());
+    ++purpose.touches;
+    purpose.separation = std::max(purpose.separation, touch.separation());
+  }
+  out->Label("Next touches");
+  for (const std::string& name : order) {
+    const Purpose& purpose = purposes[name];
+    out->Paragraph(
+        absl::StrCat(purpose.touches, " on ", absl::StrJoin(purpose.objects, ", "), name.empty() ? "" : ": ",
+                     name, "; up to ", Number(purpose.separation, 2), " noise sigmas apart a touch."),
+        TextLayout::kPlain, 2);
+  }
+}
+
+void AddUnusedRows(const v1::Report& report, TextLayout* out) {
+  uint64_t rows = 0;
+  for (const v1::UnusedRows& unused : report.data().unused()) rows += unused.rows();
+  if (rows == 0) return;
+  out->Label("Not used");
+  out->Paragraph(absl::StrCat(Count(rows), " of ", Count(report.data().rows()), " rows:"));
+  for (const v1::UnusedRows& unused : report.data().unused()) {
+    std::string text = absl::StrCat(Count(unused.rows()), " ", unused.reason());
+    if (!unused.examples().empty()) {
+      const int shown = std::min(unused.examples_size(), 5);
+      absl::StrAppend(&text, unused.examples_size() == 1 && unused.rows() == 1 ? " (touch " : " (touches ",
+                      absl::StrJoin(unused.examples().begin(), unused.examples().begin() + shown, ", "),
+                      unused.rows() > static_cast<uint32_t>(shown) ? ", ...)" : ")");
+    }
+    out->Paragraph(text, TextLayout::kPlain, 2);
+  }
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,16 @@
+// The parts of the terminal report that say why and what to do. Each adds nothing if the report has nothing.
+#pragma once
+
+#include "client/report/text_layout.h"
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone::client {
+
+void AddDistributions(const v1::Report& report, TextLayout* out);  // sets without poses
+void AddWhy(const v1::Report& report, TextLayout* out);
+void AddUnexplained(const v1::Report& report, TextLayout* out);
+void AddWhatToDo(const v1::Report& report, TextLayout* out);
+void AddNextTouches(const v1::Report& report, TextLayout* out);
+void AddUnusedRows(const v1::Report& report, TextLayout* out);
+
+}  // namespace touchstone::client

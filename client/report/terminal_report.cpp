@@ -1,0 +1,152 @@
+// The report in the terminal: how wrong, where, why, ladder, what to do (DESIGN 9).
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include "client/report/report.h"
+#include "client/report/terminal_parts.h"
+#include "client/report/words.h"
+
+namespace touchstone::client {
+namespace {
+
+using Cell = TextLayout::Cell;
+
+void AddOpening(const v1::Report& report, TextLayout* out) {
+  const v1::DataSummary& data = report.data();
+  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
+  if (data.objects_size() > 0) {
+    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
+  }
+  if (data.poses() > 0)
+    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
+  if (data.poses() > 0 && data.rounds() > 1) absl::StrAppend(&text, " x ", data.rounds(), " rounds");
+  absl::StrAppend(&text, ".");
+  const Floor floor = NoiseFloorOf(report);
+  if (floor.sigma_us > 0) {
+    const std::string length = LengthOf(floor.sigma_us, report);
+    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
+                    length.empty() ? "" : absl::StrCat(" (", length, ")"));
+    if (floor.bound) {
+      absl::StrAppend(&text, ": an upper bound, since no touch was repeated.");
+    } else if (data.repeats() > 0) {
+      absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats.");
+    } else {
+      absl::StrAppend(&text, ".");
+    }
+  }
+  out->Lead(text);
+  for (const std::string& warning : report.warnings())
+    out->Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
+  out->Blank();
+  const bool good = report.verdict() == v1::Report::ADEQUATE;
+  out->Lead(Headline(report), good ? TextLayout::kGood : TextLayout::kBold);
+  out->Blank();
+}
+
+void AddHowWrong(const v1::Report& report, TextLayout* out) {
+  if (!(report.initial().rmse_us() > 0)) return;
+  const Floor floor = NoiseFloorOf(report);
+  std::string text = absl::StrCat("RMSE ", Time(report.initial().rmse_us()));
+  if (floor.sigma_us > 0) {
+    absl::StrAppend(&text, ", ", Number(report.initial().rmse_us() / floor.sigma_us, 2),
+                    " times the floor: ", floor.bound ? "at least " : "", Share(report.reducible_share()),
+                    " of the error is the model's, not noise.");
+  } else {
+    absl::StrAppend(&text, ".");
+  }
+  out->Label("How wrong");
+  out->Paragraph(text);
+  if (report.finger_bias_us_size() > 0) {
+    std::vector<std::string> fingers;
+    for (int i = 0; i < report.finger_bias_us_size(); ++i) {
+      const std::string name = i < report.fingers_size() ? report.fingers(i) : absl::StrCat(i);
+      fingers.push_back(absl::StrCat(name, " ", SignedTime(report.finger_bias_us(i))));
+    }
+    out->Paragraph(absl::StrCat("Mean residual of the fingers: ", absl::StrJoin(fingers, ", "), "."));
+  }
+}
+
+void AddWhere(const v1::Report& report, TextLayout* out) {
+  if (report.where().empty()) return;
+  out->Label("Where");
+  std::vector<std::vector<Cell>> rows;
+  for (int i = 0; i < std::min(report.where_size(), 6); ++i) {
+    const v1::Slice& slice = report.where(i);
+    const std::string words = slice.words().empty()
+                                  ? absl::StrCat("mean residual ", SignedTime(slice.mean_residual_us()))
+                                  : slice.words();
+    rows.push_back(
+        {{slice.slice()},
+         {absl::StrCat(Count(slice.touches()), " touches"), true},
+         {absl::StrCat(Share(slice.share_of_excess_error()), i == 0 ? " of the excess" : ""), false},
+         {words}});
+  }
+  // Right-align the shares though only the first says of what.
+  size_t widest = 0;
+  for (const v1::Slice& slice : report.where()) {
+    widest = std::max(widest, Share(slice.share_of_excess_error()).size());
+  }
+  for (auto& row : rows) row[2].text.insert(0, widest - std::min(widest, row[2].text.find(" %") + 2), ' ');
+  out->Rows(rows);
+}
+
+void AddLadder(const v1::Report& report, TextLayout* out) {
+  const std::vector<Rung> rungs = Ladder(report);
+  if (rungs.empty()) return;
+  out->Label("Ladder");
+  double largest = 0;
+  int names = 0;
+  bool heldout = false, p = false;
+  for (const Rung& rung : rungs) {
+    largest = std::max(largest, rung.rmse_us);
+    names = std::max(names, Columns(rung.name));
+    heldout |= !std::isnan(rung.heldout_rmse_us);
+    p |= !std::isnan(rung.lack_of_fit_p);
+  }
+  const bool wide = out->width() >= 96;
+  const int bar = std::clamp(out->room() - names - 2 - (wide ? 44 : 12), 10, 40);
+  std::vector<std::vector<Cell>> rows;
+  if (wide && (heldout || p)) {
+    rows.push_back({{""},
+                    {""},
+                    {"RMSE", true, TextLayout::kDim},
+                    {heldout ? "unseen touches" : "", true, TextLayout::kDim},
+                    {p ? "lack-of-fit p" : "", true, TextLayout::kDim}});
+  }
+  for (const Rung& rung : rungs) {
+    std::vector<Cell> row = {{rung.name},
+                             {std::string(BarLength(rung.rmse_us, largest, bar), '#'), false,
+                              rung.kind == Rung::kFloor ? TextLayout::kDim : TextLayout::kBar}};
+    row.push_back({Time(rung.rmse_us), true});
+    if (wide && (heldout || p)) {
+      row.push_back({std::isnan(rung.heldout_rmse_us) ? "" : Time(rung.heldout_rmse_us), true});
+      row.push_back({std::isnan(rung.lack_of_fit_p) ? "" : Probability(rung.lack_of_fit_p), true});
+    }
+    rows.push_back(row);
+  }
+  out->Rows(rows);
+}
+
+}  // namespace
+
+std::string TerminalReport(const v1::Report& report, int width, bool colour) {
+  TextLayout out(width, colour);
+  AddOpening(report, &out);
+  AddHowWrong(report, &out);
+  AddDistributions(report, &out);
+  AddWhere(report, &out);
+  AddWhy(report, &out);
+  AddUnexplained(report, &out);
+  AddLadder(report, &out);
+  AddWhatToDo(report, &out);
+  AddNextTouches(report, &out);
+  AddUnusedRows(report, &out);
+  return out.Take();
+}
+
+}  // namespace touchstone::client

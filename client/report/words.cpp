@@ -1,0 +1,231 @@
+#include "client/report/words.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/strip.h>
+
+namespace touchstone::client {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+// Decimals that show `digits` significant digits of `value`.
+int DecimalsFor(double value, int digits) {
+  if (!(std::abs(value) > 0) || !std::isfinite(value)) return 0;
+  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value)) + 1e-12));
+  return std::clamp(digits - 1 - exponent, 0, 9);
+}
+
+// "3e-9" rather than "3e-09".
+std::string ShortExponent(std::string text) {
+  const size_t e = text.find('e');
+  if (e == std::string::npos) return text;
+  size_t digit = e + 2;
+  while (digit + 1 < text.size() && text[digit] == '0') text.erase(digit, 1);
+  if (text[e + 1] == '+') text.erase(e + 1, 1);
+  return text;
+}
+
+// Decimals of a value so that its error shows one digit, or two if that digit is a 1.
+int DecimalsForError(double error) {
+  const int decimals = DecimalsFor(error, 1);
+  return error * std::pow(10.0, decimals) < 1.95 ? DecimalsFor(error, 2) : decimals;
+}
+
+}  // namespace
+
+std::string Fixed(double value, int decimals) {
+  if (std::isnan(value)) return "n/a";
+  std::string text = absl::StrFormat("%.*f", decimals, value);
+  if (text[0] == '-' && text.find_first_of("123456789") == std::string::npos) text.erase(0, 1);
+  return text;
+}
+
+std::string Number(double value, int digits) {
+  if (std::isnan(value)) return "n/a";
+  if (std::isinf(value)) return value > 0 ? "infinite" : "-infinite";
+  const double size = std::abs(value);
+  if (size == 0) return "0";
+  if (size < 1e-4 || size >= 1e7) {
+    char text[40];
+    std::snprintf(text, sizeof(text), "%.*g", digits, value);
+    return ShortExponent(text);
+  }
+  return Fixed(value, DecimalsFor(value, digits));
+}
+
+std::string Tick(double value) {
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.6g", value);
+  return ShortExponent(text);
+}
+
+std::string Count(uint64_t count) {
+  std::string text = absl::StrCat(count);
+  if (text.size() < 5) return text;
+  for (int place = static_cast<int>(text.size()) - 3; place > 0; place -= 3) text.insert(place, " ");
+  return text;
+}
+
+TimeUnit UnitOfTime(double us) {
+  const double size = std::abs(us);
+  if (size >= 999.5e3) return {1e-6, "s"};
+  if (size >= 999.5) return {1e-3, "ms"};
+  return {1, "us"};
+}
+
+std::string Time(double us) {
+  if (std::isnan(us)) return "n/a";
+  const TimeUnit unit = UnitOfTime(us);
+  return absl::StrCat(Number(us * unit.per_us), " ", unit.symbol);
+}
+
+std::string SignedTime(double us) {
+  return absl::StrCat(us > 0 ? "+" : "", Time(us));
+}
+
+std::string TimeChange(double from_us, double to_us) {
+  const TimeUnit unit = UnitOfTime(std::max(std::abs(from_us), std::abs(to_us)));
+  const double from = from_us * unit.per_us, to = to_us * unit.per_us;
+  const int decimals =
+      std::min(2, std::max(DecimalsFor(std::max(from, to), 3), DecimalsFor(std::min(from, to), 2)));
+  return absl::StrCat(Fixed(from, decimals), " -> ", Fixed(to, decimals), " ", unit.symbol);
+}
+
+std::string Probability(double p) {
+  if (std::isnan(p)) return "n/a";
+  if (p < 1e-15) return "< 1e-15";
+  if (p < 1e-3) return Number(p, 1);
+  return p > 0.995 ? "1.00" : Fixed(p, p < 0.1 ? 3 : 2);
+}
+
+std::string Share(double share) {
+  if (std::isnan(share)) return "n/a";
+  const double percent = 100 * share;
+  return absl::StrCat(Fixed(percent, std::abs(percent) < 9.95 || (percent > 97 && percent < 99.95) ? 1 : 0),
+                      " %");
+}
+
+std::string Covariate(const std::string& name, const std::string& unit) {
+  if (unit.empty()) return name;
+  // "incidence_deg" with unit "deg" is "incidence (deg)".
+  static const std::pair<const char*, const char*> kSuffixes[] = {
+      {"_mm_s2", "mm/s2"}, {"_mm_s", "mm/s"}, {"_per_m", "1/m"}, {"_mm", "mm"},
+      {"_deg", "deg"},     {"_us", "us"},     {"_s", "s"}};
+  absl::string_view stem = name;
+  for (const auto& [suffix, symbol] : kSuffixes) {
+    if (unit == symbol && absl::ConsumeSuffix(&stem, suffix)) break;
+  }
+  return absl::StrCat(stem, " (", unit, ")");
+}
+
+std::string ValueWithError(const v1::ParameterValue& value) {
+  double scale = 1;
+  std::string unit = value.unit();
+  if (unit == "us") {
+    const TimeUnit time = UnitOfTime(std::max(std::abs(value.value()), value.std_error()));
+    scale = time.per_us;
+    unit = time.symbol;
+  }
+  const double error = value.std_error() * scale;
+  std::string text;
+  if (error > 0 && std::isfinite(error) && error < 1e7 && error > 1e-9) {
+    const int decimals = DecimalsForError(error);
+    text = absl::StrCat(Fixed(value.value() * scale, decimals), " +- ", Fixed(error, decimals));
+  } else {
+    text = error == 0 ? Tick(value.value() * scale) : Number(value.value() * scale);
+  }
+  return unit.empty() ? text : absl::StrCat(text, " ", unit);
+}
+
+std::string Interval(const v1::ParameterValue& value) {
+  if (!(value.lower() < value.upper())) return "";
+  double scale = 1;
+  std::string unit = value.unit();
+  if (unit == "us") {
+    const TimeUnit time = UnitOfTime(std::max(std::abs(value.lower()), std::abs(value.upper())));
+    scale = time.per_us;
+    unit = time.symbol;
+  }
+  const int decimals = DecimalsFor((value.upper() - value.lower()) * scale, 2);
+  return absl::StrCat(Fixed(value.lower() * scale, decimals), " to ", Fixed(value.upper() * scale, decimals),
+                      unit.empty() ? "" : " ", unit);
+}
+
+std::string ParameterName(const v1::ParameterValue& value) {
+  std::string name = value.name();
+  if (!value.finger().empty()) {
+    const bool axis = value.finger() == "x" || value.finger() == "y" || value.finger() == "z";
+    absl::StrAppend(&name, axis ? " " : " of finger ", value.finger());
+  }
+  if (!value.object().empty()) absl::StrAppend(&name, ", ", value.object());
+  return name;
+}
+
+std::string Join(const std::vector<std::string>& words, const std::string& last) {
+  std::string text;
+  for (size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) absl::StrAppend(&text, i + 1 == words.size() ? absl::StrCat(" ", last, " ") : ", ");
+    absl::StrAppend(&text, words[i]);
+  }
+  return text;
+}
+
+std::string StepName(const v1::Step& step) {
+  std::vector<std::string> names = {step.effect()};
+  names.insert(names.end(), step.equivalent().begin(), step.equivalent().end());
+  return Join(names, "or");
+}
+
+Floor NoiseFloorOf(const v1::Report& report) {
+  Floor floor;
+  floor.sigma_us = report.noise_floor_us() > 0 ? report.noise_floor_us() : report.noise_floor().sigma_us();
+  floor.bound = report.has_noise_floor() && !report.noise_floor().from_repeats();
+  return floor;
+}
+
+std::string LengthOf(double us, const v1::Report& report) {
+  const auto& speeds = report.data().speeds_mm_s();
+  if (speeds.empty() || !(us > 0)) return "";
+  const auto [slowest, fastest] = std::minmax_element(speeds.begin(), speeds.end());
+  const std::string least = Number(us * 1e-6 * *slowest, 2), most = Number(us * 1e-6 * *fastest, 2);
+  if (*slowest == *fastest) return absl::StrCat(least, " mm at ", Tick(*slowest), " mm/s");
+  return absl::StrCat(least, " to ", most, " mm at ", Tick(*slowest), " to ", Tick(*fastest), " mm/s");
+}
+
+std::vector<Rung> Ladder(const v1::Report& report) {
+  std::vector<Rung> rungs;
+  if (!(report.initial().rmse_us() > 0)) return rungs;
+  const auto add = [&](Rung::Kind kind, std::string name, double rmse, double heldout, double p) {
+    rungs.push_back({kind, std::move(name), rmse, heldout > 0 ? heldout : kUnknown, p});
+  };
+  const v1::Quality& initial = report.initial();
+  add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), initial.rmse_us(),
+      initial.heldout_rmse_us(), initial.lack_of_fit_p());
+  if (report.steps().empty() && !report.refitted().empty()) {
+    add(Rung::kRefit, "values fitted anew", report.final().rmse_us(), report.final().heldout_rmse_us(),
+        report.final().lack_of_fit_p());
+  }
+  for (const v1::Step& step : report.steps()) {
+    add(Rung::kStep, absl::StrCat("+ ", StepName(step)), step.rmse_us(), step.heldout_rmse_us(),
+        step.lack_of_fit_p());
+  }
+  if (!report.unexplained().formula().empty() && report.unexplained().rmse_us() > 0) {
+    add(Rung::kSuggestion, "+ suggested formula", report.unexplained().rmse_us(),
+        report.unexplained().heldout_rmse_us(), kUnknown);
+  }
+  const Floor floor = NoiseFloorOf(report);
+  if (floor.sigma_us > 0) {
+    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma_us, kUnknown,
+        kUnknown);
+  }
+  return rungs;
+}
+
+}  // namespace touchstone::client

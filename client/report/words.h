@@ -1,0 +1,71 @@
+// Numbers, units and sentences of a report, as terminal and page both show them. Plain ASCII ("+-", "us",
+// "->"); the page sets them in type (html_page.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone::client {
+
+// `digits` significant digits, no exponent between 1e-4 and 1e7: "41.0", "0.012", "3e-9"; "n/a" for NaN.
+std::string Number(double value, int digits = 3);
+// With `decimals` decimals; never "-0.0".
+std::string Fixed(double value, int decimals);
+// A round number as it is: "20", "0.05", "-3e-9".
+std::string Tick(double value);
+// Whole numbers of at least five digits in groups: "1 000 000".
+std::string Count(uint64_t count);
+
+// The unit in which a person reads a time: us below 1 ms, ms below 1 s, else s.
+struct TimeUnit {
+  double per_us;
+  const char* symbol;
+};
+TimeUnit UnitOfTime(double us);
+
+std::string Time(double us);                                              // "41.0 ms", "850 us"
+std::string SignedTime(double us);                                        // "+9.10 ms"
+std::string TimeChange(double from_us, double to_us);                     // "41.0 -> 5.0 ms"
+std::string Probability(double p);                                        // "0.40", "3e-9", "< 1e-15"
+std::string Share(double share);                                          // "98.5 %"
+std::string Covariate(const std::string& name, const std::string& unit);  // "incidence (deg)"
+
+// "2.98 +- 0.02 mm": as many digits as the error allows. Times in the unit for people.
+std::string ValueWithError(const v1::ParameterValue& value);
+// "2.94 to 3.02 mm", or empty if the report has no interval.
+std::string Interval(const v1::ParameterValue& value);
+// "radius_mm", with the finger, axis and object: "latency_us of finger l", "translation_mm x, lat10".
+std::string ParameterName(const v1::ParameterValue& value);
+
+// "a", "a or b", "a, b or c".
+std::string Join(const std::vector<std::string>& words, const std::string& last);
+// "tip_radius or object_scale": a step with its equivalents.
+std::string StepName(const v1::Step& step);
+
+// The noise floor, from wherever the report has it, and whether it is only an upper bound; 0: unknown.
+struct Floor {
+  double sigma_us = 0;
+  bool bound = false;
+};
+Floor NoiseFloorOf(const v1::Report& report);
+// "0.10 mm at 20 mm/s", or a range when there are several speeds; empty without speeds.
+std::string LengthOf(double us, const v1::Report& report);
+
+// One rung of the ladder.
+struct Rung {
+  enum Kind { kGiven, kRefit, kStep, kSuggestion, kFloor };
+  Kind kind;
+  std::string name;
+  double rmse_us;
+  double heldout_rmse_us;  // NaN: none
+  double lack_of_fit_p;    // NaN: none
+};
+// The given model, what was changed, and the noise floor; empty for a set without poses.
+std::vector<Rung> Ladder(const v1::Report& report);
+
+// The verdict in one sentence.
+std::string Headline(const v1::Report& report);
+
+}  // namespace touchstone::client
