@@ -11,9 +11,9 @@
 namespace touchstone {
 
 struct ResidualScale {
-  double sigma_s = 0;         // of one finger's time
-  double spacing_m = 0.030;   // between fingers, for the local curvature
-  uint64_t seed = 0;          // of permutations and of the noise that is added to simulated times
+  double sigma_s = 0;        // of one finger's time
+  double spacing_m = 0.030;  // between fingers, for the local curvature
+  uint64_t seed = 0;         // of permutations and of the noise that is added to simulated times
 };
 
 // Fills groups, worst_touches, finger_bias_us, curves, histograms, parity, surface_points and outlines.

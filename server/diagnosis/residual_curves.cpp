@@ -77,7 +77,11 @@ class CurveMaker {
         before_(before),
         after_(after),
         seed_(seed),
-        touches_(ThinnedTouches(observations, before, kMostTouches)) {}
+        touches_(ThinnedTouches(observations, before, kMostTouches)) {
+    // Touches of one pose side by side: so are the cells that are made from them.
+    std::stable_sort(touches_.begin(), touches_.end(),
+                     [&](int a, int b) { return observations.pose[a] < observations.pose[b]; });
+  }
 
   void Make(const ResidualCovariate& covariate, int number, int covariates, v1::CovariateCurve* curve) const;
 
@@ -90,7 +94,7 @@ class CurveMaker {
   const std::vector<double>& before_;
   const std::vector<double>& after_;
   const uint64_t seed_;
-  const std::vector<int> touches_;
+  std::vector<int> touches_;
 };
 
 void CurveMaker::Make(const ResidualCovariate& covariate, int number, int covariates,
@@ -113,8 +117,6 @@ void CurveMaker::Make(const ResidualCovariate& covariate, int number, int covari
     curve->set_p(1);
     return;
   }
-  // Cells of one pose side by side.
-  std::stable_sort(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) { return a.pose < b.pose; });
   for (int i = 0; i < observations_.fingers; ++i) AddBins(cells, ends, i, curve);
   // Whoever looks at many curves finds one that bends by chance.
   curve->set_p(std::min(1.0, covariates * Test(cells, ends, number)));

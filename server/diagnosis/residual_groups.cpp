@@ -50,7 +50,8 @@ class Groups {
       message->set_touches(static_cast<uint32_t>(group.touches));
       message->set_rmse_us(std::sqrt(group.squares / group.degrees) * 1e6);
       message->set_mean_residual_us(group.sum / group.fingers * 1e6);
-      message->set_share_of_excess_error(all_excess > 0 ? std::clamp(group.excess / all_excess, 0.0, 1.0) : 0);
+      message->set_share_of_excess_error(all_excess > 0 ? std::clamp(group.excess / all_excess, 0.0, 1.0)
+                                                        : 0);
     }
   }
 
@@ -103,7 +104,8 @@ void DescribeGroups(const Observations& observations, const std::vector<double>&
     report->add_finger_bias_us(by_finger[i].fingers ? by_finger[i].sum / by_finger[i].fingers * 1e6 : 0);
   }
 
-  const auto by_level = [&](const std::string& kind, std::vector<Group> groups, const std::vector<int>& level) {
+  const auto by_level = [&](const std::string& kind, std::vector<Group> groups,
+                            const std::vector<int>& level) {
     for (size_t n = 0; n < touches.size(); ++n)
       tally.Add(&groups[level[n]], &residuals[size_t(touches[n]) * fingers], fingers, compared[n]);
     tally.Report(kind, groups, all_excess, report);
@@ -160,9 +162,8 @@ void DescribeGroups(const Observations& observations, const std::vector<double>&
     }
   }
   const size_t worst = std::min(kWorstTouches, order.size());
-  std::partial_sort(order.begin(), order.begin() + worst, order.end(), [&](int a, int b) {
-    return norm2[a] != norm2[b] ? norm2[a] > norm2[b] : a < b;
-  });
+  std::partial_sort(order.begin(), order.begin() + worst, order.end(),
+                    [&](int a, int b) { return norm2[a] != norm2[b] ? norm2[a] > norm2[b] : a < b; });
   for (size_t n = 0; n < worst; ++n) {
     const int k = touches[order[n]];
     v1::TouchError* message = report->add_worst_touches();
