@@ -1,4 +1,5 @@
 // Measured against simulated: parity and histograms.
+#include <algorithm>
 #include <cmath>
 
 #include <absl/strings/str_cat.h>
@@ -28,7 +29,7 @@ std::string Parity(const v1::Report& report) {
   std::string pair;
   for (const bool after : {false, true}) {
     if (after && !improved) break;
-    Chart chart(400, 400, after ? "improved model" : "given model",
+    Chart chart(440, 430, after ? "improved model" : "given model",
                 {absl::StrCat("simulated (", unit.symbol, ")"), range},
                 {absl::StrCat("measured (", unit.symbol, ")"), range});
     std::vector<ChartPoint> points;
@@ -49,6 +50,11 @@ std::string Parity(const v1::Report& report) {
       "</div>\n<p class=\"note\">One dot a finger and touch: contact times of a touch, relative to each "
       "other. On the dashed line, measured and simulated agree. ",
       Count((report.parity_size() + step - 1) / step), " of ", Count(report.parity_size()), " drawn.</p>\n");
+}
+
+std::string Title(const std::string& quantity) {
+  if (quantity == "descriptor_us") return "Descriptor";
+  return quantity == "curvature_per_m" ? "Local curvature" : quantity;
 }
 
 // "descriptor (us)" and the factor that brings it into the unit for people.
@@ -84,7 +90,7 @@ std::string HistogramChart(const v1::Histogram& histogram, bool improved) {
   for (auto* values : {&measured, &simulated, &better}) {
     for (double& value : *values) value *= 100 / peak;
   }
-  Chart chart(310, 220, histogram.object().empty() ? "all objects" : histogram.object(),
+  Chart chart(300, 210, histogram.object().empty() ? "all objects" : histogram.object(),
               {title, {edges.front(), edges.back()}}, {"density (% of the highest bin)", {0, 106}});
   chart.Steps(edges, measured, "measured");
   chart.Steps(edges, simulated, "line given");
@@ -97,16 +103,31 @@ std::string HistogramChart(const v1::Histogram& histogram, bool improved) {
 }
 
 std::string Histograms(const v1::Report& report) {
-  std::string grid;
+  std::string grids;
   const bool improved = !report.improved_model_yaml().empty();
-  for (const v1::Histogram& histogram : report.histograms()) grid += HistogramChart(histogram, improved);
-  if (grid.empty()) return "";
+  // A row of pictures for each quantity: all objects first, then each.
+  std::vector<std::string> quantities;
+  for (const v1::Histogram& histogram : report.histograms()) {
+    if (std::find(quantities.begin(), quantities.end(), histogram.quantity()) == quantities.end()) {
+      quantities.push_back(histogram.quantity());
+    }
+  }
+  for (const std::string& quantity : quantities) {
+    std::string grid;
+    for (const v1::Histogram& histogram : report.histograms()) {
+      if (histogram.quantity() == quantity) grid += HistogramChart(histogram, improved);
+    }
+    if (!grid.empty())
+      absl::StrAppend(&grids, "<h4>", Escape(Title(quantity)), "</h4>\n<div class=\"grid\">", grid,
+                      "</div>\n");
+  }
+  if (grids.empty()) return "";
   std::vector<std::pair<std::string, std::string>> keys = {{"measured", "measured"},
                                                            {"given", "given model"}};
   if (improved) keys.push_back({"better", "improved model"});
   return absl::StrCat(
-      "<h3>Histograms</h3>\n", Legend(keys), "<div class=\"grid\">", grid,
-      "</div>\n<p class=\"note\">Descriptor: a finger\u2019s contact time after the first finger\u2019s. "
+      "<h3>Histograms</h3>\n", Legend(keys), grids,
+      "<p class=\"note\">Descriptor: a finger\u2019s contact time after the first finger\u2019s. "
       "Local "
       "curvature, for three fingers: speed \u00d7 (t<sub>l</sub> \u2212 2 t<sub>m</sub> + t<sub>r</sub>) / "
       "spacing\u00b2, positive where the surface is convex. p: that measured and simulated touches come from "

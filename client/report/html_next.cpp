@@ -45,8 +45,8 @@ std::string Arrow(const ObjectPicture& picture, const View& view, const v1::Comm
   return absl::StrCat("<path class=\"arrow\" d=\"M", px(Along(tail, lateral, -bar)), "L",
                       px(Along(tail, lateral, bar)), "M", px(tail), "L", px(tip), head,
                       "\"/><text class=\"label\" text-anchor=\"middle\" x=\"",
-                      std::lround(from.x - 16 * dx / size), "\" y=\"",
-                      std::lround(from.y - 16 * dy / size + 8), "\">", number, "</text>");
+                      std::lround(from.x - 22 * dx / size), "\" y=\"",
+                      std::lround(from.y - 20 * dy / size + 8), "\">", number, "</text>");
 }
 
 std::string Pictures(const v1::Report& report) {

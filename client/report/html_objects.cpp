@@ -191,7 +191,8 @@ std::string HtmlObjects(const v1::Report& report) {
   absl::StrAppend(
       &body,
       "</div>\n<p class=\"note\">Each dot is one finger\u2019s contact, at the point where the given "
-      "model puts it, coloured by its residual. ",
+      "model puts it, coloured by its residual. Front: seen from the front and above; back: from behind and "
+      "below. ",
       Count(shown), " of ", Count(report.surface_points_size()), " contacts are drawn");
   if (order.size() > kMostObjects)
     absl::StrAppend(&body, ", stills of the first ", kMostObjects, " objects only");

@@ -70,7 +70,8 @@ std::string Typeset(absl::string_view text) {
   for (const char* unit : {"us", "ms", "s", "mm", "deg", "%", "mm/s", "mm/s2", "1/m"}) {
     const std::string shown =
         absl::StrReplaceAll(unit, {{"us", "\u00b5s"}, {"deg", "\u00b0"}, {"s2", "s\u00b2"}});
-    const std::string plain = absl::StrCat(" ", unit), set = absl::StrCat("\u00a0", shown);
+    const std::string plain = absl::StrCat(" ", unit),
+                      set = absl::StrCat(absl::string_view(unit) == "deg" ? "" : "\u00a0", shown);
     for (size_t at = out.find(plain); at != std::string::npos; at = out.find(plain, at + 1)) {
       const size_t end = at + plain.size();
       const bool whole = end == out.size() || (!std::isalnum(static_cast<unsigned char>(out[end])) &&

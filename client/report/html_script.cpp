@@ -98,8 +98,8 @@ function turnTable(data) {
       pen.fill();
       pen.stroke();
     }
-    // A dot is hidden if a triangle lies in front of it by more than 5 % of the size.
-    const margin = 0.05 * object.size * scale;
+    // A dot is hidden if a triangle lies in front of it by more than 4 % of the size.
+    const margin = 0.04 * object.size * scale;
     const covered = (p) => faces.some((f) => {
       if (f.area === 0) return false;
       const w1 = ((f.b[0] - p[0]) * (f.d[1] - p[1]) - (f.d[0] - p[0]) * (f.b[1] - p[1])) / -f.area;

@@ -33,17 +33,23 @@ margin:0;max-width:none}
 .pill{border:1.5px solid currentColor;border-radius:99px;padding:.05rem .7rem;font-weight:600;color:var(--given)}
 .pill.good{color:var(--good)}
 .pill.plain{color:var(--soft)}
-.lead{font-size:1.0625rem;max-width:40em}
+.lead{font-size:1.0625rem;max-width:40em;margin:1.6rem 0 .6rem}
 .about{color:var(--soft);margin-bottom:1.2rem}
-.facts{color:var(--soft);font-size:.9375rem;max-width:none}
+.facts{margin:.2rem 0 0;color:var(--soft);font-size:.9375rem;max-width:none}
 figure{margin:1.25rem 0 0;min-width:0}
 figcaption{color:var(--soft);font-size:.8125rem;line-height:1.45;margin-top:.45rem;max-width:48em}
 .grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(19rem,100%),1fr));gap:1.25rem 2rem;
 align-items:start}
 .grid figure{margin:0}
-.wide{grid-template-columns:repeat(auto-fit,minmax(min(26rem,100%),1fr))}
+.wide{grid-template-columns:repeat(auto-fit,minmax(min(28rem,100%),1fr))}
 .note{color:var(--soft);font-size:.8125rem;line-height:1.45;margin-top:.7rem;max-width:48em}
-.pair{display:grid;grid-template-columns:1fr 1fr;gap:.5rem}
+.pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(13rem,100%),1fr));gap:.5rem 1rem}
+.groups{grid-template-columns:repeat(auto-fill,minmax(min(22rem,100%),1fr));gap:1.5rem 3rem}
+.groups td:first-child{overflow-wrap:anywhere}
+.groups .barcell{min-width:3.5rem}
+.head{font-weight:600;font-size:.9375rem;margin:0 0 .4rem}
+.head span{font-weight:400;color:var(--soft)}
+h4{font-size:.9375rem;font-weight:600;margin:1.4rem 0 .4rem}
 .narrow{width:14%;min-width:5rem}
 .line-high{height:1.4em;display:flex;align-items:center}
 .pictures{width:9rem}
@@ -57,14 +63,15 @@ th,td{padding:.42rem .9rem .42rem 0;border-bottom:1px solid var(--line)}
 td{vertical-align:top}
 th:last-child,td:last-child{padding-right:0}
 thead th{border-bottom-color:var(--soft)}
-.num{text-align:right;white-space:nowrap}
+.num{text-align:right;white-space:nowrap;padding-right:1.4rem}
+sup,sub{line-height:0;font-size:.75em}
 .name{font-weight:600}
 .dim,.dim td{color:var(--soft)}
 .barcell{width:34%;min-width:7rem}
 svg{display:block;max-width:100%}
 svg.bar{width:100%;height:.9rem;margin-top:.2rem;overflow:visible}
 .fill.given{fill:var(--given)}.fill.better{fill:var(--better)}.fill.floor{fill:var(--soft)}
-.fill.suggested{fill:var(--better);opacity:.5}.fill.share{fill:var(--measured)}
+.fill.suggested{fill:var(--better);opacity:.5}.fill.share{fill:var(--area)}
 .mark{stroke:var(--ink);stroke-width:1.5;stroke-dasharray:3 2}
 .ladder{font-size:1rem}
 .ladder td{padding-top:.5rem;padding-bottom:.5rem}

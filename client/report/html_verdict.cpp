@@ -99,10 +99,10 @@ std::string HtmlHead(const v1::Report& report) {
     }
   }
   if (!report.data().origin().empty()) absl::StrAppend(&head, " \u00b7 ", Escape(report.data().origin()));
-  absl::StrAppend(&head, "</span></p>\n<h1>", Typeset(Headline(report)), "</h1>\n");
+  absl::StrAppend(&head, "</span></p>\n<h1>", Typeset(Headline(report)), "</h1>\n", LadderTable(report));
   if (!report.summary().empty())
     absl::StrAppend(&head, "<p class=\"lead\">", Typeset(report.summary()), "</p>\n");
-  absl::StrAppend(&head, LadderTable(report), "<p class=\"facts\">", Facts(report), "</p>\n");
+  absl::StrAppend(&head, "<p class=\"facts\">", Facts(report), "</p>\n");
   if (!report.warnings().empty()) {
     head += "<aside class=\"warnings\"><p>What limits this report</p><ul>";
     for (const std::string& warning : report.warnings())

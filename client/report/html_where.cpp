@@ -62,7 +62,7 @@ std::string Groups(const v1::Report& report) {
     absl::StrAppend(&grid, "<figure>", table, "</tbody></table></figure>\n");
   }
   return absl::StrCat(
-      "<h3>By group</h3>\n<div class=\"grid\">", grid,
+      "<h3>By group</h3>\n<div class=\"grid groups\">", grid,
       "</div>\n<p class=\"note\">RMSE of the given model within each group, all on one scale; dashed the "
       "noise floor. Last column: the group\u2019s share of the error beyond the floor.</p>\n");
 }
@@ -88,7 +88,7 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
   std::string pair;
   for (const bool after : {false, true}) {
     if (after && report.improved_model_yaml().empty()) break;
-    Chart chart(310, 210, after ? "improved model" : "given model", x_axis, y_axis);
+    Chart chart(232, 190, after ? "improved model" : "given model", x_axis, y_axis);
     chart.ZeroLine();
     std::vector<std::string> fingers;
     for (const v1::CurveBin& bin : curve.bins()) {
@@ -110,9 +110,9 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
     pair += chart.Svg(absl::StrCat("Mean residual of each finger against ", x_axis.title, ", ",
                                    after ? "improved model" : "given model"));
   }
-  return Figure(absl::StrCat("<div class=\"pair\">", pair, "</div>"),
-                Typeset(absl::StrCat("p ", Probability(curve.p()),
-                                     curve.p() < 0.01 ? ": the residual hangs on it" : "")));
+  return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>p ",
+                      Typeset(Probability(curve.p())), curve.p() < 0.01 ? ": the residual hangs on it" : "",
+                      "</span></p><div class=\"pair\">", pair, "</div></figure>\n");
 }
 
 std::string Curves(const v1::Report& report) {

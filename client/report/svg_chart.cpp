@@ -44,7 +44,7 @@ std::vector<double> Ticks(Range range, int count) {
   }
   std::vector<double> ticks;
   for (double k = std::ceil(range.low / step - 1e-9); k * step <= range.high + 1e-9 * span; ++k) {
-    ticks.push_back(k * step);
+    ticks.push_back(k == 0 ? 0.0 : k * step);  // not -0
   }
   return ticks;
 }
@@ -145,8 +145,9 @@ std::string Chart::Frame() const {
 }
 
 std::string Chart::Svg(const std::string& description) const {
-  return absl::StrCat("<svg class=\"chart\" viewBox=\"0 0 ", Px(width_), " ", Px(height_),
-                      "\" role=\"img\" aria-label=\"", Escape(description), "\">", Frame(), marks_, "</svg>");
+  return absl::StrCat("<svg class=\"chart\" style=\"max-width:", Px(1.15 * width_), "px\" viewBox=\"0 0 ",
+                      Px(width_), " ", Px(height_), "\" role=\"img\" aria-label=\"", Escape(description),
+                      "\">", Frame(), marks_, "</svg>");
 }
 
 std::string IntervalPicture(const v1::ParameterValue& parameter) {

@@ -96,7 +96,7 @@ ObjectPicture::Projected ObjectPicture::Project(const View& view, const Vector& 
 bool ObjectPicture::Visible(const View& view, const Vector& point_mm) const {
   const Vector towards = Towards(view);
   for (const Triangle& t : triangles_) {
-    if (Distance(point_mm, towards, t.a, t.b, t.c) > 0.05 * size_) return false;
+    if (Distance(point_mm, towards, t.a, t.b, t.c) > 0.04 * size_) return false;
   }
   return true;
 }

@@ -31,7 +31,7 @@ class ObjectPicture {
     double x, y, depth;  // px, px, mm towards the viewer
   };
   Projected Project(const View& view, const Vector& point_mm) const;
-  // No triangle lies in front of the point by more than 5 % of the size; meshes are coarser than points.
+  // No triangle lies in front of the point by more than 4 % of the size; meshes are coarser than points.
   bool Visible(const View& view, const Vector& point_mm) const;
   // The triangles that face the viewer, back to front: paths of classes t0 (dark) to t4 (light).
   std::string Faces(const View& view) const;

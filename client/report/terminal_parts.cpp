@@ -31,11 +31,24 @@ std::string Parameter(const v1::ParameterValue& parameter, bool named) {
   return named ? absl::StrCat(ParameterName(parameter), " ", text) : text;
 }
 
+// The finger alone names a parameter of which there is one a finger.
+bool OnlyFingersDiffer(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& parameters) {
+  return !parameters.empty() && std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) {
+    return p.name() == parameters[0].name() && !p.finger().empty() && p.object().empty();
+  });
+}
+
 // One row an effect, and one more for each further parameter.
 template <typename Effect>
 void AddEffect(const Effect& effect, const std::string& name, double probability, const std::string& change,
                const std::string& note, TextLayout::Style style, std::vector<std::vector<Cell>>* rows) {
-  const auto& parameters = effect.parameters();
+  auto parameters = effect.parameters();
+  if (OnlyFingersDiffer(parameters)) {
+    for (auto& parameter : parameters) {
+      parameter.set_name(parameter.finger());
+      parameter.clear_finger();
+    }
+  }
   const bool named =
       parameters.size() > 1 ||
       (parameters.size() == 1 && (!parameters[0].finger().empty() || !parameters[0].object().empty()));
@@ -98,35 +111,39 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
 
 void AddWhy(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<Cell>> rows;
+  if (report.steps_size() > 0) {
+    rows.push_back({{""},
+                    {""},
+                    {"probability", true, TextLayout::kDim},
+                    {"unseen touches", true, TextLayout::kDim},
+                    {""}});
+  }
   double before = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
-  bool note = true;
   std::set<std::string> named;
   for (const v1::Refit& refit : report.refitted()) {
-    AddEffect(refit, refit.effect(), std::nan(""), "", "value in the model put right", TextLayout::kPlain,
-              &rows);
+    AddEffect(refit, refit.effect(), std::nan(""), "", "put right", TextLayout::kPlain, &rows);
     named.insert(refit.effect());
   }
   for (const v1::Step& step : report.steps()) {
-    const double after = Unseen(step.heldout_rmse_us(), step.rmse_us());
-    AddEffect(step, step.effect(), step.probability(), TimeChange(before, after),
-              note ? "on touches the fit did not see" : "then", TextLayout::kPlain, &rows);
-    note = false;
-    before = after;
     named.insert(step.effect());
     named.insert(step.equivalent().begin(), step.equivalent().end());
   }
-  // What else could stand in the place of the first step.
-  if (report.steps_size() > 0) {
-    const double initial = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
-    int rivals = 0;
-    for (const v1::Candidate& candidate : report.candidates()) {
-      if (rivals == kMostRivals || !(candidate.gain_nats() > 0)) break;
-      if (!named.insert(candidate.effect()).second) continue;
+  for (int i = 0; i < report.steps_size(); ++i) {
+    const v1::Step& step = report.steps(i);
+    const double after = Unseen(step.heldout_rmse_us(), step.rmse_us());
+    AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
+              TimeChange(before, after), "", TextLayout::kPlain, &rows);
+    // What else could stand in the place of the first step.
+    for (int rival = 0, shown = 0; i == 0 && rival < report.candidates_size() && shown < kMostRivals;
+         ++rival) {
+      const v1::Candidate& candidate = report.candidates(rival);
+      if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                TimeChange(initial, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())),
-                candidate.note().empty() ? "in its place" : candidate.note(), TextLayout::kDim, &rows);
-      ++rivals;
+                TimeChange(before, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())),
+                candidate.note(), TextLayout::kDim, &rows);
+      ++shown;
     }
+    before = after;
   }
   if (!rows.empty()) out->Label("Why");
   out->Rows(rows);
@@ -225,7 +242,7 @@ void AddUnusedRows(const v1::Report& report, TextLayout* out) {
   out->Label("Not used");
   out->Paragraph(absl::StrCat(Count(rows), " of ", Count(report.data().rows()), " rows:"));
   for (const v1::UnusedRows& unused : report.data().unused()) {
-    std::string text = absl::StrCat(Count(unused.rows()), " ", unused.reason());
+    std::string text = absl::StrCat(Count(unused.rows()), ": ", unused.reason());
     if (!unused.examples().empty()) {
       const int shown = std::min(unused.examples_size(), 5);
       absl::StrAppend(&text, unused.examples_size() == 1 && unused.rows() == 1 ? " (touch " : " (touches ",

@@ -51,13 +51,13 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
 void AddHowWrong(const v1::Report& report, TextLayout* out) {
   if (!(report.initial().rmse_us() > 0)) return;
   const Floor floor = NoiseFloorOf(report);
+  const double ratio = floor.sigma_us > 0 ? report.initial().rmse_us() / floor.sigma_us : 0;
   std::string text = absl::StrCat("RMSE ", Time(report.initial().rmse_us()));
-  if (floor.sigma_us > 0) {
-    absl::StrAppend(&text, ", ", Number(report.initial().rmse_us() / floor.sigma_us, 2),
-                    " times the floor: ", floor.bound ? "at least " : "", Share(report.reducible_share()),
-                    " of the error is the model's, not noise.");
+  if (ratio > 1.02) {
+    absl::StrAppend(&text, ", ", Number(ratio, 2), " times the floor: ", floor.bound ? "at least " : "",
+                    Share(report.reducible_share()), " of the error is the model's, not noise.");
   } else {
-    absl::StrAppend(&text, ".");
+    text += ratio > 0 ? ", no more than the floor." : ".";
   }
   out->Label("How wrong");
   out->Paragraph(text);
@@ -109,14 +109,14 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
     p |= !std::isnan(rung.lack_of_fit_p);
   }
   const bool wide = out->width() >= 96;
-  const int bar = std::clamp(out->room() - names - 2 - (wide ? 44 : 12), 10, 40);
+  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11), 10, 40);
   std::vector<std::vector<Cell>> rows;
   if (wide && (heldout || p)) {
     rows.push_back({{""},
                     {""},
                     {"RMSE", true, TextLayout::kDim},
-                    {heldout ? "unseen touches" : "", true, TextLayout::kDim},
-                    {p ? "lack-of-fit p" : "", true, TextLayout::kDim}});
+                    {heldout ? "unseen" : "", true, TextLayout::kDim},
+                    {p ? "lack of fit p" : "", true, TextLayout::kDim}});
   }
   for (const Rung& rung : rungs) {
     std::vector<Cell> row = {{rung.name},

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
@@ -38,10 +40,30 @@ std::string TextLayout::LabelColumn() {
   return absl::StrCat(Styled(label, kBold), std::string(label.empty() ? kLabel : blanks, ' '));
 }
 
+namespace {
+
+// Words, a number and its unit as one.
+std::vector<std::string> Words(absl::string_view text) {
+  static const std::set<absl::string_view> kUnits = {"us", "ms", "s", "mm", "deg", "%", "mm/s", "1/m"};
+  std::vector<std::string> words;
+  for (absl::string_view word : absl::StrSplit(text, absl::ByAnyChar(" \n\t\r"), absl::SkipEmpty())) {
+    const absl::string_view bare = word.substr(0, word.find_last_not_of(".,;:)") + 1);
+    const bool unit = !words.empty() && absl::ascii_isdigit(words.back().back()) && kUnits.count(bare) > 0;
+    if (unit) {
+      absl::StrAppend(&words.back(), " ", word);
+    } else {
+      words.emplace_back(word);
+    }
+  }
+  return words;
+}
+
+}  // namespace
+
 std::vector<std::string> TextLayout::Wrap(absl::string_view text, int first, int rest) const {
   std::vector<std::string> lines;
   std::string line;
-  for (absl::string_view word : absl::StrSplit(text, absl::ByAnyChar(" \n\t\r"), absl::SkipEmpty())) {
+  for (const std::string& word : Words(text)) {
     const int room = lines.empty() ? first : rest;
     if (!line.empty() && Columns(line) + 1 + Columns(word) > room) {
       lines.push_back(std::move(line));

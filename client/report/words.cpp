@@ -8,6 +8,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
 namespace touchstone::client {
@@ -122,7 +123,7 @@ std::string Covariate(const std::string& name, const std::string& unit) {
   for (const auto& [suffix, symbol] : kSuffixes) {
     if (unit == symbol && absl::ConsumeSuffix(&stem, suffix)) break;
   }
-  return absl::StrCat(stem, " (", unit, ")");
+  return absl::StrCat(absl::StrReplaceAll(stem, {{"_", " "}}), " (", unit, ")");
 }
 
 std::string ValueWithError(const v1::ParameterValue& value) {
