@@ -1,0 +1,249 @@
+#include "server/diagnosis/noise_kinds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "server/diagnosis/noise_likelihood.h"
+
+namespace touchstone {
+namespace {
+
+constexpr int kMostTouches = 1500;       // that a shape is judged on
+constexpr double kEnterNats = 10;        // gain in log likelihood that a further noise parameter needs
+constexpr double kKurtosisSigmas = 4;    // of the sample's excess kurtosis before tails are looked at
+constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
+constexpr double kLeastTick = 20e-6;     // s
+constexpr double kMostSlope = 10;
+
+// The maximum of f on [low, high] by golden section.
+double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* most) {
+  const double golden = 0.5 * (std::sqrt(5.0) - 1);
+  double a = high - golden * (high - low), b = low + golden * (high - low);
+  double fa = f(a), fb = f(b);
+  for (int step = 0; step < steps; ++step) {
+    if (fa > fb)
+      high = b, b = a, fb = fa, a = high - golden * (high - low), fa = f(a);
+    else
+      low = a, a = b, fa = fb, b = low + golden * (high - low), fb = f(b);
+  }
+  *most = std::max(fa, fb);
+  return fa > fb ? a : b;
+}
+
+// Standard error from the curvature of a log likelihood at its maximum.
+double CurvatureError(const std::function<double(double)>& f, double at, double step) {
+  const double bend = f(at + step) + f(at - step) - 2 * f(at);
+  return bend < 0 ? step / std::sqrt(-bend) : 0;
+}
+
+std::vector<NoisyTouch> Collect(const Observations& o, const std::vector<double>& residuals,
+                                const std::vector<double>& tangents) {
+  std::vector<NoisyTouch> all;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    NoisyTouch touch;
+    touch.k = k;
+    for (int i = 0; i < o.fingers; ++i) {
+      const size_t e = static_cast<size_t>(k) * o.fingers + i;
+      if (std::isnan(residuals[e]) || std::isnan(tangents[e])) continue;
+      touch.residual_s.push_back(residuals[e]);
+      touch.tangent.push_back(std::min(tangents[e], 10.0));
+    }
+    if (touch.residual_s.size() >= 2) all.push_back(std::move(touch));
+  }
+  return all;
+}
+
+std::vector<NoisyTouch> Thinned(const std::vector<NoisyTouch>& all) {
+  if (static_cast<int>(all.size()) <= kMostTouches) return all;
+  std::vector<NoisyTouch> part;
+  for (int j = 0; j < kMostTouches; ++j) part.push_back(all[all.size() * j / kMostTouches]);
+  return part;
+}
+
+bool TailsLookHeavy(const std::vector<NoisyTouch>& touches) {
+  double second = 0, fourth = 0, count = 0;
+  for (const NoisyTouch& touch : touches) {
+    const double n = static_cast<double>(touch.residual_s.size());
+    for (size_t i = 0; i < touch.residual_s.size(); ++i) {
+      const double x = touch.residual_s[i] / (1 - 1 / n);
+      second += x * x, fourth += x * x * x * x, count += 1;
+    }
+  }
+  if (count < 20 || second <= 0) return false;
+  return fourth * count / (second * second) - 3 > kKurtosisSigmas * std::sqrt(24 / count);
+}
+
+// Times of a polling loop differ by whole multiples of its interval.
+NoiseEstimate FindPolling(const Observations& o) {
+  std::vector<double> differences;
+  for (int k = 0; k < o.size() && differences.size() < 6000; ++k) {
+    if (!o.used[k]) continue;
+    double least = INFINITY;
+    for (int i = 0; i < o.fingers; ++i) {
+      const double time = o.time_s[static_cast<size_t>(k) * o.fingers + i];
+      if (time < least) least = time;
+    }
+    for (int i = 0; i < o.fingers; ++i) {
+      const double time = o.time_s[static_cast<size_t>(k) * o.fingers + i];
+      if (time > least) differences.push_back(time - least);
+    }
+  }
+  NoiseEstimate none;
+  if (differences.size() < 20) return none;
+  std::sort(differences.begin(), differences.end());
+  // The smallest step between different values is the interval, or a small multiple of it.
+  double least_gap = differences[0];
+  for (size_t j = 1; j < differences.size(); ++j) {
+    const double gap = differences[j] - differences[j - 1];
+    if (gap > 2 * kTickTolerance) least_gap = std::min(least_gap, gap);
+  }
+  for (int divisor = 1; divisor <= 3; ++divisor) {
+    double interval = least_gap / divisor;
+    if (interval < kLeastTick) break;
+    // Refined over ever larger differences, so that the count of ticks stays certain.
+    bool fits = true;
+    for (size_t known = 1; known < differences.size() && fits; known *= 2) {
+      double sum_nd = 0, sum_nn = 0;
+      for (size_t j = 0; j < std::min(2 * known, differences.size()); ++j) {
+        const double ticks = std::round(differences[j] / interval);
+        sum_nd += ticks * differences[j], sum_nn += ticks * ticks;
+      }
+      if (!(sum_nn > 0)) fits = false;
+      else interval = sum_nd / sum_nn;
+    }
+    size_t on_tick = 0;
+    for (const double difference : differences)
+      on_tick += std::abs(difference - std::round(difference / interval) * interval) <= kTickTolerance;
+    if (!fits || on_tick < 0.99 * differences.size()) continue;
+    NoiseEstimate found;
+    found.value = interval;
+    found.std_error = 0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
+    found.std_error = std::max(found.std_error, 1e-9);
+    // Each difference would fall on a tick by chance with this probability.
+    found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
+    return found;
+  }
+  return none;
+}
+
+NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expected) {
+  double silent = 0, all = 0;
+  for (int k = 0; k < o.size(); ++k)
+    for (int i = 0; i < o.fingers; ++i) {
+      const size_t e = static_cast<size_t>(k) * o.fingers + i;
+      if (!expected[e]) continue;
+      all += 1;
+      silent += std::isnan(o.time_s[e]);
+    }
+  NoiseEstimate found;
+  if (silent < 3 || silent < 0.002 * all) return found;
+  found.value = silent / all;
+  found.std_error = std::sqrt(found.value * (1 - found.value) / all);
+  found.gain_nats = silent * std::log(1 / 1e-4);
+  return found;
+}
+
+}  // namespace
+
+NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residuals,
+                        const std::vector<double>& tan_incidence, const std::vector<char>& expected) {
+  NoiseFindings found;
+  found.poll_interval_s = FindPolling(o);
+  found.missed_probability = FindMissed(o, expected);
+  const std::vector<NoisyTouch> all = Collect(o, residuals, tan_incidence);
+  if (all.empty()) return found;
+  const std::vector<NoisyTouch> touches = Thinned(all);
+
+  NoiseModel best;
+  double best_log = ProfileSigma(touches, &best);
+  const NoiseModel gaussian = best;
+  double degrees = 0;
+  for (const NoisyTouch& touch : all) degrees += static_cast<double>(touch.residual_s.size()) - 1;
+
+  // Heavy tails, or a few outliers among Gaussian noise?
+  const bool heavy = TailsLookHeavy(touches);
+  NoiseModel mixture;
+  if (heavy) {
+    NoiseModel student = gaussian;
+    student.shape = NoiseShape::kStudent;
+    const auto student_at = [&](double log_degrees) {
+      student.degrees = std::exp(log_degrees);
+      student.sigma_s = gaussian.sigma_s;
+      return ProfileSigma(touches, &student);
+    };
+    double student_log = -INFINITY;
+    const double log_degrees = Maximise(student_at, std::log(1.2), std::log(60.0), 9, &student_log);
+    double mixture_log = -INFINITY;
+    for (const double width : {6.0, 15.0, 40.0, 100.0})
+      for (const double share : {0.002, 0.007, 0.02, 0.05}) {
+        NoiseModel at = gaussian;
+        at.shape = NoiseShape::kMixture;
+        at.width = width, at.share = share;
+        const double value = ProfileSigma(touches, &at);
+        if (value > mixture_log) mixture_log = value, mixture = at;
+      }
+    if (student_log - best_log >= kEnterNats && student_log >= mixture_log - 3) {
+      student_at(log_degrees);
+      const double bend = CurvatureError(student_at, log_degrees, 0.1);
+      student_at(log_degrees);
+      found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - best_log};
+      best = student, best_log = student_log;
+    } else if (mixture_log - best_log >= kEnterNats) {
+      for (const NoisyTouch& touch : all)
+        if (OutlierProbability(touch, mixture) > 0.5) found.outliers.push_back(touch.k);
+      best = mixture, best_log = mixture_log;
+    }
+  }
+
+  // Does it grow on slopes?
+  NoiseModel sloped = best;
+  const auto sloped_at = [&](double slope) {
+    sloped.slope = slope;
+    sloped.sigma_s = best.sigma_s;
+    return ProfileSigma(touches, &sloped);
+  };
+  double sloped_log = -INFINITY;
+  // Sigma is looked for below its value without a slope, so the range is wide enough.
+  const double log_slope = Maximise([&](double x) { return sloped_at(std::exp(x)); }, std::log(0.02),
+                                    std::log(kMostSlope), best.shape == NoiseShape::kGaussian ? 20 : 8, &sloped_log);
+  if (sloped_log - best_log >= kEnterNats) {
+    const double slope = std::exp(log_slope);
+    const double error = CurvatureError(sloped_at, slope, 0.05 * slope);
+    sloped_at(slope);
+    found.slope = {slope, error, sloped_log - best_log};
+    best = sloped;
+  }
+  found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * std::max(degrees, 1.0)), 0};
+  if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;  // the slope shares what is known
+
+  // Polling adds the scatter of the ticks.
+  if (found.poll_interval_s.gain_nats > 0) {
+    const double tick = found.poll_interval_s.value;
+    const double variance = best.sigma_s * best.sigma_s - tick * tick / 12;
+    found.sigma_s.value = variance > 0 ? std::sqrt(variance) : 0;
+    if (found.sigma_s.value < 0.1 * tick) found.sigma_s.value = 0;
+  }
+
+  // What a touch should count for where the noise is not the same everywhere.
+  if (found.degrees_of_freedom.gain_nats > 0 || found.slope.gain_nats > 0) {
+    found.weights.assign(o.size(), 1.0);
+    const double nu = found.degrees_of_freedom.gain_nats > 0 ? best.degrees : INFINITY;
+    for (const NoisyTouch& touch : all) {
+      double squares = 0, variance = 0;
+      const double n = static_cast<double>(touch.residual_s.size());
+      for (size_t i = 0; i < touch.residual_s.size(); ++i) {
+        const double s = best.sigma_s * (1 + best.slope * touch.tangent[i]);
+        squares += touch.residual_s[i] * touch.residual_s[i] / (s * s);
+        variance += s * s / n;
+      }
+      double weight = best.sigma_s * best.sigma_s / variance;
+      if (std::isfinite(nu)) weight *= (nu + n - 1) / (nu + squares);
+      found.weights[touch.k] = weight;
+    }
+  }
+  return found;
+}
+
+}  // namespace touchstone
