@@ -31,9 +31,15 @@ double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const E
 }
 
 // "formula: ..." as it stands in a model file.
-std::string FormulaYaml(const Model& model, int index) {
-  Model only = model;
-  only.effects = {model.effects[index]};
+std::string FormulaYaml(const Fit& fit, int index) {
+  Model only = fit.model.base();
+  only.effects = {only.effects[index]};
+  EffectInstance& instance = only.effects[0];
+  size_t at_value = 0;  // a formula's parameters are numbers
+  for (const v1::ParameterValue& value : fit.model.Describe(index, fit.point, fit.covariance)) {
+    const ParameterInfo& parameter = instance.effect->parameters[at_value];
+    instance.values[at_value++] = ToSi(parameter.unit, RoundedTo(value.value(), value.std_error()));
+  }
   const std::string text = FormatModel(only);
   const size_t at = text.find("effects:");
   const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
@@ -126,7 +132,7 @@ absl::Status DescribeUnexplained(const Study& study, const Explained& explained,
   const Fit& fit = explained.fit;
   const EffectInstance& instance = fit.model.base().effects[explained.formula];
   unexplained->set_formula(instance.effect->formula->expression);
-  unexplained->set_formula_yaml(FormulaYaml(fit.model.base(), explained.formula));
+  unexplained->set_formula_yaml(FormulaYaml(fit, explained.formula));
   for (v1::ParameterValue& value : fit.model.Describe(explained.formula, fit.point, fit.covariance))
     *unexplained->add_parameters() = std::move(value);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction with, study.predictor->Run(fit.model.base(), false, false));

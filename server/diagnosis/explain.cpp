@@ -208,7 +208,10 @@ absl::StatusOr<Explained> Explain(Study* study) {
       tangents[e] = std::sqrt(1 / (cosine * cosine) - 1);
       expected[e] = !std::isnan(details.time_s[e]);
     }
-    explained.noise = FindNoise(o, residuals, tangents, expected);
+    explained.noise = FindNoise(
+        o, residuals, tangents, expected,
+        explained.fit.model.size() +
+            (study->thinned ? 0 : study->likelihood->surfaces()[explained.fit.surface].degrees));
 
     // Outliers leave, touches of little worth count less: then everything once more.
     if (pass + 1 == kPasses || (explained.noise.outliers.empty() && explained.noise.weights.empty())) break;

@@ -148,7 +148,7 @@ NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expecte
 }  // namespace
 
 NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residuals,
-                        const std::vector<double>& tan_incidence, const std::vector<char>& expected) {
+                        const std::vector<double>& tan_incidence, const std::vector<char>& expected, double taken) {
   NoiseFindings found;
   found.poll_interval_s = FindPolling(o);
   found.missed_probability = FindMissed(o, expected);
@@ -215,7 +215,10 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
     found.slope = {slope, error, sloped_log - best_log};
     best = sloped;
   }
-  found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * std::max(degrees, 1.0)), 0};
+  // What the fit has followed of the noise is given back.
+  const double left = std::max(degrees - taken, 1.0);
+  best.sigma_s *= std::sqrt(degrees / left);
+  found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * left), 0};
   if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;  // the slope shares what is known
 
   // Polling adds the scatter of the ticks.

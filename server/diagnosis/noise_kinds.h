@@ -28,8 +28,10 @@ struct NoiseFindings {
 
 // residuals: what is left, less any surface error; tan_incidence: of every finger; both [k * fingers + i], NaN
 // where a finger takes no part. expected: whether the model expects the finger to report.
-// Only touches that are used count; large sets are thinned.
+// taken: degrees of freedom that the fit and the surface error have used up. Only touches that are used count;
+// large sets are thinned.
 NoiseFindings FindNoise(const Observations& observations, const std::vector<double>& residuals,
-                        const std::vector<double>& tan_incidence, const std::vector<char>& expected);
+                        const std::vector<double>& tan_incidence, const std::vector<char>& expected,
+                        double taken);
 
 }  // namespace touchstone
