@@ -123,7 +123,7 @@ std::string Stills(const std::string& name, const Object& object, int number, bo
           absl::StrCat("<svg class=\"map\" viewBox=\"0 0 400 400\" role=\"img\" aria-label=\"Residuals on ",
                        Escape(name), ", ", words, "\">", body, Dots(picture, view, object, after, limit_us),
                        "</svg>"),
-          words);
+          absl::StrCat(after ? "improved" : "given", back ? ", back" : ", front"));
     }
   }
   return out;

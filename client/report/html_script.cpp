@@ -56,7 +56,10 @@ function turnTable(data) {
     const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9], all = one.v.length ? one.v : one.p;
     all.forEach((x, i) => { low[i % 3] = Math.min(low[i % 3], x); high[i % 3] = Math.max(high[i % 3], x); });
     one.centre = low.map((x, k) => (x + high[k]) / 2);
-    one.size = Math.hypot(...low.map((x, k) => high[k] - x)) || 1;
+    one.size = 1;
+    for (let i = 0; i < all.length; i += 3) {
+      one.size = Math.max(one.size, 2 * Math.hypot(...one.centre.map((x, k) => all[i + k] - x)));
+    }
   }
 
   function draw() {

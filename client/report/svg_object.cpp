@@ -61,8 +61,12 @@ ObjectPicture::ObjectPicture(const v1::ObjectOutline& outline, const std::vector
     if (any) break;
   }
   for (int k = 0; k < 3; ++k) centre_[k] = 0.5 * (low[k] + high[k]);
-  const Vector diagonal = Minus(high, low);
-  size_ = std::max(1e-6, std::sqrt(Dot(diagonal, diagonal)));
+  double radius = 5e-7;
+  for (const Vector& p : corners.empty() ? points_mm : corners) {
+    const Vector out = Minus(p, centre_);
+    if (IsFinite(out)) radius = std::max(radius, std::sqrt(Dot(out, out)));
+  }
+  size_ = 2 * radius;
 
   double volume = 0;
   for (int i = 0; i + 2 < outline.triangles_size(); i += 3) {
@@ -89,7 +93,7 @@ ObjectPicture::Projected ObjectPicture::Project(const View& view, const Vector& 
   const double a = view.azimuth_deg * kPi / 180;
   const Vector towards = Towards(view), right = {-std::sin(a), std::cos(a), 0}, up = Cross(towards, right);
   const Vector p = Minus(point_mm, centre_);
-  const double scale = 0.94 * kSide / size_;
+  const double scale = 0.96 * kSide / size_;
   return {kSide / 2 + scale * Dot(p, right), kSide / 2 - scale * Dot(p, up), Dot(p, towards)};
 }
 

@@ -45,7 +45,7 @@ class ObjectPicture {
   };
   std::vector<Triangle> triangles_;
   Vector centre_{};
-  double size_ = 1;  // diameter of the sphere round the box
+  double size_ = 1;  // diameter of the sphere about the box's centre that holds all
 };
 
 Vector Towards(const View& view);  // unit vector towards the viewer

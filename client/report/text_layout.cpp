@@ -103,12 +103,21 @@ void TextLayout::Rows(const std::vector<std::vector<Cell>>& rows) {
   }
   int before_last = 0;
   for (size_t i = 0; i + 1 < widths.size(); ++i) before_last += widths[i] > 0 ? widths[i] + 2 : 0;
+  if (before_last > room()) {
+    // No room for columns: each row is a paragraph.
+    for (const auto& row : rows) {
+      std::string text;
+      for (const Cell& cell : row)
+        absl::StrAppend(&text, text.empty() || cell.text.empty() ? "" : ", ", cell.text);
+      if (!text.empty()) Paragraph(text, row.front().style, 2);
+    }
+    return;
+  }
   const bool last_fits = widths.empty() || before_last + widths.back() <= room();
   const bool last_wraps_beside = room() - before_last >= 28;
 
   for (const auto& row : rows) {
     std::string line;
-    int used = 0;
     for (size_t i = 0; i < row.size(); ++i) {
       const bool last = i + 1 == widths.size();
       const Cell& cell = row[i];
@@ -131,7 +140,6 @@ void TextLayout::Rows(const std::vector<std::vector<Cell>>& rows) {
       const std::string blanks(widths[i] - Columns(cell.text), ' ');
       const std::string text = Styled(cell.text, cell.style);
       absl::StrAppend(&line, cell.right ? blanks : "", text, cell.right ? "" : blanks, last ? "" : "  ");
-      used += widths[i] + 2;
     }
     if (line.empty()) continue;
     absl::StrAppend(&text_, LabelColumn(), line.substr(0, line.find_last_not_of(' ') + 1), "\n");

@@ -38,7 +38,7 @@ class TextLayout {
     Style style = kPlain;
   };
   // Rows with aligned columns, two spaces between them. The last column wraps into what room is left, below
-  // the row if it is little.
+  // the row if it is little; without room for the columns, rows become paragraphs.
   void Rows(const std::vector<std::vector<Cell>>& rows);
 
   std::string Take() { return std::move(text_); }

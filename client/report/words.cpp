@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
 
 #include <absl/strings/match.h>
@@ -19,7 +21,10 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 // Decimals that show `digits` significant digits of `value`.
 int DecimalsFor(double value, int digits) {
   if (!(std::abs(value) > 0) || !std::isfinite(value)) return 0;
-  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value)) + 1e-12));
+  // The exponent after rounding: 0.9996 with three digits is 1.00.
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.*e", digits - 1, value);
+  const int exponent = std::atoi(std::strchr(text, 'e') + 1);
   return std::clamp(digits - 1 - exponent, 0, 9);
 }
 

@@ -1,0 +1,262 @@
+#include <algorithm>
+#include <cmath>
+#include <regex>
+#include <set>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "client/report/html_page.h"
+#include "client/report/report.h"
+#include "client/report/sample_reports.h"
+#include "client/report/svg_chart.h"
+#include "client/report/svg_object.h"
+
+namespace touchstone::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+int Times(const std::string& text, const std::string& piece) {
+  int times = 0;
+  for (size_t at = text.find(piece); at != std::string::npos; at = text.find(piece, at + 1)) ++times;
+  return times;
+}
+
+TEST(Escape, LeavesNoMarkup) {
+  EXPECT_EQ(Escape("<b a=\"1\" c='2'>&\x01"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;");
+}
+
+TEST(Typeset, SetsNumbersInType) {
+  EXPECT_EQ(Typeset("-3.1 +- 0.2 us"), "\u22123.1\u00a0\u00b1\u00a00.2\u00a0\u00b5s");
+  EXPECT_EQ(Typeset("p 3e-9"), "p 3\u00d710<sup>\u22129</sup>");
+  EXPECT_EQ(Typeset("41.0 -> 5.0 ms"), "41.0 \u2192 5.0\u00a0ms");
+  EXPECT_EQ(Typeset("25 deg"), "25\u00b0");
+}
+
+TEST(Typeset, LeavesNamesAlone) {
+  EXPECT_EQ(Typeset("lat-10 and cov_us_2 s3e"), "lat-10 and cov_us_2 s3e");
+}
+
+TEST(HtmlReport, EscapesWhatUsersNamed) {
+  const std::string evil = "</script><script>alert('x')</script>\"";
+  v1::Report report = MissingEffectsReport();
+  report.set_model_name(evil);
+  report.set_summary(evil);
+  report.set_version(evil);
+  report.set_model_hash(evil);
+  report.set_improved_model_yaml(evil);
+  report.add_warnings(evil);
+  report.mutable_data()->set_objects(0, evil);
+  report.mutable_data()->set_origin(evil);
+  report.mutable_data()->mutable_unused(0)->set_reason(evil);
+  for (auto& point : *report.mutable_surface_points()) point.set_object(evil);
+  for (auto& outline : *report.mutable_outlines()) outline.set_object(evil);
+  for (auto& touch : *report.mutable_worst_touches()) touch.set_object(evil);
+  for (auto& touch : *report.mutable_next_touches()) touch.set_object(evil);
+  for (auto& group : *report.mutable_groups()) group.set_name(evil);
+  for (auto& histogram : *report.mutable_histograms()) histogram.set_object(evil);
+  for (auto& finger : *report.mutable_fingers()) finger = evil;
+  for (auto& slice : *report.mutable_where()) slice.set_slice(evil);
+  for (auto& curve : *report.mutable_curves()) curve.set_covariate(evil);
+  for (auto& step : *report.mutable_steps()) {
+    step.set_effect(evil);
+    step.set_meaning(evil);
+    step.mutable_parameters(0)->set_name(evil);
+    step.mutable_parameters(0)->set_unit(evil);
+  }
+  for (auto& candidate : *report.mutable_candidates()) candidate.set_note(evil);
+  const std::string html = HtmlReport(report);
+  EXPECT_EQ(Times(html, "<script>alert"), 0);
+  EXPECT_EQ(Times(html, "<script>"), 1) << "the page's own";
+  // One script of data, one of code, each closed once.
+  EXPECT_EQ(Times(html, "</script>"), 2);
+  const size_t data = html.find('{', html.find("id=\"objects-data\""));
+  const auto json = nlohmann::json::parse(html.substr(data, html.find("</script>", data) - data));
+  EXPECT_EQ(json["objects"][0]["name"], evil);
+}
+
+TEST(HtmlReport, HasEverySectionWhoseDataAreThere) {
+  const std::string html = HtmlReport(MissingEffectsReport());
+  for (const char* id : {"todo", "why", "where", "objects", "fit", "next", "data", "methods"}) {
+    EXPECT_EQ(Times(html, absl::StrCat("<section id=\"", id, "\"")), 1) << id;
+  }
+  EXPECT_EQ(Times(HtmlReport(UnexplainedReport()), "<section id=\"unexplained\""), 1);
+  EXPECT_EQ(Times(HtmlReport(WithoutPosesReport()), "<section id=\"distributions\""), 1);
+}
+
+TEST(HtmlReport, LeavesOutSectionsWithoutData) {
+  const std::string html = HtmlReport(v1::Report());
+  EXPECT_EQ(Times(html, "<section"), 0);
+  EXPECT_GE(Times(html, "Nothing could be compared."), 1);
+  EXPECT_EQ(Times(HtmlReport(AdequateReport()), "<section id=\"todo\""), 0);
+}
+
+TEST(HtmlReport, SaysTheVerdictFirstAndOnce) {
+  for (const NamedReport& sample : AllSampleReports()) {
+    const std::string html = HtmlReport(sample.report);
+    EXPECT_EQ(Times(html, "<h1>"), 1) << sample.name;
+    const size_t section = html.find("<section");
+    if (section != std::string::npos) {
+      EXPECT_LT(html.find("<h1>"), section) << sample.name;
+    }
+  }
+}
+
+TEST(HtmlReport, SaysWarningsAndSummaryOnce) {
+  v1::Report report = MissingEffectsReport();
+  report.set_summary("A summary like no other.");
+  report.add_warnings("A warning like no other.");
+  const std::string html = HtmlReport(report);
+  EXPECT_EQ(Times(html, "A summary like no other."), 1);
+  EXPECT_EQ(Times(html, "A warning like no other."), 1);
+  EXPECT_EQ(Times(html, report.steps(0).check_on_rig().substr(0, 20)), 1);
+  EXPECT_EQ(Times(html, "33</td>"), 1) << "rows not used";
+}
+
+TEST(HtmlReport, HasNoIdTwice) {
+  for (const NamedReport& sample : AllSampleReports()) {
+    const std::string html = HtmlReport(sample.report);
+    std::set<std::string> ids;
+    const std::regex id(" id=\"([^\"]*)\"");
+    for (std::sregex_iterator it(html.begin(), html.end(), id), end; it != end; ++it) {
+      EXPECT_TRUE(ids.insert((*it)[1]).second) << sample.name << " " << (*it)[1];
+    }
+  }
+}
+
+TEST(HtmlReport, FetchesNothing) {
+  for (const NamedReport& sample : AllSampleReports()) {
+    const std::string html = HtmlReport(sample.report);
+    for (const char* trace : {"http://", "https://", "src=", "url(", "@import", "<link", "<img"}) {
+      EXPECT_EQ(Times(html, trace), 0) << sample.name;
+    }
+  }
+}
+
+TEST(HtmlReport, IsSmallerThanAMegabyteAndAHalfFor960Touches) {
+  EXPECT_LT(HtmlReport(MissingEffectsReport()).size(), 1500000u);
+}
+
+TEST(HtmlReport, ThinsPointsOfLargeSets) {
+  v1::Report report = CompareReport();
+  for (int i = 0; i < 6; ++i) {
+    report.mutable_surface_points()->MergeFrom(CompareReport().surface_points());
+    report.mutable_parity()->MergeFrom(CompareReport().parity());
+  }
+  const std::string html = HtmlReport(report);
+  EXPECT_LT(html.size(), 1500000u);
+  EXPECT_GE(Times(html, " of 20 160 contacts are drawn"), 1);
+}
+
+TEST(HtmlReport, ClosesEveryElementItOpens) {
+  for (const NamedReport& sample : AllSampleReports()) {
+    const std::string html = HtmlReport(sample.report);
+    for (const char* tag : {"section", "figure", "table", "tbody", "thead", "tr",     "td",  "th", "div",
+                            "svg",     "g",      "dl",    "dt",    "dd",    "ol",     "ul",  "li", "p",
+                            "span",    "pre",    "h2",    "h3",    "h4",    "button", "text"}) {
+      EXPECT_EQ(Times(html, absl::StrCat("<", tag, " ")) + Times(html, absl::StrCat("<", tag, ">")),
+                Times(html, absl::StrCat("</", tag, ">")))
+          << tag << " in " << sample.name;
+    }
+  }
+}
+
+TEST(HtmlReport, ShowsNoNanAsANumber) {
+  v1::Report report = MissingEffectsReport();
+  const double nan = std::nan("");
+  report.mutable_initial()->set_lack_of_fit_p(nan);
+  report.mutable_initial()->set_heldout_rmse_us(nan);
+  report.mutable_steps(0)->mutable_parameters(0)->set_std_error(nan);
+  report.mutable_steps(0)->mutable_parameters(0)->set_lower(nan);
+  report.mutable_parity(0)->set_measured_us(nan);
+  report.mutable_surface_points(0)->set_after_us(nan);
+  report.mutable_surface_points(1)->set_x_mm(nan);
+  report.mutable_curves(0)->mutable_bins(0)->set_mean_residual_us(nan);
+  report.mutable_histograms(0)->set_measured(0, nan);
+  const std::string html = HtmlReport(report);
+  for (const char* word : {" nan", ">nan", "\"nan", "-nan", "Lnan", "Mnan", "Vnan", "NaN", "inf "}) {
+    EXPECT_EQ(Times(html, word), 0) << word;
+  }
+}
+
+TEST(HtmlReport, GivesEveryPictureATextAlternative) {
+  const std::string html = HtmlReport(MissingEffectsReport());
+  const std::regex svg("<svg [^>]*>");
+  for (std::sregex_iterator it(html.begin(), html.end(), svg), end; it != end; ++it) {
+    const std::string tag = it->str();
+    EXPECT_TRUE(absl::StrContains(tag, "aria-label=\"") || absl::StrContains(tag, "aria-hidden")) << tag;
+  }
+}
+
+TEST(Bar, IsAsLongAsItsShare) {
+  EXPECT_THAT(Bar(0.25, "given"), HasSubstr("width=\"25.00%\""));
+  EXPECT_THAT(Bar(7, "given"), HasSubstr("width=\"100.00%\""));
+  EXPECT_THAT(Bar(std::nan(""), "given"), HasSubstr("width=\"0.00%\""));
+}
+
+TEST(HtmlReport, LadderBarsAreProportionalToTheErrors) {
+  v1::Report report = MissingEffectsReport();
+  report.mutable_initial()->set_rmse_us(40000);
+  report.mutable_steps(0)->set_rmse_us(10000);
+  const std::string html = HtmlReport(report);
+  const std::string ladder = html.substr(html.find("class=\"ladder\""), 2500);
+  EXPECT_THAT(ladder, HasSubstr("fill given\" height=\"100%\" width=\"100.00%\""));
+  EXPECT_THAT(ladder, HasSubstr("fill better\" height=\"100%\" width=\"25.00%\""));
+}
+
+TEST(Ticks, AreRoundAndWithinTheRange) {
+  EXPECT_THAT(Ticks({-1.3, 4.2}, 5), testing::ElementsAre(0, 2, 4));
+  EXPECT_THAT(Ticks({0, 100}, 5), testing::ElementsAre(0, 20, 40, 60, 80, 100));
+  EXPECT_THAT(Ticks({3, 3}, 5), testing::IsEmpty());
+}
+
+// A square in the plane z = 0, 20 mm wide, seen from above or below.
+v1::ObjectOutline Plate() {
+  v1::ObjectOutline plate;
+  for (const float x : {-10, -10, 0, 10, -10, 0, 10, 10, 0, -10, 10, 0}) plate.add_vertices_mm(x);
+  for (const uint32_t corner : {0, 1, 2, 0, 2, 3}) plate.add_triangles(corner);
+  return plate;
+}
+
+TEST(ObjectPicture, HidesWhatIsBehind) {
+  const ObjectPicture picture(Plate(), {});
+  const View above = {0, 80}, below = {0, -80};
+  EXPECT_TRUE(picture.Visible(above, {0, 0, 5}));
+  EXPECT_FALSE(picture.Visible(below, {0, 0, 5}));
+  EXPECT_TRUE(picture.Visible(below, {0, 0, 0})) << "a point on the surface is not hidden by it";
+}
+
+TEST(ObjectPicture, FindsWhereALineHits) {
+  const ObjectPicture picture(Plate(), {});
+  Vector hit;
+  ASSERT_TRUE(picture.Hit({1, 2, 30}, {0, 0, -1}, &hit));
+  EXPECT_THAT(hit, testing::ElementsAre(1, 2, 0));
+  EXPECT_FALSE(picture.Hit({30, 2, 30}, {0, 0, -1}, &hit));
+}
+
+TEST(ObjectPicture, KeepsEverythingWithinThePicture) {
+  const ObjectPicture picture(Plate(), {});
+  for (const Vector& corner : {Vector{-10, -10, 0}, Vector{10, -10, 0}, Vector{10, 10, 0}}) {
+    const auto p = picture.Project(kFrontView, corner);
+    EXPECT_GE(std::min(p.x, p.y), 0);
+    EXPECT_LE(std::max(p.x, p.y), ObjectPicture::kSide);
+  }
+}
+
+TEST(ObjectPicture, ToleratesBrokenOutlines) {
+  v1::ObjectOutline broken = Plate();
+  broken.add_triangles(0);
+  broken.add_triangles(99);
+  broken.add_triangles(1);
+  broken.set_vertices_mm(0, std::nanf(""));
+  EXPECT_THAT(ObjectPicture(broken, {}).Faces(kFrontView), Not(HasSubstr("nan")));
+  EXPECT_EQ(ObjectPicture(v1::ObjectOutline(), {}).Faces(kFrontView), "");
+}
+
+}  // namespace
+}  // namespace touchstone::client

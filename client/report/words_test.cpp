@@ -1,0 +1,134 @@
+#include "client/report/words.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "client/report/report.h"
+#include "client/report/sample_reports.h"
+
+namespace touchstone::client {
+namespace {
+
+v1::ParameterValue Value(double value, double error, const char* unit) {
+  v1::ParameterValue parameter;
+  parameter.set_value(value);
+  parameter.set_std_error(error);
+  parameter.set_unit(unit);
+  return parameter;
+}
+
+TEST(Time, IsInMicrosecondsBelowOneMillisecond) {
+  EXPECT_EQ(Time(850), "850 us");
+  EXPECT_EQ(Time(999.6), "1.00 ms");
+  EXPECT_EQ(Time(41000), "41.0 ms");
+  EXPECT_EQ(Time(2.5e6), "2.50 s");
+  EXPECT_EQ(Time(std::nan("")), "n/a");
+  EXPECT_EQ(SignedTime(9100), "+9.10 ms");
+  EXPECT_EQ(SignedTime(-850), "-850 us");
+}
+
+TEST(TimeChange, SharesOneUnit) {
+  EXPECT_EQ(TimeChange(41000, 5000), "41.0 -> 5.0 ms");
+  EXPECT_EQ(TimeChange(1200, 815), "1.20 -> 0.82 ms");
+}
+
+TEST(ValueWithError, HasAsManyDigitsAsTheErrorAllows) {
+  EXPECT_EQ(ValueWithError(Value(2.9812, 0.0211, "mm")), "2.98 +- 0.02 mm");
+  EXPECT_EQ(ValueWithError(Value(2.9812, 0.0123, "mm")), "2.981 +- 0.012 mm");
+  EXPECT_EQ(ValueWithError(Value(8200, 190, "us")), "8.20 +- 0.19 ms");
+  EXPECT_EQ(ValueWithError(Value(-0.001, 0.5, "deg")), "0.0 +- 0.5 deg");
+  EXPECT_EQ(ValueWithError(Value(20, 0, "mm/s")), "20 mm/s");
+  EXPECT_EQ(ValueWithError(Value(20, std::nan(""), "mm/s")), "20.0 mm/s");
+}
+
+TEST(Probability, NeverClaimsCertainty) {
+  EXPECT_EQ(Probability(0), "< 1e-15");
+  EXPECT_EQ(Probability(3.2e-9), "3e-9");
+  EXPECT_EQ(Probability(0.0123), "0.012");
+  EXPECT_EQ(Probability(0.44), "0.44");
+}
+
+TEST(Share, ShowsTenthsNearTheEnds) {
+  EXPECT_EQ(Share(0.985), "98.5 %");
+  EXPECT_EQ(Share(0.71), "71 %");
+  EXPECT_EQ(Share(0.04), "4.0 %");
+  EXPECT_EQ(Share(1), "100 %");
+}
+
+TEST(Count, GroupsLongNumbers) {
+  EXPECT_EQ(Count(960), "960");
+  EXPECT_EQ(Count(8000), "8000");
+  EXPECT_EQ(Count(1234567), "1 234 567");
+}
+
+TEST(Headline, SaysEveryVerdictInOneSentence) {
+  EXPECT_EQ(Headline(MissingEffectsReport()),
+            "The model lacks tip_radius (or surface_offset) and channel_latency; with them the error falls "
+            "from 41.0 ms "
+            "to 5.01 ms, the noise floor.");
+  EXPECT_EQ(Headline(WrongValuesReport()),
+            "No effect is missing, but the values of contact_slowdown are off: put right, the error falls "
+            "from 9.10 ms "
+            "to 815 us.");
+  EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
+  EXPECT_EQ(Headline(UnexplainedReport()),
+            "The model is wrong in a way that no built-in effect explains. It hangs on travel_mm.");
+  EXPECT_EQ(Headline(CompareReport()), "The model is off by 41.0 ms, 8.2 times the noise floor.");
+  EXPECT_EQ(Headline(WithoutPosesReport()),
+            "Measured and simulated touches differ as distributions (p = 0.0005).");
+}
+
+TEST(Ladder, RunsFromTheGivenModelToTheFloor) {
+  std::vector<Rung> rungs = Ladder(MissingEffectsReport());
+  ASSERT_EQ(rungs.size(), 4u);
+  EXPECT_EQ(rungs[0].name, "nominal");
+  EXPECT_EQ(rungs[1].name, "+ tip_radius or surface_offset");
+  EXPECT_EQ(rungs[2].rmse_us, 5010);
+  EXPECT_EQ(rungs[3].kind, Rung::kFloor);
+  EXPECT_EQ(Ladder(WrongValuesReport())[1].kind, Rung::kRefit);
+  EXPECT_EQ(Ladder(UnexplainedReport())[1].kind, Rung::kSuggestion);
+  EXPECT_TRUE(Ladder(v1::Report()).empty());
+}
+
+TEST(JsonReport, HasTheKeysThatOthersRelyOn) {
+  for (const NamedReport& sample : AllSampleReports()) {
+    const auto text = JsonReport(sample.report);
+    ASSERT_TRUE(text.ok()) << text.status();
+    const nlohmann::json json = nlohmann::json::parse(*text);
+    for (const char* key : {"verdict", "touches", "noise_floor_us", "initial", "refitted", "steps", "final",
+                            "where", "unexplained", "next_touches"}) {
+      EXPECT_TRUE(json.contains(key)) << sample.name << " " << key;
+    }
+    for (const char* key : {"rmse_us", "heldout_rmse_us", "lack_of_fit_p"}) {
+      EXPECT_TRUE(json["initial"][key].is_number()) << sample.name << " " << key;
+      EXPECT_TRUE(json["final"][key].is_number()) << sample.name << " " << key;
+    }
+    EXPECT_TRUE(json["unexplained"]["covariates"].is_array());
+    EXPECT_TRUE(json["unexplained"]["formula"].is_string());
+  }
+}
+
+TEST(JsonReport, WritesStepsAsTheDesignShowsThem) {
+  const nlohmann::json json = nlohmann::json::parse(*JsonReport(MissingEffectsReport()));
+  EXPECT_EQ(json["verdict"], "MISSING_EFFECTS");
+  EXPECT_EQ(json["touches"], 960);
+  const nlohmann::json& step = json["steps"][0];
+  EXPECT_EQ(step["effect"], "tip_radius");
+  EXPECT_EQ(step["equivalent"], nlohmann::json({"surface_offset"}));
+  EXPECT_EQ(json["steps"][1]["equivalent"], nlohmann::json::array());
+  EXPECT_EQ(step["parameters"][0]["name"], "radius_mm");
+  EXPECT_DOUBLE_EQ(step["parameters"][0]["std_error"], 0.021);
+  EXPECT_EQ(step["parameters"][0]["unit"], "mm");
+}
+
+TEST(JsonReport, IsValidJsonWhereNumbersAreNotKnown) {
+  v1::Report report = MissingEffectsReport();
+  report.mutable_initial()->set_lack_of_fit_p(std::nan(""));
+  const nlohmann::json json = nlohmann::json::parse(*JsonReport(report));
+  EXPECT_EQ(json["initial"]["lack_of_fit_p"], "NaN");
+}
+
+}  // namespace
+}  // namespace touchstone::client
