@@ -1,0 +1,45 @@
+// The arms of the trial: what is hidden in each, drawn from the seed of the set.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/hidden_effects/score/workshop.h"
+
+namespace touchstone::hidden {
+
+enum class Kind {
+  kNothing,            // perhaps but surface bumps
+  kEffects,            // one or more of the catalogue
+  kIndistinguishable,  // one of the catalogue that these data cannot tell from its rivals
+  kUnlisted,           // physics that the catalogue lacks
+  kNoPoses,            // only objects and times
+  kWrongValue,         // a value of the model's own
+  kNoiseMissing,       // the seed's own story
+};
+
+struct Arm {
+  std::string name;
+  Kind kind = Kind::kNothing;
+  int sets = 0;  // at --share 1
+  std::function<Scenario(const Workshop&, uint64_t seed)> draw;
+  // Effects that may be named besides the truth: what the set's own accidents look like.
+  std::vector<std::string> tolerated;
+};
+
+// In the order of the table.
+const std::vector<Arm>& Arms();
+const Arm* FindArm(const std::string& name);
+
+enum class Seeds { kTuning, kSealed };
+
+// The seed of set k of an arm: ranges of tuning and sealed seeds share no number.
+uint64_t SeedOf(Seeds seeds, const Arm& arm, int k);
+
+// Effects that fit alike whatever is touched at one speed (or at any speed). Of `truth` with these values, in
+// this scenario; without truth itself.
+std::vector<std::string> RivalsOf(const Hidden& truth, const Scenario& scenario);
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,20 @@
+// What others would do with the same sets: to be beaten, not to be used.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/diagnose.h"
+
+namespace touchstone::hidden {
+
+struct Baselines {
+  std::vector<std::string> bic;        // forward selection over the catalogue by BIC: its choices, in order
+  std::vector<std::string> rmse_drop;  // effects are added as long as the RMSE falls by more than 2 %
+  bool gp_detects = false;             // a Gaussian process over each surface explains something (3 nats)
+};
+
+// All linear: derivatives by finite differences, at the nominal model.
+absl::StatusOr<Baselines> RunBaselines(const DiagnosisInput& input);
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,268 @@
+#include "tests/hidden_effects/score/judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "tests/hidden_effects/generator/rig.h"
+#include "tests/hidden_effects/generator/unlisted.h"
+
+namespace touchstone::hidden {
+namespace {
+
+using Names = std::vector<std::string>;
+
+bool Contains(const Names& names, const std::string& name) {
+  return std::count(names.begin(), names.end(), name) > 0;
+}
+
+Names EquivalentsOf(const v1::Step& step) {
+  return Names(step.equivalent().begin(), step.equivalent().end());
+}
+
+// Whether a step is the truth: by its name, or as one of a class that these data cannot tell apart, if the
+// step says so.
+bool Names_(const v1::Step& step, const Hidden& truth, const Scenario& scenario) {
+  if (step.effect() == truth.effect) return true;
+  return Contains(RivalsOf(truth, scenario), step.effect()) && Contains(EquivalentsOf(step), truth.effect);
+}
+
+// The hidden value that a parameter of the report stands for. False: it stands for none.
+bool TrueValue(const v1::ParameterValue& parameter, const Hidden& truth, const Scenario& scenario,
+               double* value) {
+  const auto& values = truth.values;
+  if (truth.effect == "object_pose") {
+    size_t at = parameter.name() == "translation_mm" ? 0 : 3;
+    const size_t axis = std::string("xyz").find(parameter.finger());
+    if (parameter.finger().size() != 1 || axis == std::string::npos) return false;
+    at += axis;
+    if (values.size() > 6) {
+      size_t object = 0;
+      while (object < scenario.objects.size() && scenario.objects[object]->name() != parameter.object())
+        ++object;
+      if (object == scenario.objects.size()) return false;  // one value for objects that differ
+      at += 6 * object;
+    }
+    *value = values[at];
+    return true;
+  }
+  if (ValueCount(truth.effect, scenario.fingers) == scenario.fingers && scenario.fingers > 1) {
+    for (int i = 0; i < scenario.fingers; ++i) {
+      const std::string name = scenario.fingers == 3 ? std::string(1, "lmr"[i]) : std::to_string(i);
+      if (parameter.finger() != name) continue;
+      *value = values[i];
+      return true;
+    }
+    return false;
+  }
+  *value = values[0];
+  return true;
+}
+
+void JudgeValues(const v1::Step& step, const Hidden& truth, const Scenario& scenario,
+                 std::vector<Mark>* marks) {
+  // surface_error is a competitor whose length is not meant to be read.
+  if (step.effect() != truth.effect || truth.effect == "surface_error") return;
+  bool near = step.parameters_size() > 0;
+  for (const v1::ParameterValue& parameter : step.parameters()) {
+    double value = 0;
+    if (!TrueValue(parameter, truth, scenario, &value)) {
+      near = false;
+      continue;
+    }
+    near &= std::abs(parameter.value() - value) <= 3 * parameter.std_error();
+    marks->push_back({"interval covers", parameter.lower() <= value && value <= parameter.upper()});
+  }
+  marks->push_back({"within 3 standard errors", near});
+}
+
+void JudgeEffects(const Arm& arm, const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
+  // Each hidden effect takes one step.
+  std::vector<const v1::Step*> taken;
+  int found = 0;
+  bool all_quiet = true;
+  for (const Hidden& hidden : truth.hidden) {
+    for (const v1::Step& step : report.steps()) {
+      if (std::count(taken.begin(), taken.end(), &step) || !Names_(step, hidden, truth)) continue;
+      taken.push_back(&step), ++found;
+      JudgeValues(step, hidden, truth, marks);
+      break;
+    }
+    all_quiet &= hidden.effect != "surface_error";
+  }
+  bool added = false;
+  for (const v1::Step& step : report.steps())
+    added |= std::count(taken.begin(), taken.end(), &step) == 0 && !Contains(arm.tolerated, step.effect());
+
+  const bool first_is_right =
+      report.steps_size() > 0 &&
+      std::any_of(truth.hidden.begin(), truth.hidden.end(),
+                  [&](const Hidden& hidden) { return Names_(report.steps(0), hidden, truth); });
+  bool named = true;
+  for (const Hidden& hidden : truth.hidden) {
+    bool here = false;
+    for (const v1::Step& step : report.steps())
+      here |= step.effect() == hidden.effect || Contains(EquivalentsOf(step), hidden.effect);
+    named &= here;
+  }
+  marks->push_back({"right first", first_is_right});
+  marks->push_back({"truth named", named});
+  marks->push_back({"all found, none added", found == static_cast<int>(truth.hidden.size()) && !added});
+  marks->push_back({"none added", !added});
+  marks->push_back({"says missing effects", report.verdict() == v1::Report::MISSING_EFFECTS});
+  if (all_quiet)
+    marks->push_back({"rmse at the floor", report.final().rmse_us() <= 1.05 * report.noise_floor_us()});
+}
+
+void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
+  const Hidden& hidden = truth.hidden.front();
+  Names wanted = RivalsOf(hidden, truth);
+  wanted.push_back(hidden.effect);
+  bool said = false, decided = false;
+  for (const v1::Step& step : report.steps()) {
+    Names together = EquivalentsOf(step);
+    together.push_back(step.effect());
+    said |=
+        std::all_of(wanted.begin(), wanted.end(), [&](const auto& name) { return Contains(together, name); });
+    decided |= !step.decided_by().empty();
+  }
+  for (const v1::Ambiguity& ambiguity : report.ambiguities()) decided |= !ambiguity.decided_by().empty();
+  marks->push_back({"said so", said});
+  marks->push_back({"said so, with what decides", said && decided});
+  marks->push_back({"one step", report.steps_size() == 1});
+}
+
+void JudgeUnlisted(const Scenario& truth, const v1::Report& report, double formula_cuts_to,
+                   std::vector<Mark>* marks) {
+  const bool owned_up = report.verdict() == v1::Report::UNEXPLAINED;
+  marks->push_back({"unexplained", owned_up});
+  marks->push_back({"wrong name instead", !owned_up && report.steps_size() > 0});
+  const auto& right = FindUnlisted(truth.unlisted.front().name).covariates;
+  const auto& covariates = report.unexplained().covariates();
+  marks->push_back({"right covariate first", covariates.size() > 0 && Contains(right, covariates[0].name())});
+  marks->push_back({"formula halves the misfit", formula_cuts_to <= 0.5});
+}
+
+std::string Number(double value) {
+  char text[32];
+  snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report& report,
+                        double formula_cuts_to) {
+  std::vector<Mark> marks;
+  Kind kind = arm.kind;
+  if (kind == Kind::kEffects && truth.hidden.empty()) kind = Kind::kNothing;
+  switch (kind) {
+    case Kind::kNothing: {
+      bool claim =
+          report.verdict() == v1::Report::UNEXPLAINED || report.verdict() == v1::Report::WRONG_VALUES;
+      for (const v1::Step& step : report.steps()) claim |= !Contains(arm.tolerated, step.effect());
+      marks.push_back({"false claim", claim});
+      break;
+    }
+    case Kind::kEffects:
+      JudgeEffects(arm, truth, report, &marks);
+      break;
+    case Kind::kIndistinguishable:
+      JudgeAmbiguity(truth, report, &marks);
+      break;
+    case Kind::kUnlisted:
+      JudgeUnlisted(truth, report, formula_cuts_to, &marks);
+      break;
+    case Kind::kNoPoses:
+      marks.push_back({"names a culprit", report.steps_size() > 0});
+      marks.push_back(
+          {truth.hidden.empty() ? "false detection" : "detects", report.distributions().p() < 0.01});
+      break;
+    case Kind::kWrongValue: {
+      bool value_right = false;
+      for (const v1::Refit& refit : report.refitted())
+        for (const v1::ParameterValue& parameter : refit.parameters())
+          value_right |= refit.effect() == truth.hidden[0].effect &&
+                         std::abs(parameter.value() - truth.hidden[0].values[0]) <= 3 * parameter.std_error();
+      marks.push_back({"says wrong values", report.verdict() == v1::Report::WRONG_VALUES});
+      marks.push_back({"value right", value_right});
+      break;
+    }
+    case Kind::kNoiseMissing: {
+      bool named = report.steps_size() == 1 && report.steps(0).effect() == "gaussian_noise", sized = false;
+      if (named)
+        for (const v1::ParameterValue& parameter : report.steps(0).parameters())
+          sized |= std::abs(parameter.value() / truth.sigma_us - 1) < 0.05;
+      marks.push_back({"noise named", named});
+      marks.push_back({"noise within 5 %", sized});
+      bool agree = report.histograms_size() > 0;
+      for (const v1::Histogram& histogram : report.histograms()) agree &= histogram.p_improved() > 0.001;
+      marks.push_back({"histograms agree", agree});
+      break;
+    }
+  }
+  return marks;
+}
+
+std::vector<Mark> JudgeNames(const Arm& arm, const Scenario& truth, const Names& names) {
+  v1::Report report;
+  for (const std::string& name : names) {
+    v1::Step* step = report.add_steps();
+    step->set_effect(name);
+    // Methods that know no equivalents are forgiven exact ties.
+    for (const Hidden& hidden : truth.hidden)
+      if (Contains(RivalsOf(hidden, truth), name)) step->add_equivalent(hidden.effect);
+  }
+  report.set_verdict(names.empty() ? v1::Report::ADEQUATE : v1::Report::MISSING_EFFECTS);
+  return Judge(arm, truth, report, NAN);
+}
+
+std::string TruthInWords(const Scenario& truth) {
+  std::string words;
+  const auto add = [&](const std::string& name, const std::vector<double>& values) {
+    words += (words.empty() ? "" : "; ") + name;
+    for (const double value : values) words += " " + Number(value);
+  };
+  for (const Hidden& hidden : truth.hidden) add(hidden.effect, hidden.values);
+  for (const Unlisted& unlisted : truth.unlisted)
+    add("unlisted " + unlisted.name, {unlisted.k_mm, unlisted.second});
+  return words.empty() ? "nothing" : words;
+}
+
+std::string ReportInWords(const v1::Report& report) {
+  std::string words = v1::Report::Verdict_Name(report.verdict());
+  const auto add_values = [&](const auto& parameters) {
+    for (const v1::ParameterValue& p : parameters)
+      words += " " + p.name() + (p.object().empty() ? "" : "(" + p.object() + ")") +
+               (p.finger().empty() ? "" : "[" + p.finger() + "]") + "=" + Number(p.value()) + "+-" +
+               Number(p.std_error());
+  };
+  for (const v1::Step& step : report.steps()) {
+    words += "; " + step.effect();
+    if (step.equivalent_size() > 0) {
+      words += " [or";
+      for (const std::string& name : step.equivalent()) words += " " + name;
+      words += "]";
+    }
+    words += " P=" + Number(step.probability());
+    add_values(step.parameters());
+  }
+  for (const v1::Refit& refit : report.refitted()) {
+    words += "; refitted " + refit.effect();
+    add_values(refit.parameters());
+  }
+  if (report.has_unexplained()) {
+    words += "; unexplained:";
+    for (const v1::CovariateTest& test : report.unexplained().covariates()) {
+      words += " " + test.name();
+      if (&test == &report.unexplained().covariates(std::min(2, report.unexplained().covariates_size() - 1)))
+        break;
+    }
+    words += " formula '" + report.unexplained().formula() + "'";
+  }
+  words += "; rmse " + Number(report.initial().rmse_us()) + " -> " + Number(report.final().rmse_us()) +
+           " floor " + Number(report.noise_floor_us()) + " us, p " + Number(report.final().lack_of_fit_p());
+  return words;
+}
+
+}  // namespace touchstone::hidden

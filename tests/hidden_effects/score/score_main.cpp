@@ -1,0 +1,56 @@
+// touchstone-hidden-effects: how good is the diagnosis? Prints the table of tests/hidden_effects/RESULTS.md.
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "tests/hidden_effects/score/trial.h"
+
+int main(int argc, char** argv) {
+  using namespace touchstone::hidden;
+  TrialOptions options;
+  std::string seeds = "tuning", meshes = TOUCHSTONE_SHARED_MESHES;
+  bool verbose = false, no_baselines = false;
+  CLI::App app{"Hides effects in measurement sets, diagnoses them, and prints how often that was right."};
+  app.add_option("--seeds", seeds, "tuning or sealed")->check(CLI::IsMember({"tuning", "sealed"}));
+  app.add_option("--share", options.share, "of the number of sets of every arm")->check(CLI::PositiveNumber);
+  app.add_option("--arm", options.arms, "only this arm (may be repeated)");
+  app.add_option("--threads", options.threads, "sets at once")->check(CLI::Range(1, 64));
+  app.add_option("--meshes", meshes, "folder with lat00.off ...; missing ones are made");
+  app.add_option("--dump", options.dump_folder, "write sets that were judged wrong there");
+  app.add_flag("--verbose", verbose, "a line a set: truth, verdict, steps, values");
+  app.add_flag("--no-baselines", no_baselines, "only the diagnosis");
+  CLI11_PARSE(app, argc, argv);
+  for (const std::string& arm : options.arms) {
+    if (FindArm(arm) != nullptr) continue;
+    fprintf(stderr, "no arm is called '%s'; there are:\n", arm.c_str());
+    for (const Arm& known : Arms()) fprintf(stderr, "  %s\n", known.name.c_str());
+    return 2;
+  }
+  options.seeds = seeds == "sealed" ? Seeds::kSealed : Seeds::kTuning;
+  options.baselines = !no_baselines;
+  if (!options.dump_folder.empty()) std::filesystem::create_directories(options.dump_folder);
+
+  const Workshop workshop = OpenWorkshop(meshes);
+  const TrialResult result = RunTrial(options, workshop, [&](const Outcome& outcome, int done, int of) {
+    if (verbose) {
+      printf("%s %s %llu (%.1f s): hidden %s => %s%s\n", AllRight(outcome) ? "ok   " : "WRONG",
+             outcome.arm->name.c_str(), static_cast<unsigned long long>(outcome.seed), outcome.seconds,
+             TruthInWords(outcome.set.truth).c_str(), ReportInWords(outcome.report).c_str(),
+             outcome.error.c_str());
+      for (const Mark& mark : outcome.marks)
+        printf("        %s: %s\n", mark.measure.c_str(), mark.yes ? "yes" : "no");
+      fflush(stdout);
+    } else if (done % 20 == 0 || done == of) {
+      fprintf(stderr, "%d of %d sets\n", done, of);
+    }
+  });
+  printf("%s", Table(result.results).c_str());
+  const auto& seconds = result.seconds;
+  if (!seconds.empty())
+    printf(
+        "\n%d sets, %d without a report. One diagnosis on one thread takes %.2f s (median), %.2f s "
+        "(slowest).\n",
+        result.sets, result.errors, seconds[seconds.size() / 2], seconds.back());
+  return result.errors == 0 ? 0 : 1;
+}

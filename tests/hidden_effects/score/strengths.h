@@ -1,0 +1,27 @@
+// How strong hidden effects are: of realistic size, or as weak as a given signal over the whole set.
+#pragma once
+
+#include <random>
+#include <string>
+
+#include "tests/hidden_effects/generator/generate.h"
+
+namespace touchstone::hidden {
+
+// The effects of the catalogue that change expectations and that a search can name, and those that change the
+// scatter.
+const std::vector<std::string>& EffectsOfExpectation();
+const std::vector<std::string>& EffectsOfScatter();
+
+// Values of a size that rigs show, with a random direction. What would be invisible in the scenario (less
+// than 25 standard errors) is made stronger.
+Hidden RealisticEffect(const std::string& effect, const Scenario& scenario, uint64_t seed);
+
+// The same direction, as weak as this signal (in standard errors over the whole set), found by bisection.
+Hidden WeakEffect(const std::string& effect, const Scenario& scenario, uint64_t seed, double signal);
+
+// An unlisted effect whose RMS over the set's residual degrees of freedom is this many sigmas.
+Unlisted UnlistedEffect(const std::string& name, const Scenario& scenario, uint64_t seed,
+                        double rms_in_sigmas);
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,64 @@
+#include "tests/hidden_effects/score/workshop.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+
+#include "server/base/status.h"
+#include "server/diagnosis/observations.h"
+#include "server/diagnosis/prediction.h"
+#include "server/effects/all_effects.h"
+#include "server/geometry/mesh_file.h"
+#include "server/geometry/supershape.h"
+
+namespace touchstone::hidden {
+
+constexpr uint64_t kTriangles = 65'000;
+
+Workshop OpenWorkshop(const std::string& mesh_folder) {
+  Workshop workshop;
+  for (const std::string& name : SupershapeNames()) {
+    const std::string path = mesh_folder + "/" + name + ".off";
+    const bool on_disk = std::filesystem::exists(path);
+    auto mesh = on_disk ? ReadMeshFile(path) : MakeSupershape(NamedSupershape(name).value(), kTriangles);
+    if (!mesh.ok()) {
+      std::cerr << mesh.status() << '\n';
+      std::abort();
+    }
+    workshop.solids.push_back(
+        std::make_shared<Solid>(name, on_disk ? ReadTriangles(path) : SupershapeTriangles(name, kTriangles)));
+    workshop.surfaces[name] = Surface::Create(name, *std::move(mesh)).value();
+  }
+  return workshop;
+}
+
+absl::StatusOr<DiagnosisInput> InputFor(const std::string& csv, const std::string& model_yaml,
+                                        const Workshop& workshop) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(MeasurementSet set, ParseMeasurementSet(csv, "hidden"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(model_yaml, "nominal.yaml", Catalogue()));
+  DiagnosisInput input;
+  input.set = std::make_shared<const MeasurementSet>(std::move(set));
+  input.model = std::make_shared<const Model>(std::move(model));
+  for (const std::string& object : input.set->objects) input.surfaces[object] = workshop.surfaces.at(object);
+  return input;
+}
+
+absl::StatusOr<DiagnosisInput> InputFor(const Set& set, const Workshop& workshop) {
+  return InputFor(set.csv, set.model_yaml, workshop);
+}
+
+absl::StatusOr<double> ExactRmseUs(const Set& set, const std::string& model_yaml, const Workshop& workshop) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set.csv, model_yaml, workshop));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
+  // In the place of what was reported, what is exactly so.
+  for (int k = 0; k < observations.size(); ++k)
+    for (int i = 0; i < observations.fingers; ++i)
+      observations.time_s[k * observations.fingers + i] =
+          set.exact_time_us[observations.row[k] * observations.fingers + i] * 1e-6;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction prediction,
+                              Predict(observations, *input.model, false, false, nullptr));
+  return 1e6 * Rmse(observations, Residuals(observations, prediction));
+}
+
+}  // namespace touchstone::hidden
