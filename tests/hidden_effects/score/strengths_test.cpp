@@ -1,0 +1,97 @@
+#include "tests/hidden_effects/score/strengths.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/effects/all_effects.h"
+#include "tests/hidden_effects/generator/rig.h"
+#include "tests/hidden_effects/generator/unlisted.h"
+#include "tests/hidden_effects/score/arms.h"
+
+namespace touchstone::hidden {
+namespace {
+
+const Scenario& SmallSet() {
+  static const Scenario* scenario = [] {
+    auto* s = new Scenario;
+    for (const char* name : {"lat05", "lat20"})
+      s->objects.push_back(std::make_shared<Solid>(name, SupershapeTriangles(name, 5000)));
+    s->poses = 24;
+    return s;
+  }();
+  return *scenario;
+}
+
+double SignalOf(const Hidden& hidden, uint64_t seed) {
+  const Set plain = Generate(SmallSet(), seed);
+  Scenario with = SmallSet();
+  with.hidden = {hidden};
+  return SignalInStandardErrors(ExactTimesUs(with, plain, seed), plain.exact_time_us, 3,
+                                plain.truth.sigma_us);
+}
+
+TEST(Strengths, WeakEffectsHaveTheSignalThatWasAskedFor) {
+  for (const std::string& effect : EffectsOfExpectation())
+    EXPECT_NEAR(SignalOf(WeakEffect(effect, SmallSet(), 5, 12), 5), 12, 0.5) << effect;
+}
+
+TEST(Strengths, RealisticEffectsAreVisible) {
+  for (const std::string& effect : EffectsOfExpectation())
+    EXPECT_GE(SignalOf(RealisticEffect(effect, SmallSet(), 5), 5), 25) << effect;
+}
+
+TEST(Strengths, NumbersAFingerSumToNothing) {
+  for (const char* effect : {"finger_length", "channel_latency", "thermal_drift"}) {
+    const Hidden hidden = RealisticEffect(effect, SmallSet(), 5);
+    ASSERT_EQ(hidden.values.size(), 3u);
+    EXPECT_NEAR(hidden.values[0] + hidden.values[1] + hidden.values[2], 0, 1e-9 * std::abs(hidden.values[0]));
+  }
+}
+
+TEST(Strengths, UnlistedEffectsHaveTheRmsThatWasAskedFor) {
+  for (const UnlistedKind& kind : UnlistedKinds()) {
+    const Set plain = Generate(SmallSet(), 5);
+    Scenario with = SmallSet();
+    with.unlisted = {UnlistedEffect(kind.name, SmallSet(), 5, 1)};
+    const double signal =
+        SignalInStandardErrors(ExactTimesUs(with, plain, 5), plain.exact_time_us, 3, plain.truth.sigma_us);
+    // What moves with the travel does not grow quite in proportion.
+    EXPECT_NEAR(signal / std::sqrt(2.0 * plain.touches), 1, 0.1) << kind.name;
+  }
+}
+
+TEST(Arms, KnowEveryEffectOfTheCatalogueWithItsNumberOfValues) {
+  for (const auto& effect : Catalogue().All()) {
+    if (effect->parameters.empty()) continue;  // formulas
+    EXPECT_EQ(ValueCount(effect->name, 5), effect->ValueCount(5)) << effect->name;
+    EXPECT_EQ(IsNoise(effect->name),
+              effect->name == "gaussian_noise" ||
+                  std::count(EffectsOfScatter().begin(), EffectsOfScatter().end(), effect->name) > 0)
+        << effect->name;
+  }
+}
+
+TEST(Arms, TuningAndSealedSeedsNeverMeet) {
+  uint64_t last_tuning = 0, first_sealed = ~uint64_t{0};
+  for (const Arm& arm : Arms()) {
+    last_tuning = std::max(last_tuning, SeedOf(Seeds::kTuning, arm, 10 * arm.sets));
+    first_sealed = std::min(first_sealed, SeedOf(Seeds::kSealed, arm, 0));
+    EXPECT_GT(arm.sets, 0);
+  }
+  EXPECT_LT(last_tuning, first_sealed);
+}
+
+TEST(Arms, LatencyAndLengthAreRivalsAtOneSpeedOnly) {
+  Scenario scenario = SmallSet();
+  const Hidden latency{"channel_latency", {1000, -2000, 1000}};
+  EXPECT_EQ(RivalsOf(latency, scenario), std::vector<std::string>{"finger_length"});
+  scenario.speeds_mm_s = {20, 50};
+  EXPECT_TRUE(RivalsOf(latency, scenario).empty());
+  // A brake cannot make times shorter.
+  EXPECT_EQ(RivalsOf({"speed_error", {0.02}}, scenario), std::vector<std::string>{"clock_skew"});
+  EXPECT_EQ(RivalsOf({"speed_error", {-0.02}}, scenario).size(), 2u);
+}
+
+}  // namespace
+}  // namespace touchstone::hidden
