@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kTermsFitted = 3;
 constexpr int kMostFormulaTerms = 2;
-constexpr int kPasses = 2;
+constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // data that differ by less tell nothing
 
 std::string FormulaName(const FormulaTerm& term) {
@@ -213,8 +213,13 @@ absl::StatusOr<Explained> Explain(Study* study) {
         explained.fit.model.size() +
             (study->thinned ? 0 : study->likelihood->surfaces()[explained.fit.surface].degrees));
 
-    // Outliers leave, touches of little worth count less: then everything once more.
-    if (pass + 1 == kPasses || (explained.noise.outliers.empty() && explained.noise.weights.empty())) break;
+    // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they
+    // leave or count less, then everything once more.
+    if (pass + 1 == kPasses) break;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int edges,
+                                LeaveOutEdges(*study->predictor, explained.fit.model.base(), &o));
+    const bool reweigh = weights.empty() && !explained.noise.weights.empty();
+    if (edges == 0 && explained.noise.outliers.empty() && !reweigh) break;
     for (const int k : explained.noise.outliers)
       LeaveOut(&o, k, "an outlier: one finger's time is far from what all other touches allow");
     weights.clear();

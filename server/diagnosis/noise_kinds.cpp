@@ -62,12 +62,13 @@ std::vector<NoisyTouch> Thinned(const std::vector<NoisyTouch>& all) {
   return part;
 }
 
-bool TailsLookHeavy(const std::vector<NoisyTouch>& touches) {
+// Excess kurtosis of residuals in units of their own scale.
+bool TailsLookHeavy(const std::vector<NoisyTouch>& touches, const NoiseModel& model) {
   double second = 0, fourth = 0, count = 0;
   for (const NoisyTouch& touch : touches) {
     const double n = static_cast<double>(touch.residual_s.size());
     for (size_t i = 0; i < touch.residual_s.size(); ++i) {
-      const double x = touch.residual_s[i] / (1 - 1 / n);
+      const double x = touch.residual_s[i] / std::sqrt(1 - 1 / n) / (1 + model.slope * touch.tangent[i]);
       second += x * x, fourth += x * x * x * x, count += 1;
     }
   }
@@ -158,62 +159,75 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
 
   NoiseModel best;
   double best_log = ProfileSigma(touches, &best);
-  const NoiseModel gaussian = best;
   double degrees = 0;
   for (const NoisyTouch& touch : all) degrees += static_cast<double>(touch.residual_s.size()) - 1;
 
+  // Does it grow on slopes?
+  const auto with_slope = [&](NoiseModel from, double* log_likelihood) {
+    NoiseModel sloped = from;
+    const auto at = [&](double log_slope) {
+      sloped.slope = std::exp(log_slope);
+      sloped.sigma_s = from.sigma_s;
+      return ProfileSigma(touches, &sloped);
+    };
+    const int steps = from.shape == NoiseShape::kGaussian ? 20 : 8;
+    const double log_slope = Maximise(at, std::log(0.02), std::log(kMostSlope), steps, log_likelihood);
+    at(log_slope);
+    return sloped;
+  };
+  double sloped_log = -INFINITY;
+  const NoiseModel sloped = with_slope(best, &sloped_log);
+  double slope_gain = sloped_log - best_log;
+  if (slope_gain >= kEnterNats) best = sloped, best_log = sloped_log;
+
   // Heavy tails, or a few outliers among Gaussian noise?
-  const bool heavy = TailsLookHeavy(touches);
-  NoiseModel mixture;
-  if (heavy) {
-    NoiseModel student = gaussian;
+  if (TailsLookHeavy(touches, best)) {
+    NoiseModel student = best;
     student.shape = NoiseShape::kStudent;
     const auto student_at = [&](double log_degrees) {
       student.degrees = std::exp(log_degrees);
-      student.sigma_s = gaussian.sigma_s;
+      student.sigma_s = best.sigma_s;
       return ProfileSigma(touches, &student);
     };
     double student_log = -INFINITY;
     const double log_degrees = Maximise(student_at, std::log(1.2), std::log(60.0), 9, &student_log);
+    NoiseModel mixture;
     double mixture_log = -INFINITY;
     for (const double width : {6.0, 15.0, 40.0, 100.0})
       for (const double share : {0.002, 0.007, 0.02, 0.05}) {
-        NoiseModel at = gaussian;
+        NoiseModel at = best;
         at.shape = NoiseShape::kMixture;
         at.width = width, at.share = share;
         const double value = ProfileSigma(touches, &at);
         if (value > mixture_log) mixture_log = value, mixture = at;
       }
-    if (student_log - best_log >= kEnterNats && student_log >= mixture_log - 3) {
-      student_at(log_degrees);
+    const double before = best_log;
+    if (student_log - before >= kEnterNats && student_log >= mixture_log - 3) {
       const double bend = CurvatureError(student_at, log_degrees, 0.1);
       student_at(log_degrees);
-      found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - best_log};
+      found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - before};
       best = student, best_log = student_log;
-    } else if (mixture_log - best_log >= kEnterNats) {
+    } else if (mixture_log - before >= kEnterNats) {
       for (const NoisyTouch& touch : all)
         if (OutlierProbability(touch, mixture) > 0.5) found.outliers.push_back(touch.k);
       best = mixture, best_log = mixture_log;
     }
+    // Tails may have looked like a slope.
+    if (slope_gain >= kEnterNats && best.shape != NoiseShape::kGaussian) {
+      NoiseModel level = best;
+      level.slope = 0;
+      slope_gain = best_log - ProfileSigma(touches, &level);
+      if (slope_gain < kEnterNats) best = level;
+    }
   }
-
-  // Does it grow on slopes?
-  NoiseModel sloped = best;
-  const auto sloped_at = [&](double slope) {
-    sloped.slope = slope;
-    sloped.sigma_s = best.sigma_s;
-    return ProfileSigma(touches, &sloped);
-  };
-  double sloped_log = -INFINITY;
-  // Sigma is looked for below its value without a slope, so the range is wide enough.
-  const double log_slope = Maximise([&](double x) { return sloped_at(std::exp(x)); }, std::log(0.02),
-                                    std::log(kMostSlope), best.shape == NoiseShape::kGaussian ? 20 : 8, &sloped_log);
-  if (sloped_log - best_log >= kEnterNats) {
-    const double slope = std::exp(log_slope);
-    const double error = CurvatureError(sloped_at, slope, 0.05 * slope);
-    sloped_at(slope);
-    found.slope = {slope, error, sloped_log - best_log};
-    best = sloped;
+  if (slope_gain >= kEnterNats) {
+    NoiseModel at = best;
+    const auto by_slope = [&](double slope) {
+      at.slope = slope;
+      at.sigma_s = best.sigma_s;
+      return ProfileSigma(touches, &at);
+    };
+    found.slope = {best.slope, CurvatureError(by_slope, best.slope, 0.05 * best.slope), slope_gain};
   }
   // What the fit has followed of the noise is given back.
   const double left = std::max(degrees - taken, 1.0);

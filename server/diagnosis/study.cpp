@@ -83,29 +83,6 @@ absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
       m < p ? "milliseconds (multiply by 1000) or seconds" : "nanoseconds, or speeds in m/s"));
 }
 
-// Where a small move of the tool makes a finger meet another part of the object, the time says more about the
-// edge than about the rig, and the fit would chase it.
-absl::Status LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* o) {
-  std::vector<std::vector<double>> travels;
-  for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(kEdgeM, 0.0), std::pair(-kEdgeM, 0.0),
-                             std::pair(0.0, kEdgeM), std::pair(0.0, -kEdgeM)}) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> travel, predictor.TravelWhenMoved(model, x, y));
-    travels.push_back(std::move(travel));
-  }
-  for (int k = 0; k < o->size(); ++k) {
-    bool edge = false;
-    for (size_t e = static_cast<size_t>(k) * o->fingers; e < static_cast<size_t>(k + 1) * o->fingers; ++e) {
-      if (std::isnan(o->time_s[e]) || std::isnan(travels[0][e])) continue;
-      for (const int axis : {1, 3}) {
-        const double bend = travels[axis][e] + travels[axis + 1][e] - 2 * travels[0][e];
-        edge |= !(std::abs(bend) < kEdgeJumpM);
-      }
-    }
-    if (edge) LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
-  }
-  return absl::OkStatus();
-}
-
 // A part of the observations; `previous` stays within it.
 Observations Thin(const Observations& o, const std::vector<int>& kept) {
   Observations part;
@@ -130,6 +107,31 @@ Observations Thin(const Observations& o, const std::vector<int>& kept) {
 }
 
 }  // namespace
+
+absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* o) {
+  std::vector<std::vector<double>> travels;
+  for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(kEdgeM, 0.0), std::pair(-kEdgeM, 0.0),
+                             std::pair(0.0, kEdgeM), std::pair(0.0, -kEdgeM)}) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> travel, predictor.TravelWhenMoved(model, x, y));
+    travels.push_back(std::move(travel));
+  }
+  int left_out = 0;
+  for (int k = 0; k < o->size(); ++k) {
+    if (!o->used[k]) continue;
+    bool edge = false;
+    for (size_t e = static_cast<size_t>(k) * o->fingers; e < static_cast<size_t>(k + 1) * o->fingers; ++e) {
+      if (std::isnan(o->time_s[e]) || std::isnan(travels[0][e])) continue;
+      for (const int axis : {1, 3}) {
+        const double bend = travels[axis][e] + travels[axis + 1][e] - 2 * travels[0][e];
+        edge |= !(std::abs(bend) < kEdgeJumpM);
+      }
+    }
+    if (!edge) continue;
+    LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
+    ++left_out;
+  }
+  return left_out;
+}
 
 PureError PureErrorOf(const Observations& o, const std::vector<double>& residuals) {
   // Groups of one pose and one set of reporting fingers: sums of residuals and of squares.
@@ -244,7 +246,7 @@ absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input, co
       members += !std::isnan(o.time_s[e]) && !std::isnan(study->nominal.time_s[e]);
     if (members < 2) LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
   }
-  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*study->predictor, *input.model, &o));
+  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*study->predictor, *input.model, &o).status());
   return study;
 }
 

@@ -40,6 +40,10 @@ absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input, co
 // study->searched->row (empty: all 1).
 absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_row);
 
+// Where a small move of the tool makes a finger meet another part of the object, the time says more about the
+// edge than about the rig, and a fit would chase it. Leaves such touches out; returns how many are new.
+absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* observations);
+
 // Pure error of residuals (contrasts) among repeats: touches of one pose with the same fingers.
 struct PureError {
   double sum_of_squares = 0;
