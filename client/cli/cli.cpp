@@ -93,6 +93,11 @@ std::vector<std::string> CommandNames(const CLI::App* app) {
   return names;
 }
 
+absl::Status EmbeddedOnly(absl::string_view option) {
+  return absl::InvalidArgumentError(absl::StrCat(
+      option, ": works only without --server; give it to touchstone-server instead (the same option there)"));
+}
+
 int PrintError(absl::string_view message) {
   std::fflush(stdout);
   std::fprintf(stderr, "touchstone: error: %s\n", std::string(message).c_str());
@@ -109,6 +114,7 @@ Cli::Cli()
                "touchstone touch lat20 --approach 0,0,-1                one touch from above\n"
                "touchstone capture lat20 --approach 0,0,-1 -o top.png   its photograph\n"
                "touchstone stream --samples 10000 --out data            a dataset of touches\n"
+               "touchstone diagnose set.csv --model nominal.yaml        where and why a model is wrong\n"
                "touchstone doctor                                       is everything in order here?")));
   app_.set_help_flag("-h,--help", "This text; also touchstone COMMAND --help");
   app_.set_version_flag("--version", "touchstone " TOUCHSTONE_VERSION, "The version");
@@ -142,8 +148,11 @@ CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
 }
 
 void Cli::AddOutputOptions(CLI::App* command) {
-  command->add_flag("--json", output_.json, "Machine-readable output; the names of numbers end in their unit")
-      ->group("Output");
+  // A command whose --json names a file has its own.
+  if (command->get_option_no_throw("--json") == nullptr)
+    command
+        ->add_flag("--json", output_.json, "Machine-readable output; the names of numbers end in their unit")
+        ->group("Output");
   command->add_flag("-q,--quiet", output_.quiet, "Nothing but errors on stderr")->group("Output");
   command->add_flag("-v,--verbose", output_.verbose, "More about what happens on stderr")->group("Output");
   command->set_help_flag("-h,--help", "This text")->group("Output");
@@ -173,31 +182,40 @@ void Cli::AddSourceOptions(CLI::App* command) {
 }
 
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
+  if (!source_.servers.empty()) {
+    const char* embedded_only = !source_.meshes.empty()        ? "--mesh"
+                                : !source_.mesh_folder.empty() ? "--mesh-dir"
+                                                               : nullptr;
+    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
+    return ConnectWithMeshes({});
+  }
+  std::vector<MeshSource> meshes;
+  if (!source_.mesh_folder.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshSourcesOfFolder(source_.mesh_folder));
+  }
+  for (const std::string& text : source_.meshes) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource mesh, ParseMeshSource(text));
+    meshes.push_back(std::move(mesh));
+  }
+  return ConnectWithMeshes(std::move(meshes));
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
+    std::vector<MeshSource> meshes) const {
   client::ConnectionOptions options;
   options.servers = SplitCommas(source_.servers);
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, {"auto", "egl", "cpu"}).status());
   if (!options.servers.empty()) {
-    const char* embedded_only = !source_.meshes.empty()        ? "--mesh"
-                                : !source_.mesh_folder.empty() ? "--mesh-dir"
-                                : source_.threads != 0         ? "--threads"
-                                : source_.egl_device >= 0      ? "--egl-device"
-                                                               : nullptr;
-    if (embedded_only != nullptr)
-      return absl::InvalidArgumentError(absl::StrCat(
-          embedded_only,
-          ": works only without --server; give it to touchstone-server instead (the same option there)"));
+    const char* embedded_only = source_.threads != 0      ? "--threads"
+                                : source_.egl_device >= 0 ? "--egl-device"
+                                                          : nullptr;
+    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
     TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
     Detail("connected to " + connection->address());
     return connection;
   }
   ServerOptions& embedded = options.embedded;
-  if (!source_.mesh_folder.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(embedded.meshes, MeshSourcesOfFolder(source_.mesh_folder));
-  }
-  for (const std::string& text : source_.meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource mesh, ParseMeshSource(text));
-    embedded.meshes.push_back(std::move(mesh));
-  }
+  embedded.meshes = std::move(meshes);
   if (source_.threads < 0)
     return absl::InvalidArgumentError(
         absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one a core"));

@@ -1,5 +1,4 @@
 // The command line as people and scripts meet it: the real binary, its exit codes, words and files.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -14,6 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "client/cli/real_binary_test.h"
 #include "client/source/dataset_manifest.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/text.h"
@@ -28,50 +28,8 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-struct Outcome {
-  int exit_code = -1;  // 128 + signal if one ended it
-  std::string out, err;
-};
-
-class CommandLineTest : public ::testing::Test {
+class CommandLineTest : public RealBinaryTest {
  protected:
-  CommandLineTest() {
-    std::string name = (fs::temp_directory_path() / "touchstone_cli_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~CommandLineTest() override { fs::remove_all(folder_); }
-
-  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
-
-  // Starts touchstone in the test's folder, its output in files.
-  pid_t Start(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), TOUCHSTONE_BINARY);
-    const pid_t child = ::fork();
-    if (child != 0) return child;
-    if (::chdir(folder_.c_str()) != 0) ::_exit(99);
-    for (const auto& [descriptor, name] : {std::pair{1, ".out"}, std::pair{2, ".err"}}) {
-      const int file = ::open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-      ::dup2(file, descriptor);
-    }
-    std::vector<char*> raw;
-    for (std::string& argument : arguments) raw.push_back(argument.data());
-    raw.push_back(nullptr);
-    ::execv(raw[0], raw.data());
-    ::_exit(98);
-  }
-
-  Outcome Wait(pid_t child) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    Outcome outcome;
-    outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    outcome.out = ReadFile(Path(".out")).value_or("");
-    outcome.err = ReadFile(Path(".err")).value_or("");
-    return outcome;
-  }
-
-  Outcome Run(std::vector<std::string> arguments) { return Wait(Start(std::move(arguments))); }
-
   // Every file under a folder with the hash of its bytes; dataset.json with its text, for the message.
   std::map<std::string, std::string> Snapshot(const std::string& name) {
     std::map<std::string, std::string> files;
@@ -82,12 +40,6 @@ class CommandLineTest : public ::testing::Test {
                                                 : Sha256HexOfFile(entry.path().string()).value_or("?");
     return files;
   }
-
-  void Write(const std::string& name, const std::string& text) {
-    ASSERT_TRUE(WriteFileAtomically(Path(name), text).ok());
-  }
-
-  std::string folder_;
 };
 
 TEST_F(CommandLineTest, HelpBeginsWithExamples) {

@@ -54,6 +54,9 @@ class Cli {
   void AddSourceOptions(CLI::App* command);
   // The source that those options name.
   absl::StatusOr<std::unique_ptr<client::Connection>> Connect() const;
+  // The same, with these meshes in place of --mesh and --mesh-dir where the source is in this process; a
+  // server has its own, and the caller may send these along.
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(std::vector<MeshSource> meshes) const;
   const SourceOptions& source() const { return source_; }
   const OutputOptions& output() const { return output_; }
 
@@ -131,6 +134,10 @@ void AddTouch(Cli* cli);
 void AddCapture(Cli* cli);
 void AddStream(Cli* cli);
 void AddMesh(Cli* cli);
+void AddCompare(Cli* cli);
+void AddDiagnose(Cli* cli);
+void AddPropose(Cli* cli);
+void AddSession(Cli* cli);
 void AddDoctor(Cli* cli);
 
 }  // namespace touchstone::cli

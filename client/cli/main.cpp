@@ -15,6 +15,10 @@ void AddCommands(Cli* cli) {
   AddCapture(cli);
   AddStream(cli);
   AddMesh(cli);
+  AddCompare(cli);
+  AddDiagnose(cli);
+  AddPropose(cli);
+  AddSession(cli);
   AddDoctor(cli);
 }
 

@@ -42,6 +42,17 @@ void ProgressBar::Show(uint64_t done, uint64_t total, uint64_t this_run) {
   drawn_ = true;
 }
 
+void ProgressBar::ShowStage(const std::string& stage, double share) {
+  const Clock::time_point now = Clock::now();
+  if (!enabled_ || now < next_) return;
+  next_ = now + kInterval;
+  const int filled = static_cast<int>(std::min(std::max(share, 0.0), 1.0) * kBarWidth);
+  const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
+  std::fprintf(stderr, "\r\x1b[K[%s] %3.0f %%  %s", bar.c_str(), 100 * share, stage.c_str());
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
 void ProgressBar::Clear() {
   if (drawn_) std::fprintf(stderr, "\r\x1b[K");
   drawn_ = false;

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 namespace touchstone::cli {
 
@@ -14,6 +15,8 @@ class ProgressBar {
 
   // `done` of `total` samples; `this_run` of them were made since the bar began, which gives the rate.
   void Show(uint64_t done, uint64_t total, uint64_t this_run);
+  // `share` from 0 to 1 of a work whose present stage has a name.
+  void ShowStage(const std::string& stage, double share);
   // Wipes the line, so that other text may be written.
   void Clear();
 

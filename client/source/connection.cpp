@@ -53,6 +53,8 @@ Connection::~Connection() {
   source_.reset();
   models_.reset();
   control_.reset();
+  sessions_.reset();
+  diagnosis_.reset();
   channel_.reset();
 }
 
@@ -101,6 +103,8 @@ void Connection::MakeStubs() {
   source_ = v1::Source::NewStub(channel_);
   models_ = v1::Models::NewStub(channel_);
   control_ = v1::Control::NewStub(channel_);
+  sessions_ = v1::Sessions::NewStub(channel_);
+  diagnosis_ = v1::Diagnosis::NewStub(channel_);
 }
 
 }  // namespace touchstone::client

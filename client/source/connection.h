@@ -14,7 +14,9 @@
 #include "server/service/server.h"
 #include "server/service/server_options.h"
 #include "touchstone/v1/control.grpc.pb.h"
+#include "touchstone/v1/diagnosis.grpc.pb.h"
 #include "touchstone/v1/models.grpc.pb.h"
+#include "touchstone/v1/sessions.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
 namespace touchstone::client {
@@ -39,6 +41,8 @@ class Connection {
   v1::Source::Stub& source() { return *source_; }
   v1::Models::Stub& models() { return *models_; }
   v1::Control::Stub& control() { return *control_; }
+  v1::Sessions::Stub& sessions() { return *sessions_; }
+  v1::Diagnosis::Stub& diagnosis() { return *diagnosis_; }
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
 
   // "127.0.0.1:50051", or "this process".
@@ -75,6 +79,8 @@ class Connection {
   std::unique_ptr<v1::Source::Stub> source_;
   std::unique_ptr<v1::Models::Stub> models_;
   std::unique_ptr<v1::Control::Stub> control_;
+  std::unique_ptr<v1::Sessions::Stub> sessions_;
+  std::unique_ptr<v1::Diagnosis::Stub> diagnosis_;
 };
 
 }  // namespace touchstone::client

@@ -21,9 +21,6 @@ struct MeasuredTouch {
   std::vector<double> time_s;
 };
 
-// "l", "m", "r" for three fingers, else "0", "1", ...
-std::string FingerName(int finger, int fingers);
-
 // "t_l_us" ...
 std::string TimeColumnName(int finger, int fingers);
 
@@ -37,8 +34,8 @@ std::string MeasurementRow(const MeasuredTouch& touch, bool session_time,
 // A whole file; writes session_time_s and the covariates that any row has.
 std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches);
 
-// Reads a measurement file or a plan. Errors name `origin`, line, column, what is wrong and what was
-// expected. Columns beyond DESIGN 7's are refused; times may be absent.
+// Reads a measurement file or a plan as server/session/measurement_set.h does, as messages; the poses must be
+// there.
 absl::StatusOr<std::vector<MeasuredTouch>> ParseMeasurements(const std::string& text,
                                                              const std::string& origin);
 

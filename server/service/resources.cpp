@@ -145,15 +145,19 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::s
       absl::StrCat("model.hash: no model has the hash '", prefix, "'", DidYouMean(prefix, known)));
 }
 
-absl::Status ModelStore::Create(const Model& model) {
-  std::lock_guard<std::mutex> lock(mutex_);
+absl::Status ModelStore::CheckName(const std::string& name) {
   const bool plain =
-      !model.name.empty() && model.name.size() <= 64 && model.name[0] != '.' &&
-      model.name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
+      !name.empty() && name.size() <= 64 && name[0] != '.' &&
+      name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
           std::string::npos;
-  if (!plain)
-    return absl::InvalidArgumentError(absl::StrCat(
-        "model.name = '", model.name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+  if (plain) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "model.name = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+}
+
+absl::Status ModelStore::Create(const Model& model) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(model.name));
+  std::lock_guard<std::mutex> lock(mutex_);
   Refresh();
   const auto found = models_.find(model.name);
   if (found != models_.end()) {

@@ -16,6 +16,7 @@
 #include "server/image/renderer.h"
 #include "server/model/model.h"
 #include "server/service/server_options.h"
+#include "server/service/session_store.h"
 
 namespace touchstone {
 
@@ -48,6 +49,8 @@ class ModelStore {
 
   absl::StatusOr<std::shared_ptr<const Model>> FindByName(const std::string& name) const;
   absl::StatusOr<std::shared_ptr<const Model>> FindByHash(const std::string& prefix) const;
+  // 1 to 64 letters, digits, '_', '-' or '.', not '.' first.
+  static absl::Status CheckName(const std::string& name);
   absl::Status Create(const Model& model);
   std::vector<std::shared_ptr<const Model>> All() const;
 
@@ -64,6 +67,7 @@ struct Resources {
   std::unique_ptr<ThreadPool> pool;
   ObjectStore objects;
   std::unique_ptr<ModelStore> models;
+  std::unique_ptr<SessionStore> sessions;
   std::shared_ptr<const Model> default_model;
 
   // Made at the first use, so that a server is ready before a driver is.
@@ -73,6 +77,7 @@ struct Resources {
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
   std::atomic<uint32_t> running_requests{0};
   std::atomic<uint32_t> running_streams{0};
+  std::atomic<uint32_t> running_diagnoses{0};
   std::atomic<uint64_t> touches{0};
   std::atomic<uint64_t> images{0};
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();

@@ -12,8 +12,10 @@
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/service/control_service.h"
+#include "server/service/diagnosis_service.h"
 #include "server/service/models_service.h"
 #include "server/service/resources.h"
+#include "server/service/sessions_service.h"
 #include "server/service/source_service.h"
 
 namespace touchstone {
@@ -45,6 +47,11 @@ absl::Status CheckOptions(const ServerOptions& options) {
       CheckRange(options.most_images_per_request, 1, 1'000'000, "most_images_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_streams, 1, 100'000, "most_streams"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_message_mib, 1, 2047, "most_message_mib"));
+  // A session goes through a receive buffer and the reader's line numbers, which are ints.
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_session_mib, 1, 4095, "most_session_mib"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_sessions_mib, 1, 1 << 30, "most_sessions_mib"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_diagnoses, 1, 1000, "most_diagnoses"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_proposed_touches, 1, 100'000, "most_proposed_touches"));
   TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));
   for (const auto& [value, name] :
@@ -72,6 +79,8 @@ struct Server::Parts {
   std::unique_ptr<SourceService> source;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<ModelsService> models;
+  std::unique_ptr<SessionsService> sessions;
+  std::unique_ptr<DiagnosisService> diagnosis;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
 };
@@ -88,12 +97,15 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.objects, ObjectStore::Load(options, resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(options.models_dir));
+  TOUCHSTONE_ASSIGN_OR_RETURN(resources.sessions, SessionStore::Open(options));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
                               DefaultModel(options.default_model, resources.models.get()));
   parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
   parts.source = std::make_unique<SourceService>(&resources, parts.leases.get());
   parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   parts.models = std::make_unique<ModelsService>(&resources);
+  parts.sessions = std::make_unique<SessionsService>(&resources);
+  parts.diagnosis = std::make_unique<DiagnosisService>(&resources);
 
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(options.most_message_mib << 20);
@@ -104,6 +116,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   builder.RegisterService(parts.source.get());
   builder.RegisterService(parts.control.get());
   builder.RegisterService(parts.models.get());
+  builder.RegisterService(parts.sessions.get());
+  builder.RegisterService(parts.diagnosis.get());
   parts.server = builder.BuildAndStart();
   if (parts.server == nullptr || (!options.listen.empty() && parts.port == 0)) {
     parts.server = nullptr;
@@ -112,7 +126,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
         "': cannot listen there; is the address right (HOST:PORT, port 0 for any), and the port free?"));
   }
   if (auto* health = parts.server->GetHealthCheckService(); health != nullptr)
-    for (const char* name : {"touchstone.v1.Source", "touchstone.v1.Control", "touchstone.v1.Models"})
+    for (const char* name : {"touchstone.v1.Source", "touchstone.v1.Control", "touchstone.v1.Models",
+                             "touchstone.v1.Sessions", "touchstone.v1.Diagnosis"})
       health->SetServingStatus(name, true);
   return server;
 }

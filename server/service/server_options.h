@@ -33,6 +33,7 @@ struct ServerOptions {
   std::vector<MeshSource> meshes;          // besides the five built-in supershapes
   int supershape_triangles = 20000;        // about; of each built-in
   std::string models_dir;                  // where models are kept; empty: in memory
+  std::string sessions_dir;                // where sessions are kept; empty: in memory
   std::string default_model = "nominal";
   int threads = 0;  // that simulate; 0: one a core
   RendererOptions renderer;
@@ -42,6 +43,10 @@ struct ServerOptions {
   int most_images_per_request = 1000;
   int most_streams = 64;  // dataset streams at once; one more is RESOURCE_EXHAUSTED
   int most_message_mib = 256;
+  int most_session_mib = 1024;   // one stored session
+  int most_sessions_mib = 4096;  // all stored sessions together, and all that are being sent at once
+  int most_diagnoses = 4;  // compared, diagnosed or proposed for at once; one more is RESOURCE_EXHAUSTED
+  int most_proposed_touches = 1000;
   double lease_window_s = 2;
   double drain_s = 10;  // what running calls get after SIGTERM
 };

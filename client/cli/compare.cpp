@@ -1,0 +1,34 @@
+// touchstone compare: how wrong a model is, and where.
+#include "client/cli/comparison.h"
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckOutputs(cli, options, {{"--html", options.html}, {"--json", options.json}}));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
+  v1::CompareRequest request;
+  *request.mutable_evidence() = comparison->evidence();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
+                              comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
+                                return comparison->connection().diagnosis().Compare(context, request);
+                              }));
+  return PrintReport(cli, options, report);
+}
+
+}  // namespace
+
+void AddCompare(Cli* cli) {
+  auto options = std::make_shared<ComparisonOptions>();
+  CLI::App* command = cli->AddCommand(
+      nullptr, "compare", "Says how wrong a model is against measured touches, and where.",
+      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
+      "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
+      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json | jq .initial",
+      [cli, options] { return RunCompare(*cli, *options); });
+  AddComparisonOptions(cli, command, options.get(), /*html=*/true);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,305 @@
+#include "client/cli/comparison.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <random>
+
+#include "client/report/report.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/effects/all_effects.h"
+#include "server/geometry/mesh_file.h"
+#include "server/model/model.h"
+#include "server/service/evidence.h"
+#include "server/session/measurement_set.h"
+
+namespace touchstone::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMostModelBytes = 1 << 20;
+constexpr size_t kMostInline = 16 << 20;  // a larger set is sent in pieces, as a session
+constexpr size_t kPiece = 1 << 20;
+constexpr int kWidthOfNoTerminal = 110;
+constexpr int kLeastWidth = 60, kMostWidth = 160;
+
+// A set as the user names it: its file's text, or the name of a session that the server keeps.
+struct SetText {
+  std::string csv, session;
+};
+absl::StatusOr<SetText> ReadSet(const Cli& cli, const std::string& text) {
+  SetText set;
+  if (text == "-") {
+    set.csv.assign(std::istreambuf_iterator<char>(std::cin), {});
+    return set;
+  }
+  std::error_code error;
+  const bool looks_like_file = absl::StrContains(text, "/") || absl::EndsWith(text, ".csv");
+  if (!cli.source().servers.empty() && !looks_like_file && !fs::exists(text, error)) {
+    set.session = text;
+    return set;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, ReadFile(text));
+  return set;
+}
+
+// The mesh files of these objects in --mesh-dir; other files there are left alone.
+absl::Status AddMeshesOfFolder(const std::string& folder, const std::vector<std::string>& objects,
+                               std::map<std::string, MeshSource>* meshes) {
+  const std::vector<std::string> formats = MeshFormatNames();
+  std::map<std::string, std::string> paths;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().stem().string();
+    const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
+    if (extension.empty() ||
+        std::find(formats.begin(), formats.end(), extension.substr(1)) == formats.end() ||
+        std::find(objects.begin(), objects.end(), name) == objects.end())
+      continue;
+    const auto [other, is_new] = paths.emplace(name, entry.path().string());
+    if (!is_new && meshes->count(name) == 0)
+      return absl::InvalidArgumentError(absl::StrCat("--mesh-dir: ", other->second, " and ",
+                                                     entry.path().string(), " are both '", name,
+                                                     "': say which with --mesh ", name, "=FILE"));
+  }
+  if (error) return absl::NotFoundError(absl::StrCat("--mesh-dir: '", folder, "': ", error.message()));
+  for (const auto& [name, path] : paths) {
+    MeshSource source;
+    source.name = name;
+    source.path = path;
+    meshes->emplace(name, source);  // --mesh comes first
+  }
+  return absl::OkStatus();
+}
+
+// The meshes that the set's objects need, of those that the options name.
+absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vector<std::string>& objects) {
+  std::map<std::string, MeshSource> meshes;
+  for (const std::string& text : cli.source().meshes) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const MeshSource source, ParseMeshSource(text));
+    if (!meshes.emplace(source.name, source).second)
+      return absl::InvalidArgumentError(
+          absl::StrCat("--mesh: two are named '", source.name, "'; one an object was expected"));
+    if (std::find(objects.begin(), objects.end(), source.name) == objects.end()) {
+      cli.Log(absl::StrCat("note: --mesh ", text, ": the set has no such object",
+                           DidYouMean(source.name, objects)));
+      meshes.erase(source.name);
+    }
+  }
+  if (!cli.source().mesh_folder.empty())
+    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli.source().mesh_folder, objects, &meshes));
+  std::vector<MeshSource> list;
+  for (const auto& [name, source] : meshes) list.push_back(source);
+  return list;
+}
+
+int TerminalWidth() {
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kWidthOfNoTerminal;
+  return std::clamp<int>(size.ws_col, kLeastWidth, kMostWidth);
+}
+
+}  // namespace
+
+void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html) {
+  command
+      ->add_option("SET", options->set,
+                   "The measurement file (CSV); -: stdin; with --server also a stored session's name")
+      ->type_name("")
+      ->required();
+  command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")
+      ->type_name("MODEL");
+  command
+      ->add_option("--also", options->also,
+                   "A file of your own effects (formulas) that compete with the catalogue, repeatable")
+      ->type_name("FILE")
+      ->take_all()
+      ->expected(1);
+  command->add_option("--seed", options->seed, "Seed of permutations and draws. Default: 0")->type_name("N");
+  if (html)
+    command->add_option("--html", options->html, "Write the report as one HTML file that opens offline")
+        ->type_name("FILE");
+  CLI::Option* json = command->add_option(
+      "--json", options->json, "Write the report as JSON; alone or with -: to stdout, instead of the text");
+  json->type_name("[FILE]")->expected(0, 1)->group("Output");
+  options->json_option = json;
+  cli->AddSourceOptions(command);
+}
+
+absl::Status CheckOutputs(const Cli& cli, const ComparisonOptions& options,
+                          const std::vector<std::pair<std::string, std::string>>& outputs) {
+  std::vector<std::string> inputs = options.also;
+  inputs.push_back(options.set);
+  inputs.push_back(options.model);
+  for (const std::string& text : cli.source().meshes)
+    if (const auto mesh = ParseMeshSource(text); mesh.ok()) inputs.push_back(mesh->path);
+  const std::string folder = cli.source().mesh_folder;
+  for (size_t k = 0; k < outputs.size(); ++k) {
+    const auto& [option, path] = outputs[k];
+    if (path.empty() || path == "-") continue;
+    std::error_code error;
+    for (const std::string& input : inputs)
+      if (fs::equivalent(path, input, error))
+        return absl::InvalidArgumentError(absl::StrCat(
+            option, ": ", path, " is ", input, ", which is read and never changed; choose another name"));
+    const fs::path parent = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
+    const std::string extension = absl::AsciiStrToLower(fs::path(path).extension().string());
+    const std::vector<std::string> formats = MeshFormatNames();
+    if (!folder.empty() && fs::equivalent(parent, folder, error) && !extension.empty() &&
+        std::find(formats.begin(), formats.end(), extension.substr(1)) != formats.end())
+      return absl::InvalidArgumentError(
+          absl::StrCat(option, ": ", path, " would be a mesh of --mesh-dir; choose another name"));
+    for (size_t other = 0; other < k; ++other)
+      if (fs::weakly_canonical(outputs[other].second, error) == fs::weakly_canonical(path, error))
+        return absl::InvalidArgumentError(absl::StrCat(option, " and ", outputs[other].first, ": both are ",
+                                                       path, "; one would replace the other"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
+                                                             const ComparisonOptions& options) {
+  std::unique_ptr<Comparison> comparison(new Comparison(cli));
+  v1::Evidence& evidence = comparison->evidence_;
+  evidence.set_seed(options.seed);
+  // Files are checked here, so that errors name them.
+  TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(), ParseModelRef(options.model));
+  if (evidence.model().has_yaml())
+    TOUCHSTONE_RETURN_IF_ERROR(ParseModel(evidence.model().yaml(), options.model, Catalogue()).status());
+  for (const std::string& path : options.also) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMostModelBytes));
+    TOUCHSTONE_RETURN_IF_ERROR(ParseModel(AsModelFile(text), path, Catalogue()).status());
+    evidence.add_also_yaml(text);
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(SetText set, ReadSet(cli, options.set));
+  const bool served = !cli.source().servers.empty();
+  std::vector<MeshSource> meshes;
+  if (set.session.empty()) {
+    evidence.set_origin(options.set == "-" ? "stdin" : options.set);
+    if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet read, ParseMeasurementSet(set.csv, evidence.origin()));
+      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, read.objects));
+    }
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(comparison->connection_,
+                              cli.ConnectWithMeshes(served ? std::vector<MeshSource>() : meshes));
+  if (!set.session.empty()) {
+    evidence.set_session(set.session);
+    v1::GetSessionRequest request;
+    request.set_name(set.session);
+    const absl::StatusOr<v1::Session> session = client::Connection::Call(
+        &v1::Sessions::Stub::GetSession, comparison->connection_->sessions(), request);
+    if (absl::IsNotFound(session.status()))
+      return absl::NotFoundError(
+          absl::StrCat("SET: ", options.set, " is no file, and at the server ", session.status().message()));
+    TOUCHSTONE_RETURN_IF_ERROR(session.status());
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes,
+                                MeshesOf(cli, {session->objects().begin(), session->objects().end()}));
+  }
+  if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
+  if (!set.session.empty()) return comparison;
+  if (set.csv.size() > kMostInline)
+    TOUCHSTONE_RETURN_IF_ERROR(comparison->SendAhead(set.csv));
+  else
+    evidence.set_csv(std::move(set.csv));
+  return comparison;
+}
+
+Comparison::~Comparison() {
+  if (sent_ahead_.empty()) return;
+  v1::DeleteSessionRequest request;
+  request.set_name(sent_ahead_);
+  const auto deleted =
+      client::Connection::Call(&v1::Sessions::Stub::DeleteSession, connection_->sessions(), request);
+  if (!deleted.ok())
+    cli_.Detail(
+        absl::StrCat("session ", sent_ahead_, " is left at the server: ", deleted.status().message()));
+}
+
+absl::Status Comparison::SendMeshes(const std::vector<MeshSource>& meshes) {
+  if (meshes.empty()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
+                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection_->source(),
+                                                       v1::ListObjectsRequest()));
+  std::map<std::string, std::string> hashes;
+  for (const v1::Object& object : served.objects()) hashes[object.name()] = object.mesh_hash();
+  for (const MeshSource& source : meshes) {
+    MeshImport import;
+    import.unit = source.unit;
+    import.up = source.up;
+    import.scale = source.scale;
+    if (source.fit_mm > 0) import.fit_mm = source.fit_mm;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadMeshFile(source.path, import));
+    if (hashes[source.name] == MeshHash(mesh)) continue;
+    cli_.Detail(absl::StrCat("sending ", source.path, ": the server lacks it"));
+    v1::MeshFile* file = evidence_.add_meshes();
+    file->set_name(source.name);
+    file->set_format(absl::AsciiStrToLower(fs::path(source.path).extension().string().substr(1)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(*file->mutable_data(), ReadFile(source.path));
+    file->set_unit(source.unit);
+    file->set_up(source.up);
+    file->set_scale(source.scale);
+    file->set_fit_mm(source.fit_mm);
+  }
+  const size_t bytes = evidence_.ByteSizeLong();
+  if (bytes + kMostInline > static_cast<size_t>(client::kMostMessageBytes))
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--mesh: the meshes have ", bytes >> 20,
+        " MiB, too much for one request; give them to touchstone-server (the same option there)"));
+  return absl::OkStatus();
+}
+
+absl::Status Comparison::SendAhead(const std::string& csv) {
+  std::random_device random;
+  const std::string name = absl::StrCat("sent-ahead-", absl::Hex(random()), absl::Hex(random()));
+  grpc::ClientContext context;
+  const Interrupt::Handler handler([&context] { context.TryCancel(); });
+  v1::Session session;
+  const auto writer = connection_->sessions().CreateSession(&context, &session);
+  v1::CreateSessionRequest request;
+  request.set_name(name);
+  for (size_t begin = 0; begin < csv.size(); begin += kPiece) {
+    request.set_csv(csv.substr(begin, kPiece));
+    if (!writer->Write(request)) break;
+    request.clear_name();
+  }
+  writer->WritesDone();
+  const absl::Status status = client::FromGrpc(writer->Finish());
+  if (!status.ok()) {
+    // The server knows the set by the passing name only.
+    std::string message(status.message());
+    if (absl::StartsWith(message, name)) message = evidence_.origin() + message.substr(name.size());
+    return absl::Status(status.code(), message);
+  }
+  sent_ahead_ = name;
+  evidence_.set_session(name);
+  return absl::OkStatus();
+}
+
+absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
+  if (!options.html.empty()) {
+    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.html, client::HtmlReport(report)));
+    if (options.html != "-") cli.Log("wrote " + options.html);
+  }
+  if (options.JsonGiven()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::string json, client::JsonReport(report));
+    if (!absl::EndsWith(json, "\n")) json += '\n';
+    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.json, json));
+    if (!options.JsonOnStdout()) cli.Log("wrote " + options.json);
+  }
+  if (options.JsonOnStdout() || options.html == "-") return absl::OkStatus();
+  const bool colour = ::isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
+  return WriteOutput("", client::TerminalReport(report, TerminalWidth(), colour));
+}
+
+}  // namespace touchstone::cli

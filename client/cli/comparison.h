@@ -1,0 +1,89 @@
+// What compare, diagnose and propose share: the set, the model and the meshes that go together, the call with
+// its progress, and the report in its three forms.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/cli/common.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/progress_bar.h"
+
+namespace touchstone::cli {
+
+struct ComparisonOptions {
+  std::string set;
+  std::string model;
+  std::vector<std::string> also;
+  uint64_t seed = 0;
+  std::string html;
+  std::string json;
+  const CLI::Option* json_option = nullptr;
+
+  // --json alone and --json - are the output's form, as everywhere; --json FILE is a file beside the report.
+  bool JsonGiven() const { return json_option->count() > 0; }
+  bool JsonOnStdout() const { return JsonGiven() && (json.empty() || json == "-"); }
+};
+
+// SET, --model, --also, --seed, --json FILE and, if `html`, --html FILE; then the options of the source.
+void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html);
+
+// Refuses, before any work, outputs (option and path) that would replace what is read, or one another.
+absl::Status CheckOutputs(const Cli& cli, const ComparisonOptions& options,
+                          const std::vector<std::pair<std::string, std::string>>& outputs);
+
+// A source and what to ask it.
+class Comparison {
+ public:
+  // Reads what is here and connects. Only meshes that the set names are read; a server is sent those that it
+  // lacks.
+  static absl::StatusOr<std::unique_ptr<Comparison>> Open(const Cli& cli, const ComparisonOptions& options);
+  // A set that was sent ahead is deleted again.
+  ~Comparison();
+
+  client::Connection& connection() { return *connection_; }
+  const v1::Evidence& evidence() const { return evidence_; }
+
+  // Runs the call that `start` makes; shows progress; returns the report. Ctrl-C cancels it.
+  template <typename Response, typename Start>
+  absl::StatusOr<v1::Report> Run(const Start& start) const;
+
+ private:
+  explicit Comparison(const Cli& cli) : cli_(cli) {}
+  absl::Status SendMeshes(const std::vector<MeshSource>& meshes);
+  absl::Status SendAhead(const std::string& csv);
+
+  const Cli& cli_;
+  std::unique_ptr<client::Connection> connection_;
+  v1::Evidence evidence_;
+  std::string sent_ahead_;  // the session's name
+};
+
+// The report as JSON, as HTML and in the terminal, as the options ask.
+absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
+
+template <typename Response, typename Start>
+absl::StatusOr<v1::Report> Comparison::Run(const Start& start) const {
+  grpc::ClientContext context;
+  const Interrupt::Handler handler([&context] { context.TryCancel(); });
+  ProgressBar bar(!cli_.output().quiet);
+  const auto reader = start(&context);
+  Response response;
+  v1::Report report;
+  bool reported = false;
+  while (reader->Read(&response)) {
+    if (response.has_progress()) bar.ShowStage(response.progress().stage(), response.progress().done());
+    if (!response.has_report()) continue;
+    report = std::move(*response.mutable_report());
+    reported = true;
+  }
+  bar.Clear();
+  const absl::Status status = client::FromGrpc(reader->Finish());
+  if (!status.ok()) return status;
+  if (!reported) return absl::InternalError("the source ended without a report");
+  return report;
+}
+
+}  // namespace touchstone::cli

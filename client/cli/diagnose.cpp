@@ -1,0 +1,90 @@
+// touchstone diagnose: how wrong a model is, where, why, what to add, and what the error becomes.
+#include <filesystem>
+
+#include "client/cli/comparison.h"
+#include "server/base/status.h"
+#include "server/effects/all_effects.h"
+#include "server/model/model.h"
+
+namespace touchstone::cli {
+namespace {
+
+struct Options : ComparisonOptions {
+  std::string save_model;
+  std::string keep_as;
+};
+
+// The improved model under the file's name, or the model itself where nothing was to be changed.
+absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report& report,
+                       Comparison* comparison) {
+  const bool changed = !report.improved_model_yaml().empty();
+  std::string yaml = report.improved_model_yaml();
+  if (!changed) {
+    v1::GetModelRequest request;
+    *request.mutable_model() = comparison->evidence().model();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const v1::Model same,
+        client::Connection::Call(&v1::Models::Stub::GetModel, comparison->connection().models(), request));
+    yaml = same.yaml();
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(yaml, "the improved model", Catalogue()));
+  // A new model under the old one's name would be refused by a server that knows the old one.
+  const Model as_it_was = model;
+  model.name = std::filesystem::path(options.save_model).stem().string();
+  if (!ParseModel(FormatModel(model), options.save_model, Catalogue()).ok()) model.name = as_it_was.name;
+  TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.save_model, FormatModel(model)));
+  const std::string hash = model.Hash().substr(0, 12);
+  cli.Log(changed ? absl::StrCat("wrote ", options.save_model, " (", model.name, ", hash ", hash, ")")
+                  : absl::StrCat("wrote ", options.save_model,
+                                 ": the same model, nothing was to be changed (hash ", hash, ")"));
+  return absl::OkStatus();
+}
+
+absl::Status RunDiagnose(const Cli& cli, const Options& options) {
+  // What would spoil the end is told at the beginning.
+  TOUCHSTONE_RETURN_IF_ERROR(CheckOutputs(
+      cli, options,
+      {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
+  if (!options.keep_as.empty() && cli.source().servers.empty())
+    return absl::InvalidArgumentError(
+        "--keep-as: a server keeps models; give --server, or --save-model for a file");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
+  v1::DiagnoseRequest request;
+  *request.mutable_evidence() = comparison->evidence();
+  request.set_save_model(options.keep_as);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
+                              comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+                                return comparison->connection().diagnosis().Diagnose(context, request);
+                              }));
+  TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
+  if (!options.keep_as.empty()) cli.Log(absl::StrCat("the server keeps the model as ", options.keep_as));
+  if (!options.save_model.empty()) return SaveModel(cli, options, report, comparison.get());
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddDiagnose(Cli* cli) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = cli->AddCommand(
+      nullptr, "diagnose",
+      "Says how wrong a model is against measured touches, where, why, and what to add; climbs until the "
+      "rest is "
+      "noise.",
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --html report.html --json "
+      "report.json\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
+      [cli, options] { return RunDiagnose(*cli, *options); });
+  AddComparisonOptions(cli, command, options.get(), /*html=*/true);
+  command->add_option("--save-model", options->save_model, "Write the improved model to this file")
+      ->type_name("FILE");
+  command
+      ->add_option("--keep-as", options->keep_as,
+                   "With --server: keep the improved model there under this name, served at once")
+      ->type_name("NAME");
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,304 @@
+// compare, diagnose, propose and session as people and scripts meet them: the real binary, on a small set
+// that `touchstone touch` made under a model with an effect.
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
+#include <absl/strings/str_split.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/real_binary_test.h"
+#include "client/source/measurement_csv.h"
+#include "server/service/server.h"
+
+namespace touchstone::cli {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr char kModel[] =
+    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
+
+class DiagnoseCommandTest : public RealBinaryTest {
+ protected:
+  // 24 poses twice on each of two objects, touched with balls for tips: set.csv. The meshes have names of
+  // their own.
+  void MakeSet() {
+    Write("nominal.yaml", kModel);
+    Write("tips.yaml", absl::StrCat(kModel, "  - tip_radius: {radius_mm: 3}\n"));
+    std::filesystem::create_directories(Path("meshes"));
+    const std::pair<const char*, const char*> shapes[] = {{"cup", "lat05"}, {"mug", "lat20"}};
+    std::vector<client::MeasuredTouch> touches;
+    for (const auto& [name, shape] : shapes) {
+      ASSERT_EQ(Run({"mesh", "supershape", shape, "--triangles", "2000", "-o",
+                     absl::StrCat("meshes/", name, ".off")})
+                    .exit_code,
+                0);
+      ASSERT_EQ(Run({"plan", name, "--mesh-dir", "meshes", "--plan", "faces", "--samples-per-face", "4",
+                     "--rounds", "2", "-o", "plan.csv"})
+                    .exit_code,
+                0);
+      const Outcome outcome = Run({"touch", "--plan", "plan.csv", "--mesh-dir", "meshes", "--model",
+                                   "tips.yaml", "--seed", std::to_string(touches.size() + 1)});
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+      auto some = client::ParseMeasurements(outcome.out, "touch");
+      ASSERT_TRUE(some.ok()) << some.status();
+      for (client::MeasuredTouch& touch : *some) {
+        touch.touch = touches.size();
+        touch.object = name;
+        touches.push_back(std::move(touch));
+      }
+    }
+    Write("set.csv", client::FormatMeasurements(touches));
+  }
+
+  std::vector<std::string> Command(const std::string& command, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {command,        "set.csv",    "--model",
+                                          "nominal.yaml", "--mesh-dir", "meshes"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  // set.csv with the field of a column changed in its n-th row (from 1); the whole column with row 0.
+  std::string Changed(const std::string& column, int row,
+                      const std::function<std::string(std::string)>& change) {
+    std::vector<std::string> lines = absl::StrSplit(Read("set.csv"), '\n');
+    const std::vector<std::string> names = absl::StrSplit(lines[0], ',');
+    const size_t at = std::find(names.begin(), names.end(), column) - names.begin();
+    for (size_t line = 1; line < lines.size(); ++line) {
+      if (lines[line].empty() || (row != 0 && static_cast<int>(line) != row)) continue;
+      std::vector<std::string> fields = absl::StrSplit(lines[line], ',');
+      fields.at(at) = change(fields.at(at));
+      lines[line] = absl::StrJoin(fields, ",");
+    }
+    return absl::StrJoin(lines, "\n");
+  }
+};
+
+// What two runs may differ in.
+Json WithoutDuration(const std::string& text) {
+  Json report = Json::parse(text);
+  report.erase("duration_s");
+  return report;
+}
+
+TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
+  MakeSet();
+  const Outcome before = Run(Command("compare", {"--json", "before.json"}));
+  ASSERT_EQ(before.exit_code, 0) << before.err;
+  EXPECT_THAT(before.out, HasSubstr("96 touches"));
+  const Outcome outcome = Run(
+      Command("diagnose", {"--json", "report.json", "--html", "report.html", "--save-model", "better.yaml"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("tip_radius"));
+  EXPECT_THAT(outcome.err, HasSubstr("wrote better.yaml (better, hash "));
+  const Json report = Json::parse(Read("report.json"));
+  EXPECT_EQ(report["verdict"], "MISSING_EFFECTS");
+  ASSERT_GE(report["steps"].size(), 1u);
+  EXPECT_EQ(report["steps"][0]["effect"], "tip_radius");
+  EXPECT_NEAR(report["steps"][0]["parameters"][0]["value"], 3, 0.5);
+  EXPECT_THAT(Read("report.html"), HasSubstr("</html>"));
+
+  const Outcome after =
+      Run({"compare", "set.csv", "--model", "better.yaml", "--mesh-dir", "meshes", "--json"});
+  ASSERT_EQ(after.exit_code, 0) << after.err;
+  EXPECT_LT(Json::parse(after.out)["initial"]["rmse_us"],
+            0.5 * Json::parse(Read("before.json"))["initial"]["rmse_us"].get<double>());
+}
+
+TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
+  MakeSet();
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.supershape_triangles = 1000;
+  options.threads = 1;
+  auto server = Server::Start(options);
+  ASSERT_TRUE(server.ok()) << server.status();
+  const std::string address = absl::StrCat("127.0.0.1:", (*server)->port());
+
+  const Outcome here = Run(Command("diagnose", {"--json", "--seed", "4"}));
+  ASSERT_EQ(here.exit_code, 0) << here.err;
+  const Outcome there =
+      Run(Command("diagnose", {"--json", "-", "--seed", "4", "--server", address, "--keep-as", "kept"}));
+  ASSERT_EQ(there.exit_code, 0) << there.err;
+  EXPECT_EQ(WithoutDuration(here.out), WithoutDuration(there.out));
+  const Outcome kept = Run({"model", "show", "kept", "--server", address});
+  EXPECT_THAT(kept.out, HasSubstr("tip_radius")) << kept.err;
+
+  // The same as a stored session, whose meshes are sent along.
+  ASSERT_EQ(Run({"session", "create", "monday", "set.csv", "--server", address}).exit_code, 0);
+  const Outcome stored = Run({"compare", "monday", "--model", "nominal.yaml", "--mesh-dir", "meshes",
+                              "--server", address, "--json"});
+  ASSERT_EQ(stored.exit_code, 0) << stored.err;
+  EXPECT_EQ(Json::parse(stored.out)["initial"], Json::parse(here.out)["initial"]);
+}
+
+TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {
+  Write("set.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,2\n");
+  Write("other.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,3\n");
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.supershape_triangles = 1000;
+  auto server = Server::Start(options);
+  ASSERT_TRUE(server.ok()) << server.status();
+  const std::string at = absl::StrCat("--server=127.0.0.1:", (*server)->port());
+
+  EXPECT_THAT(Run({"session", "create", "monday", "set.csv", at}).err,
+              HasSubstr("stored as monday: 1 touch"));
+  EXPECT_EQ(Run({"session", "create", "monday", "set.csv", at}).exit_code, 0);
+  const Outcome taken = Run({"session", "create", "monday", "other.csv", at});
+  EXPECT_EQ(taken.exit_code, 2);
+  EXPECT_THAT(taken.err, HasSubstr("session 'monday' stands for other bytes"));
+  EXPECT_THAT(Run({"session", "create", "../x", "set.csv", at}).err, HasSubstr("name = '../x'"));
+  EXPECT_EQ(Run({"session", "create", "checked", "other.csv", "--check", at}).exit_code, 0);
+  const Json list = Json::parse(Run({"session", "list", "--json", at}).out);
+  ASSERT_EQ(list["sessions"].size(), 1u);
+  EXPECT_EQ(list["sessions"][0]["name"], "monday");
+  EXPECT_EQ(list["sessions"][0]["has_poses"], false);
+  EXPECT_EQ(Run({"session", "export", "monday", at}).out, Read("set.csv"));
+  EXPECT_THAT(Run({"session", "show", "mondy", at}).err, HasSubstr("did you mean 'monday'?"));
+  EXPECT_EQ(Run({"session", "delete", "monday", at}).exit_code, 0);
+  EXPECT_EQ(Run({"session", "show", "monday", at}).exit_code, 2);
+  EXPECT_THAT(Run({"session", "list"}).err, HasSubstr("--server is missing"));
+}
+
+TEST_F(DiagnoseCommandTest, AProposedPlanCanBeTouched) {
+  MakeSet();
+  const Outcome outcome = Run(Command("propose", {"--touches", "6", "-o", "plan.csv"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  if (Read("plan.csv").empty()) {
+    EXPECT_THAT(outcome.err, HasSubstr("no touches to propose"));
+    return;
+  }
+  const Outcome touched = Run({"touch", "--plan", "plan.csv", "--mesh-dir", "meshes", "-o", "more.csv"});
+  EXPECT_EQ(touched.exit_code, 0) << touched.err;
+  EXPECT_LE(client::ParseMeasurements(Read("more.csv"), "more.csv")->size(), 6u);
+}
+
+TEST_F(DiagnoseCommandTest, BadInputIsNamedWithItsPlace) {
+  MakeSet();
+  const auto message = [&](const std::string& csv) {
+    Write("bad.csv", csv);
+    const Outcome outcome = Run({"compare", "bad.csv", "--model", "nominal.yaml", "--mesh-dir", "meshes"});
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    return outcome.err;
+  };
+  const std::string set = Read("set.csv");
+  EXPECT_THAT(message(absl::StrReplaceAll(set, {{"approach_y", "cov_y"}})),
+              HasSubstr("bad.csv:1: column 'approach_y' is missing"));
+  EXPECT_THAT(message(absl::StrReplaceAll(set, {{"t_r_us", "cov_r"}})),
+              HasSubstr("a column 't_r_us' was expected"));
+  EXPECT_THAT(message(absl::StrReplaceAll(set, {{"speed_mm_s", "sped_mm_s"}})),
+              HasSubstr("'sped_mm_s' is no column of a measurement file, did you mean 'speed_mm_s'?"));
+  EXPECT_THAT(message(Changed("t_m_us", 5, [](const std::string&) { return "nan"; })),
+              HasSubstr("bad.csv:6: column t_m_us: 'nan' is not a finite number"));
+  EXPECT_THAT(message(Changed("touch", 9, [](const std::string&) { return "3"; })),
+              HasSubstr("bad.csv:10: column touch: 3 stands on line 5 already"));
+  EXPECT_THAT(message(Changed("object", 7, [](const std::string&) { return "cap"; })),
+              AllOf(HasSubstr("bad.csv:8: column object: 'cap' has no mesh"), HasSubstr("--mesh cap=FILE"),
+                    HasSubstr("did you mean 'cup'?")));
+  EXPECT_THAT(message(""), HasSubstr("bad.csv:1: a header line was expected"));
+  EXPECT_THAT(message(set.substr(0, set.find('\n') + 1)), HasSubstr("has a header but no touch"));
+  EXPECT_THAT(message(Read("nominal.yaml")), HasSubstr("bad.csv:1: column 1"));
+}
+
+TEST_F(DiagnoseCommandTest, TimesInMillisecondsAreNoticed) {
+  MakeSet();
+  for (const char* column : {"t_l_us", "t_m_us", "t_r_us"})
+    Write("set.csv", Changed(column, 0, [](const std::string& time) {
+            return time.empty() ? time : std::to_string(std::stod(time) / 1000);
+          }));
+  const Outcome outcome = Run(Command("compare"));
+  // An honest report or a refusal; either way it says that the unit is suspect.
+  EXPECT_THAT(outcome.exit_code, ::testing::AnyOf(0, 2));
+  EXPECT_THAT(outcome.out + outcome.err, HasSubstr("1000"));
+}
+
+TEST_F(DiagnoseCommandTest, WhatIsReadIsNeverWrittenOver) {
+  MakeSet();
+  const std::string set = Read("set.csv");
+  for (const std::string& option : {"--json", "--html", "--save-model"}) {
+    const Outcome outcome = Run(Command("diagnose", {option, "set.csv"}));
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(option + ": set.csv is set.csv, which is read and never changed"));
+  }
+  EXPECT_EQ(Read("set.csv"), set);
+  EXPECT_THAT(Run(Command("diagnose", {"--save-model", "./nominal.yaml"})).err, HasSubstr("never changed"));
+  EXPECT_EQ(Read("nominal.yaml"), kModel);
+  EXPECT_THAT(Run(Command("propose", {"-o", "meshes/cup.off"})).err, HasSubstr("would be a mesh"));
+  EXPECT_THAT(Run(Command("compare", {"--json", "a", "--html", "a"})).err,
+              HasSubstr("one would replace the other"));
+}
+
+TEST_F(DiagnoseCommandTest, OnlyMeshesThatTheSetNamesAreRead) {
+  MakeSet();
+  Write("meshes/broken.off", "this is no mesh");
+  EXPECT_EQ(Run(Command("compare", {"-q"})).exit_code, 0);
+  Write("meshes/cup.stl", "nor is this");
+  EXPECT_THAT(Run(Command("compare")).err, HasSubstr("are both 'cup': say which with --mesh cup=FILE"));
+  EXPECT_EQ(Run(Command("compare", {"--mesh", "cup=meshes/cup.off"})).exit_code, 0);
+  EXPECT_THAT(Run(Command("compare", {"--mesh", "cup=meshes/broken.off"})).err,
+              HasSubstr("meshes/broken.off"));
+}
+
+TEST_F(DiagnoseCommandTest, AUsersFormulaMayStandAlone) {
+  MakeSet();
+  Write("mine.yaml",
+        "formula:\n  name: mine\n  adds: travel_mm\n  expression: \"k * finger\"\n"
+        "  parameters: {k: {value: 0, unit: mm, min: -1, max: 1}}\n");
+  const Outcome outcome = Run(Command("diagnose", {"--also", "mine.yaml", "--json"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("formula mine"));
+  Write("mine.yaml", "formula:\n  name: mine\n  adds: travel_mm\n  expression: \"k * fingr\"\n");
+  const Outcome wrong = Run(Command("diagnose", {"--also", "mine.yaml"}));
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, AllOf(HasSubstr("mine.yaml"), HasSubstr("fingr")));
+}
+
+TEST_F(DiagnoseCommandTest, HelpBeginsWithExamples) {
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"compare"}, {"diagnose"}, {"propose"}, {"session"}, {"session", "create"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.push_back("--help");
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0);
+    ASSERT_NE(outcome.out.find("Examples:"), std::string::npos) << outcome.out;
+    EXPECT_LT(outcome.out.find("Examples:"), outcome.out.find("Usage:"));
+  }
+}
+
+TEST_F(DiagnoseCommandTest, AnInterruptEndsItSoon) {
+  MakeSet();
+  // Large enough to be still at work after a moment.
+  std::vector<std::string> lines = absl::StrSplit(Read("set.csv"), '\n', absl::SkipEmpty());
+  std::string large = lines[0] + "\n";
+  for (int k = 0; k < 100'000; ++k) {
+    const std::string& line = lines[1 + k % (lines.size() - 1)];
+    absl::StrAppend(&large, k, line.substr(line.find(',')), "\n");
+  }
+  Write("set.csv", large);
+  const pid_t child = Start(Command("diagnose"));
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  const auto begin = std::chrono::steady_clock::now();
+  ::kill(child, SIGINT);
+  const Outcome outcome = Wait(child);
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  // A second is promised; a loaded machine gets room.
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+}
+
+}  // namespace
+}  // namespace touchstone::cli

@@ -1,0 +1,70 @@
+// For tests that run the real binary (TOUCHSTONE_BINARY) in a folder of their own.
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/base/text.h"
+
+namespace touchstone::cli {
+
+struct Outcome {
+  int exit_code = -1;  // 128 + signal if one ended it
+  std::string out, err;
+};
+
+class RealBinaryTest : public ::testing::Test {
+ protected:
+  RealBinaryTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "touchstone_cli_XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~RealBinaryTest() override { std::filesystem::remove_all(folder_); }
+
+  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
+
+  // Starts touchstone in the test's folder, its output in files.
+  pid_t Start(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), TOUCHSTONE_BINARY);
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    if (::chdir(folder_.c_str()) != 0) ::_exit(99);
+    for (const auto& [descriptor, name] : {std::pair{1, ".out"}, std::pair{2, ".err"}}) {
+      const int file = ::open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+      ::dup2(file, descriptor);
+    }
+    std::vector<char*> raw;
+    for (std::string& argument : arguments) raw.push_back(argument.data());
+    raw.push_back(nullptr);
+    ::execv(raw[0], raw.data());
+    ::_exit(98);
+  }
+
+  Outcome Wait(pid_t child) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    Outcome outcome;
+    outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    outcome.out = ReadFile(Path(".out")).value_or("");
+    outcome.err = ReadFile(Path(".err")).value_or("");
+    return outcome;
+  }
+
+  Outcome Run(std::vector<std::string> arguments) { return Wait(Start(std::move(arguments))); }
+
+  void Write(const std::string& name, const std::string& text) {
+    ASSERT_TRUE(WriteFileAtomically(Path(name), text).ok());
+  }
+  std::string Read(const std::string& name) { return ReadFile(Path(name)).value_or(""); }
+
+  std::string folder_;
+};
+
+}  // namespace touchstone::cli

@@ -1,0 +1,172 @@
+#include "server/service/diagnosis_service.h"
+
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/diagnosis/diagnose.h"
+#include "server/effects/all_effects.h"
+#include "server/service/convert.h"
+#include "server/service/evidence.h"
+
+namespace touchstone {
+namespace {
+
+using Work = std::function<absl::StatusOr<v1::Report>(const DiagnosisInput&, const DiagnosisContext&)>;
+constexpr std::chrono::milliseconds kProgressInterval{250};
+constexpr int kDefaultProposedTouches = 24;
+
+// The work runs in a thread of its own and only leaves notes here, so that progress is sent in time whatever
+// the work is at, and a client that reads slowly does not hold it up.
+class Worker {
+ public:
+  explicit Worker(std::function<absl::StatusOr<v1::Report>(const DiagnosisContext&)> work, ThreadPool* pool)
+      : thread_([this, work = std::move(work), pool] {
+          DiagnosisContext context;
+          context.pool = pool;
+          context.progress = [this](const std::string& stage, double done) { return Note(stage, done); };
+          absl::StatusOr<v1::Report> report = work(context);
+          std::lock_guard<std::mutex> lock(mutex_);
+          report_ = std::move(report);
+          finished_ = true;
+          wake_.notify_all();
+        }) {}
+  ~Worker() {
+    cancelled_ = true;
+    thread_.join();
+  }
+
+  // Waits a little; true when the work is done.
+  bool Wait(v1::Progress* progress) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    wake_.wait_for(lock, kProgressInterval, [&] { return finished_; });
+    *progress = progress_;
+    return finished_;
+  }
+  void Cancel() { cancelled_ = true; }
+  absl::StatusOr<v1::Report>& report() { return report_; }  // after Wait said true
+
+ private:
+  bool Note(const std::string& stage, double done) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    progress_.set_stage(stage);
+    progress_.set_done(std::min(std::max(done, 0.0), 1.0));
+    return !cancelled_;
+  }
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  v1::Progress progress_;
+  bool finished_ = false;
+  std::atomic<bool> cancelled_{false};
+  absl::StatusOr<v1::Report> report_ = absl::UnknownError("not finished");
+  std::thread thread_;  // last: it uses the others
+};
+
+// Reads the evidence, works on it, sends progress and at the end the report. `send` returns false when the
+// client is gone.
+absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
+                 Resources* resources, const std::function<bool(const v1::Progress&)>& send,
+                 v1::Report* result) {
+  const RunningGuard running(&resources->running_diagnoses);
+  if (resources->running_diagnoses > static_cast<uint32_t>(resources->options.most_diagnoses))
+    return absl::ResourceExhaustedError(
+        absl::StrCat("this server works on ", resources->options.most_diagnoses,
+                     " sets already (most_diagnoses): try again, or at another server"));
+  const auto begin = std::chrono::steady_clock::now();
+  Worker worker(
+      [&](const DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+        if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
+        TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, ReadEvidence(evidence, *resources));
+        return work(input, how);
+      },
+      resources->pool.get());
+  v1::Progress progress;
+  while (!worker.Wait(&progress)) {
+    if (context->IsCancelled() || !send(progress)) worker.Cancel();
+  }
+  if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(worker.report().status());
+  *result = *std::move(worker.report());
+  result->set_version(kVersion);
+  result->set_duration_s(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  return absl::OkStatus();
+}
+
+template <typename Response>
+absl::Status RunAndSend(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
+                        Resources* resources, grpc::ServerWriter<Response>* writer, v1::Report* report) {
+  Response response;
+  const auto send = [&](const v1::Progress& progress) {
+    *response.mutable_progress() = progress;
+    return writer->Write(response);
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(Run(context, evidence, work, resources, send, report));
+  response.clear_progress();
+  *response.mutable_report() = *report;
+  if (!writer->Write(response)) return absl::CancelledError("the client is gone");
+  return absl::OkStatus();
+}
+
+// The improved model, or the same one if nothing changed, under a name of the client's.
+absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& request, Resources* resources) {
+  Model model;
+  if (report.improved_model_yaml().empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto same, FromProto(request.evidence().model(), *resources));
+    model = *same;
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(model,
+                                ParseModel(report.improved_model_yaml(), "improved_model_yaml", Catalogue()));
+  }
+  model.name = request.save_model();
+  const absl::Status status = resources->models->Create(model);
+  if (!status.ok()) return absl::Status(status.code(), absl::StrCat("save_model: ", status.message()));
+  spdlog::info("model '{}' added by a diagnosis, hash {}", model.name, model.Hash().substr(0, 8));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
+                                       grpc::ServerWriter<v1::CompareResponse>* writer) {
+  v1::Report report;
+  return ToGrpc(RunAndSend(context, request->evidence(), touchstone::Compare, resources_, writer, &report));
+}
+
+grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::DiagnoseRequest* request,
+                                        grpc::ServerWriter<v1::DiagnoseResponse>* writer) {
+  // Before the work, what can be known before it.
+  const std::string& name = request->save_model();
+  if (!name.empty())
+    if (const absl::Status status = ModelStore::CheckName(name); !status.ok())
+      return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
+  v1::Report report;
+  absl::Status status =
+      RunAndSend(context, request->evidence(), touchstone::Diagnose, resources_, writer, &report);
+  // The report is sent even if the model cannot be kept.
+  if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);
+  return ToGrpc(status);
+}
+
+grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::ProposeRequest* request,
+                                       grpc::ServerWriter<v1::ProposeResponse>* writer) {
+  const uint32_t most = resources_->options.most_proposed_touches;
+  if (request->touches() > most)
+    return ToGrpc(
+        absl::InvalidArgumentError(absl::StrCat("touches = ", request->touches(), ": at most ", most)));
+  const int touches =
+      request->touches() == 0 ? kDefaultProposedTouches : static_cast<int>(request->touches());
+  const Work work = [touches](const DiagnosisInput& input, const DiagnosisContext& how) {
+    return touchstone::Propose(input, touches, how);
+  };
+  v1::Report report;
+  return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
+}
+
+}  // namespace touchstone

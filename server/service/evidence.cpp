@@ -1,0 +1,153 @@
+#include "server/service/evidence.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
+
+#include <algorithm>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/effects/all_effects.h"
+#include "server/geometry/mesh_file.h"
+#include "server/service/convert.h"
+
+namespace touchstone {
+namespace {
+
+constexpr int kMostAlso = 64;     // model files
+constexpr size_t kMostNamed = 5;  // objects in a message
+constexpr size_t kMostAlsoBytes = 1 << 20;
+
+absl::StatusOr<MeasurementSet> ReadSet(const v1::Evidence& message, const Resources& resources) {
+  const std::string origin = message.origin().empty() ? "measurements" : message.origin();
+  switch (message.measurements_case()) {
+    case v1::Evidence::kSession: {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> csv,
+                                  resources.sessions->Bytes(message.session()));
+      return ParseMeasurementSet(*csv, message.origin().empty() ? message.session() : origin);
+    }
+    case v1::Evidence::kCsv:
+      return ParseMeasurementSet(message.csv(), origin);
+    case v1::Evidence::MEASUREMENTS_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError("evidence.measurements is empty: set session or csv");
+}
+
+absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const v1::MeshFile& file) {
+  const std::string place = absl::StrCat("mesh '", file.name(), "'");
+  MeshImport import;
+  if (!file.unit().empty()) import.unit = file.unit();
+  if (!file.up().empty()) import.up = file.up();
+  if (file.scale() != 0) import.scale = file.scale();
+  if (file.fit_mm() != 0) import.fit_mm = file.fit_mm();
+  const auto in_place = [&](const absl::Status& status) {
+    return absl::Status(status.code(), absl::StrCat(place, ": ", status.message()));
+  };
+  auto mesh = ReadMeshBytes(absl::StrCat(file.name(), ".", file.format()),
+                            absl::AsciiStrToLower(file.format()), file.data(), import);
+  if (!mesh.ok()) return in_place(mesh.status());
+  auto surface = Surface::Create(file.name(), *std::move(mesh));
+  if (!surface.ok()) return in_place(surface.status());
+  return surface;
+}
+
+// One surface an object of the set; every object without one is named.
+absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resources, DiagnosisInput* input) {
+  std::map<std::string, const v1::MeshFile*> files;
+  for (const v1::MeshFile& file : message.meshes())
+    if (!files.emplace(file.name(), &file).second)
+      return absl::InvalidArgumentError(
+          absl::StrCat("meshes: two are named '", file.name(), "'; one an object was expected"));
+  std::vector<std::string> missing;
+  for (const std::string& name : input->set->objects) {
+    const auto file = files.find(name);
+    const auto served = resources.objects.all().find(name);
+    if (file != files.end()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(input->surfaces[name], ReadSurface(*file->second));
+    } else if (served != resources.objects.all().end()) {
+      input->surfaces[name] = served->second.surface;
+    } else {
+      missing.push_back(name);
+    }
+  }
+  if (missing.empty()) return absl::OkStatus();
+
+  std::vector<std::string> known;
+  for (const auto& [name, file] : files) known.push_back(name);
+  for (const auto& [name, object] : resources.objects.all())
+    if (files.count(name) == 0) known.push_back(name);
+  // Where the name stands in the file.
+  const MeasurementSet& set = *input->set;
+  const auto object = std::find(set.objects.begin(), set.objects.end(), missing[0]) - set.objects.begin();
+  const auto row = std::find(set.object.begin(), set.object.end(), object) - set.object.begin();
+  const std::string others =
+      missing.size() == 1
+          ? ""
+          : absl::StrCat(" (nor have ", missing.size() - 1, " others: ",
+                         absl::StrJoin(missing.begin() + 1,
+                                       missing.begin() + std::min(missing.size(), kMostNamed), ", "),
+                         missing.size() > kMostNamed ? ", ..." : "", ")");
+  return absl::NotFoundError(absl::StrCat(set.origin, ":", set.line[row], ": column object: '", missing[0],
+                                          "' has no mesh", others, "; give it with --mesh ", missing[0],
+                                          "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
+}
+
+absl::Status ReadAlso(const v1::Evidence& message, DiagnosisInput* input) {
+  if (message.also_yaml_size() > kMostAlso)
+    return absl::InvalidArgumentError(
+        absl::StrCat("also_yaml has ", message.also_yaml_size(), " files: at most ", kMostAlso));
+  for (int k = 0; k < message.also_yaml_size(); ++k) {
+    const std::string place = absl::StrCat("also_yaml[", k, "]");
+    if (message.also_yaml(k).size() > kMostAlsoBytes)
+      return absl::InvalidArgumentError(
+          absl::StrCat(place, " has ", message.also_yaml(k).size(), " bytes: at most ", kMostAlsoBytes));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Model model,
+                                ParseModel(AsModelFile(message.also_yaml(k)), place, Catalogue()));
+    if (model.effects.empty())
+      return absl::InvalidArgumentError(
+          absl::StrCat(place, ": has no effects; at least one that may be missing was expected"));
+    for (const EffectInstance& instance : model.effects) input->also.push_back(instance.effect);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::string AsModelFile(const std::string& yaml) {
+  const std::vector<std::string> lines = absl::StrSplit(yaml, '\n');
+  const auto begins = [](absl::string_view line) {
+    return !line.empty() && line[0] != '#' && !absl::ascii_isspace(static_cast<unsigned char>(line[0]));
+  };
+  const auto first = std::find_if(lines.begin(), lines.end(), begins);
+  const bool whole = std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
+    return absl::StartsWith(line, "touchstone:") || absl::StartsWith(line, "effects:") ||
+           absl::StartsWith(line, "end_effector:");
+  });
+  if (first == lines.end() || whole) return yaml;
+  std::string text =
+      "touchstone: model/1\nname: also\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n";
+  const bool listed = absl::StartsWith(*first, "-");
+  for (auto line = lines.begin(); line != lines.end(); ++line)
+    absl::StrAppend(&text, listed ? "  " : line == first ? "  - " : "    ", *line, "\n");
+  return text;
+}
+
+absl::StatusOr<DiagnosisInput> ReadEvidence(const v1::Evidence& message, const Resources& resources) {
+  DiagnosisInput input;
+  input.seed = message.seed();
+  TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, &input));
+  TOUCHSTONE_ASSIGN_OR_RETURN(MeasurementSet set, ReadSet(message, resources));
+  if (set.fingers == 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat(set.origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
+  input.set = std::make_shared<const MeasurementSet>(std::move(set));
+  TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
+  return input;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,275 @@
+#include "server/service/session_store.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/session/measurement_set.h"
+
+namespace touchstone {
+namespace {
+
+constexpr char kExtension[] = ".csv";
+constexpr size_t kPiece = 1 << 20;
+constexpr size_t kMostSessions = 10000;
+
+uint64_t Mebibytes(int count) {
+  return static_cast<uint64_t>(count) << 20;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOptions& options) {
+  auto store = std::make_unique<SessionStore>();
+  store->folder_ = options.sessions_dir;
+  store->most_bytes_ = Mebibytes(options.most_session_mib);
+  store->most_bytes_together_ = Mebibytes(options.most_sessions_mib);
+  if (store->folder_.empty()) return store;
+  std::error_code error;
+  std::filesystem::create_directories(store->folder_, error);
+  if (error)
+    return absl::InvalidArgumentError(
+        absl::StrCat("sessions_dir: ", store->folder_, ": ", error.message(), "; a folder was expected"));
+  return store;
+}
+
+absl::Status SessionStore::Upload::Append(absl::string_view piece) {
+  if (csv_.size() + piece.size() > store_->most_bytes_)
+    return absl::InvalidArgumentError(absl::StrCat("csv: a session may have at most ",
+                                                   store_->most_bytes_ >> 20,
+                                                   " MiB (most_session_mib); divide it by object"));
+  counted_ += piece.size();
+  const uint64_t uploading = store_->uploading_ += piece.size();
+  csv_.append(piece.data(), piece.size());
+  if (uploading > store_->most_bytes_together_)
+    return absl::ResourceExhaustedError(
+        absl::StrCat("more than ", store_->most_bytes_together_ >> 20,
+                     " MiB of sessions are being sent at once (most_sessions_mib): try again"));
+  return absl::OkStatus();
+}
+
+absl::Status SessionStore::CheckName(const std::string& name) {
+  const bool plain =
+      !name.empty() && name.size() <= 64 && name[0] != '.' &&
+      name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
+          std::string::npos;
+  if (plain) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("name = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+}
+
+absl::StatusOr<v1::Session> SessionStore::Describe(const std::string& name, absl::string_view csv,
+                                                   const std::string& origin) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet set, ParseMeasurementSet(csv, origin));
+  if (set.fingers == 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat(origin, ":1: has no column t_*_us: it is a plan; a session holds what was measured"));
+  v1::Session session;
+  session.set_name(name);
+  session.set_hash(Sha256Hex(csv));
+  session.set_bytes(csv.size());
+  session.set_touches(set.size());
+  session.set_fingers(set.fingers);
+  for (const std::string& object : set.objects) session.add_objects(object);
+  session.set_has_poses(set.has_poses);
+  return session;
+}
+
+std::string SessionStore::PathOf(const std::string& name) const {
+  return absl::StrCat(folder_, "/", name, kExtension);
+}
+
+bool SessionStore::Stat(const std::string& name, Version* version) const {
+  struct stat info;
+  if (::stat(PathOf(name).c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return false;
+  constexpr int64_t kNanosecondsPerSecond = 1'000'000'000;
+  version->modified_ns = info.st_mtim.tv_sec * kNanosecondsPerSecond + info.st_mtim.tv_nsec;
+  version->bytes = info.st_size;
+  version->inode = info.st_ino;
+  return true;
+}
+
+std::vector<std::string> SessionStore::Names() const {
+  std::vector<std::string> names;
+  if (folder_.empty()) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [name, known] : known_) names.push_back(name);
+    return names;
+  }
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, error)) {
+    const std::string file = entry.path().filename().string();
+    if (!absl::EndsWith(file, kExtension)) continue;
+    std::string name = file.substr(0, file.size() - std::strlen(kExtension));
+    if (CheckName(name).ok()) names.push_back(std::move(name));
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+SessionStore::Usage SessionStore::Stored() const {
+  Usage usage;
+  if (folder_.empty()) {
+    usage.sessions = known_.size();
+    for (const auto& [name, known] : known_) usage.bytes += known.csv->size();
+    return usage;
+  }
+  Version version;
+  for (const std::string& name : Names())
+    if (Stat(name, &version)) {
+      ++usage.sessions;
+      usage.bytes += version.bytes;
+    }
+  return usage;
+}
+
+absl::Status SessionStore::NoSession(const std::string& name) const {
+  return absl::NotFoundError(absl::StrCat("no session is named '", name, "'", DidYouMean(name, Names())));
+}
+
+absl::StatusOr<v1::Session> SessionStore::Find(const std::string& name) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
+  Version version;
+  const bool stored = folder_.empty() || Stat(name, &version);
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = known_.find(name);
+    if (stored && found != known_.end() && found->second.version == version) return found->second.session;
+  }
+  if (folder_.empty() || !stored) return NoSession(name);
+  // Another replica wrote it, or this one before it was started anew.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, ReadFile(PathOf(name)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, Describe(name, csv, name));
+  std::lock_guard<std::mutex> lock(mutex_);
+  Known& known = known_[name];
+  known.session = session;
+  known.version = version;
+  return session;
+}
+
+std::vector<v1::Session> SessionStore::All() {
+  std::vector<v1::Session> all;
+  for (const std::string& name : Names())
+    if (auto session = Find(name); session.ok()) all.push_back(*std::move(session));
+  return all;
+}
+
+// Whole or not at all, and never over another one: two replicas may be given the same name at once.
+absl::Status SessionStore::WriteNew(const std::string& name, const std::string& csv) const {
+  static std::atomic<uint64_t> counter{0};
+  const std::string path = PathOf(name);
+  const std::string draft = absl::StrCat(folder_, "/.", name, ".", ::getpid(), ".", counter++);
+  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(draft, csv));
+  const int failed = ::link(draft.c_str(), path.c_str()) == 0 ? 0 : errno;
+  ::unlink(draft.c_str());
+  if (failed == 0) return absl::OkStatus();
+  if (failed == EEXIST) return absl::AlreadyExistsError(path);
+  // A file system without links: the race is lost to the last writer there.
+  if (failed == EPERM || failed == EOPNOTSUPP || failed == ENOSYS) return WriteFileAtomically(path, csv);
+  return absl::InternalError(absl::StrCat(path, ": ", std::strerror(failed)));
+}
+
+absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::string csv) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, Describe(name, csv, name));
+  const auto same = [&](const absl::StatusOr<v1::Session>& other) -> absl::StatusOr<v1::Session> {
+    if (other.ok() && other->hash() == session.hash()) return session;
+    return absl::AlreadyExistsError(
+        absl::StrCat("session '", name, "' stands for other bytes",
+                     other.ok() ? absl::StrCat(" (hash ", other->hash().substr(0, 8), ")") : "",
+                     " and a session never changes: give ", session.hash().substr(0, 8),
+                     " another name, or delete it first"));
+  };
+  const auto before = Find(name);
+  if (before.ok() || !absl::IsNotFound(before.status())) return same(before);
+
+  std::unique_lock<std::mutex> lock(mutex_, std::defer_lock);
+  if (folder_.empty()) {
+    lock.lock();
+    // Two calls at once: the other one made the name.
+    if (const auto found = known_.find(name); found != known_.end()) return same(found->second.session);
+  }
+  const Usage stored = Stored();
+  if (stored.sessions >= kMostSessions)
+    return absl::ResourceExhaustedError(
+        absl::StrCat("the store holds ", kMostSessions, " sessions; delete some"));
+  if (stored.bytes + csv.size() > most_bytes_together_)
+    return absl::ResourceExhaustedError(absl::StrCat("the store holds ", stored.bytes >> 20, " of ",
+                                                     most_bytes_together_ >> 20,
+                                                     " MiB (most_sessions_mib); delete some sessions"));
+  if (folder_.empty()) {
+    known_[name] = {session, {}, std::make_shared<const std::string>(std::move(csv))};
+    return session;
+  }
+  const absl::Status written = WriteNew(name, csv);
+  if (absl::IsAlreadyExists(written)) return same(Find(name));
+  TOUCHSTONE_RETURN_IF_ERROR(written);
+  Version version;
+  if (Stat(name, &version)) {
+    lock.lock();
+    known_[name] = {session, version, nullptr};
+  }
+  return session;
+}
+
+absl::StatusOr<std::shared_ptr<const std::string>> SessionStore::Bytes(const std::string& name) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
+  if (folder_.empty()) {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (const auto found = known_.find(name); found != known_.end()) return found->second.csv;
+    }
+    return NoSession(name);
+  }
+  Version version;
+  if (!Stat(name, &version)) return NoSession(name);
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::string csv, ReadFile(PathOf(name)));
+  return std::make_shared<const std::string>(std::move(csv));
+}
+
+absl::Status SessionStore::Export(const std::string& name,
+                                  const std::function<bool(absl::string_view)>& take) {
+  if (folder_.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> csv, Bytes(name));
+    for (size_t begin = 0; begin < csv->size(); begin += kPiece)
+      if (!take(absl::string_view(*csv).substr(begin, kPiece))) break;
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
+  Version version;
+  if (!Stat(name, &version)) return NoSession(name);
+  // Open, the file stays as it is although its name may be deleted.
+  std::ifstream file(PathOf(name), std::ios::binary);
+  std::string piece(kPiece, '\0');
+  uint64_t taken = 0;
+  while (taken < version.bytes && file.read(piece.data(), kPiece).gcount() > 0) {
+    taken += file.gcount();
+    if (!take(absl::string_view(piece.data(), file.gcount()))) return absl::OkStatus();
+  }
+  if (taken != version.bytes)
+    return absl::DataLossError(
+        absl::StrCat(PathOf(name), ": ended after ", taken, " of ", version.bytes, " bytes"));
+  return absl::OkStatus();
+}
+
+absl::Status SessionStore::Delete(const std::string& name) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
+  bool deleted = false;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    deleted = known_.erase(name) > 0;
+  }
+  if (!folder_.empty()) deleted = ::unlink(PathOf(name).c_str()) == 0;
+  return deleted ? absl::OkStatus() : NoSession(name);
+}
+
+}  // namespace touchstone

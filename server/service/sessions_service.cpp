@@ -1,0 +1,82 @@
+#include "server/service/sessions_service.h"
+
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include "server/base/status.h"
+#include "server/service/convert.h"
+
+namespace touchstone {
+
+grpc::Status SessionsService::CreateSession(grpc::ServerContext* context,
+                                            grpc::ServerReader<v1::CreateSessionRequest>* reader,
+                                            v1::Session* response) {
+  return ToGrpc(DoCreate(context, reader, response));
+}
+
+absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
+                                       grpc::ServerReader<v1::CreateSessionRequest>* reader,
+                                       v1::Session* response) {
+  const RunningGuard running(&resources_->running_requests);
+  SessionStore& store = *resources_->sessions;
+  v1::CreateSessionRequest request;
+  if (!reader->Read(&request))
+    return absl::InvalidArgumentError("the stream is empty: its first message gives name, all of them csv");
+  const std::string name = request.name();
+  const bool validate_only = request.validate_only();
+  // A name that cannot be is told before a gigabyte is sent.
+  if (!validate_only || !name.empty()) TOUCHSTONE_RETURN_IF_ERROR(SessionStore::CheckName(name));
+  SessionStore::Upload upload(&store);
+  do {
+    if (!request.name().empty() && request.name() != name)
+      return absl::InvalidArgumentError(
+          absl::StrCat("name = '", request.name(), "': the first message said '", name, "'; say it once"));
+    TOUCHSTONE_RETURN_IF_ERROR(upload.Append(request.csv()));
+  } while (reader->Read(&request));
+
+  // A stream that broke off looks like one that ended, and might even end with a whole row.
+  if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
+
+  const std::string origin = name.empty() ? "csv" : name;
+  TOUCHSTONE_ASSIGN_OR_RETURN(*response, validate_only ? SessionStore::Describe(name, upload.Take(), origin)
+                                                       : store.Create(name, upload.Take()));
+  if (!validate_only)
+    spdlog::info("session '{}' stored, {} touches, hash {}", name, response->touches(),
+                 response->hash().substr(0, 8));
+  return absl::OkStatus();
+}
+
+grpc::Status SessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
+                                           v1::ListSessionsResponse* response) {
+  for (v1::Session& session : resources_->sessions->All()) *response->add_sessions() = std::move(session);
+  return grpc::Status::OK;
+}
+
+grpc::Status SessionsService::GetSession(grpc::ServerContext*, const v1::GetSessionRequest* request,
+                                         v1::Session* response) {
+  auto session = resources_->sessions->Find(request->name());
+  if (!session.ok()) return ToGrpc(session.status());
+  *response = *std::move(session);
+  return grpc::Status::OK;
+}
+
+grpc::Status SessionsService::ExportSession(grpc::ServerContext*, const v1::ExportSessionRequest* request,
+                                            grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
+  bool gone = false;
+  v1::ExportSessionResponse response;
+  const absl::Status status = resources_->sessions->Export(request->name(), [&](absl::string_view piece) {
+    response.set_csv(std::string(piece));
+    gone = !writer->Write(response);
+    return !gone;
+  });
+  return ToGrpc(gone ? absl::CancelledError("the client is gone") : status);
+}
+
+grpc::Status SessionsService::DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest* request,
+                                            v1::DeleteSessionResponse*) {
+  const absl::Status status = resources_->sessions->Delete(request->name());
+  if (status.ok()) spdlog::info("session '{}' deleted", request->name());
+  return ToGrpc(status);
+}
+
+}  // namespace touchstone
