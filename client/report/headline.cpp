@@ -25,8 +25,10 @@ std::string Falls(double from_us, double to_us) {
 std::string Compared(const v1::Report& report) {
   if (report.has_distributions()) {
     const double p = report.distributions().p();
-    return absl::StrCat(p < 0.01 ? "Measured and simulated touches differ as distributions"
-                                 : "Measured and simulated touches cannot be told apart as distributions",
+    const std::string lacks =
+        report.steps().empty() ? "M" : absl::StrCat("The model lacks ", Steps(report), "; with it, m");
+    return absl::StrCat(lacks, "easured and simulated touches ",
+                        p < 0.01 ? "differ as distributions" : "cannot be told apart as distributions",
                         " (p ", p < 1e-15 ? "" : "= ", Probability(p), ").");
   }
   if (!(report.initial().rmse_us() > 0)) return "Nothing could be compared.";
@@ -40,7 +42,7 @@ std::string Compared(const v1::Report& report) {
 std::string Unexplained(const v1::Report& report) {
   std::string on;
   if (!report.unexplained().covariates().empty()) {
-    on = absl::StrCat(" It hangs on ", report.unexplained().covariates(0).name(), ".");
+    on = absl::StrCat(" It depends on ", report.unexplained().covariates(0).name(), ".");
   }
   if (report.steps().empty()) {
     return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
@@ -54,6 +56,7 @@ std::string Unexplained(const v1::Report& report) {
 std::string Headline(const v1::Report& report) {
   const double from = report.initial().rmse_us(), to = report.final().rmse_us();
   const std::string model = report.model_name().empty() ? "the model" : report.model_name();
+  if (report.has_distributions()) return Compared(report);
   switch (report.verdict()) {
     case v1::Report::ADEQUATE:
       return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(report.touches()),

@@ -90,7 +90,7 @@ std::string HistogramChart(const v1::Histogram& histogram, bool improved) {
   for (auto* values : {&measured, &simulated, &better}) {
     for (double& value : *values) value *= 100 / peak;
   }
-  Chart chart(300, 210, histogram.object().empty() ? "all objects" : histogram.object(),
+  Chart chart(244, 190, histogram.object().empty() ? "all objects" : histogram.object(),
               {title, {edges.front(), edges.back()}}, {"density (% of the highest bin)", {0, 106}});
   chart.Steps(edges, measured, "measured");
   chart.Steps(edges, simulated, "line given");
@@ -118,7 +118,7 @@ std::string Histograms(const v1::Report& report) {
       if (histogram.quantity() == quantity) grid += HistogramChart(histogram, improved);
     }
     if (!grid.empty())
-      absl::StrAppend(&grids, "<h4>", Escape(Title(quantity)), "</h4>\n<div class=\"grid\">", grid,
+      absl::StrAppend(&grids, "<h4>", Escape(Title(quantity)), "</h4>\n<div class=\"grid hist\">", grid,
                       "</div>\n");
   }
   if (grids.empty()) return "";

@@ -1,4 +1,5 @@
 // Next touches, drawn on the objects and listed; sets without poses.
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -86,10 +87,14 @@ std::string Direction(const v1::Vector3& v) {
 
 std::string HtmlNextTouches(const v1::Report& report) {
   if (report.next_touches().empty()) return "";
-  std::string table = absl::StrCat("<div class=\"scroll\"><table>",
-                                   HeaderRow({">No.", "Object", ">Target x y z (mm)", ">Approach",
-                                              ">Speed (mm/s)", ">Apart (sigmas)", "What it is for"}),
-                                   "<tbody>");
+  // A purpose that all share is said once.
+  const std::string& first = report.next_touches(0).purpose();
+  const bool one_purpose = std::all_of(report.next_touches().begin(), report.next_touches().end(),
+                                       [&](const auto& next) { return next.purpose() == first; });
+  std::vector<std::string> titles = {">No.",      "Object",        ">Target x y z (mm)",
+                                     ">Approach", ">Speed (mm/s)", ">Apart (sigmas)"};
+  if (!one_purpose) titles.push_back("What it is for");
+  std::string table = absl::StrCat("<div class=\"scroll\"><table>", HeaderRow(titles), "<tbody>");
   for (int i = 0; i < report.next_touches_size(); ++i) {
     const v1::ProposedTouch& next = report.next_touches(i);
     const v1::Vector3& t = next.touch().target_m();
@@ -98,10 +103,13 @@ std::string HtmlNextTouches(const v1::Report& report) {
                                             Fixed(1000 * t.z(), 1))),
                     NumberCell(Direction(next.touch().approach())),
                     NumberCell(Tick(1000 * next.touch().speed_m_s())),
-                    NumberCell(Number(next.separation(), 2)), Cell(Typeset(next.purpose())), "</tr>\n");
+                    NumberCell(Number(next.separation(), 2)),
+                    one_purpose ? "" : Cell(Typeset(next.purpose())), "</tr>\n");
   }
   return Section(
-      "next", "Next touches", "Touches that would tell the explanations that are left apart.",
+      "next", "Next touches",
+      one_purpose && !first.empty() ? absl::StrCat("Touches that would decide: ", Typeset(first), ".")
+                                    : "Touches that would tell the explanations that are left apart.",
       absl::StrCat(
           Pictures(report),
           Figure(absl::StrCat(table, "</tbody></table></div>"),

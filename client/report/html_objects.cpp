@@ -108,7 +108,7 @@ std::string Stills(const std::string& name, const Object& object, int number, bo
     points.push_back({point->x_mm(), point->y_mm(), point->z_mm()});
   const v1::ObjectOutline none;
   const ObjectPicture picture(object.outline != nullptr ? *object.outline : none, points);
-  std::string out = absl::StrCat("<h4>", Escape(name), "</h4>");
+  std::string out = absl::StrCat("<div class=\"block\"><h4>", Escape(name), "</h4><div class=\"grid maps\">");
   for (const bool after : {false, true}) {
     if (after && !improved) break;
     for (const bool back : {false, true}) {
@@ -126,7 +126,7 @@ std::string Stills(const std::string& name, const Object& object, int number, bo
           absl::StrCat(after ? "improved" : "given", back ? ", back" : ", front"));
     }
   }
-  return out;
+  return out + "</div></div>\n";
 }
 
 // What the script turns: whole tenths of millimetres and whole microseconds keep it small.
@@ -184,13 +184,13 @@ std::string HtmlObjects(const v1::Report& report) {
                                   "the object; turn it by dragging or with "
                                   "the arrow keys\"></canvas><p class=\"legend\" id=\"told\" "
                                   "aria-live=\"polite\">Drag, or use the arrow keys, to "
-                                  "turn it.</p></div>\n<div class=\"grid maps\">");
+                                  "turn it.</p></div>\n");
   for (size_t i = 0; i < order.size() && i < kMostObjects; ++i) {
     body += Stills(order[i], objects.at(order[i]), static_cast<int>(i), improved, limit_us);
   }
   absl::StrAppend(
       &body,
-      "</div>\n<p class=\"note\">Each dot is one finger\u2019s contact, at the point where the given "
+      "<p class=\"note\">Each dot is one finger\u2019s contact, at the point where the given "
       "model puts it, coloured by its residual. Front: seen from the front and above; back: from behind and "
       "below. ",
       Count(shown), " of ", Count(report.surface_points_size()), " contacts are drawn");

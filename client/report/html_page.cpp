@@ -25,7 +25,10 @@ std::string Signs(const std::string& text) {
     if (text[i] == '-' && IsDigit(after) && (before == ' ' || before == '(' || before == '[')) {
       out += "\u2212";
     } else if (text[i] == 'e' && IsDigit(before) && (IsDigit(after) || after == '-')) {
-      absl::StrAppend(&out, "\u00d710<sup>", after == '-' ? "\u2212" : "");
+      // "1e-9" is a bare power of ten.
+      const bool bare = before == '1' && (i == 1 || text[i - 2] == ' ');
+      if (bare) out.pop_back();
+      absl::StrAppend(&out, bare ? "" : "\u00d7", "10<sup>", after == '-' ? "\u2212" : "");
       if (after == '-') ++i;
       while (i + 1 < text.size() && IsDigit(text[i + 1])) out += text[++i];
       out += "</sup>";

@@ -107,15 +107,21 @@ TEST(HtmlReport, SaysTheVerdictFirstAndOnce) {
   }
 }
 
-TEST(HtmlReport, SaysWarningsAndSummaryOnce) {
+TEST(HtmlReport, SaysWarningsOnce) {
   v1::Report report = MissingEffectsReport();
-  report.set_summary("A summary like no other.");
   report.add_warnings("A warning like no other.");
   const std::string html = HtmlReport(report);
-  EXPECT_EQ(Times(html, "A summary like no other."), 1);
   EXPECT_EQ(Times(html, "A warning like no other."), 1);
   EXPECT_EQ(Times(html, report.steps(0).check_on_rig().substr(0, 20)), 1);
   EXPECT_EQ(Times(html, "33</td>"), 1) << "rows not used";
+}
+
+TEST(HtmlReport, ShowsTheSummaryWhereNoPartSaysTheSame) {
+  v1::Report report = WithoutPosesReport();
+  report.set_summary("A summary like no other.");
+  EXPECT_EQ(Times(HtmlReport(report), "A summary like no other."), 1);
+  *report.mutable_initial() = MissingEffectsReport().initial();
+  EXPECT_EQ(Times(HtmlReport(report), "A summary like no other."), 0);
 }
 
 TEST(HtmlReport, HasNoIdTwice) {

@@ -85,7 +85,8 @@ function turnTable(data) {
       if (!a || !b || !d) continue;
       const u = [b[0] - a[0], a[1] - b[1], b[2] - a[2]], v = [d[0] - a[0], a[1] - d[1], d[2] - a[2]];
       const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-      const long = Math.hypot(...n) || 1, turned = n[2] < 0 ? -1 : 1;
+      const long = Math.hypot(...n), turned = n[2] < 0 ? -1 : 1;
+      if (long < 1e-3) continue;
       const lit = turned * (-0.35 * n[0] + 0.5 * n[1] + 0.79 * n[2]) / long;
       faces.push({a, b, d, depth: a[2] + b[2] + d[2], area: n[2], shade: Math.min(4, Math.max(0, Math.floor(5.6 * lit - 0.6)))});
     }

@@ -23,7 +23,7 @@ body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.55 system-ui,
 "Helvetica Neue",Arial,sans-serif;font-variant-numeric:tabular-nums}
 main{max-width:66rem;margin:0 auto;padding:2.5rem 1.5rem 4rem}
 h1{font-size:clamp(1.55rem,1.1rem + 2vw,2.25rem);line-height:1.2;letter-spacing:-.018em;font-weight:650;
-margin:.35rem 0 .9rem;max-width:26em;text-wrap:balance}
+margin:.6rem 0 .9rem;max-width:26em;text-wrap:balance}
 h2{font-size:1.35rem;line-height:1.3;letter-spacing:-.01em;font-weight:650;margin:0 0 .3rem}
 h3{font-size:1rem;line-height:1.4;font-weight:650;margin:2rem 0 .5rem}
 section{margin-top:3.5rem;padding-top:1.5rem;border-top:1px solid var(--line)}
@@ -50,11 +50,15 @@ align-items:start}
 .head{font-weight:600;font-size:.9375rem;margin:0 0 .4rem}
 .head span{font-weight:400;color:var(--soft)}
 h4{font-size:.9375rem;font-weight:600;margin:1.4rem 0 .4rem}
-.narrow{width:14%;min-width:5rem}
+
 .line-high{height:1.4em;display:flex;align-items:center}
 .pictures{width:9rem}
 svg.chart.interval{width:8.5rem;height:1rem}
 .arrows{grid-template-columns:repeat(auto-fill,minmax(min(15rem,100%),1fr))}
+.why .barcell{width:26%}
+.why td>div{white-space:nowrap}
+.hist{grid-template-columns:repeat(auto-fill,minmax(min(14rem,100%),1fr));gap:1.25rem 1.75rem}
+.arrows .map{overflow:visible}
 .arrows figcaption{text-align:center;margin-top:0}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.9375rem;line-height:1.4}
@@ -67,7 +71,7 @@ thead th{border-bottom-color:var(--soft)}
 sup,sub{line-height:0;font-size:.75em}
 .name{font-weight:600}
 .dim,.dim td{color:var(--soft)}
-.barcell{width:34%;min-width:7rem}
+.barcell{width:34%;min-width:7rem}.barcell.narrow{width:18%;min-width:5rem}
 svg{display:block;max-width:100%}
 svg.bar{width:100%;height:.9rem;margin-top:.2rem;overflow:visible}
 .fill.given{fill:var(--given)}.fill.better{fill:var(--better)}.fill.floor{fill:var(--soft)}
@@ -85,6 +89,7 @@ ol.steps{list-style:none;margin:1rem 0 0;padding:0;display:grid;gap:1.75rem}
 ol.steps>li{display:grid;grid-template-columns:2.1rem 1fr;gap:0 .9rem}
 .count{width:2.1rem;height:2.1rem;border-radius:50%;background:var(--better);color:var(--paper);font-weight:650;
 display:grid;place-items:center}
+ol.steps>li>div{min-width:0}
 ol.steps h3{margin:.15rem 0 .3rem;font-size:1.125rem}
 ol.steps p{margin:0 0 .4rem}
 ol.steps table{margin:.5rem 0 .7rem;width:auto;min-width:min(34rem,100%)}
@@ -122,7 +127,6 @@ rect.f0{fill:var(--f0)}rect.f1{fill:var(--f1)}rect.f2{fill:var(--f2)}rect.f3{fil
 rect.f4{fill:var(--f4)}rect.f5{fill:var(--f5)}
 .map{width:100%;height:auto}
 .maps{grid-template-columns:repeat(4,1fr);gap:.4rem 1rem}
-.maps h4{grid-column:1/-1;font-size:.9375rem;margin:1rem 0 0}
 .maps figcaption{margin-top:0;text-align:center}
 .dot{fill:none;stroke-linecap:round;stroke-width:9}
 .d0{stroke:var(--d0)}.d1{stroke:var(--d1)}.d2{stroke:var(--d2)}.d3{stroke:var(--d3)}.d4{stroke:var(--d4)}
@@ -138,7 +142,7 @@ rect.f4{fill:var(--f4)}rect.f5{fill:var(--f5)}
 stroke-width:5px;stroke-linejoin:round}
 #stage{display:none}
 .js #stage{display:block}
-canvas{display:block;width:100%;height:30rem;max-height:75vh;touch-action:pan-y;cursor:grab;background:var(--wash);
+canvas{display:block;width:100%;height:30rem;max-height:75vh;touch-action:pan-y;cursor:grab;border:1px solid var(--line);
 border-radius:.5rem}
 footer{margin-top:3.5rem;padding-top:1rem;border-top:1px solid var(--line);color:var(--soft);font-size:.8125rem}
 .vh{position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%);white-space:nowrap}
@@ -156,11 +160,12 @@ dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:.4rem}}
 --d0:#40237a;--d1:#7760b6;--d2:#aa9bd3;--d3:#a9aeb4;--d4:#eeaf5c;--d5:#d97a14;--d6:#9a4600;
 --s0:#c6ccd3;--s1:#d3d8de;--s2:#dfe3e8;--s3:#e9ecf0;--s4:#f1f3f6}
 @page{margin:16mm 15mm}
-body{font-size:10pt;-webkit-print-color-adjust:exact;print-color-adjust:exact}main{max-width:none;padding:0}
+html{font-size:9.5pt}body{font-size:1rem;-webkit-print-color-adjust:exact;print-color-adjust:exact}main{max-width:none;padding:0}
 #stage,.js #stage,button{display:none}section{margin-top:1.6rem;padding-top:.8rem}
-figure,tr,ol.steps>li,.warnings{break-inside:avoid}h2,h3,.about,thead{break-after:avoid}
+figure,tr,ol.steps>li,.warnings,.block{break-inside:avoid}figure:has(table){break-inside:auto}
+h2,h3,h4,.about,thead{break-after:avoid}
 .warnings{border:1px solid #999}pre{white-space:pre-wrap;border:1px solid #ccc}.scroll{overflow:visible}
-.grid{grid-template-columns:repeat(2,1fr)}.maps{grid-template-columns:repeat(4,1fr)}a{color:inherit}}
+.grid{grid-template-columns:repeat(2,1fr)}.hist{grid-template-columns:repeat(4,1fr)}.arrows{grid-template-columns:repeat(3,1fr)}.maps{grid-template-columns:repeat(4,1fr)}a{color:inherit}}
 )css";
 }
 

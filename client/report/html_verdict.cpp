@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include "client/report/html_page.h"
 #include "client/report/words.h"
@@ -40,7 +41,7 @@ std::string Facts(const v1::Report& report) {
     const std::string length = LengthOf(floor.sigma_us, report);
     absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
-    if (floor.bound) absl::StrAppend(&text, ", an upper bound: no touch was repeated");
+    if (floor.bound) absl::StrAppend(&text, ", an upper bound without repeats");
     if (!floor.bound && data.repeats() > 0)
       absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats");
     text += ".";
@@ -99,9 +100,11 @@ std::string HtmlHead(const v1::Report& report) {
     }
   }
   if (!report.data().origin().empty()) absl::StrAppend(&head, " \u00b7 ", Escape(report.data().origin()));
-  absl::StrAppend(&head, "</span></p>\n<h1>", Typeset(Headline(report)), "</h1>\n", LadderTable(report));
-  if (!report.summary().empty())
-    absl::StrAppend(&head, "<p class=\"lead\">", Typeset(report.summary()), "</p>\n");
+  absl::StrAppend(&head, "</span></p>\n<h1>",
+                  absl::StrReplaceAll(Typeset(Headline(report)), {{"built-in", "built\u2011in"}}), "</h1>\n",
+                  LadderTable(report));
+  const std::string summary = SummaryToShow(report);
+  if (!summary.empty()) absl::StrAppend(&head, "<p class=\"lead\">", Typeset(summary), "</p>\n");
   absl::StrAppend(&head, "<p class=\"facts\">", Facts(report), "</p>\n");
   if (!report.warnings().empty()) {
     head += "<aside class=\"warnings\"><p>What limits this report</p><ul>";

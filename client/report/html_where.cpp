@@ -111,7 +111,7 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
                                    after ? "improved model" : "given model"));
   }
   return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>p ",
-                      Typeset(Probability(curve.p())), curve.p() < 0.01 ? ": the residual hangs on it" : "",
+                      Typeset(Probability(curve.p())), curve.p() < 0.01 ? ": the residual depends on it" : "",
                       "</span></p><div class=\"pair\">", pair, "</div></figure>\n");
 }
 

@@ -12,6 +12,8 @@
 namespace touchstone::client {
 namespace {
 
+constexpr int kMostParameters = 4;  // of a candidate
+
 double Unseen(double heldout_us, double rmse_us) {
   return heldout_us > 0 ? heldout_us : rmse_us;
 }
@@ -20,7 +22,9 @@ double Unseen(double heldout_us, double rmse_us) {
 template <typename Parameters>
 std::string ParameterCells(const Parameters& parameters) {
   std::string names, pictures;
-  for (const v1::ParameterValue& parameter : parameters) {
+  const int shown = parameters.size() > kMostParameters ? kMostParameters - 1 : parameters.size();
+  for (int i = 0; i < shown; ++i) {
+    const v1::ParameterValue& parameter = parameters[i];
     const std::string interval = Interval(parameter);
     absl::StrAppend(&names, "<div",
                     interval.empty() ? "" : absl::StrCat(" title=\"95 % interval ", Escape(interval), "\""),
@@ -28,6 +32,8 @@ std::string ParameterCells(const Parameters& parameters) {
                     Typeset(ValueWithError(parameter)), "</div>");
     absl::StrAppend(&pictures, "<div class=\"line-high\">", IntervalPicture(parameter), "</div>");
   }
+  if (shown < parameters.size())
+    absl::StrAppend(&names, "<div class=\"dim\">", parameters.size() - shown, " more</div>");
   return Cell(names) + Cell(pictures, "pictures");
 }
 
@@ -46,11 +52,11 @@ std::string CandidateTable(const v1::Report& report) {
     const double left = Unseen(candidate.heldout_rmse_us(), candidate.rmse_us());
     const double p = candidate.probability();
     absl::StrAppend(
-        &table, p < 0.005 ? "<tr class=\"dim\">" : "<tr>",
+        &table, p < 0.05 ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           candidate.scope() == "object" ? "<br><small>a value per object</small>" : "")),
         NumberCell(p < 0.005 ? "< 0.01" : Fixed(p, 2)), NumberCell(left > 0 ? Time(left) : ""),
-        Cell(left > 0 ? Bar(left / largest, p < 0.005 ? "share" : "better", floor > 0 ? floor / largest : -1)
+        Cell(left > 0 ? Bar(left / largest, p < 0.05 ? "share" : "better", floor > 0 ? floor / largest : -1)
                       : "",
              "barcell"));
     if (candidate.note().empty()) {
@@ -68,13 +74,10 @@ std::string CandidateTable(const v1::Report& report) {
 
 std::string Ambiguities(const v1::Report& report) {
   std::string items;
-  for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
-    if (ambiguity.effects().empty()) continue;
-    const std::vector<std::string> effects(ambiguity.effects().begin(), ambiguity.effects().end());
-    absl::StrAppend(
-        &items, "<dt class=\"name\">", Escape(Join(effects, "or")), "</dt><dd>",
-        ambiguity.decided_by().empty() ? "" : absl::StrCat("To decide: ", Typeset(ambiguity.decided_by())),
-        "</dd>");
+  for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report)) {
+    const std::vector<std::string> effects(ambiguity->effects().begin(), ambiguity->effects().end());
+    absl::StrAppend(&items, "<dt class=\"name\">", Escape(Join(effects, "or")), "</dt><dd>",
+                    Typeset(ToDecide(ambiguity->decided_by())), "</dd>");
   }
   if (items.empty()) return "";
   return absl::StrCat("<h3>What these data cannot tell apart</h3>\n<dl>", items, "</dl>\n");
@@ -93,7 +96,7 @@ std::string HtmlUnexplained(const v1::Report& report) {
   std::string body;
   if (!rest.covariates().empty()) {
     body = absl::StrCat("<div class=\"scroll\"><table>",
-                        HeaderRow({"The rest hangs on", ">p", ">gain in log evidence (nats)"}), "<tbody>");
+                        HeaderRow({"The rest depends on", ">p", ">gain in log evidence (nats)"}), "<tbody>");
     for (const v1::CovariateTest& test : rest.covariates()) {
       absl::StrAppend(&body, "<tr>", Cell(Escape(test.name()), "name"), NumberCell(Probability(test.p())),
                       NumberCell(Number(test.gain_nats())), "</tr>");

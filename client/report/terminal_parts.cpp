@@ -76,6 +76,11 @@ double Unseen(double heldout_us, double rmse_us) {
   return heldout_us > 0 ? heldout_us : rmse_us;
 }
 
+// Without poses there is no RMSE.
+std::string Change(double before_us, double after_us) {
+  return before_us > 0 && after_us > 0 ? TimeChange(before_us, after_us) : "";
+}
+
 }  // namespace
 
 void AddDistributions(const v1::Report& report, TextLayout* out) {
@@ -111,14 +116,12 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
 
 void AddWhy(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<Cell>> rows;
-  if (report.steps_size() > 0) {
-    rows.push_back({{""},
-                    {""},
-                    {"probability", true, TextLayout::kDim},
-                    {"unseen touches", true, TextLayout::kDim},
-                    {""}});
-  }
   double before = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+  if (report.steps_size() > 0) {
+    const char* unseen = before > 0 ? "unseen touches" : "";
+    rows.push_back(
+        {{""}, {""}, {"probability", true, TextLayout::kDim}, {unseen, true, TextLayout::kDim}, {""}});
+  }
   std::set<std::string> named;
   for (const v1::Refit& refit : report.refitted()) {
     AddEffect(refit, refit.effect(), std::nan(""), "", "put right", TextLayout::kPlain, &rows);
@@ -132,34 +135,30 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
     const v1::Step& step = report.steps(i);
     const double after = Unseen(step.heldout_rmse_us(), step.rmse_us());
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
-              TimeChange(before, after), "", TextLayout::kPlain, &rows);
+              Change(before, after), "", TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
     for (int rival = 0, shown = 0; i == 0 && rival < report.candidates_size() && shown < kMostRivals;
          ++rival) {
       const v1::Candidate& candidate = report.candidates(rival);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                TimeChange(before, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())),
-                candidate.note(), TextLayout::kDim, &rows);
+                Change(before, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())), candidate.note(),
+                TextLayout::kDim, &rows);
       ++shown;
     }
     before = after;
   }
   if (!rows.empty()) out->Label("Why");
   out->Rows(rows);
-  std::set<std::string> told;
   for (const v1::Step& step : report.steps()) {
     if (step.equivalent().empty()) continue;
-    told.insert(step.decided_by());
     out->Paragraph(
-        absl::StrCat(StepName(step), ": these data cannot tell them apart.",
-                     step.decided_by().empty() ? "" : absl::StrCat(" To decide: ", step.decided_by())));
+        absl::StrCat(StepName(step), ": these data cannot tell them apart. ", ToDecide(step.decided_by())));
   }
-  for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
-    if (ambiguity.effects_size() < 2 || told.count(ambiguity.decided_by()) > 0) continue;
-    const std::vector<std::string> effects(ambiguity.effects().begin(), ambiguity.effects().end());
-    out->Paragraph(absl::StrCat(Join(effects, "or"),
-                                ": these data cannot tell them apart. To decide: ", ambiguity.decided_by()));
+  for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report)) {
+    const std::vector<std::string> effects(ambiguity->effects().begin(), ambiguity->effects().end());
+    out->Paragraph(absl::StrCat(Join(effects, "or"), ": these data cannot tell them apart. ",
+                                ToDecide(ambiguity->decided_by())));
   }
 }
 
@@ -173,7 +172,7 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
       const double p = rest.covariates(i).p();
       names.push_back(absl::StrCat(rest.covariates(i).name(), " (p ", Probability(p), ")"));
     }
-    out->Paragraph(absl::StrCat("The rest hangs on ", absl::StrJoin(names, ", "), "."));
+    out->Paragraph(absl::StrCat("The rest depends on ", absl::StrJoin(names, ", "), "."));
   }
   if (rest.formula().empty()) return;
   std::string text = absl::StrCat("A suggestion, not a cause: ", rest.formula());
@@ -193,7 +192,8 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
 
 void AddWhatToDo(const v1::Report& report, TextLayout* out) {
   out->Label("What to do");
-  if (!report.summary().empty()) out->Paragraph(report.summary());
+  const std::string summary = SummaryToShow(report);
+  if (!summary.empty()) out->Paragraph(summary);
   for (const v1::Step& step : report.steps()) {
     std::string text = step.meaning();
     if (!step.remedy().empty()) absl::StrAppend(&text, text.empty() ? "" : " ", step.remedy());

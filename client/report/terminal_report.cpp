@@ -32,7 +32,7 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
     absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
     if (floor.bound) {
-      absl::StrAppend(&text, ": an upper bound, since no touch was repeated.");
+      absl::StrAppend(&text, ", an upper bound without repeats.");
     } else if (data.repeats() > 0) {
       absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats.");
     } else {

@@ -6,7 +6,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <set>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -232,6 +234,30 @@ std::vector<Rung> Ladder(const v1::Report& report) {
         kUnknown);
   }
   return rungs;
+}
+
+std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report) {
+  std::set<std::set<std::string>> told;
+  for (const v1::Step& step : report.steps()) {
+    std::set<std::string> alike(step.equivalent().begin(), step.equivalent().end());
+    alike.insert(step.effect());
+    told.insert(alike);
+  }
+  std::vector<const v1::Ambiguity*> others;
+  for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
+    const std::set<std::string> alike(ambiguity.effects().begin(), ambiguity.effects().end());
+    if (alike.size() > 1 && told.insert(alike).second) others.push_back(&ambiguity);
+  }
+  return others;
+}
+
+std::string ToDecide(const std::string& decided_by) {
+  if (decided_by.empty() || absl::ascii_isupper(decided_by[0])) return decided_by;
+  return absl::StrCat("To decide: ", decided_by);
+}
+
+std::string SummaryToShow(const v1::Report& report) {
+  return report.initial().rmse_us() > 0 ? "" : report.summary();
 }
 
 }  // namespace touchstone::client

@@ -65,6 +65,13 @@ struct Rung {
 // The given model, what was changed, and the noise floor; empty for a set without poses.
 std::vector<Rung> Ladder(const v1::Report& report);
 
+// Pairs that no step names as its equivalents.
+std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report);
+// "To decide: a second speed", or the text itself if it is a sentence.
+std::string ToDecide(const std::string& decided_by);
+// The report's own summary where its parts do not say the same at more length: without a ladder.
+std::string SummaryToShow(const v1::Report& report);
+
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 

@@ -74,10 +74,35 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "to 815 us.");
   EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
   EXPECT_EQ(Headline(UnexplainedReport()),
-            "The model is wrong in a way that no built-in effect explains. It hangs on travel_mm.");
+            "The model is wrong in a way that no built-in effect explains. It depends on travel_mm.");
   EXPECT_EQ(Headline(CompareReport()), "The model is off by 41.0 ms, 8.2 times the noise floor.");
   EXPECT_EQ(Headline(WithoutPosesReport()),
             "Measured and simulated touches differ as distributions (p = 0.0005).");
+}
+
+TEST(Headline, TellsOfDistributionsWithNoiseThatTheModelLacks) {
+  v1::Report report = WithoutPosesReport();
+  report.set_verdict(v1::Report::MISSING_EFFECTS);
+  report.add_steps()->set_effect("gaussian_noise");
+  report.mutable_distributions()->set_p(0.4);
+  EXPECT_EQ(Headline(report),
+            "The model lacks gaussian_noise; with it, measured and simulated touches cannot be told apart as "
+            "distributions (p = 0.40).");
+}
+
+TEST(OtherAmbiguities, LeaveOutWhatAStepSays) {
+  v1::Report report = MissingEffectsReport();
+  v1::Ambiguity* same = report.add_ambiguities();
+  same->add_effects("surface_offset");
+  same->add_effects("tip_radius");
+  ASSERT_EQ(OtherAmbiguities(report).size(), 1u);
+  EXPECT_EQ(OtherAmbiguities(report)[0]->effects(0), "channel_latency");
+}
+
+TEST(ToDecide, TakesSentencesAsTheyAre) {
+  EXPECT_EQ(ToDecide("a second speed"), "To decide: a second speed");
+  EXPECT_EQ(ToDecide("Touch at a second speed."), "Touch at a second speed.");
+  EXPECT_EQ(ToDecide(""), "");
 }
 
 TEST(Ladder, RunsFromTheGivenModelToTheFloor) {
