@@ -10,6 +10,7 @@
 #include "server/diagnosis/describe_residuals.h"
 #include "server/diagnosis/ladder.h"
 #include "server/diagnosis/summary.h"
+#include "server/diagnosis/unposed.h"
 #include "server/diagnosis/where.h"
 
 namespace touchstone {
@@ -78,6 +79,7 @@ v1::Report Begin(const DiagnosisInput& input) {
 }  // namespace
 
 absl::StatusOr<v1::Report> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
+  if (!input.set->has_poses) return CompareUnposed(input, context, false);
   const double began = Now();
   Gate gate(context);
   DiagnosisContext gated = context;
@@ -105,6 +107,7 @@ absl::StatusOr<v1::Report> Compare(const DiagnosisInput& input, const DiagnosisC
 }
 
 absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touches, const DiagnosisContext& context) {
+  if (!input.set->has_poses) return CompareUnposed(input, context, true);
   const double began = Now();
   Gate gate(context);
   DiagnosisContext gated = context;

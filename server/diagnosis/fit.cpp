@@ -1,7 +1,7 @@
 #include "server/diagnosis/fit.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +18,8 @@ constexpr double kJumpOverMedian = 200;
 constexpr int kMostIterations = 10;
 constexpr int kMostHalvings = 5;
 constexpr double kConverged = 0.02;     // nats
+constexpr double kSeen = 10;           // squared scale over standard error from where a direction counts as seen
+constexpr double kPriorWidth = 10;     // of a value's prior (Cauchy) over the size that rigs show
 constexpr double kRidge = 1e-4;         // prior precision over 1 / scale^2: holds what nothing determines
 
 // Sum of logs, without overflow.
@@ -87,7 +89,8 @@ Minimum Minimise(const Eigen::MatrixXd& gram, const std::vector<int>& members,
 double LogPriorOfValues(const std::vector<Coordinate>& coordinates, const Eigen::VectorXd& point) {
   double sum = 0;
   for (size_t i = 0; i < coordinates.size(); ++i) {
-    const double x = (point[static_cast<int>(i)] - coordinates[i].neutral) / coordinates[i].scale;
+    const double x =
+        (point[static_cast<int>(i)] - coordinates[i].neutral) / (kPriorWidth * coordinates[i].scale);
     sum -= std::log1p(x * x);
   }
   return sum;
@@ -123,9 +126,16 @@ Judgement Judge(const Likelihood& likelihood, const std::vector<Eigen::MatrixXd>
       for (int j = 0; j < n; ++j)
         information(i, j) = gram(members[1 + m.free[i]], members[1 + m.free[j]]) *
                             (coordinates[m.free[i]].scale * coordinates[m.free[j]].scale / (sigma * sigma));
-    const Eigen::LDLT<Eigen::MatrixXd> solved(Eigen::MatrixXd::Identity(n, n) + information);
-    const double occam =
-        n > 0 ? 0.5 * solved.vectorD().array().max(1e-300).log().sum() : 0;
+    // Every direction that can be seen costs the same, as if the prior were worth one observation: the sizes
+    // that rigs usually show must not decide between two weak causes. What cannot be seen costs nothing.
+    double occam = 0;
+    if (n > 0) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information, Eigen::EigenvaluesOnly);
+      for (int i = 0; i < n; ++i) {
+        const double seen = std::max(eigen.eigenvalues()[i], 0.0);
+        occam += 0.5 * std::log1p(likelihood.rows() * seen / (seen + kSeen));
+      }
+    }
     const double evidence = log_likelihood - occam + LogPriorOfValues(coordinates, point + m.step);
     logs.push_back(log_likelihood);
     evidences.push_back(evidence);

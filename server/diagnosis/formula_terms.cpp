@@ -22,6 +22,12 @@ constexpr double kLeastPeriodMm = 1.5, kMostPeriodMm = 40;
 // The expression of a term may be long; what people would try first comes cheaper.
 constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
 
+double ThreeDigits(double value) {
+  if (value == 0) return 0;
+  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 2);
+  return unit >= 1 ? std::round(value / unit) * unit : std::round(value / unit) / std::round(1 / unit);
+}
+
 using Value = std::function<double(int k, int finger)>;
 
 // A covariate or a function of one.
@@ -90,6 +96,13 @@ std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
   if (!d.curvature_per_m.empty())
     with_square("curvature_per_m", true, [&d, at](int k, int i) { return d.curvature_per_m[at(k, i)]; });
 
+  // What happens only when a certain finger is first.
+  const double middle = 0.5 * (o.fingers - 1);
+  for (int finger = 0; finger < o.fingers; ++finger)
+    add("first_finger", absl::StrCat("(first_finger == ", ShortestNumber(finger - middle), ")"), false, kSimpleNats,
+        [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
+  add("first_finger", "first_finger", false, kSimpleNats,
+      [&d, middle](int k, int) { return d.first_finger[k] - middle; });
   with_square("previous_press_mm", true, [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * 1e3; });
   const auto varies = [&](const std::vector<double>& column) {
     return !column.empty() && *std::max_element(column.begin(), column.end()) >
@@ -100,13 +113,23 @@ std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
     with_square("speed_mm_s", false, speed_mm_s);
     add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats, [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });
   }
-  if (set.has_session_time)
-    with_square("session_time_s", false, [&](int k, int) { return set.session_time_s[o.row[k]]; });
-  for (const auto& [name, column] : set.covariates) {
-    if (!varies(column)) continue;
+  // Conditions stand far from zero, and their effect was put to zero somewhere in the middle.
+  const auto centred = [&](const std::string& name, const std::vector<double>& column) {
+    if (!varies(column)) return;
+    double sum = 0;
+    for (const double x : column) sum += x;
+    const double mean = ThreeDigits(sum / static_cast<double>(column.size()));
+    const std::string text = absl::StrCat("(", name, mean < 0 ? " + " : " - ", ShortestNumber(std::abs(mean)), ")");
     const std::vector<double>* values = &column;
-    with_square(name, false, [&o, values](int k, int) { return (*values)[o.row[k]]; });
-  }
+    const Value plain = [&o, values](int k, int) { return (*values)[o.row[k]]; };
+    const Value shifted = [plain, mean](int k, int i) { return plain(k, i) - mean; };
+    add(name, name, false, kSimpleNats, plain);
+    if (mean == 0) return;
+    add(name, text, false, kSimpleNats, shifted);
+    add(name, text + "^2", false, kCurvedNats, [shifted](int k, int i) { return shifted(k, i) * shifted(k, i); });
+  };
+  if (set.has_session_time) centred("session_time_s", set.session_time_s);
+  for (const auto& [name, column] : set.covariates) centred(name, column);
   return factors;
 }
 

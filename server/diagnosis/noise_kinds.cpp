@@ -233,7 +233,9 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
   const double left = std::max(degrees - taken, 1.0);
   best.sigma_s *= std::sqrt(degrees / left);
   found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * left), 0};
-  if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;  // the slope shares what is known
+  // Slope and tails share what is known of the scale.
+  if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;
+  if (found.degrees_of_freedom.gain_nats > 0) found.sigma_s.std_error *= 1.6;
 
   // Polling adds the scatter of the ticks.
   if (found.poll_interval_s.gain_nats > 0) {

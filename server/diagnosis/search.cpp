@@ -28,6 +28,8 @@ double ChiSquaredTail(double x, int q) {
 }  // namespace
 
 bool Search::Accepts(const Fit& before, const Fit& after, size_t moves) const {
+  // So few numbers are followed by anything.
+  if (experiment_.contrasts->rows() < rules_.least_rows_a_value * (after.model.size() + 1)) return false;
   if (after.evidence - before.evidence < rules_.enter_nats) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);

@@ -15,11 +15,12 @@ namespace touchstone {
 
 // Thresholds, chosen on the tuning seeds of tests/hidden_effects.
 struct SearchRules {
-  double enter_nats = 7;            // gain in log evidence that a step needs
-  double family_wise_p = 1e-3;      // of the likelihood ratio, over all moves
+  double enter_nats = 4.5;            // gain in log evidence that a step needs
+  double family_wise_p = 2e-3;      // of the likelihood ratio, over all moves
   double practical = 0.008;         // share by which the error on touches left out must fall
   double equivalent_nats = 3;       // explanations as near as this are named together
-  double formula_nats = 9;          // price of a term that was picked from a dictionary
+  double formula_nats = 11;         // price of a term that was picked from a dictionary
+  int least_rows_a_value = 8;       // contrasts that each fitted value needs
   int most_steps = 6;
   int most_refits = 6;              // candidates that are fitted in full a step
 };
