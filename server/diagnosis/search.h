@@ -17,7 +17,7 @@ namespace touchstone {
 struct SearchRules {
   double enter_nats = 4.5;            // gain in log evidence that a step needs
   double family_wise_p = 2e-3;      // of the likelihood ratio, over all moves
-  double practical = 0.008;         // share by which the error on touches left out must fall
+  double practical = 0.003;         // share by which the error on touches left out must fall
   double equivalent_nats = 3;       // explanations as near as this are named together
   double formula_nats = 11;         // price of a term that was picked from a dictionary
   int least_rows_a_value = 8;       // contrasts that each fitted value needs
