@@ -67,31 +67,42 @@ struct Protocol {
   std::vector<double> session_time_s, speed_mm_s, temperature;
 };
 
+// The course of a session: pauses between touches, and the room's temperature.
+class Course {
+ public:
+  explicit Course(uint64_t seed) : clock_(Stream(seed, "clock")), room_(Stream(seed, "room")) {
+    phase_ = std::uniform_real_distribution<double>(0, 2 * M_PI)(room_);
+  }
+  void Touch(const Command& command, int round, double speed_mm_s, Protocol* out) {
+    now_s_ += std::uniform_real_distribution<double>(6.3, 11.7)(clock_);
+    out->commands.push_back(command);
+    out->round.push_back(round);
+    out->session_time_s.push_back(now_s_);
+    out->speed_mm_s.push_back(command.speed_mm_s > 0 ? command.speed_mm_s : speed_mm_s);
+    const double degrees = 23 + 2 * std::sin(2 * M_PI * now_s_ / 3000 + phase_) + 0.2 * draught_(room_);
+    out->temperature.push_back(std::round(degrees * 100) / 100);
+  }
+
+ private:
+  std::mt19937_64 clock_, room_;
+  std::normal_distribution<double> draught_;
+  double phase_ = 0, now_s_ = 0;
+};
+
 Protocol DrawProtocol(const Scenario& scenario, uint64_t seed) {
-  auto poses = Stream(seed, "pose"), clock = Stream(seed, "clock"), room = Stream(seed, "room");
-  std::uniform_real_distribution<double> pause_s(6.3, 11.7), phase(0, 2 * M_PI);
-  const double room_phase = phase(room);
-  std::normal_distribution<double> draught(0, 0.2);
+  auto poses = Stream(seed, "pose");
+  Course course(seed);
   Protocol out;
-  double now_s = 0;
+  const auto& speeds = scenario.speeds_mm_s;
   for (size_t object = 0; object < scenario.objects.size(); ++object) {
     std::vector<Command> drawn;
     for (int k = 0; k < scenario.poses; ++k) {
       drawn.push_back(DrawCommand(scenario, object, 6 * k / scenario.poses, poses));
       drawn.back().pose = object * scenario.poses + k;
     }
-    for (int round = 0; round < scenario.rounds; ++round) {
-      for (int k = 0; k < scenario.poses; ++k) {
-        now_s += pause_s(clock);
-        out.commands.push_back(drawn[k]);
-        out.round.push_back(round);
-        out.session_time_s.push_back(now_s);
-        const int speed = (scenario.speed_by_round ? round : k) % scenario.speeds_mm_s.size();
-        out.speed_mm_s.push_back(scenario.speeds_mm_s[speed]);
-        const double degrees = 23 + 2 * std::sin(2 * M_PI * now_s / 3000 + room_phase) + draught(room);
-        out.temperature.push_back(std::round(degrees * 100) / 100);
-      }
-    }
+    for (int round = 0; round < scenario.rounds; ++round)
+      for (int k = 0; k < scenario.poses; ++k)
+        course.Touch(drawn[k], round, speeds[(scenario.speed_by_round ? round : k) % speeds.size()], &out);
   }
   return out;
 }
@@ -129,7 +140,8 @@ std::string Csv(const Scenario& scenario, const Protocol& protocol, const std::v
     if (scenario.with_poses) {
       csv += std::to_string(k) + ',' + object + ',' + std::to_string(protocol.round[k]) + ',' +
              std::to_string(command.face) + ',' + Number(protocol.session_time_s[k]) + ',' +
-             Number(protocol.speed_mm_s[k]) + ',' + Number(scenario.standoff_mm);
+             Number(protocol.speed_mm_s[k]) + ',' +
+             Number(command.standoff_mm > 0 ? command.standoff_mm : scenario.standoff_mm);
       for (const Vec* vector : {&command.target_mm, &command.approach, &command.lateral})
         for (int axis = 0; axis < 3; ++axis) csv += ',' + Number((*vector)[axis]);
       if (scenario.with_temperature) csv += ',' + Number(protocol.temperature[k]);
@@ -207,10 +219,7 @@ std::vector<double> Report(const Scenario& scenario, uint64_t seed, const std::v
   return out;
 }
 
-}  // namespace
-
-Set Generate(const Scenario& scenario, uint64_t seed) {
-  const Protocol protocol = DrawProtocol(scenario, seed);
+Set Played(const Scenario& scenario, const Protocol& protocol, uint64_t seed) {
   Set set;
   set.truth = scenario;
   set.touches = protocol.commands.size();
@@ -224,6 +233,28 @@ Set Generate(const Scenario& scenario, uint64_t seed) {
   set.csv = Csv(scenario, protocol, set.reported_us);
   set.model_yaml = NominalYaml(scenario);
   return set;
+}
+
+}  // namespace
+
+Set Generate(const Scenario& scenario, uint64_t seed) {
+  return Played(scenario, DrawProtocol(scenario, seed), seed);
+}
+
+std::vector<Command> DrawCommands(const Scenario& scenario, int count, uint64_t seed) {
+  auto poses = Stream(seed, "pose");
+  std::vector<Command> commands;
+  const int objects = scenario.objects.size();
+  for (int k = 0; k < count; ++k)
+    commands.push_back(DrawCommand(scenario, k % objects, k / objects % 6, poses));
+  return commands;
+}
+
+Set GenerateFor(const Scenario& scenario, const std::vector<Command>& commands, uint64_t seed) {
+  Course course(seed);
+  Protocol protocol;
+  for (const Command& command : commands) course.Touch(command, 0, scenario.speeds_mm_s[0], &protocol);
+  return Played(scenario, protocol, seed);
 }
 
 std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed) {

@@ -15,6 +15,7 @@ struct Command {
   int object = 0, face = 0;
   int pose = -1;  // equal numbers, equal commands; -1: alone
   Eigen::Vector3d target_mm, approach, lateral;
+  double standoff_mm = 0, speed_mm_s = 0;  // 0: the scenario's
 };
 
 struct Set {
@@ -31,6 +32,14 @@ struct Set {
 // A pure function. Draws of poses, session times, noise, bumps and losses come from separate streams of the
 // seed, so that two scenarios that differ in one thing differ in that thing only.
 Set Generate(const Scenario& scenario, uint64_t seed);
+
+// Touches of the six faces in turn, object by object in turn: as many as wanted, the first of them always the
+// same.
+std::vector<Command> DrawCommands(const Scenario& scenario, int count, uint64_t seed);
+
+// A session of these touches, once each. A longer list with the same beginning has the same beginning of
+// times.
+Set GenerateFor(const Scenario& scenario, const std::vector<Command>& commands, uint64_t seed);
 
 // Only exact_time_us, for poses that Generate has drawn: what the effects do without chance.
 std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed);

@@ -166,6 +166,21 @@ TEST(Generator, ManySpeedsManyFingersAndNoPosesAreWritten) {
   EXPECT_THAT(Generate(scenario, 3).csv, testing::StartsWith("object,t_0_us"));
 }
 
+TEST(Generator, ALongerListOfTouchesBeginsLikeAShorterOne) {
+  const auto commands = DrawCommands(Lats(), 20, 3);
+  const Set longer = GenerateFor(Lats(), commands, 3);
+  const Set shorter = GenerateFor(Lats(), {commands.begin(), commands.begin() + 12}, 3);
+  EXPECT_EQ(shorter.reported_us,
+            std::vector<double>(longer.reported_us.begin(), longer.reported_us.begin() + 36));
+  EXPECT_EQ(DrawCommands(Lats(), 5, 3).back().target_mm, commands[4].target_mm);
+  // A command may have a standoff and a speed of its own.
+  Command near = commands[0];
+  near.standoff_mm = 30, near.speed_mm_s = 10;
+  const Set own = GenerateFor(Lats(), {near}, 3);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(own.exact_time_us[i], 2 * longer.exact_time_us[i] - 30 / 10.0 * 1e6, 1e-3);
+}
+
 TEST(Generator, EveryUnlistedEffectMovesSomething) {
   for (const UnlistedKind& kind : UnlistedKinds()) {
     Scenario scenario = Lats();

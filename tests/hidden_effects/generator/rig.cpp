@@ -95,11 +95,11 @@ std::vector<Rig::Landing> Rig::Land(const Command& command) const {
   if (turn.norm() > 0)
     back = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix().transpose();
 
+  const double standoff = command.standoff_mm > 0 ? command.standoff_mm : scenario_.standoff_mm;
   std::vector<Landing> landings;
   for (int i = 0; i < scenario_.fingers; ++i) {
     const double x = (i - 0.5 * (scenario_.fingers - 1)) * spacing;
-    const Vec tip =
-        command.target_mm - a * scenario_.standoff_mm + lateral * x - Vec(0, 0, Value("gravity_sag"));
+    const Vec tip = command.target_mm - a * standoff + lateral * x - Vec(0, 0, Value("gravity_sag"));
     const Vec way = back * a;
     const Contact contact = scenario_.objects[command.object]->FirstContact(back * (tip - moved) / size, way,
                                                                             Value("tip_radius") / size);

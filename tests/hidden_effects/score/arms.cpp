@@ -44,6 +44,17 @@ Scenario Weak(const Workshop& workshop, uint64_t seed) {
   return scenario;
 }
 
+// Whether two effects fit alike at one speed, or add up to what one of them could do alone.
+bool SameClass(const std::string& a, const std::string& b) {
+  static const std::vector<std::vector<std::string>> kClasses = {
+      {"speed_error", "clock_skew", "contact_slowdown"},
+      {"channel_latency", "finger_length", "tool_tilt"},
+      {"gravity_sag", "object_pose"}};
+  return std::any_of(kClasses.begin(), kClasses.end(), [&](const auto& names) {
+    return std::count(names.begin(), names.end(), a) > 0 && std::count(names.begin(), names.end(), b) > 0;
+  });
+}
+
 // `count` different effects, no two of which fit alike.
 Scenario Realistic(Scenario scenario, uint64_t seed, int count) {
   auto random = Stream(seed, "kind");
@@ -54,8 +65,7 @@ Scenario Realistic(Scenario scenario, uint64_t seed, int count) {
   while (static_cast<int>(hidden.size()) < count) {
     const std::string effect = Pick(pool, random);
     const bool clash = std::any_of(hidden.begin(), hidden.end(), [&](const Hidden& other) {
-      const auto rivals = RivalsOf(other, scenario);
-      return other.effect == effect || std::count(rivals.begin(), rivals.end(), effect) > 0;
+      return other.effect == effect || SameClass(other.effect, effect);
     });
     if (!clash) hidden.push_back(RealisticEffect(effect, scenario, seed + hidden.size() * 7919));
   }

@@ -143,6 +143,14 @@ void JudgeUnlisted(const Scenario& truth, const v1::Report& report, double formu
   marks->push_back({"formula halves the misfit", formula_cuts_to <= 0.5});
 }
 
+// Questions that a list of names answers.
+bool IsAboutNames(const std::string& measure) {
+  for (const char* known : {"false claim", "right first", "truth named", "all found, none added",
+                            "none added", "wrong name instead"})
+    if (measure == known) return true;
+  return false;
+}
+
 std::string Number(double value) {
   char text[32];
   snprintf(text, sizeof text, "%.4g", value);
@@ -214,7 +222,10 @@ std::vector<Mark> JudgeNames(const Arm& arm, const Scenario& truth, const Names&
       if (Contains(RivalsOf(hidden, truth), name)) step->add_equivalent(hidden.effect);
   }
   report.set_verdict(names.empty() ? v1::Report::ADEQUATE : v1::Report::MISSING_EFFECTS);
-  return Judge(arm, truth, report, NAN);
+  std::vector<Mark> marks;
+  for (const Mark& mark : Judge(arm, truth, report, NAN))
+    if (IsAboutNames(mark.measure)) marks.push_back(mark);
+  return marks;
 }
 
 std::string TruthInWords(const Scenario& truth) {

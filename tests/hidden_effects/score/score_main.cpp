@@ -1,9 +1,11 @@
 // touchstone-hidden-effects: how good is the diagnosis? Prints the table of tests/hidden_effects/RESULTS.md.
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
+#include "tests/hidden_effects/score/next_touches.h"
 #include "tests/hidden_effects/score/trial.h"
 
 int main(int argc, char** argv) {
@@ -11,6 +13,7 @@ int main(int argc, char** argv) {
   TrialOptions options;
   std::string seeds = "tuning", meshes = TOUCHSTONE_SHARED_MESHES;
   bool verbose = false, no_baselines = false;
+  int races = -1;
   CLI::App app{"Hides effects in measurement sets, diagnoses them, and prints how often that was right."};
   app.add_option("--seeds", seeds, "tuning or sealed")->check(CLI::IsMember({"tuning", "sealed"}));
   app.add_option("--share", options.share, "of the number of sets of every arm")->check(CLI::PositiveNumber);
@@ -20,6 +23,8 @@ int main(int argc, char** argv) {
   app.add_option("--dump", options.dump_folder, "write sets that were judged wrong there");
   app.add_flag("--verbose", verbose, "a line a set: truth, verdict, steps, values");
   app.add_flag("--no-baselines", no_baselines, "only the diagnosis");
+  app.add_option("--races", races,
+                 "designed against random next touches; default: 20 by share, none with --arm");
   CLI11_PARSE(app, argc, argv);
   for (const std::string& arm : options.arms) {
     if (FindArm(arm) != nullptr) continue;
@@ -49,8 +54,17 @@ int main(int argc, char** argv) {
   const auto& seconds = result.seconds;
   if (!seconds.empty())
     printf(
-        "\n%d sets, %d without a report. One diagnosis on one thread takes %.2f s (median), %.2f s "
+        "\n%d sets, %d without a report. One diagnosis takes %.2f s of one core (median), %.2f s "
         "(slowest).\n",
         result.sets, result.errors, seconds[seconds.size() / 2], seconds.back());
+  if (races < 0)
+    races = options.arms.empty() ? std::max(1, static_cast<int>(std::lround(20 * options.share))) : 0;
+  const Races raced = RunRaces(workshop, options.seeds, races, options.threads, [&](const Race& race) {
+    if (verbose)
+      printf("race: hidden %s => designed %d%s, random %d%s %s\n", TruthInWords(race.truth).c_str(),
+             race.designed, race.designed_arrived ? "" : " (gave up)", race.random,
+             race.random_arrived ? "" : " (gave up)", race.error.c_str());
+  });
+  if (races > 0) printf("\n%s", RacesInWords(raced).c_str());
   return result.errors == 0 ? 0 : 1;
 }

@@ -121,7 +121,8 @@ std::string Table(const Results& results) {
     out += std::string("| ") + row.arm + " | " + row.measure + " | " + TargetInWords(row) + " | " +
            std::to_string(rate.of) + " | " + Percent(rate.Value()) + " | " + Percent(lower) + " - " +
            Percent(upper) + " | " + Passed(row, rate.Value()) + " | " + Of(results.bic, row, row.measure) +
-           " | " + Of(results.rmse_drop, row, row.measure) + " | " + Of(results.gp, row, "detects") + " |\n";
+           " | " + Of(results.rmse_drop, row, row.measure) + " | " + Of(results.gp, row, row.measure) +
+           " |\n";
   }
   return out;
 }

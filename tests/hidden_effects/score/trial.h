@@ -27,7 +27,7 @@ struct Outcome {
   Set set;
   v1::Report report;
   std::vector<Mark> marks, bic, rmse_drop, gp;
-  double seconds = 0;  // of Diagnose
+  double seconds = 0;  // of Diagnose, CPU time
   std::string error;   // why there is no report; empty: there is one
 };
 
@@ -39,7 +39,7 @@ bool AllRight(const Outcome& outcome);
 struct TrialResult {
   Results results;
   int sets = 0, errors = 0;
-  std::vector<double> seconds;  // of every Diagnose
+  std::vector<double> seconds;  // of every Diagnose, sorted
 };
 
 // `each` is called after every set, from one thread at a time.

@@ -1,0 +1,130 @@
+#include "tests/hidden_effects/score/next_touches.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <iterator>
+#include <mutex>
+#include <thread>
+
+#include "server/base/status.h"
+#include "tests/hidden_effects/generator/rig.h"
+#include "tests/hidden_effects/score/strengths.h"
+
+namespace touchstone::hidden {
+namespace {
+
+constexpr int kBegin = 48;
+// 6 nats: 400 to 1.
+constexpr double kSure = 0.9975;
+// Effects of geometry that look alike in few touches and that no tie binds.
+constexpr const char* kEffects[] = {"tip_radius", "oblique_slip", "finger_spacing", "object_scale",
+                                    "tool_yaw"};
+
+bool RightAndSure(const v1::Report& report, const std::string& effect) {
+  return report.steps_size() == 1 && report.steps(0).effect() == effect &&
+         report.steps(0).equivalent_size() == 0 && report.steps(0).probability() >= kSure;
+}
+
+absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const Scenario& scenario) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Propose(input, kAddedAtOnce, {}));
+  std::vector<Command> commands;
+  for (const v1::ProposedTouch& proposed : report.next_touches()) {
+    const v1::CommandedTouch& touch = proposed.touch();
+    Command command;
+    while (command.object < static_cast<int>(scenario.objects.size()) &&
+           scenario.objects[command.object]->name() != proposed.object())
+      ++command.object;
+    if (command.object == static_cast<int>(scenario.objects.size()))
+      return absl::InternalError("a touch of an unknown object was proposed: " + proposed.object());
+    command.target_mm =
+        1000 * Eigen::Vector3d(touch.target_m().x(), touch.target_m().y(), touch.target_m().z());
+    command.approach = Eigen::Vector3d(touch.approach().x(), touch.approach().y(), touch.approach().z());
+    command.lateral = Eigen::Vector3d(touch.lateral().x(), touch.lateral().y(), touch.lateral().z());
+    command.standoff_mm = 1000 * touch.standoff_m();
+    command.speed_mm_s = 1000 * touch.speed_m_s();
+    commands.push_back(command);
+  }
+  return commands;
+}
+
+// Touches that were added until the verdict; `*arrived` false if it was never right and sure.
+absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bool designed, uint64_t seed,
+                          bool* arrived) {
+  const std::vector<Command> random = DrawCommands(scenario, kBegin + kMostAdded, seed);
+  std::vector<Command> commands(random.begin(), random.begin() + kBegin);
+  for (;;) {
+    const Set set = GenerateFor(scenario, commands, seed);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set, workshop));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Diagnose(input, {}));
+    const int added = static_cast<int>(commands.size()) - kBegin;
+    *arrived = RightAndSure(report, scenario.hidden.front().effect);
+    if (*arrived || added >= kMostAdded) return added;
+    std::vector<Command> next(random.begin() + commands.size(),
+                              random.begin() + commands.size() + kAddedAtOnce);
+    if (designed) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Command> proposed, Proposed(input, scenario));
+      // What is not proposed is random.
+      std::copy_n(proposed.begin(), std::min<size_t>(proposed.size(), kAddedAtOnce), next.begin());
+    }
+    commands.insert(commands.end(), next.begin(), next.end());
+  }
+}
+
+}  // namespace
+
+Race RunRace(const Workshop& workshop, uint64_t seed) {
+  auto random = Stream(seed, "kind");
+  Scenario scenario;
+  scenario.objects = {workshop.solids[0], workshop.solids[4]};
+  scenario.poses = kBegin / 2, scenario.rounds = 1;
+  const std::string effect = kEffects[random() % std::size(kEffects)];
+  scenario.hidden = {WeakEffect(effect, scenario, seed, 6)};
+  Race race;
+  race.truth = scenario;
+  const auto designed = Added(workshop, scenario, true, seed, &race.designed_arrived);
+  const auto others = Added(workshop, scenario, false, seed, &race.random_arrived);
+  for (const auto* added : {&designed, &others})
+    if (!added->ok()) race.error = added->status().ToString();
+  if (race.error.empty()) race.designed = *designed, race.random = *others;
+  return race;
+}
+
+Races RunRaces(const Workshop& workshop, Seeds seeds, int count, int threads,
+               const std::function<void(const Race&)>& each) {
+  Races sum;
+  std::mutex mutex;
+  std::atomic<int> next{0};
+  const auto work = [&] {
+    for (int k = next++; k < count; k = next++) {
+      // Behind the seeds of the arms.
+      const Race race = RunRace(workshop, SeedOf(seeds, Arms().back(), 500'000 + k));
+      const std::lock_guard<std::mutex> lock(mutex);
+      ++sum.races;
+      sum.errors += !race.error.empty();
+      sum.designed += race.designed, sum.random += race.random;
+      sum.designed_gave_up += !race.designed_arrived, sum.random_gave_up += !race.random_arrived;
+      each(race);
+    }
+  };
+  std::vector<std::thread> workers;
+  for (int k = 0; k < threads; ++k) workers.emplace_back(work);
+  for (std::thread& worker : workers) worker.join();
+  return sum;
+}
+
+std::string RacesInWords(const Races& races) {
+  if (races.races == 0) return "";
+  const double share = races.random == 0 ? 0 : static_cast<double>(races.designed) / races.random;
+  char text[400];
+  snprintf(
+      text, sizeof text,
+      "Next touches: %d faint effects, verdicts of 6 nats. Touches that had to be added: %.1f designed, %.1f "
+      "random; %.0f %% (target <= 50 %%, %s). No verdict within %d: %d designed, %d random. %d errors.\n",
+      races.races, static_cast<double>(races.designed) / races.races,
+      static_cast<double>(races.random) / races.races, 100 * share, share <= 0.5 ? "pass" : "**miss**",
+      kMostAdded, races.designed_gave_up, races.random_gave_up, races.errors);
+  return text;
+}
+
+}  // namespace touchstone::hidden

@@ -1,0 +1,35 @@
+// Does it pay to make the touches that the diagnosis proposes? A small set with a faint effect grows, once by
+// the touches that are proposed, once by random ones, until the verdict is right and sure.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "tests/hidden_effects/score/arms.h"
+
+namespace touchstone::hidden {
+
+struct Race {
+  Scenario truth;
+  int designed = 0, random = 0;                           // touches that were added until the verdict
+  bool designed_arrived = false, random_arrived = false;  // false: gave up at kMostAdded
+  std::string error;
+};
+
+inline constexpr int kAddedAtOnce = 8;
+inline constexpr int kMostAdded = 96;
+
+Race RunRace(const Workshop& workshop, uint64_t seed);
+
+struct Races {
+  int races = 0, errors = 0, designed = 0, random = 0;  // sums of added touches
+  int designed_gave_up = 0, random_gave_up = 0;
+};
+
+Races RunRaces(const Workshop& workshop, Seeds seeds, int count, int threads,
+               const std::function<void(const Race&)>& each);
+
+// A line of Markdown for the table.
+std::string RacesInWords(const Races& races);
+
+}  // namespace touchstone::hidden

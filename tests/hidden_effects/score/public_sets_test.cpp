@@ -1,0 +1,126 @@
+// Sets with known truth by a third simulation, which shares no code with the product or with the oracle here.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/effects/all_effects.h"
+#include "tests/hidden_effects/score/judge.h"
+#include "tests/hidden_effects/score/workshop.h"
+
+namespace touchstone::hidden {
+namespace {
+
+using testing::Contains;
+
+const char kFolder[] = TOUCHSTONE_SHARED_DATA "/measurements/";
+
+class PublicSets : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { workshop_ = new Workshop(OpenWorkshop(kFolder)); }
+  static void TearDownTestSuite() { delete workshop_; }
+
+  v1::Report Diagnosed(const std::string& file) {
+    auto set = ReadMeasurementSet(kFolder + file);
+    EXPECT_TRUE(set.ok()) << set.status();
+    auto model = ParseModel(
+        "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
+        "  - gaussian_noise: {sigma_us: 5000}\n",
+        "nominal.yaml", Catalogue());
+    DiagnosisInput input;
+    input.set = std::make_shared<const MeasurementSet>(*std::move(set));
+    input.model = std::make_shared<const Model>(*std::move(model));
+    for (const std::string& object : input.set->objects)
+      input.surfaces[object] = workshop_->surfaces.at(object);
+    auto report = Diagnose(input, {});
+    EXPECT_TRUE(report.ok()) << report.status();
+    return report.ok() ? *report : v1::Report();
+  }
+
+  static double Value(const v1::Step& step, const std::string& finger = "") {
+    for (const v1::ParameterValue& parameter : step.parameters())
+      if (parameter.finger() == finger) return parameter.value();
+    ADD_FAILURE() << step.effect() << " has no value for '" << finger << "'";
+    return 0;
+  }
+
+  static Workshop* workshop_;
+};
+Workshop* PublicSets::workshop_ = nullptr;
+
+#define SKIP_WITHOUT(file)                                     \
+  if (!std::filesystem::exists(std::string(kFolder) + (file))) \
+  GTEST_SKIP() << kFolder << (file) << " is missing"
+
+TEST_F(PublicSets, NothingHiddenIsAdequate) {
+  SKIP_WITHOUT("nothing_hidden.csv");
+  const v1::Report report = Diagnosed("nothing_hidden.csv");
+  EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE) << ReportInWords(report);
+  EXPECT_EQ(report.touches(), 960u);
+  EXPECT_NEAR(report.noise_floor_us(), 5000, 400);
+}
+
+TEST_F(PublicSets, TipRadiusIsNamedAndMeasured) {
+  SKIP_WITHOUT("tip_radius.csv");
+  const v1::Report report = Diagnosed("tip_radius.csv");
+  ASSERT_EQ(report.steps_size(), 1) << ReportInWords(report);
+  EXPECT_EQ(report.steps(0).effect(), "tip_radius");
+  EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
+  EXPECT_NEAR(Value(report.steps(0)), 1.5, 0.15);
+  EXPECT_LE(report.final().rmse_us(), 1.05 * report.noise_floor_us());
+}
+
+TEST_F(PublicSets, ObjectPushIsNamedAndMeasured) {
+  SKIP_WITHOUT("object_push.csv");
+  const v1::Report report = Diagnosed("object_push.csv");
+  ASSERT_EQ(report.steps_size(), 1) << ReportInWords(report);
+  EXPECT_EQ(report.steps(0).effect(), "object_push");
+  EXPECT_NEAR(Value(report.steps(0)), 0.3, 0.03);
+  EXPECT_LE(report.final().rmse_us(), 1.05 * report.noise_floor_us());
+}
+
+TEST_F(PublicSets, TwoEffectsAreBothNamed) {
+  SKIP_WITHOUT("two_effects.csv");
+  const v1::Report report = Diagnosed("two_effects.csv");
+  ASSERT_EQ(report.steps_size(), 2) << ReportInWords(report);
+  for (const v1::Step& step : report.steps()) {
+    if (step.effect() == "oblique_slip") {
+      EXPECT_NEAR(Value(step), 0.5, 0.05);
+    } else if (step.effect() == "finger_length") {
+      EXPECT_THAT(step.equivalent(), Contains("channel_latency"));
+      EXPECT_NEAR(Value(step, "l"), 0.2, 0.03);
+      EXPECT_NEAR(Value(step, "m"), -0.05, 0.03);
+      EXPECT_NEAR(Value(step, "r"), -0.15, 0.03);
+    } else {
+      EXPECT_EQ(step.effect(), "channel_latency");
+      EXPECT_THAT(step.equivalent(), Contains("finger_length"));
+    }
+  }
+}
+
+TEST_F(PublicSets, WhatNoCatalogueListsIsUnexplainedAndHangsOnTheApproach) {
+  SKIP_WITHOUT("unlisted.csv");
+  const v1::Report report = Diagnosed("unlisted.csv");
+  EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED) << ReportInWords(report);
+  ASSERT_GT(report.unexplained().covariates_size(), 0);
+  EXPECT_EQ(report.unexplained().covariates(0).name(), "approach_z") << ReportInWords(report);
+  EXPECT_GT(report.unexplained().heldout_gain(), 0.5);
+}
+
+TEST_F(PublicSets, ABadPrintIsNoPhysics) {
+  SKIP_WITHOUT("surface_error.csv");
+  const v1::Report report = Diagnosed("surface_error.csv");
+  for (const v1::Step& step : report.steps())
+    EXPECT_EQ(step.effect(), "surface_error") << ReportInWords(report);
+  EXPECT_NE(report.verdict(), v1::Report::UNEXPLAINED);
+}
+
+TEST_F(PublicSets, WithoutPosesADifferenceIsFoundAndNobodyIsBlamed) {
+  SKIP_WITHOUT("without_poses.csv");
+  const v1::Report report = Diagnosed("without_poses.csv");
+  EXPECT_EQ(report.steps_size(), 0) << ReportInWords(report);
+  EXPECT_TRUE(report.has_distributions());
+}
+
+}  // namespace
+}  // namespace touchstone::hidden

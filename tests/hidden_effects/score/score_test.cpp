@@ -1,0 +1,96 @@
+// The trial in small, on fixed seeds: about thirty sets over all arms.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hidden_effects/score/trial.h"
+
+namespace touchstone::hidden {
+namespace {
+
+const Workshop& TheWorkshop() {
+  static const auto* workshop = new Workshop(OpenWorkshop(TOUCHSTONE_SHARED_DATA "/measurements"));
+  return *workshop;
+}
+
+// Runs the first `sets` sets of an arm; every answer to `measure` must be `wanted`, but for `exceptions`.
+void ExpectAlways(const char* arm_name, int sets, const char* measure, bool wanted, int exceptions = 0) {
+  const Arm* arm = FindArm(arm_name);
+  ASSERT_NE(arm, nullptr);
+  int asked = 0, otherwise = 0;
+  std::string wrong;
+  for (int k = 0; k < sets; ++k) {
+    const Outcome outcome = RunOne(*arm, SeedOf(Seeds::kTuning, *arm, k), TheWorkshop(), false);
+    ASSERT_EQ(outcome.error, "");
+    for (const Mark& mark : outcome.marks) {
+      if (mark.measure != measure) continue;
+      ++asked;
+      if (mark.yes == wanted) continue;
+      ++otherwise;
+      wrong += "\n  hidden " + TruthInWords(outcome.set.truth) + "\n  said " + ReportInWords(outcome.report);
+    }
+  }
+  EXPECT_GT(asked, 0);
+  EXPECT_LE(otherwise, exceptions) << wrong;
+}
+
+TEST(HiddenEffects, NothingHiddenIsNamedNothing) {
+  ExpectAlways("nothing", 4, "false claim", false);
+}
+
+TEST(HiddenEffects, ABadPrintIsNotSoldAsPhysics) {
+  ExpectAlways("bumps of 0.25 sigma", 2, "false claim", false);
+  ExpectAlways("bumps of 0.5 sigma", 2, "false claim", false);
+}
+
+TEST(HiddenEffects, AreNamedFirst) {
+  ExpectAlways("one", 5, "right first", true);
+}
+
+TEST(HiddenEffects, AreNamedFirstEvenIfWeak) {
+  ExpectAlways("one weak", 4, "right first", true, 1);
+}
+
+TEST(HiddenEffects, HaveTheirValues) {
+  ExpectAlways("one", 3, "within 3 standard errors", true);
+}
+
+TEST(HiddenEffects, AreAllFoundTogether) {
+  ExpectAlways("two", 3, "all found, none added", true, 1);
+}
+
+TEST(HiddenEffects, ThatDataCannotTellApartAreNamedTogetherWithWhatDecides) {
+  ExpectAlways("latency or length, one speed", 2, "said so, with what decides", true);
+  ExpectAlways("stretched time", 2, "said so, with what decides", true);
+}
+
+TEST(HiddenEffects, ThatASecondSpeedTellsApartAreToldApart) {
+  ExpectAlways("latency or length, two speeds", 2, "right first", true);
+}
+
+TEST(HiddenEffects, ThatNoCatalogueListsAreOwnedUp) {
+  ExpectAlways("unlisted", 4, "wrong name instead", false, 1);
+}
+
+TEST(HiddenEffects, OfSetsWithoutPosesBlameNobody) {
+  ExpectAlways("no poses", 2, "names a culprit", false);
+}
+
+TEST(HiddenEffects, AreNotMadeUpFromLossesAndOutliers) {
+  ExpectAlways("20 % missing", 1, "false claim", false);
+  ExpectAlways("2 % outliers", 1, "false claim", false);
+}
+
+TEST(TheModelsOwnValues, AreCorrectedWhereTheyAreWrong) {
+  ExpectAlways("wrong value", 2, "says wrong values", true);
+  ExpectAlways("wrong value", 1, "value right", true);
+}
+
+// The seed's own story: an ideal model against measurements with Gaussian noise of 0.04779.
+TEST(TheSeedsOwnStory, IsThatNoiseIsMissing) {
+  ExpectAlways("noise missing", 1, "noise named", true);
+  ExpectAlways("noise missing", 1, "noise within 5 %", true);
+  ExpectAlways("noise missing", 1, "histograms agree", true);
+}
+
+}  // namespace
+}  // namespace touchstone::hidden
