@@ -108,7 +108,7 @@ std::string HtmlNextTouches(const v1::Report& report) {
   }
   return Section(
       "next", "Next touches",
-      one_purpose && !first.empty() ? absl::StrCat("Touches that would decide: ", Typeset(first), ".")
+      one_purpose && !first.empty() ? absl::StrCat("What they are for: ", Typeset(first), ".")
                                     : "Touches that would tell the explanations that are left apart.",
       absl::StrCat(
           Pictures(report),

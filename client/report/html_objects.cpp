@@ -40,7 +40,8 @@ std::map<std::string, Object> Objects(const v1::Report& report, std::vector<std:
   return objects;
 }
 
-// Half the width of the colour scale: 98 % of the residuals before lie within, on a round number.
+// Half the width of the colour scale: 98 % of the residuals before lie within; the seven colours begin at
+// round numbers.
 double ColourLimit(const v1::Report& report) {
   std::vector<double> sizes;
   for (const v1::SurfacePoint& point : report.surface_points()) {
@@ -51,7 +52,7 @@ double ColourLimit(const v1::Report& report) {
   std::nth_element(sizes.begin(), sizes.begin() + rank, sizes.end());
   if (!(sizes[rank] > 0)) return 1;
   const double power = std::pow(10.0, std::floor(std::log10(sizes[rank])));
-  for (const double step : {1.0, 1.4, 2.1, 2.8, 3.5, 5.0, 7.0, 10.0}) {
+  for (const double step : {1.05, 1.4, 2.1, 2.8, 3.5, 4.2, 5.6, 7.0, 8.4, 10.5}) {
     if (sizes[rank] <= step * power) return step * power;
   }
   return 10 * power;
@@ -84,6 +85,7 @@ std::string Scale(double limit_us) {
 
 std::string Dots(const ObjectPicture& picture, const View& view, const Object& object, bool after,
                  double limit_us) {
+  const long width = std::lround(std::clamp(9 * std::sqrt(500.0 / (1 + object.points.size())), 8.0, 16.0));
   std::string paths[kColours], out;
   for (const v1::SurfacePoint* point : object.points) {
     const double residual = after ? point->after_us() : point->residual_us();
@@ -92,10 +94,12 @@ std::string Dots(const ObjectPicture& picture, const View& view, const Object& o
     const ObjectPicture::Projected p = picture.Project(view, at);
     absl::StrAppend(&paths[Colour(residual, limit_us)], "M", std::lround(p.x), " ", std::lround(p.y), "h0");
   }
-  // Small residuals below, large ones on top.
+  // Few contacts are drawn larger, so that their colours can be seen. Small residuals below, large ones on
+  // top.
   for (const int colour : {3, 2, 4, 1, 5, 0, 6}) {
     if (!paths[colour].empty())
-      absl::StrAppend(&out, "<path class=\"dot d", colour, "\" d=\"", paths[colour], "\"/>");
+      absl::StrAppend(&out, "<path class=\"dot d", colour, "\" stroke-width=\"", width, "\" d=\"",
+                      paths[colour], "\"/>");
   }
   return out;
 }

@@ -162,9 +162,9 @@ TEST(HtmlReport, ThinsPointsOfLargeSets) {
 TEST(HtmlReport, ClosesEveryElementItOpens) {
   for (const NamedReport& sample : AllSampleReports()) {
     const std::string html = HtmlReport(sample.report);
-    for (const char* tag : {"section", "figure", "table", "tbody", "thead", "tr",     "td",  "th", "div",
-                            "svg",     "g",      "dl",    "dt",    "dd",    "ol",     "ul",  "li", "p",
-                            "span",    "pre",    "h2",    "h3",    "h4",    "button", "text"}) {
+    for (const char* tag : {"section", "figure", "table", "tbody", "thead", "tr",     "td",   "th",     "div",
+                            "svg",     "g",      "dl",    "dt",    "dd",    "ol",     "ul",   "li",     "p",
+                            "span",    "pre",    "h2",    "h3",    "h4",    "button", "text", "details"}) {
       EXPECT_EQ(Times(html, absl::StrCat("<", tag, " ")) + Times(html, absl::StrCat("<", tag, ">")),
                 Times(html, absl::StrCat("</", tag, ">")))
           << tag << " in " << sample.name;

@@ -111,6 +111,7 @@ function turnTable(data) {
       const w3 = 1 - w1 - w2;
       return w1 >= 0 && w2 >= 0 && w3 >= 0 && w1 * f.a[2] + w2 * f.b[2] + w3 * f.d[2] > p[2] + margin;
     });
+    const spot = Math.min(7, Math.max(3.5, 4 * Math.sqrt(500 / object.f.length)));
     spots = [];
     for (let i = 0; i < object.f.length; ++i) {
       if (hidden.has(object.f[i])) continue;
@@ -121,7 +122,7 @@ function turnTable(data) {
     for (const s of spots) {
       pen.fillStyle = dots[Math.min(6, Math.max(0, Math.floor((s.us / data.limit_us + 1) * 3.5)))];
       pen.beginPath();
-      pen.arc(s.x, s.y, 4, 0, 7);
+      pen.arc(s.x, s.y, spot, 0, 7);
       pen.fill();
     }
   }

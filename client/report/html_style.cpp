@@ -33,9 +33,9 @@ margin:0;max-width:none}
 .pill{border:1.5px solid currentColor;border-radius:99px;padding:.05rem .7rem;font-weight:600;color:var(--given)}
 .pill.good{color:var(--good)}
 .pill.plain{color:var(--soft)}
-.lead{font-size:1.0625rem;max-width:40em;margin:1.6rem 0 .6rem}
+.lead{font-size:1.0625rem;max-width:40em;margin:1.6rem 0 -.4rem}
 .about{color:var(--soft);margin-bottom:1.2rem}
-.facts{margin:.2rem 0 0;color:var(--soft);font-size:.9375rem;max-width:none}
+.facts{margin:1.1rem 0 0;color:var(--soft);font-size:.9375rem;max-width:none}
 figure{margin:1.25rem 0 0;min-width:0}
 figcaption{color:var(--soft);font-size:.8125rem;line-height:1.45;margin-top:.45rem;max-width:48em}
 .grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(19rem,100%),1fr));gap:1.25rem 2rem;
@@ -52,10 +52,12 @@ align-items:start}
 h4{font-size:.9375rem;font-weight:600;margin:1.4rem 0 .4rem}
 
 .line-high{height:1.4em;display:flex;align-items:center}
-.pictures{width:9rem}
+.pictures{width:9rem;min-width:9rem}
 svg.chart.interval{width:8.5rem;height:1rem}
 .arrows{grid-template-columns:repeat(auto-fill,minmax(min(15rem,100%),1fr))}
-.why .barcell{width:26%}
+.why .barcell{width:20%}
+.rest{margin-top:1rem;grid-template-columns:minmax(0,1fr) minmax(0,1fr);color:var(--soft);font-size:.875rem}
+details{margin-top:1.25rem}summary{cursor:pointer;color:var(--soft);font-size:.9375rem;margin-bottom:1rem}
 .why td>div{white-space:nowrap}
 .hist{grid-template-columns:repeat(auto-fill,minmax(min(14rem,100%),1fr));gap:1.25rem 1.75rem}
 .arrows .map{overflow:visible}
@@ -79,7 +81,7 @@ svg.bar{width:100%;height:.9rem;margin-top:.2rem;overflow:visible}
 .mark{stroke:var(--ink);stroke-width:1.5;stroke-dasharray:3 2}
 .ladder{font-size:1rem}
 .ladder td{padding-top:.5rem;padding-bottom:.5rem}
-.ladder .barcell{width:46%}
+.ladder .barcell{width:42%}.ladder .name{min-width:10rem}
 .ladder svg.bar{height:1.25rem;margin-top:.1rem}
 .ladder tr.last td{border-bottom-color:transparent}
 .warnings{background:var(--warnwash);border-radius:.5rem;padding:.8rem 1.1rem;margin:1.5rem 0 0;font-size:.9375rem}
@@ -128,7 +130,7 @@ rect.f4{fill:var(--f4)}rect.f5{fill:var(--f5)}
 .map{width:100%;height:auto}
 .maps{grid-template-columns:repeat(4,1fr);gap:.4rem 1rem}
 .maps figcaption{margin-top:0;text-align:center}
-.dot{fill:none;stroke-linecap:round;stroke-width:9}
+.dot{fill:none;stroke-linecap:round}
 .d0{stroke:var(--d0)}.d1{stroke:var(--d1)}.d2{stroke:var(--d2)}.d3{stroke:var(--d3)}.d4{stroke:var(--d4)}
 .d5{stroke:var(--d5)}.d6{stroke:var(--d6)}
 .scale rect{stroke:none}
@@ -153,7 +155,7 @@ footer{margin-top:3.5rem;padding-top:1rem;border-top:1px solid var(--line);color
 .ladder td{border:0;padding:.1rem 0}.ladder .barcell{grid-column:1/-1;grid-row:2;width:100%}
 .ladder .more{grid-column:1/-1;text-align:left;font-size:.8125rem;color:var(--soft)}
 .ladder .more:empty{display:none}.ladder .more::before{content:attr(data-label) " "}
-dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:.4rem}}
+dl,.rest{grid-template-columns:1fr;gap:0}dd{margin-bottom:.4rem}.ladder .name{min-width:0}}
 @media print{:root{color-scheme:light;--paper:#fff;--wash:#f4f5f7;--ink:#000;--soft:#444;--line:#ccc;--given:#c8500a;
 --better:#0b6bb0;--measured:#4a525c;--area:#c9ced5;--good:#1a7f4b;--warn:#6b4600;--warnwash:#fff;
 --f0:#b4548a;--f1:#00805d;--f2:#b97d00;--f3:#3d7fc4;--f4:#7a55c7;--f5:#6b7280;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include <absl/strings/str_cat.h>
 
@@ -11,6 +12,9 @@
 
 namespace touchstone::client {
 namespace {
+
+constexpr double kTellingP = 0.01;
+constexpr size_t kLeastCurves = 4;  // shown though they tell nothing
 
 std::string Slices(const v1::Report& report) {
   if (report.where().empty()) return "";
@@ -47,6 +51,7 @@ std::string Groups(const v1::Report& report) {
   const double floor = NoiseFloorOf(report).sigma_us;
   std::string grid;
   for (const std::string& kind : order) {
+    if (kinds[kind].size() < 2) continue;  // says no more than the whole
     std::string title = kind;
     for (const auto& [name, shown] : kKinds) title = name == kind ? shown : title;
     std::string table = absl::StrCat("<table>", HeaderRow({title, ">RMSE", "", ">of excess"}), "<tbody>");
@@ -111,27 +116,52 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
                                    after ? "improved model" : "given model"));
   }
   return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>p ",
-                      Typeset(Probability(curve.p())), curve.p() < 0.01 ? ": the residual depends on it" : "",
+                      Typeset(Probability(curve.p())),
+                      curve.p() < kTellingP ? ": the residual depends on it" : "",
                       "</span></p><div class=\"pair\">", pair, "</div></figure>\n");
 }
 
-std::string Curves(const v1::Report& report) {
-  std::string grid;
-  std::vector<std::pair<std::string, std::string>> keys;
+// Most telling first; those of numbered groups (face 3) are left to the tables of groups.
+std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::Report& report) {
+  std::set<std::string> kinds;
+  for (const v1::GroupError& group : report.groups()) kinds.insert(group.kind());
+  std::vector<const v1::CovariateCurve*> curves;
   for (const v1::CovariateCurve& curve : report.curves()) {
-    if (curve.bins().empty()) continue;
-    grid += CurvePair(report, curve);
-    for (const v1::CurveBin& bin : curve.bins()) {
-      const auto same = [&](const auto& key) { return key.second == absl::StrCat("finger ", bin.finger()); };
+    if (!curve.bins().empty() && kinds.count(curve.covariate()) == 0) curves.push_back(&curve);
+  }
+  const auto rank = [](const v1::CovariateCurve* curve) { return std::isnan(curve->p()) ? 2 : curve->p(); };
+  std::stable_sort(curves.begin(), curves.end(),
+                   [&](const auto* a, const auto* b) { return rank(a) < rank(b); });
+  return curves;
+}
+
+std::string Curves(const v1::Report& report) {
+  const std::vector<const v1::CovariateCurve*> curves = CurvesToShow(report);
+  if (curves.empty()) return "";
+  std::string open, folded;
+  std::vector<std::pair<std::string, std::string>> keys;
+  size_t shown = 0;
+  for (const v1::CovariateCurve* curve : curves) {
+    const bool telling = curve->p() < kTellingP || shown < kLeastCurves;
+    (telling ? open : folded) += CurvePair(report, *curve);
+    shown += telling;
+    for (const v1::CurveBin& bin : curve->bins()) {
+      const std::string finger = absl::StrCat("finger ", bin.finger());
+      const auto same = [&](const auto& key) { return key.second == finger; };
       if (bin.finger().empty() || std::any_of(keys.begin(), keys.end(), same)) continue;
-      keys.push_back({absl::StrCat("f", keys.size() % 6), absl::StrCat("finger ", bin.finger())});
+      keys.push_back({absl::StrCat("f", keys.size() % 6), finger});
     }
   }
-  if (grid.empty()) return "";
-  return absl::StrCat("<h3>Residual against every covariate</h3>\n", Legend(keys),
-                      "<div class=\"grid wide\">", grid,
-                      "</div>\n<p class=\"note\">Means within bins, whiskers one standard error. p: of any "
-                      "dependence, by permutation, corrected for the number of covariates.</p>\n");
+  if (!folded.empty()) {
+    folded = absl::StrCat("<details><summary>", curves.size() - shown,
+                          " more, on which the residual does not depend</summary><div class=\"grid wide\">",
+                          folded, "</div></details>\n");
+  }
+  return absl::StrCat(
+      "<h3>Residual against every covariate</h3>\n", Legend(keys), "<div class=\"grid wide\">", open,
+      "</div>\n", folded,
+      "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
+      "permutation, corrected for the number of covariates.</p>\n");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Why: every effect of the catalogue as the one that is missing, and what these data cannot tell apart; and
 // when nothing listed explains the rest, what it hangs on.
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <absl/strings/str_cat.h>
@@ -18,6 +19,29 @@ double Unseen(double heldout_us, double rmse_us) {
   return heldout_us > 0 ? heldout_us : rmse_us;
 }
 
+// "offset_mm l", "relative lat10".
+std::string ShortName(const v1::ParameterValue& parameter) {
+  return absl::StrCat(parameter.name(), parameter.finger().empty() ? "" : " ", parameter.finger(),
+                      parameter.object().empty() ? "" : " ", parameter.object());
+}
+
+// Effects without a fit, by the reason why there is none.
+std::string NotFitted(const v1::Report& report) {
+  std::vector<std::string> notes;
+  std::map<std::string, std::vector<std::string>> effects;
+  for (const v1::Candidate& candidate : report.candidates()) {
+    if (candidate.rmse_us() > 0 || candidate.note().empty()) continue;
+    std::vector<std::string>& names = effects[candidate.note()];
+    if (names.empty()) notes.push_back(candidate.note());
+    names.push_back(absl::StrCat(candidate.effect(), candidate.scope() == "object" ? " (per object)" : ""));
+  }
+  std::string items;
+  for (const std::string& note : notes) {
+    absl::StrAppend(&items, "<dt>", Escape(Join(effects[note], "and")), "</dt><dd>", Typeset(note), "</dd>");
+  }
+  return items.empty() ? "" : absl::StrCat("<dl class=\"rest\">", items, "</dl>\n");
+}
+
 // Value and picture of each parameter, one line each.
 template <typename Parameters>
 std::string ParameterCells(const Parameters& parameters) {
@@ -28,7 +52,7 @@ std::string ParameterCells(const Parameters& parameters) {
     const std::string interval = Interval(parameter);
     absl::StrAppend(&names, "<div",
                     interval.empty() ? "" : absl::StrCat(" title=\"95 % interval ", Escape(interval), "\""),
-                    "><span class=\"dim\">", Escape(ParameterName(parameter)), "</span> ",
+                    "><span class=\"dim\">", Escape(ShortName(parameter)), "</span> ",
                     Typeset(ValueWithError(parameter)), "</div>");
     absl::StrAppend(&pictures, "<div class=\"line-high\">", IntervalPicture(parameter), "</div>");
   }
@@ -49,13 +73,14 @@ std::string CandidateTable(const v1::Report& report) {
                                               "Parameter \u00b1 standard error", "95 % interval"}),
                                    "<tbody>");
   for (const v1::Candidate& candidate : report.candidates()) {
+    if (!(candidate.rmse_us() > 0) && !candidate.note().empty()) continue;
     const double left = Unseen(candidate.heldout_rmse_us(), candidate.rmse_us());
     const double p = candidate.probability();
     absl::StrAppend(
         &table, p < 0.05 ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           candidate.scope() == "object" ? "<br><small>a value per object</small>" : "")),
-        NumberCell(p < 0.005 ? "< 0.01" : Fixed(p, 2)), NumberCell(left > 0 ? Time(left) : ""),
+        NumberCell(EffectProbability(p)), NumberCell(left > 0 ? Time(left) : ""),
         Cell(left > 0 ? Bar(left / largest, p < 0.05 ? "share" : "better", floor > 0 ? floor / largest : -1)
                       : "",
              "barcell"));
@@ -66,10 +91,11 @@ std::string CandidateTable(const v1::Report& report) {
     }
     table += "</tr>\n";
   }
-  return Figure(
-      absl::StrCat(table, "</tbody></table></div>"),
-      "Each effect alone, as the first to be added. It would leave: the RMSE on touches left out of the fit, "
-      "dashed the noise floor. Intervals: 95 %, the upright line is zero, no effect.");
+  return Figure(absl::StrCat(table, "</tbody></table></div>"),
+                "Each effect alone, as the first to be added. It would leave: the RMSE on touches left out "
+                "of the fit, "
+                "dashed the noise floor. Intervals: 95 %, the upright line is zero, no effect.") +
+         NotFitted(report);
 }
 
 std::string Ambiguities(const v1::Report& report) {

@@ -62,9 +62,11 @@ ObjectPicture::ObjectPicture(const v1::ObjectOutline& outline, const std::vector
   }
   for (int k = 0; k < 3; ++k) centre_[k] = 0.5 * (low[k] + high[k]);
   double radius = 5e-7;
-  for (const Vector& p : corners.empty() ? points_mm : corners) {
-    const Vector out = Minus(p, centre_);
-    if (IsFinite(out)) radius = std::max(radius, std::sqrt(Dot(out, out)));
+  for (const std::vector<Vector>* set : {static_cast<const std::vector<Vector>*>(&corners), &points_mm}) {
+    for (const Vector& p : *set) {
+      const Vector out = Minus(p, centre_);
+      if (IsFinite(out)) radius = std::max(radius, std::sqrt(Dot(out, out)));
+    }
   }
   size_ = 2 * radius;
 

@@ -53,7 +53,7 @@ void AddEffect(const Effect& effect, const std::string& name, double probability
       parameters.size() > 1 ||
       (parameters.size() == 1 && (!parameters[0].finger().empty() || !parameters[0].object().empty()));
   const std::string first = parameters.empty() ? "" : Parameter(parameters[0], named);
-  const std::string p = std::isnan(probability) ? "" : probability < 0.005 ? "< 0.01" : Fixed(probability, 2);
+  const std::string p = EffectProbability(probability);
   rows->push_back({{name, false, style},
                    {first, false, style},
                    {p, true, style},

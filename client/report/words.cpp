@@ -113,6 +113,11 @@ std::string Probability(double p) {
   return p > 0.995 ? "1.00" : Fixed(p, p < 0.1 ? 3 : 2);
 }
 
+std::string EffectProbability(double p) {
+  if (std::isnan(p)) return "";
+  return p < 0.005 ? "< 0.01" : p > 0.995 ? "> 0.99" : Fixed(p, 2);
+}
+
 std::string Share(double share) {
   if (std::isnan(share)) return "n/a";
   const double percent = 100 * share;

@@ -29,6 +29,7 @@ std::string Time(double us);                                              // "41
 std::string SignedTime(double us);                                        // "+9.10 ms"
 std::string TimeChange(double from_us, double to_us);                     // "41.0 -> 5.0 ms"
 std::string Probability(double p);                                        // "0.40", "3e-9", "< 1e-15"
+std::string EffectProbability(double p);                                  // "0.97", "< 0.01", "> 0.99"
 std::string Share(double share);                                          // "98.5 %"
 std::string Covariate(const std::string& name, const std::string& unit);  // "incidence (deg)"
 

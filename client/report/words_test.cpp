@@ -43,11 +43,17 @@ TEST(ValueWithError, HasAsManyDigitsAsTheErrorAllows) {
   EXPECT_EQ(ValueWithError(Value(20, std::nan(""), "mm/s")), "20.0 mm/s");
 }
 
-TEST(Probability, NeverClaimsCertainty) {
+TEST(Probability, HasOneDigitOfSmallValues) {
   EXPECT_EQ(Probability(0), "< 1e-15");
   EXPECT_EQ(Probability(3.2e-9), "3e-9");
   EXPECT_EQ(Probability(0.0123), "0.012");
   EXPECT_EQ(Probability(0.44), "0.44");
+}
+
+TEST(EffectProbability, NeverClaimsCertainty) {
+  EXPECT_EQ(EffectProbability(1), "> 0.99");
+  EXPECT_EQ(EffectProbability(0.97), "0.97");
+  EXPECT_EQ(EffectProbability(0), "< 0.01");
 }
 
 TEST(Share, ShowsTenthsNearTheEnds) {
