@@ -246,16 +246,15 @@ absl::Status UnposedComparison::RankAmongSets() {
 // How far the touches were tilted and spread is unknown. What another tilt or spread explains is no error of
 // the model: so the most favourable one is taken. That makes p too large rather than too small.
 absl::Status UnposedComparison::FitPlan() {
-  const UnposedNull null = NullOf(sets_, objects_.size());
-  double best = null.Largest(UnposedDistances(measured_, reference_));
+  double best = UnposedDistances(measured_, reference_)[0];
   const auto attempt = [&](double tilt_deg, double spread, FacesPlan* best_plan) -> absl::Status {
     for (UnposedObject& object : objects_) {
       object.plan.faces.most_tilt_rad = tilt_deg * kRadiansPerDegree;
       object.plan.faces.spread = spread;
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<UnposedSample> reference, MakeReference(model_));
-    const double largest = null.Largest(UnposedDistances(measured_, reference));
-    if (largest < best) best = largest, *best_plan = objects_[0].plan.faces;
+    const double distance = UnposedDistances(measured_, reference)[0];
+    if (distance < best) best = distance, *best_plan = objects_[0].plan.faces;
     return absl::OkStatus();
   };
   FacesPlan coarse = objects_[0].plan.faces;
