@@ -1,3 +1,5 @@
+#include <spdlog/spdlog.h>
+
 #include <cstdio>
 
 #include "client/cli/common.h"
@@ -35,6 +37,8 @@ int main(int argc, char** argv) {
     return touchstone::cli::kRefused;
   }
 #endif
+  // A source in this process keeps no log: stdout and stderr are the command's.
+  spdlog::set_level(spdlog::level::off);
   touchstone::cli::Interrupt::Install();
   touchstone::cli::Cli cli;
   touchstone::cli::AddCommands(&cli);
