@@ -15,9 +15,9 @@ namespace {
 constexpr double kStep = 0.02;          // of a coordinate's scale, for derivatives
 constexpr double kJumpM = 0.3e-3;       // a finger that moves so far within a step has met another face
 constexpr double kJumpOverMedian = 200;
-constexpr int kMostIterations = 10;
 constexpr int kMostHalvings = 5;
 constexpr double kConverged = 0.02;     // nats
+constexpr double kSmallStep = 0.05;    // standard errors
 constexpr double kSeen = 10;           // squared scale over standard error from where a direction counts as seen
 constexpr double kPriorWidth = 10;     // of a value's prior (Cauchy) over the size that rigs show
 constexpr double kRidge = 1e-4;         // prior precision over 1 / scale^2: holds what nothing determines
@@ -246,7 +246,7 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
   return columns;
 }
 
-absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start) {
+absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int most_iterations) {
   const Likelihood& likelihood = *experiment.likelihood;
   Fit fit;
   fit.point = start.Clip(start.Start());
@@ -262,7 +262,7 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start) {
     values << ResidualContrasts(experiment, fit.time_s), derivatives;
     fit.columns = likelihood.Prepare(values);
     judgement = Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
-    if (start.size() == 0 || iteration == kMostIterations) break;
+    if (start.size() == 0 || iteration == most_iterations) break;
 
     // Along the step, as far as the likelihood of the best hypothesis really grows.
     const int s = judgement.surface;
@@ -292,7 +292,11 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start) {
     // A full step that came out as foretold needs no further derivatives.
     const Judgement after =
         Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
-    if (fraction == 1 && std::abs(after.evidence - judgement.evidence) < kConverged) {
+    double farthest = 0;  // of what is left to go, in standard errors
+    for (int i = 0; i < start.size(); ++i)
+      farthest = std::max(farthest, std::abs(after.step[i]) / std::sqrt(std::max(after.covariance(i, i), 1e-300)) *
+                                        (after.covariance(i, i) > 0));
+    if (fraction == 1 && farthest < kSmallStep && std::abs(after.evidence - judgement.evidence) < kConverged) {
       judgement = after;
       break;
     }

@@ -75,7 +75,7 @@ void RoundValues(const Fit& fit, Model* model) {
     for (const v1::ParameterValue& value : fit.model.Describe(index, fit.point, fit.covariance)) {
       for (int p = 0; p < static_cast<int>(instance.effect->parameters.size()); ++p) {
         const ParameterInfo& parameter = instance.effect->parameters[p];
-        if (parameter.name != value.name() || parameter.sum_zero) continue;
+        if (parameter.name != value.name()) continue;
         std::vector<double>& values =
             value.object().empty() ? instance.values : instance.object_values.at(value.object());
         for (int j = 0; j < parameter.Count(model->fingers); ++j) {
@@ -83,6 +83,12 @@ void RoundValues(const Fit& fit, Model* model) {
           const double rounded = RoundedTo(value.value(), value.std_error());
           if (rounded >= parameter.lower && rounded <= parameter.upper)
             values[ValueOffset(*instance.effect, p, model->fingers) + j] = ToSi(parameter.unit, rounded);
+          // The last of values that sum to zero is what the others leave.
+          const int last = parameter.Count(model->fingers) - 1;
+          if (!parameter.sum_zero || j != last) continue;
+          double sum = 0;
+          for (int i = 0; i < last; ++i) sum += values[ValueOffset(*instance.effect, p, model->fingers) + i];
+          values[ValueOffset(*instance.effect, p, model->fingers) + last] = -sum;
         }
       }
     }
@@ -125,7 +131,7 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
   // Refits.
   DescribeRefits(*study->input.model, fit, &ladder, report);
 
-  // Steps in the order in which they help most.
+  // Steps in the order in which they explain most.
   std::vector<int> kept, open;
   for (const ExplainedStep& step : explained.steps) open.push_back(step.effect);
   while (!open.empty()) {
@@ -141,8 +147,7 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
         trial = FitModel(study->experiment, Only(explained.fit.model, given, with));
         if (!trial.ok()) return trial.status();
       }
-      if (next.ok() && trial->columns.values.col(0).squaredNorm() >= next->columns.values.col(0).squaredNorm())
-        continue;
+      if (next.ok() && trial->evidence <= next->evidence) continue;
       next = std::move(trial);
       chosen = j;
     }

@@ -217,7 +217,18 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
       NoiseModel level = best;
       level.slope = 0;
       slope_gain = best_log - ProfileSigma(touches, &level);
-      if (slope_gain < kEnterNats) best = level;
+      if (slope_gain < kEnterNats) {
+        best = level;
+        if (best.shape == NoiseShape::kStudent) {
+          student = level;
+          double level_log = -INFINITY;
+          const double log_level = Maximise(student_at, std::log(1.2), std::log(60.0), 9, &level_log);
+          const double bend = CurvatureError(student_at, log_level, 0.1);
+          student_at(log_level);
+          found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - before};
+          best = student;
+        }
+      }
     }
   }
   if (slope_gain >= kEnterNats) {

@@ -15,7 +15,7 @@ namespace touchstone {
 namespace {
 
 constexpr int kFolds = 5;
-constexpr double kNearForecast = 20;  // nats: candidates this far behind the best forecast are not fitted
+constexpr double kNearForecast = 40;  // nats: candidates this far behind the best forecast are not fitted
 constexpr double kVisible = 1e-9;     // s of change at the typical size
 constexpr int kFormulaStarts = 8;
 
@@ -229,7 +229,9 @@ absl::StatusOr<bool> Search::Shrink(Explanation* explanation) const {
 
 absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation& explanation, int index) const {
   const Effect& own = *explanation.fit.model.base().effects[index].effect;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, WithoutEffect(explanation, index));
+  // The other effects stay where they are: what takes this one's place finds them so.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without,
+                              FitModel(experiment_, explanation.fit.model.Without(index), 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Move> moves, Score(without, explanation.given));
   std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.evidence > b.evidence; });
   std::vector<Alternative> alternatives;
