@@ -50,7 +50,7 @@ absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const
 
 // Touches that were added until the verdict; `*arrived` false if it was never right and sure.
 absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bool designed, uint64_t seed,
-                          bool* arrived) {
+                          bool* arrived, int* proposed_touches) {
   const std::vector<Command> random = DrawCommands(scenario, kBegin + kMostAdded, seed);
   std::vector<Command> commands(random.begin(), random.begin() + kBegin);
   for (;;) {
@@ -65,6 +65,7 @@ absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bo
     if (designed) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Command> proposed, Proposed(input, scenario));
       // What is not proposed is random.
+      *proposed_touches += std::min<size_t>(proposed.size(), kAddedAtOnce);
       std::copy_n(proposed.begin(), std::min<size_t>(proposed.size(), kAddedAtOnce), next.begin());
     }
     commands.insert(commands.end(), next.begin(), next.end());
@@ -82,8 +83,8 @@ Race RunRace(const Workshop& workshop, uint64_t seed) {
   scenario.hidden = {WeakEffect(effect, scenario, seed, 6)};
   Race race;
   race.truth = scenario;
-  const auto designed = Added(workshop, scenario, true, seed, &race.designed_arrived);
-  const auto others = Added(workshop, scenario, false, seed, &race.random_arrived);
+  const auto designed = Added(workshop, scenario, true, seed, &race.designed_arrived, &race.proposed);
+  const auto others = Added(workshop, scenario, false, seed, &race.random_arrived, nullptr);
   for (const auto* added : {&designed, &others})
     if (!added->ok()) race.error = added->status().ToString();
   if (race.error.empty()) race.designed = *designed, race.random = *others;

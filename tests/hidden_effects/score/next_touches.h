@@ -11,7 +11,8 @@ namespace touchstone::hidden {
 
 struct Race {
   Scenario truth;
-  int designed = 0, random = 0;                           // touches that were added until the verdict
+  int designed = 0, random = 0;  // touches that were added until the verdict
+  int proposed = 0;              // of the designed, those that were proposed; the others are random
   bool designed_arrived = false, random_arrived = false;  // false: gave up at kMostAdded
   std::string error;
 };

@@ -61,9 +61,10 @@ int main(int argc, char** argv) {
     races = options.arms.empty() ? std::max(1, static_cast<int>(std::lround(20 * options.share))) : 0;
   const Races raced = RunRaces(workshop, options.seeds, races, options.threads, [&](const Race& race) {
     if (verbose)
-      printf("race: hidden %s => designed %d%s, random %d%s %s\n", TruthInWords(race.truth).c_str(),
-             race.designed, race.designed_arrived ? "" : " (gave up)", race.random,
-             race.random_arrived ? "" : " (gave up)", race.error.c_str());
+      printf("race: hidden %s => designed %d (%d proposed)%s, random %d%s %s\n",
+             TruthInWords(race.truth).c_str(), race.designed, race.proposed,
+             race.designed_arrived ? "" : " (gave up)", race.random, race.random_arrived ? "" : " (gave up)",
+             race.error.c_str());
   });
   if (races > 0) printf("\n%s", RacesInWords(raced).c_str());
   return result.errors == 0 ? 0 : 1;
