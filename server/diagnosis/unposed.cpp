@@ -20,9 +20,10 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMeasuredTouches = 1500;   // at most, all objects together
-constexpr int kReferenceTouches = 3000;  // about, all objects together
-constexpr int kFirstSets = 99;           // made by the model; more only if the first look suspicious
+constexpr int kMeasuredTouches = 1500;       // at most, all objects together
+constexpr int kReferenceTouches = 3000;      // about, all objects together
+constexpr int kMostReferenceAnObject = 900;  // distances among them grow with their square
+constexpr int kFirstSets = 99;               // made by the model; more only if the first look suspicious
 constexpr int kAllSets = 499;
 constexpr double kSuspicious = 0.1;
 constexpr double kSmallP = 0.005;  // below it the model is not compatible
@@ -163,7 +164,8 @@ absl::StatusOr<std::vector<double>> UnposedComparison::TimesOfSet(const std::sha
   if (!reference) return SimulateUnposed(model, like.surface, like.plan, like.number, seed);
   Plan plan = like.plan;
   plan.faces.rounds = 1;
-  plan.faces.samples_per_face = std::max(10, kReferenceTouches / 6 / static_cast<int>(set_.objects.size()));
+  plan.faces.samples_per_face = std::clamp(kReferenceTouches / 6 / static_cast<int>(set_.objects.size()), 10,
+                                           kMostReferenceAnObject / 6);
   std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
   for (size_t n = 0; n < numbers.size(); ++n) numbers[n] = n;
   return SimulateUnposed(model, like.surface, plan, numbers, seed);
