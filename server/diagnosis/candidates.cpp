@@ -26,23 +26,24 @@ constexpr Tie kTies[] = {
     {"speed_error", "clock_skew",
      "Compare with an absolute clock, or with the arm's encoders: only a wrong speed shows there."},
     {"speed_error", "contact_slowdown",
-     "Read the arm's speed from its encoders before and after the first contact, or clamp the object and touch with "
+     "Read the arm's speed from its encoders before and after the first contact, or clamp the object and "
+     "touch with "
      "one finger: a slowdown begins at the first contact."},
     {"clock_skew", "contact_slowdown",
      "Compare with an absolute clock; or read the arm's speed before and after the first contact."},
     {"object_scale", "speed_error",
-     "Measure the object with a caliper, or touch it from the side with a shorter standoff: a wrong scale moves the "
+     "Measure the object with a caliper, or touch it from the side with a shorter standoff: a wrong scale "
+     "moves the "
      "surface, a wrong speed stretches all differences alike."},
     {"gravity_sag", "object_pose",
      "Turn the object upside down: sag stays below, a misplaced object turns along."},
     {"object_push", "contact_slowdown",
-     "Clamp the object: a push disappears. Or touch surfaces of larger steps: a slowdown grows with the gap."},
+     "Clamp the object: a push disappears. Or touch surfaces of larger steps: a slowdown grows with the "
+     "gap."},
     {"tip_radius", "oblique_slip",
      "Measure the tips, or touch one flat face at 0 and at 25 deg: balls come early there, slip comes late."},
-    {"tool_tilt", "finger_length",
-     "Swap the outer fingers: lengths go with them, a tilt stays."},
-    {"tool_tilt", "object_pose",
-     "Turn the object by 90 deg about the approach: a tilt stays with the tool."},
+    {"tool_tilt", "finger_length", "Swap the outer fingers: lengths go with them, a tilt stays."},
+    {"tool_tilt", "object_pose", "Turn the object by 90 deg about the approach: a tilt stays with the tool."},
     {"tool_yaw", "object_pose", "Turn the object by 90 deg about the approach: a yaw stays with the tool."},
     {"finger_spacing", "object_scale", "Measure the distance of the outer fingers with a caliper."},
     {"thermal_drift", "finger_length",

@@ -15,8 +15,8 @@ struct Candidate {
   bool of_user = false;  // from `also`
 };
 
-// Every effect of the catalogue that changes expectations and that the model does not have yet, an object's pose
-// and scale also object by object, and the user's own.
+// Every effect of the catalogue that changes expectations and that the model does not have yet, an object's
+// pose and scale also object by object, and the user's own.
 std::vector<Candidate> MakeCandidates(const DiagnosisInput& input);
 
 // The measurement or intervention that tells two or more effects apart, for people.

@@ -1,6 +1,7 @@
 // What can be seen of a touch: the differences between its fingers. The n - 1 orthonormal contrasts of the n
-// fingers that report carry all of it, and noise that is independent from finger to finger stays white in them
-// (DIAGNOSIS: treating t - min t as independent numbers raises false alarms to four times the nominal rate).
+// fingers that report carry all of it, and noise that is independent from finger to finger stays white in
+// them (DIAGNOSIS: treating t - min t as independent numbers raises false alarms to four times the nominal
+// rate).
 #pragma once
 
 #include <vector>
@@ -13,13 +14,13 @@ namespace touchstone {
 
 class Contrasts {
  public:
-  // The touches that are used, fingers that report and that `expected_s` (times, [k * fingers + finger]) has a
-  // number for. Rows are sorted by object, then by touch.
+  // The touches that are used, fingers that report and that `expected_s` (times, [k * fingers + finger]) has
+  // a number for. Rows are sorted by object, then by touch.
   Contrasts(const Observations& observations, const std::vector<double>& expected_s);
 
   int rows() const { return rows_; }
-  const std::vector<int>& touches() const { return touches_; }      // in the order of the rows
-  int FirstRow(int t) const { return first_row_[t]; }               // of touches()[t]; t = count: rows()
+  const std::vector<int>& touches() const { return touches_; }  // in the order of the rows
+  int FirstRow(int t) const { return first_row_[t]; }           // of touches()[t]; t = count: rows()
   int FirstRowOfObject(int object) const { return object_row_[object]; }  // object = count: rows()
   const std::vector<int>& object_of_row() const { return object_of_row_; }
   const std::vector<int>& touch_of_row() const { return touch_of_row_; }  // index into touches()

@@ -28,8 +28,8 @@ TEST(Contrasts, KeepTheLengthOfAResidual) {
 
 TEST(Contrasts, LeaveOutFingersThatDidNotReport) {
   MadeUpSet set(1, 4, 1, 0.005, 1);
-  set.observations.time_s[0] = NAN;                                       // touch 0: two fingers left
-  set.observations.time_s[3] = set.observations.time_s[4] = NAN;          // touch 1: one
+  set.observations.time_s[0] = NAN;                               // touch 0: two fingers left
+  set.observations.time_s[3] = set.observations.time_s[4] = NAN;  // touch 1: one
   const Contrasts contrasts(set.observations, set.prediction.time_s);
   EXPECT_EQ(contrasts.rows(), 1 + 0 + 2 + 2);
   EXPECT_EQ(contrasts.touches(), (std::vector<int>{0, 2, 3}));

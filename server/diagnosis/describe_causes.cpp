@@ -14,7 +14,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kRanked = 8;             // candidates that are fitted in full
+constexpr int kRanked = 8;  // candidates that are fitted in full
 constexpr int kMostCovariates = 6;
 constexpr double kCovariateP = 0.01;
 
@@ -52,7 +52,8 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
   const Search& search = *explained.search;
   const Fit& given = explained.given;
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Move> moves, search.Score(given, explained.given_effects));
-  std::stable_sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.evidence > b.evidence; });
+  std::stable_sort(moves.begin(), moves.end(),
+                   [](const Move& a, const Move& b) { return a.evidence > b.evidence; });
   std::vector<v1::Candidate> candidates;
   double all = 1;  // nothing is missing: evidence 0
   int fitted = 0;
@@ -75,7 +76,8 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
       for (v1::ParameterValue& value : fit.model.Describe(index, fit.point, fit.covariance))
         *candidate.add_parameters() = std::move(value);
       const Eigen::VectorXd r = fit.columns.values.col(0);
-      candidate.set_rmse_us(std::sqrt(r.squaredNorm() / std::max<double>(1, static_cast<double>(r.size()))) * 1e6);
+      candidate.set_rmse_us(std::sqrt(r.squaredNorm() / std::max<double>(1, static_cast<double>(r.size()))) *
+                            1e6);
       candidate.set_heldout_rmse_us(search.HeldoutRmse(fit) * 1e6);
     } else {
       candidate.set_note("not among the eight most probable; its gain is a linear forecast");
@@ -156,9 +158,9 @@ absl::Status DescribeUnexplained(const Study& study, const Explained& explained,
                               explained.search->Score(explained.without_formula, explained.given_effects));
   for (const Move& move : moves) {
     if (move.candidate < 0 || !move.visible) continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
-                                Derivatives(study.experiment, move.start, move.start.Start(),
-                                            explained.without_formula.time_s, own));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const Eigen::MatrixXd span,
+        Derivatives(study.experiment, move.start, move.start.Start(), explained.without_formula.time_s, own));
     if (span.cols() > 8) continue;  // object by object: looks like anything
     const double cosine = Cosine(others, column, span);
     if (cosine <= unexplained->nearest_cosine()) continue;

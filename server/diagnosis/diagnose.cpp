@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/describe_residuals.h"
 #include "server/diagnosis/ladder.h"
+#include "server/diagnosis/propose.h"
 #include "server/diagnosis/summary.h"
 #include "server/diagnosis/unposed.h"
 #include "server/diagnosis/where.h"
@@ -16,6 +17,7 @@
 namespace touchstone {
 namespace {
 
+constexpr int kMostRivals = 4;
 constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is ambiguous
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
@@ -64,9 +66,44 @@ void Describe(const Study& study, const std::vector<double>& before, const Predi
               const std::vector<double>& after, v1::Report* report) {
   const Observations& o = *study.observations;
   const double sigma_s = report->noise_floor_us() * 1e-6;
-  for (v1::Slice& slice : FindSlices(o, study.nominal, before, sigma_s)) *report->add_where() = std::move(slice);
+  for (v1::Slice& slice : FindSlices(o, study.nominal, before, sigma_s))
+    *report->add_where() = std::move(slice);
   DescribeResiduals(o, study.nominal, improved, before, after,
                     {sigma_s, study.input.model->spacing_m, study.input.seed}, report);
+}
+
+// Touches that would tell what fits alike apart. Always asked for by Propose; Diagnose asks only where
+// something is ambiguous.
+absl::Status AddNextTouches(const Study& study, const Explained& explained, const Ladder& ladder, int touches,
+                            bool always, v1::Report* report) {
+  std::vector<std::shared_ptr<const Model>> rivals = {std::make_shared<const Model>(ladder.improved)};
+  std::vector<std::string> names = {"the model as it is"};
+  // The step with the nearest rival decides what is asked.
+  const ExplainedStep* closest = nullptr;
+  for (const ExplainedStep& step : explained.steps) {
+    if (step.rivals.empty() || !(always || step.rivals[0].equivalent)) continue;
+    if (closest == nullptr || step.rivals[0].evidence > closest->rivals[0].evidence) closest = &step;
+  }
+  if (closest != nullptr) {
+    names[0] = NameOf(*explained.fit.model.base().effects[closest->effect].effect);
+    for (const Rival& rival : closest->rivals) {
+      if (!rival.equivalent && rivals.size() > 1) break;
+      if (static_cast<int>(rivals.size()) == kMostRivals) break;
+      rivals.push_back(std::make_shared<const Model>(rival.model));
+      names.push_back(rival.name);
+    }
+  } else if (!always) {
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<v1::ProposedTouch> proposed,
+                              ProposeTouches(*study.searched, rivals, names, report->noise_floor_us() * 1e-6,
+                                             touches, study.input.seed, study.context.pool));
+  for (const v1::ProposedTouch& touch : proposed) *report->add_next_touches() = touch;
+  if (always && proposed.empty())
+    report->add_warnings(closest == nullptr ? "No touch would tell more than those at hand."
+                                            : "No touch of this rig tells " + names[0] + " from " + names[1] +
+                                                  ": " + DecidedBy({names[0], names[1]}));
+  return absl::OkStatus();
 }
 
 v1::Report Begin(const DiagnosisInput& input) {
@@ -106,7 +143,11 @@ absl::StatusOr<v1::Report> Compare(const DiagnosisInput& input, const DiagnosisC
   return report;
 }
 
-absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touches, const DiagnosisContext& context) {
+namespace {
+
+// `always`: Propose, which names touches even where nothing is ambiguous.
+absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touches, bool always,
+                                         const DiagnosisContext& context) {
   if (!input.set->has_poses) return CompareUnposed(input, context, true);
   const double began = Now();
   Gate gate(context);
@@ -137,18 +178,22 @@ absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touche
   for (const std::string& warning : study->warnings) report.add_warnings(warning);
   AddWarnings(o, &report);
   report.set_summary(Summary(report));
-  (void)touches;
+  TOUCHSTONE_RETURN_IF_ERROR(
+      AddNextTouches(*study, explained, ladder, always ? touches : kDefaultTouches, always, &report));
   report.set_duration_s(Now() - began);
   gate.Tell("done", 1);
   return report;
 }
 
+}  // namespace
+
 absl::StatusOr<v1::Report> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
-  return DiagnoseStudy(input, kDefaultTouches, context);
+  return DiagnoseStudy(input, kDefaultTouches, false, context);
 }
 
-absl::StatusOr<v1::Report> Propose(const DiagnosisInput& input, int touches, const DiagnosisContext& context) {
-  return DiagnoseStudy(input, touches, context);
+absl::StatusOr<v1::Report> Propose(const DiagnosisInput& input, int touches,
+                                   const DiagnosisContext& context) {
+  return DiagnoseStudy(input, touches, true, context);
 }
 
 }  // namespace touchstone

@@ -1,8 +1,8 @@
 // How wrong is a model, where, why, and what to do (DESIGN 8 and 9).
 //
-// The three calls are pure functions of their input: the same input gives the same report, whatever the number
-// of threads. They never fail because the data are poor: they say what the data can tell. They fail on input
-// that contradicts itself (an object without a mesh, other numbers of fingers).
+// The three calls are pure functions of their input: the same input gives the same report, whatever the
+// number of threads. They never fail because the data are poor: they say what the data can tell. They fail on
+// input that contradicts itself (an object without a mesh, other numbers of fingers).
 #pragma once
 
 #include <functional>

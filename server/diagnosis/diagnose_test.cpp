@@ -87,8 +87,8 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
   HiddenRig rig;
   rig.samples_per_face = 6;
   rig.hidden = {{"formula",
-                 {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm", "k_min=-1",
-                  "k_max=1"}}};
+                 {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
+                  "k_min=-1", "k_max=1"}}};
   const v1::Report report = DiagnoseRig(rig);
   EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED) << report.summary();
   ASSERT_GE(report.unexplained().covariates_size(), 1);
@@ -96,21 +96,22 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
   EXPECT_THAT(report.unexplained().formula(), HasSubstr("approach_z"));
   EXPECT_GT(report.unexplained().heldout_gain(), 0.5);
   // The formula can be added as it stands.
-  const std::string yaml = "touchstone: model/1\nname: m\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n" +
-                           report.unexplained().formula_yaml();
+  const std::string yaml =
+      "touchstone: model/1\nname: m\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n" +
+      report.unexplained().formula_yaml();
   EXPECT_TRUE(ParseModel(yaml, "formula", Catalogue()).ok()) << yaml;
 }
 
 TEST(Diagnose, LetsAFormulaOfTheUserCompete) {
   HiddenRig rig;
   rig.hidden = {{"formula",
-                 {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm", "k_min=-1",
-                  "k_max=1"}}};
+                 {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
+                  "k_min=-1", "k_max=1"}}};
   DiagnosisInput input = MakeTestInput(rig);
-  const Model mine = WithEffects(
-      NominalModel(), {{"formula",
-                        {"name=mine", "adds=travel_mm", "expression=c*(finger==0)*approach_z", "c=0", "c_unit=mm",
-                         "c_min=-1", "c_max=1"}}});
+  const Model mine =
+      WithEffects(NominalModel(), {{"formula",
+                                    {"name=mine", "adds=travel_mm", "expression=c*(finger==0)*approach_z",
+                                     "c=0", "c_unit=mm", "c_min=-1", "c_max=1"}}});
   input.also = {mine.effects[0].effect};
   const absl::StatusOr<v1::Report> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
@@ -240,6 +241,28 @@ TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
   EXPECT_EQ(report->touches(), 0u);
   ASSERT_EQ(report->data().unused_size(), 1);
   EXPECT_EQ(report->data().unused(0).rows(), static_cast<uint32_t>(set->size()));
+}
+
+TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
+  HiddenRig rig;
+  rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
+  const absl::StatusOr<v1::Report> report = Propose(MakeTestInput(rig), 12, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  ASSERT_EQ(report->next_touches_size(), 12);
+  for (const v1::ProposedTouch& touch : report->next_touches()) {
+    EXPECT_GT(std::abs(touch.touch().speed_m_s() - 0.02), 0.005);
+    EXPECT_GT(touch.separation(), 0);
+    EXPECT_FALSE(touch.purpose().empty());
+  }
+}
+
+TEST(Propose, NamesTouchesEvenWhereNothingIsAmbiguous) {
+  HiddenRig rig;
+  rig.known = {{"tip_radius", {"radius_mm=1"}}};
+  rig.hidden = rig.known;
+  const absl::StatusOr<v1::Report> report = Propose(MakeTestInput(rig), 5, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_TRUE(report->next_touches_size() == 5 || report->warnings_size() > 0);
 }
 
 TEST(Compare, TellsHowWrongTheModelIsAndWhere) {

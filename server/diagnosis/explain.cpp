@@ -121,14 +121,15 @@ absl::Status FindCauses(const Study& study, Explained* explained) {
 absl::Status FindRivals(Explained* explained) {
   Explanation whole{explained->fit, explained->given_effects};
   const Search& search = *explained->search;
-  for (int index = explained->given_effects; index < static_cast<int>(explained->fit.model.base().effects.size());
-       ++index) {
+  for (int index = explained->given_effects;
+       index < static_cast<int>(explained->fit.model.base().effects.size()); ++index) {
     if (index == explained->formula) continue;
     ExplainedStep step;
     step.effect = index;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, search.WithoutEffect(whole, index));
     step.gain_nats = explained->fit.evidence - without.evidence;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Alternative> alternatives, search.Alternatives(whole, index));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Alternative> alternatives,
+                                search.Alternatives(whole, index));
     const std::string own = NameOf(*explained->fit.model.base().effects[index].effect);
     double all = std::exp(-std::min(step.gain_nats, 700.0)), alike = 0;
     for (const Alternative& alternative : alternatives) {
@@ -166,7 +167,8 @@ std::vector<double> ResidualsWithoutSurface(const Study& study, const Fit& fit) 
       if (!contrasts.TakesPart(static_cast<int>(t), i)) continue;
       double sum = 0;
       for (int row = 0; row < h.rows(); ++row) sum += h(row, i) * left[first + row];
-      residuals[static_cast<size_t>(contrasts.touches()[t]) * o.fingers + i] = sum / contrasts.root_weights()[t];
+      residuals[static_cast<size_t>(contrasts.touches()[t]) * o.fingers + i] =
+          sum / contrasts.root_weights()[t];
     }
   }
   return residuals;
@@ -208,13 +210,13 @@ absl::StatusOr<Explained> Explain(Study* study) {
       tangents[e] = std::sqrt(1 / (cosine * cosine) - 1);
       expected[e] = !std::isnan(details.time_s[e]);
     }
-    explained.noise = FindNoise(
-        o, residuals, tangents, expected,
-        explained.fit.model.size() +
-            (study->thinned ? 0 : study->likelihood->surfaces()[explained.fit.surface].degrees));
+    explained.noise =
+        FindNoise(o, residuals, tangents, expected,
+                  explained.fit.model.size() +
+                      (study->thinned ? 0 : study->likelihood->surfaces()[explained.fit.surface].degrees));
 
-    // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they
-    // leave or count less, then everything once more.
+    // Where the better model says that a finger all but misses an edge, outliers, touches of little worth:
+    // they leave or count less, then everything once more.
     if (pass + 1 == kPasses) break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const int edges,
                                 LeaveOutEdges(*study->predictor, explained.fit.model.base(), &o));

@@ -12,15 +12,15 @@
 namespace touchstone {
 namespace {
 
-constexpr double kStep = 0.02;          // of a coordinate's scale, for derivatives
-constexpr double kJumpM = 0.3e-3;       // a finger that moves so far within a step has met another face
+constexpr double kStep = 0.02;     // of a coordinate's scale, for derivatives
+constexpr double kJumpM = 0.3e-3;  // a finger that moves so far within a step has met another face
 constexpr double kJumpOverMedian = 200;
 constexpr int kMostHalvings = 5;
-constexpr double kConverged = 0.02;     // nats
-constexpr double kSmallStep = 0.05;    // standard errors
-constexpr double kSeen = 10;           // squared scale over standard error from where a direction counts as seen
-constexpr double kPriorWidth = 10;     // of a value's prior (Cauchy) over the size that rigs show
-constexpr double kRidge = 1e-4;         // prior precision over 1 / scale^2: holds what nothing determines
+constexpr double kConverged = 0.02;  // nats
+constexpr double kSmallStep = 0.05;  // standard errors
+constexpr double kSeen = 10;        // squared scale over standard error from where a direction counts as seen
+constexpr double kPriorWidth = 10;  // of a value's prior (Cauchy) over the size that rigs show
+constexpr double kRidge = 1e-4;     // prior precision over 1 / scale^2: holds what nothing determines
 
 // Sum of logs, without overflow.
 double LogSum(const std::vector<double>& logs) {
@@ -38,7 +38,8 @@ struct Minimum {
 };
 
 Minimum Minimise(const Eigen::MatrixXd& gram, const std::vector<int>& members,
-                 const std::vector<Coordinate>& coordinates, const Eigen::VectorXd& point, double sigma_squared) {
+                 const std::vector<Coordinate>& coordinates, const Eigen::VectorXd& point,
+                 double sigma_squared) {
   const int p = static_cast<int>(members.size()) - 1;
   Minimum m;
   m.step = Eigen::VectorXd::Zero(p);
@@ -147,8 +148,7 @@ Judgement Judge(const Likelihood& likelihood, const std::vector<Eigen::MatrixXd>
     best.covariance = Eigen::MatrixXd::Zero(p, p);
     Eigen::MatrixXd plain(n, n);
     for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j)
-        plain(i, j) = information(i, j) + (i == j ? kRidge : 0);
+      for (int j = 0; j < n; ++j) plain(i, j) = information(i, j) + (i == j ? kRidge : 0);
     const Eigen::MatrixXd inverse = plain.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j)
@@ -214,8 +214,7 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
       std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
       const double median = sizes[sizes.size() / 2];
       for (int k = 0; k < o.size(); ++k) {
-        const double jump_s =
-            std::max(kJumpM / o.set->speed_m_s[o.row[k]], kJumpOverMedian * median);
+        const double jump_s = std::max(kJumpM / o.set->speed_m_s[o.row[k]], kJumpOverMedian * median);
         for (int i = 0; i < o.fingers; ++i) {
           double& value = change[static_cast<size_t>(k) * o.fingers + i];
           if (std::abs(value) > jump_s) value = 0;
@@ -242,7 +241,8 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
   else
     run(0, static_cast<int>(tasks.size()));
   for (const absl::Status& status : statuses) TOUCHSTONE_RETURN_IF_ERROR(status);
-  if (experiment.cancelled && experiment.cancelled()) return absl::CancelledError("the diagnosis was cancelled");
+  if (experiment.cancelled && experiment.cancelled())
+    return absl::CancelledError("the diagnosis was cancelled");
   return columns;
 }
 
@@ -266,8 +266,9 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int 
 
     // Along the step, as far as the likelihood of the best hypothesis really grows.
     const int s = judgement.surface;
-    const double here = likelihood.LogLikelihood(likelihood.Gram(Likelihood::Pick(fit.columns, {0}), s)(0, 0), s) +
-                        LogPriorOfValues(start.coordinates(), fit.point);
+    const double here =
+        likelihood.LogLikelihood(likelihood.Gram(Likelihood::Pick(fit.columns, {0}), s)(0, 0), s) +
+        LogPriorOfValues(start.coordinates(), fit.point);
     double fraction = 1, gain = 0;
     bool moved = false;
     for (int halving = 0; halving <= kMostHalvings; ++halving, fraction /= 2) {
@@ -281,7 +282,8 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int 
       fit.point = point;
       fit.time_s = std::move(times);
       // The columns are good enough if the simulator did what they foretold.
-      fit.columns = Likelihood::Join(r, Likelihood::Pick(fit.columns, std::vector<int>(members.begin() + 1, members.end())));
+      fit.columns = Likelihood::Join(
+          r, Likelihood::Pick(fit.columns, std::vector<int>(members.begin() + 1, members.end())));
       break;
     }
     if (!moved) break;
@@ -294,9 +296,11 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int 
         Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
     double farthest = 0;  // of what is left to go, in standard errors
     for (int i = 0; i < start.size(); ++i)
-      farthest = std::max(farthest, std::abs(after.step[i]) / std::sqrt(std::max(after.covariance(i, i), 1e-300)) *
-                                        (after.covariance(i, i) > 0));
-    if (fraction == 1 && farthest < kSmallStep && std::abs(after.evidence - judgement.evidence) < kConverged) {
+      farthest =
+          std::max(farthest, std::abs(after.step[i]) / std::sqrt(std::max(after.covariance(i, i), 1e-300)) *
+                                 (after.covariance(i, i) > 0));
+    if (fraction == 1 && farthest < kSmallStep &&
+        std::abs(after.evidence - judgement.evidence) < kConverged) {
       judgement = after;
       break;
     }

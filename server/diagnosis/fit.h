@@ -35,7 +35,7 @@ struct Fit {
   double log_likelihood = 0;    // maximum over values, averaged over hypotheses of the surface
   int surface = 0;              // most probable hypothesis
   double sigma_s = 0;
-  Eigen::MatrixXd covariance;   // of the coordinates
+  Eigen::MatrixXd covariance;  // of the coordinates
 };
 
 // Further columns that compete: fixed terms with one free factor each (a formula's terms).
@@ -44,7 +44,7 @@ struct Judgement {
   double log_likelihood = 0;
   int surface = 0;
   double sigma_s = 0;
-  Eigen::VectorXd step;        // to the optimum of the most probable hypothesis
+  Eigen::VectorXd step;  // to the optimum of the most probable hypothesis
   Eigen::MatrixXd covariance;
 };
 

@@ -48,8 +48,8 @@ std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
   std::vector<Factor> factors;
   const MeasurementSet& set = *o.set;
   const auto at = [&o](int k, int i) { return static_cast<size_t>(k) * o.fingers + i; };
-  const auto add = [&](const std::string& covariate, const std::string& expression, bool differs, double price,
-                       Value value) {
+  const auto add = [&](const std::string& covariate, const std::string& expression, bool differs,
+                       double price, Value value) {
     factors.push_back({covariate, expression, differs, price, std::move(value)});
   };
   const auto with_square = [&](const std::string& name, bool differs, const Value& value) {
@@ -99,19 +99,21 @@ std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
   // What happens only when a certain finger is first.
   const double middle = 0.5 * (o.fingers - 1);
   for (int finger = 0; finger < o.fingers; ++finger)
-    add("first_finger", absl::StrCat("(first_finger == ", ShortestNumber(finger - middle), ")"), false, kSimpleNats,
-        [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
+    add("first_finger", absl::StrCat("(first_finger == ", ShortestNumber(finger - middle), ")"), false,
+        kSimpleNats, [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
   add("first_finger", "first_finger", false, kSimpleNats,
       [&d, middle](int k, int) { return d.first_finger[k] - middle; });
-  with_square("previous_press_mm", true, [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * 1e3; });
+  with_square("previous_press_mm", true,
+              [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * 1e3; });
   const auto varies = [&](const std::vector<double>& column) {
-    return !column.empty() && *std::max_element(column.begin(), column.end()) >
-                                  *std::min_element(column.begin(), column.end());
+    return !column.empty() &&
+           *std::max_element(column.begin(), column.end()) > *std::min_element(column.begin(), column.end());
   };
   if (varies(set.speed_m_s)) {
     const Value speed_mm_s = [&](int k, int) { return set.speed_m_s[o.row[k]] * 1e3; };
     with_square("speed_mm_s", false, speed_mm_s);
-    add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats, [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });
+    add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats,
+        [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });
   }
   // Conditions stand far from zero, and their effect was put to zero somewhere in the middle.
   const auto centred = [&](const std::string& name, const std::vector<double>& column) {
@@ -119,14 +121,16 @@ std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
     double sum = 0;
     for (const double x : column) sum += x;
     const double mean = ThreeDigits(sum / static_cast<double>(column.size()));
-    const std::string text = absl::StrCat("(", name, mean < 0 ? " + " : " - ", ShortestNumber(std::abs(mean)), ")");
+    const std::string text =
+        absl::StrCat("(", name, mean < 0 ? " + " : " - ", ShortestNumber(std::abs(mean)), ")");
     const std::vector<double>* values = &column;
     const Value plain = [&o, values](int k, int) { return (*values)[o.row[k]]; };
     const Value shifted = [plain, mean](int k, int i) { return plain(k, i) - mean; };
     add(name, name, false, kSimpleNats, plain);
     if (mean == 0) return;
     add(name, text, false, kSimpleNats, shifted);
-    add(name, text + "^2", false, kCurvedNats, [shifted](int k, int i) { return shifted(k, i) * shifted(k, i); });
+    add(name, text + "^2", false, kCurvedNats,
+        [shifted](int k, int i) { return shifted(k, i) * shifted(k, i); });
   };
   if (set.has_session_time) centred("session_time_s", set.session_time_s);
   for (const auto& [name, column] : set.covariates) centred(name, column);
@@ -193,17 +197,19 @@ class Scorer {
       Eigen::MatrixXd jj = own.bottomRightCorner(p, p);
       for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
       const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
-      const Eigen::VectorXd own_step = p > 0 ? Eigen::VectorXd(solver.solve(own.col(0).tail(p))) : Eigen::VectorXd();
+      const Eigen::VectorXd own_step =
+          p > 0 ? Eigen::VectorXd(solver.solve(own.col(0).tail(p))) : Eigen::VectorXd();
       const double q = own(0, 0) - (p > 0 ? own.col(0).tail(p).dot(own_step) : 0);
-      const Eigen::MatrixXd own_cross = p > 0 ? Eigen::MatrixXd(solver.solve(cross.bottomRows(p))) : Eigen::MatrixXd();
+      const Eigen::MatrixXd own_cross =
+          p > 0 ? Eigen::MatrixXd(solver.solve(cross.bottomRows(p))) : Eigen::MatrixXd();
       Eigen::MatrixXd inner;
       if (width == 2) {
         inner.resize(1, blocks);
         const int l = likelihood.surfaces()[s].length_index;
         (void)l;
         for (int b = 0; b < blocks; ++b)
-          inner(0, b) = likelihood.Cross(Likelihood::Pick(prepared, {2 * b}), Likelihood::Pick(prepared, {2 * b + 1}),
-                                         s)(0, 0);
+          inner(0, b) = likelihood.Cross(Likelihood::Pick(prepared, {2 * b}),
+                                         Likelihood::Pick(prepared, {2 * b + 1}), s)(0, 0);
       }
       for (int b = 0; b < blocks; ++b) {
         Eigen::MatrixXd a(width, width);
@@ -226,7 +232,8 @@ class Scorer {
         double occam = 0;
         for (int i = 0; i < width; ++i) {
           const double scale = scales[b * width + i];
-          occam += 0.5 * std::log1p(a(i, i) * scale * scale / (sigma * sigma)) + std::log1p(std::pow(x[i] / scale, 2));
+          occam += 0.5 * std::log1p(a(i, i) * scale * scale / (sigma * sigma)) +
+                   std::log1p(std::pow(x[i] / scale, 2));
         }
         const double log_likelihood = likelihood.LogPrior(s) + likelihood.LogLikelihood(left, s);
         sum_l[b] += std::exp(std::min(log_likelihood - most, 600.0));
@@ -287,13 +294,13 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
       if (plain && !factor.differs) continue;  // the same on every finger cannot be seen
       for (const bool adds_time : {false, true}) {
         if (adds_time && !several_speeds) continue;
-        const Eigen::VectorXd c = column(adds_time, [&](int k, int i) { return factor.value(k, i) * finger.value(k, i); });
+        const Eigen::VectorXd c =
+            column(adds_time, [&](int k, int i) { return factor.value(k, i) * finger.value(k, i); });
         if (!(c.norm() > 0)) continue;
         FormulaTerm term;
         term.covariate = factor.covariate;
         term.adds_time = adds_time;
-        term.expression =
-            absl::StrCat("k * ", finger.expression, plain ? "" : " * ", factor.expression);
+        term.expression = absl::StrCat("k * ", finger.expression, plain ? "" : " * ", factor.expression);
         terms.push_back(std::move(term));
         list.push_back(c);
         scales.push_back(scale_of(c));
@@ -309,9 +316,9 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
   for (size_t c = 0; c < terms.size(); ++c) {
     terms[c].gain_nats = evidence[c] - prices[c];
     terms[c].log_ratio = log_ratio[c];
-    const bool number = terms[c].covariate.rfind("approach", 0) == 0 || terms[c].covariate.rfind("lateral", 0) == 0 ||
-                        terms[c].covariate.rfind("normal", 0) == 0 ||
-                        terms[c].expression.find("pi/180") != std::string::npos;
+    const bool number =
+        terms[c].covariate.rfind("approach", 0) == 0 || terms[c].covariate.rfind("lateral", 0) == 0 ||
+        terms[c].covariate.rfind("normal", 0) == 0 || terms[c].expression.find("pi/180") != std::string::npos;
     const Unit unit = !number ? Unit::kNone : terms[c].adds_time ? Unit::kMicrosecond : Unit::kMillimetre;
     terms[c].parameters.push_back(Bounded("k", unit, BoundFor(step(0, c))));
     terms[c].values.push_back(step(0, c));
@@ -324,7 +331,8 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
     const double period_mm = kLeastPeriodMm * std::pow(kMostPeriodMm / kLeastPeriodMm, n / (kPeriods - 1.0));
     for (const double shift : {0.0, 0.25}) {
       list.push_back(column(false, [&](int k, int i) {
-        return std::sin(2 * kPi * (d.travel_m[static_cast<size_t>(k) * o.fingers + i] * 1e3 / period_mm + shift));
+        return std::sin(2 * kPi *
+                        (d.travel_m[static_cast<size_t>(k) * o.fingers + i] * 1e3 / period_mm + shift));
       }));
       scales.push_back(scale_of(list.back()));
     }
@@ -356,7 +364,8 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
   return terms;
 }
 
-absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name, const FormulaTerm& term) {
+absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,
+                                                             const FormulaTerm& term) {
   FormulaSpec spec;
   spec.name = name;
   spec.adds_time = term.adds_time;
@@ -374,9 +383,10 @@ FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b) {
     ParameterInfo parameter = b.parameters[p];
     const std::string renamed = parameter.name + "2";
     // Names stand between blanks or next to operators; no variable ends in them alone.
-    second = absl::StrReplaceAll(second, {{absl::StrCat(" ", parameter.name, " "), absl::StrCat(" ", renamed, " ")},
-                                          {absl::StrCat("/", parameter.name, " "), absl::StrCat("/", renamed, " ")},
-                                          {absl::StrCat(" ", parameter.name, ")"), absl::StrCat(" ", renamed, ")")}});
+    second = absl::StrReplaceAll(second,
+                                 {{absl::StrCat(" ", parameter.name, " "), absl::StrCat(" ", renamed, " ")},
+                                  {absl::StrCat("/", parameter.name, " "), absl::StrCat("/", renamed, " ")},
+                                  {absl::StrCat(" ", parameter.name, ")"), absl::StrCat(" ", renamed, ")")}});
     parameter.name = renamed;
     sum.parameters.push_back(parameter);
     sum.values.push_back(b.values[p]);

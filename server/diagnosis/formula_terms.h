@@ -1,5 +1,5 @@
-// A dictionary of simple terms that a rest may follow when no effect of the catalogue does: a factor that tells
-// the fingers apart, times a covariate or a function of one, as people would write it in a model file.
+// A dictionary of simple terms that a rest may follow when no effect of the catalogue does: a factor that
+// tells the fingers apart, times a covariate or a function of one, as people would write it in a model file.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct FormulaTerm {
   bool adds_time = false;
   std::vector<ParameterInfo> parameters;  // in the units of files
   std::vector<double> values;             // where a fit starts
-  double gain_nats = 0;                   // evidence over the fit without it, price of the choice not yet paid
-  double log_ratio = 0;                   // of the likelihoods
+  double gain_nats = 0;  // evidence over the fit without it, price of the choice not yet paid
+  double log_ratio = 0;  // of the likelihoods
   int degrees = 1;
 };
 
@@ -26,7 +26,8 @@ struct FormulaTerm {
 std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit, const Prediction& details);
 
 // The term as an effect of this name.
-absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name, const FormulaTerm& term);
+absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,
+                                                             const FormulaTerm& term);
 
 // Two terms in one expression: parameters of the second are renamed where they clash.
 FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b);

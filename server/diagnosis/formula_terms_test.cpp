@@ -15,12 +15,14 @@ using ::testing::HasSubstr;
 FormulaTerm BestTerm(const std::string& expression, const std::string& k) {
   HiddenRig rig;
   rig.samples_per_face = 6;
-  rig.hidden = {{"formula", {"name=odd", "adds=travel_mm", "expression=" + expression, "k=" + k, "k_unit=1", "k_min=-9",
-                             "k_max=9"}}};
+  rig.hidden = {{"formula",
+                 {"name=odd", "adds=travel_mm", "expression=" + expression, "k=" + k, "k_unit=1", "k_min=-9",
+                  "k_max=9"}}};
   const auto study = MakeStudy(MakeTestInput(rig), {});
   EXPECT_TRUE(study.ok()) << study.status();
   EXPECT_TRUE(PrepareSearch(study->get(), {}).ok());
-  const auto fit = FitModel((*study)->experiment, FreeModel(*(*study)->input.model, (*study)->searched->objects));
+  const auto fit =
+      FitModel((*study)->experiment, FreeModel(*(*study)->input.model, (*study)->searched->objects));
   EXPECT_TRUE(fit.ok());
   const auto details = (*study)->searched_predictor->Run(fit->model.base(), true, true);
   return ScoreTerms((*study)->experiment, *fit, *details)[0];

@@ -14,15 +14,15 @@ namespace touchstone {
 
 // One direction in which values may move.
 struct Coordinate {
-  int effect = 0;              // index into the model's effects
-  int parameter = 0;           // of that effect
-  std::string object;          // whose value; empty: every object's
-  std::vector<double> weights; // change of the effect's flat values (SI) per unit of the coordinate
-  double lower = 0, upper = 0; // of the coordinate
-  double scale = 1;            // size that rigs show: unit of steps and width of the prior
-  double neutral = 0;          // the value that changes nothing, or that the model had
-  bool inverse = false;        // the value is 1 / coordinate (acceleration_ramp: neutral at infinity)
-  int shape = 0;               // coordinates of one shape differ by object only
+  int effect = 0;               // index into the model's effects
+  int parameter = 0;            // of that effect
+  std::string object;           // whose value; empty: every object's
+  std::vector<double> weights;  // change of the effect's flat values (SI) per unit of the coordinate
+  double lower = 0, upper = 0;  // of the coordinate
+  double scale = 1;             // size that rigs show: unit of steps and width of the prior
+  double neutral = 0;           // the value that changes nothing, or that the model had
+  bool inverse = false;         // the value is 1 / coordinate (acceleration_ramp: neutral at infinity)
+  int shape = 0;                // coordinates of one shape differ by object only
 };
 
 class FreeModel {

@@ -16,7 +16,8 @@ TEST(FreeModel, StandsWhereItsBaseStands) {
   model.Free(0, true);
   EXPECT_EQ(model.size(), 2);  // three values that sum to zero
   const Model again = model.At(model.Start());
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(again.effects[0].values[i], model.base().effects[0].values[i], 1e-12);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(again.effects[0].values[i], model.base().effects[0].values[i], 1e-12);
 }
 
 TEST(FreeModel, KeepsTheSumOfZeroWhereverItMoves) {

@@ -10,8 +10,8 @@
 namespace touchstone {
 namespace {
 
-constexpr double kSurfaceNats = 5;          // evidence that makes a surface error a step by itself
-constexpr double kSurfaceWithMisfit = 1;    // ... and where the lack of fit says that something is left
+constexpr double kSurfaceNats = 5;        // evidence that makes a surface error a step by itself
+constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
 constexpr double kMisfitP = 1e-2;
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
@@ -116,7 +116,8 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
   Model whole = fit.model.base();
   RoundValues(fit, &whole);
   ladder.improved = whole;
-  if (explained.formula >= 0) ladder.improved.effects.erase(ladder.improved.effects.begin() + explained.formula);
+  if (explained.formula >= 0)
+    ladder.improved.effects.erase(ladder.improved.effects.begin() + explained.formula);
   ladder.changed = !explained.steps.empty();
   TOUCHSTONE_ASSIGN_OR_RETURN(ladder.prediction, study->predictor->Run(ladder.improved, true, true));
   ladder.residuals = Residuals(o, ladder.prediction);
@@ -154,9 +155,8 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
     kept.push_back(open[chosen]);
     open.erase(open.begin() + static_cast<long>(chosen));
     const int index = kept.back();
-    const ExplainedStep& from =
-        *std::find_if(explained.steps.begin(), explained.steps.end(),
-                      [&](const ExplainedStep& s) { return s.effect == index; });
+    const ExplainedStep& from = *std::find_if(explained.steps.begin(), explained.steps.end(),
+                                              [&](const ExplainedStep& s) { return s.effect == index; });
     v1::Step* step = report->add_steps();
     const EffectInstance& instance = fit.model.base().effects[index];
     step->set_effect(NameOf(*instance.effect));
@@ -189,10 +189,12 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
   // What the error becomes; bumps of the surface may be the last step.
   *report->mutable_final() = QualityOf(*study, search, explained.without_formula, ladder.residuals, false);
   const bool misfit = report->final().lack_of_fit_p() < kMisfitP;
-  const bool had_surface = std::any_of(study->input.model->effects.begin(), study->input.model->effects.end(),
-                                       [](const EffectInstance& e) { return e.effect->name == "surface_error"; });
-  ladder.surface = !had_surface && explained.fit.surface != 0 &&
-                   (explained.surface_nats > kSurfaceNats || (misfit && explained.surface_nats > kSurfaceWithMisfit));
+  const bool had_surface =
+      std::any_of(study->input.model->effects.begin(), study->input.model->effects.end(),
+                  [](const EffectInstance& e) { return e.effect->name == "surface_error"; });
+  ladder.surface =
+      !had_surface && explained.fit.surface != 0 &&
+      (explained.surface_nats > kSurfaceNats || (misfit && explained.surface_nats > kSurfaceWithMisfit));
   if (ladder.surface) {
     const auto effect = Catalogue().Find("surface_error");
     const v1::Quality quality = QualityOf(*study, search, explained.fit, ladder.residuals, true);
@@ -234,10 +236,10 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
                     report->final().rmse_us() > (1 + kUnexplainedShare) * floor_us;
   if (explained.formula >= 0 || rest)
     TOUCHSTONE_RETURN_IF_ERROR(DescribeUnexplained(*study, explained, ladder, floor_us, report));
-  report->set_verdict(explained.formula >= 0 || rest        ? v1::Report::UNEXPLAINED
-                      : report->steps_size() > 0            ? v1::Report::MISSING_EFFECTS
-                      : ladder.values_wrong                 ? v1::Report::WRONG_VALUES
-                                                            : v1::Report::ADEQUATE);
+  report->set_verdict(explained.formula >= 0 || rest ? v1::Report::UNEXPLAINED
+                      : report->steps_size() > 0     ? v1::Report::MISSING_EFFECTS
+                      : ladder.values_wrong          ? v1::Report::WRONG_VALUES
+                                                     : v1::Report::ADEQUATE);
   if (ladder.changed) {
     if (!ladder.improved.name.empty()) ladder.improved.name += "_better";
     report->set_improved_model_yaml(FormatModel(ladder.improved));

@@ -7,12 +7,12 @@
 namespace touchstone {
 
 struct Ladder {
-  Model improved;                    // steps and refits, no formula
-  bool changed = false;              // improved differs from the given model
-  bool values_wrong = false;         // an effect of the given model, other than noise, has other values
-  bool surface = false;              // a surface error is a step
-  std::vector<double> residuals;     // of the improved model, all touches
-  Prediction prediction;             // of the improved model, with details
+  Model improved;                 // steps and refits, no formula
+  bool changed = false;           // improved differs from the given model
+  bool values_wrong = false;      // an effect of the given model, other than noise, has other values
+  bool surface = false;           // a surface error is a step
+  std::vector<double> residuals;  // of the improved model, all touches
+  Prediction prediction;          // of the improved model, with details
 };
 
 // Fills verdict, noise floor, refitted, steps, final, unexplained, candidates, ambiguities and the improved
@@ -20,7 +20,8 @@ struct Ladder {
 absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1::Report* report);
 
 // Its parts.
-void AddNoise(const Study& study, const Explained& explained, Ladder* ladder, v1::Report* report);  // noise_steps.cpp
+void AddNoise(const Study& study, const Explained& explained, Ladder* ladder,
+              v1::Report* report);  // noise_steps.cpp
 absl::Status DescribeCandidates(const Study& study, const Explained& explained, v1::Report* report);
 absl::Status DescribeUnexplained(const Study& study, const Explained& explained, const Ladder& ladder,
                                  double floor_us, v1::Report* report);

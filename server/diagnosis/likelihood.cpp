@@ -41,8 +41,8 @@ std::vector<Eigen::Vector3d> Inducing(const std::vector<Eigen::Vector3d>& points
 
 }  // namespace
 
-Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const Prediction& details, bool field,
-                       double floor_s, ThreadPool* pool)
+Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const Prediction& details,
+                       bool field, double floor_s, ThreadPool* pool)
     : rows_(contrasts.rows()), floor_s_(floor_s) {
   const int objects = static_cast<int>(o.objects.size());
   for (int object = 0; object <= objects; ++object) object_row_.push_back(contrasts.FirstRowOfObject(object));
@@ -60,7 +60,8 @@ Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const 
       if (!contrasts.TakesPart(static_cast<int>(t), i)) continue;
       mean_slope += details.slope_s_m[static_cast<size_t>(k) * o.fingers + i];
       ++counted;
-      if (!seen[o.pose[k]]) points[o.object[k]].push_back(details.contact_m[static_cast<size_t>(k) * o.fingers + i]);
+      if (!seen[o.pose[k]])
+        points[o.object[k]].push_back(details.contact_m[static_cast<size_t>(k) * o.fingers + i]);
     }
     seen[o.pose[k]] = 1;
   }
@@ -103,7 +104,8 @@ Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const 
         for (int i = 0; i < o.fingers; ++i) {
           if (!contrasts.TakesPart(t, i)) continue;
           const size_t entry = static_cast<size_t>(k) * o.fingers + i;
-          const double gain = -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kLeastCosine);
+          const double gain =
+              -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kLeastCosine);
           for (int a = 0; a < m; ++a)
             feature[a] = Matern52((details.contact_m[entry] - inducing[a]).norm(), length_m[l]);
           for (int j = 0; j < h.rows(); ++j)
@@ -218,7 +220,11 @@ Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
   Eigen::VectorXd norms = columns.values.colwise().squaredNorm().transpose();
   const int l = surfaces_[s].length_index;
   if (l >= 0)
-    norms -= (columns.projected[l].array().square().colwise() * Shrinkage(s).array()).colwise().sum().matrix().transpose();
+    norms -= (columns.projected[l].array().square().colwise() * Shrinkage(s).array())
+                 .colwise()
+                 .sum()
+                 .matrix()
+                 .transpose();
   return norms;
 }
 
@@ -246,7 +252,8 @@ Eigen::VectorXd Likelihood::FieldMean(const Columns& r, int s) const {
   for (size_t object = 0; object < bases_[l].directions.size(); ++object) {
     const Eigen::MatrixXd& directions = bases_[l].directions[object];
     if (directions.cols() == 0) continue;
-    mean.segment(object_row_[object], directions.rows()) = directions * weights.segment(next, directions.cols());
+    mean.segment(object_row_[object], directions.rows()) =
+        directions * weights.segment(next, directions.cols());
     next += static_cast<int>(directions.cols());
   }
   return mean;

@@ -3,10 +3,11 @@
 //
 //   r = J theta + B h + e,   e ~ N(0, sigma^2 I),   h ~ GP(0, a^2 Matern-5/2(distance / length)) an object
 //
-// B turns a bump h along the normal into contact time: -slope / cos(incidence). The field always takes part, so
-// that the bumps of a bad print are not sold as physics (DIAGNOSIS: BIC alone claims an effect in up to 80 % of
-// such sets). Its amplitude and length are not estimated but averaged over a grid; sigma is profiled. With the
-// field integrated out, everything is a function of inner products, so a candidate costs no pass over the data.
+// B turns a bump h along the normal into contact time: -slope / cos(incidence). The field always takes part,
+// so that the bumps of a bad print are not sold as physics (DIAGNOSIS: BIC alone claims an effect in up to 80
+// % of such sets). Its amplitude and length are not estimated but averaged over a grid; sigma is profiled.
+// With the field integrated out, everything is a function of inner products, so a candidate costs no pass
+// over the data.
 #pragma once
 
 #include <vector>
@@ -23,15 +24,15 @@ class Likelihood {
  public:
   // `details` of the nominal model: where the contacts are. `field` false: no surface error (large sets).
   // `floor_s`: what the simulation itself may be wrong by; keeps data without noise from proving anything.
-  Likelihood(const Observations& observations, const Contrasts& contrasts, const Prediction& details, bool field,
-             double floor_s, ThreadPool* pool);
+  Likelihood(const Observations& observations, const Contrasts& contrasts, const Prediction& details,
+             bool field, double floor_s, ThreadPool* pool);
 
   // One hypothesis about the surface error; the first is that there is none.
   struct Surface {
     double length_m = 0;
     double ratio_m_s = 0;  // amplitude over sigma
     double log_determinant = 0;
-    double degrees = 0;    // of freedom that the field takes up
+    double degrees = 0;  // of freedom that the field takes up
     int length_index = -1;
   };
   const std::vector<Surface>& surfaces() const { return surfaces_; }
@@ -63,7 +64,7 @@ class Likelihood {
   Eigen::VectorXd FieldMean(const Columns& r, int s) const;
 
  private:
-  struct Basis {  // of one length
+  struct Basis {                              // of one length
     std::vector<Eigen::MatrixXd> directions;  // an object: its rows x m, orthogonal columns
     Eigen::VectorXd energies;                 // all objects' columns, squared norms
   };

@@ -1,7 +1,7 @@
 #include "server/diagnosis/likelihood.h"
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 
 #include <cmath>
 
@@ -45,7 +45,8 @@ Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, co
       const double x = std::sqrt(5.0) * (d.contact_m[a] - d.contact_m[b]).norm() / surface.length_m;
       const double gain_a = d.slope_s_m[a] / std::max(d.cos_incidence[a], 0.1);
       const double gain_b = d.slope_s_m[b] / std::max(d.cos_incidence[b], 0.1);
-      field(a, b) = surface.ratio_m_s * surface.ratio_m_s * gain_a * gain_b * (1 + x + x * x / 3) * std::exp(-x);
+      field(a, b) =
+          surface.ratio_m_s * surface.ratio_m_s * gain_a * gain_b * (1 + x + x * x / 3) * std::exp(-x);
     }
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(c.rows(), entries);
   for (size_t t = 0; t < c.touches().size(); ++t)
@@ -83,7 +84,8 @@ TEST_F(LikelihoodTest, TheFieldFollowsBumpsAndNotNoise) {
   // A bump along the normal of one object, 0.3 mm high.
   std::vector<double> bump(observations->time_s.size());
   for (size_t e = 0; e < bump.size(); ++e)
-    bump[e] = -0.3e-3 * std::exp(-(details.contact_m[e] - details.contact_m[1]).squaredNorm() / (2 * 0.02 * 0.02)) *
+    bump[e] = -0.3e-3 *
+              std::exp(-(details.contact_m[e] - details.contact_m[1]).squaredNorm() / (2 * 0.02 * 0.02)) *
               details.slope_s_m[e] / details.cos_incidence[e];
   const Eigen::VectorXd r = contrasts->Apply(bump);
   const Likelihood::Columns columns = likelihood->Prepare(r);

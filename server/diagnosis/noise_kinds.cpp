@@ -9,11 +9,11 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostTouches = 1500;       // that a shape is judged on
-constexpr double kEnterNats = 10;        // gain in log likelihood that a further noise parameter needs
-constexpr double kKurtosisSigmas = 4;    // of the sample's excess kurtosis before tails are looked at
+constexpr int kMostTouches = 1500;          // that a shape is judged on
+constexpr double kEnterNats = 10;           // gain in log likelihood that a further noise parameter needs
+constexpr double kKurtosisSigmas = 4;       // of the sample's excess kurtosis before tails are looked at
 constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
-constexpr double kLeastTick = 20e-6;     // s
+constexpr double kLeastTick = 20e-6;        // s
 constexpr double kMostSlope = 10;
 
 // The maximum of f on [low, high] by golden section.
@@ -111,8 +111,10 @@ NoiseEstimate FindPolling(const Observations& o) {
         const double ticks = std::round(differences[j] / interval);
         sum_nd += ticks * differences[j], sum_nn += ticks * ticks;
       }
-      if (!(sum_nn > 0)) fits = false;
-      else interval = sum_nd / sum_nn;
+      if (!(sum_nn > 0))
+        fits = false;
+      else
+        interval = sum_nd / sum_nn;
     }
     size_t on_tick = 0;
     for (const double difference : differences)
@@ -120,7 +122,8 @@ NoiseEstimate FindPolling(const Observations& o) {
     if (!fits || on_tick < 0.99 * differences.size()) continue;
     NoiseEstimate found;
     found.value = interval;
-    found.std_error = 0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
+    found.std_error =
+        0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
     found.std_error = std::max(found.std_error, 1e-9);
     // Each difference would fall on a tick by chance with this probability.
     found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
@@ -149,7 +152,8 @@ NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expecte
 }  // namespace
 
 NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residuals,
-                        const std::vector<double>& tan_incidence, const std::vector<char>& expected, double taken) {
+                        const std::vector<double>& tan_incidence, const std::vector<char>& expected,
+                        double taken) {
   NoiseFindings found;
   found.poll_interval_s = FindPolling(o);
   found.missed_probability = FindMissed(o, expected);

@@ -17,7 +17,8 @@ NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
   MadeUpSet set(5, 48, 4, 0, seed);
   std::vector<double> tangents(set.observations.time_s.size());
   for (size_t e = 0; e < tangents.size(); ++e) {
-    tangents[e] = std::tan(set.IncidenceDeg(static_cast<int>(e / 3), static_cast<int>(e % 3)) * kRadiansPerDegree);
+    tangents[e] =
+        std::tan(set.IncidenceDeg(static_cast<int>(e / 3), static_cast<int>(e % 3)) * kRadiansPerDegree);
     set.observations.time_s[e] += draw(tangents[e]);
   }
   set.Finish();

@@ -9,8 +9,8 @@
 namespace touchstone {
 namespace {
 
-constexpr int kNodes = 20;          // a finger, of the integral over the common shift
-constexpr int kSearches = 18;       // golden section steps
+constexpr int kNodes = 20;     // a finger, of the integral over the common shift
+constexpr int kSearches = 18;  // golden section steps
 const double kLogTwoPi = std::log(2 * kPi);
 
 double GaussianTouch(const NoisyTouch& touch, const NoiseModel& model) {
@@ -40,7 +40,8 @@ class Density {
     const double narrow = std::exp(-0.5 * x * x);
     if (model_.shape == NoiseShape::kGaussian) return narrow / std::sqrt(2 * kPi);
     const double y = x / model_.width;
-    return ((1 - model_.share) * narrow + model_.share / model_.width * std::exp(-0.5 * y * y)) / std::sqrt(2 * kPi);
+    return ((1 - model_.share) * narrow + model_.share / model_.width * std::exp(-0.5 * y * y)) /
+           std::sqrt(2 * kPi);
   }
 
  private:

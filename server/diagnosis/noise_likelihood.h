@@ -1,5 +1,5 @@
-// Likelihood of residuals under kinds of noise that are independent from finger to finger. A touch's times are
-// known up to a common shift only, so the density is integrated over that shift:
+// Likelihood of residuals under kinds of noise that are independent from finger to finger. A touch's times
+// are known up to a common shift only, so the density is integrated over that shift:
 //   p(residuals) = integral over m of prod_i f((r_i - m) / s_i) / s_i
 #pragma once
 
@@ -19,10 +19,10 @@ enum class NoiseShape { kGaussian, kStudent, kMixture };
 struct NoiseModel {
   NoiseShape shape = NoiseShape::kGaussian;
   double sigma_s = 0;
-  double slope = 0;   // s_i = sigma (1 + slope tan(inc_i))
-  double degrees = 0; // of freedom of Student's t
-  double share = 0;   // of outliers in the mixture,
-  double width = 0;   // and their sigma over the others'
+  double slope = 0;    // s_i = sigma (1 + slope tan(inc_i))
+  double degrees = 0;  // of freedom of Student's t
+  double share = 0;    // of outliers in the mixture,
+  double width = 0;    // and their sigma over the others'
 };
 
 double NoiseLogLikelihood(const std::vector<NoisyTouch>& touches, const NoiseModel& model);

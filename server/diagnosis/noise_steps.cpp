@@ -8,9 +8,9 @@
 namespace touchstone {
 namespace {
 
-constexpr double kSignificant = 3.3;      // standard errors, for a refit
-constexpr double kRelevant = 0.02;        // relative change, for a refit
-constexpr double kLeastSigmaS = 1.5e-6;   // less is the rounding of the file
+constexpr double kSignificant = 3.3;     // standard errors, for a refit
+constexpr double kRelevant = 0.02;       // relative change, for a refit
+constexpr double kLeastSigmaS = 1.5e-6;  // less is the rounding of the file
 
 class NoiseWriter {
  public:
@@ -38,7 +38,8 @@ class NoiseWriter {
     const double rounded = RoundedTo(value, error);
     if (present != nullptr) {
       const double before = FromSi(parameter.unit, present->values[0]);
-      if (std::abs(value - before) < kSignificant * error || std::abs(value - before) < kRelevant * value) return;
+      if (std::abs(value - before) < kSignificant * error || std::abs(value - before) < kRelevant * value)
+        return;
       described.set_before(before);
       v1::Refit* refit = report_->add_refitted();
       refit->set_effect(name);
@@ -80,8 +81,9 @@ class NoiseWriter {
 void AddNoise(const Study& study, const Explained& explained, Ladder* ladder, v1::Report* report) {
   NoiseWriter writer(explained, ladder, report);
   const NoiseFindings& noise = explained.noise;
-  const bool has_sigma = std::any_of(ladder->improved.effects.begin(), ladder->improved.effects.end(),
-                                     [](const EffectInstance& e) { return e.effect->name == "gaussian_noise"; });
+  const bool has_sigma =
+      std::any_of(ladder->improved.effects.begin(), ladder->improved.effects.end(),
+                  [](const EffectInstance& e) { return e.effect->name == "gaussian_noise"; });
   NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = 1e3;  // noise is there or not: any scatter beyond rounding proves it
   // Where ticks explain the scatter there is no further noise to be seen.

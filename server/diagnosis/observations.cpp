@@ -22,12 +22,12 @@ absl::Status CheckInput(const DiagnosisInput& input) {
   const MeasurementSet& set = *input.set;
   if (set.fingers == 0)
     return absl::InvalidArgumentError(absl::StrCat(
-        set.origin, ": the file has no times: it is a plan; measure it first, which fills t_l_us, t_m_us, ..."));
+        set.origin,
+        ": the file has no times: it is a plan; measure it first, which fills t_l_us, t_m_us, ..."));
   if (set.fingers != input.model->fingers)
-    return absl::InvalidArgumentError(absl::StrCat(set.origin, ": the file has times of ", set.fingers,
-                                                   " fingers, the model '", input.model->name, "' has ",
-                                                   input.model->fingers,
-                                                   "; end_effector.fingers of the model must agree"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        set.origin, ": the file has times of ", set.fingers, " fingers, the model '", input.model->name,
+        "' has ", input.model->fingers, "; end_effector.fingers of the model must agree"));
   if (set.fingers < 2)
     return absl::InvalidArgumentError(absl::StrCat(
         set.origin, ": only differences between fingers are compared, and there is but one finger"));
@@ -37,9 +37,9 @@ absl::Status CheckInput(const DiagnosisInput& input) {
   for (const std::string& object : set.objects)
     if (input.surfaces.count(object) == 0) missing.push_back(object);
   if (!missing.empty())
-    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '", absl::StrJoin(missing, "', '"),
-                                            "'; give it with --mesh ", missing[0],
-                                            "=FILE, or all of a folder with --mesh-dir DIR"));
+    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '",
+                                            absl::StrJoin(missing, "', '"), "'; give it with --mesh ",
+                                            missing[0], "=FILE, or all of a folder with --mesh-dir DIR"));
   return absl::OkStatus();
 }
 
@@ -102,7 +102,8 @@ absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
 
   for (int k = 0; k < o.size(); ++k) {
     int reporting = 0;
-    for (int i = 0; i < o.fingers; ++i) reporting += !std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
+    for (int i = 0; i < o.fingers; ++i)
+      reporting += !std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
     if (reporting == 0) LeaveOut(&o, k, "no finger reported");
     if (reporting == 1) LeaveOut(&o, k, "only one finger reported: there is nothing to compare it with");
   }

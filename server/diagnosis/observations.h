@@ -12,15 +12,16 @@
 
 namespace touchstone {
 
-// Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's order).
+// Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's
+// order).
 struct Observations {
   std::shared_ptr<const MeasurementSet> set;
   int fingers = 0;
   std::vector<std::string> objects;                      // as in the set
   std::vector<std::shared_ptr<const Surface>> surfaces;  // one an object
-  std::vector<int> row;      // touch -> row of the set
-  std::vector<int> object;   // touch -> index into objects
-  std::vector<int> pose;     // touch -> group of equal commanded touches, numbered by first appearance
+  std::vector<int> row;                                  // touch -> row of the set
+  std::vector<int> object;                               // touch -> index into objects
+  std::vector<int> pose;  // touch -> group of equal commanded touches, numbered by first appearance
   int poses = 0;
   std::vector<double> time_s;  // [k * fingers + finger], NaN: not reported
   std::vector<char> used;      // 0: left out of every fit and error (edge contacts, outliers, ...)

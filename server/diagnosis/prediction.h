@@ -25,13 +25,14 @@ struct Prediction {
   std::vector<int> first_finger;  // a touch; -1: none
 };
 
-// Deterministic part of the model (noise effects, polling, dropouts and surface_error left out) at every touch.
-// `details` false fills time_s only.
+// Deterministic part of the model (noise effects, polling, dropouts and surface_error left out) at every
+// touch. `details` false fills time_s only.
 absl::StatusOr<Prediction> Predict(const Observations& observations, const Model& model, bool details,
                                    bool curvature, ThreadPool* pool);
 
 // The residual of DESIGN 8: measured minus predicted less its mean over the touch's fingers that report and
-// that the model expects to; NaN elsewhere, and in touches with fewer than two such fingers. [k * fingers + i]
+// that the model expects to; NaN elsewhere, and in touches with fewer than two such fingers. [k * fingers +
+// i]
 std::vector<double> Residuals(const Observations& observations, const Prediction& prediction);
 
 // sqrt(sum ||residual||^2 / sum (fingers - 1)) over the touches used; 0 without any.

@@ -233,8 +233,8 @@ absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const Model& mode
     thread_local TouchWorkspace workspace;
     Fill(block, simulator, &batch);
     for (int t = 0; t < batch.size(); ++t)
-      batch.target_m[t] += along_lateral_m * batch.lateral[t] +
-                           along_binormal_m * batch.approach[t].cross(batch.lateral[t]);
+      batch.target_m[t] +=
+          along_lateral_m * batch.lateral[t] + along_binormal_m * batch.approach[t].cross(batch.lateral[t]);
     if (absl::Status ran = simulator.RunToMotion(&batch, &workspace); !ran.ok()) {
       const std::lock_guard<std::mutex> lock(mutex);
       status = ran;

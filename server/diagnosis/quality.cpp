@@ -62,14 +62,16 @@ v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
     // Without repeats: how much better a smooth remainder explains the residuals than none.
     const double gain = std::max(SurfaceEvidence(study, fit), 0.0);
     quality.set_lack_of_fit_p(
-        0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) + (gain > 0 ? 0 : 0.5));
+        0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) +
+        (gain > 0 ? 0 : 0.5));
   }
   quality.set_rmse_us(rmse * 1e6);
   quality.set_heldout_rmse_us(rmse * share * 1e6);
   return quality;
 }
 
-v1::NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best, double fitted_parameters) {
+v1::NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best,
+                            double fitted_parameters) {
   v1::NoiseFloor floor;
   PureError error = PureErrorOf(o, best);
   floor.set_from_repeats(HasRepeats(error));

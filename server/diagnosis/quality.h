@@ -5,15 +5,15 @@
 
 namespace touchstone {
 
-// F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without repeats
-// or without degrees of freedom.
+// F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without
+// repeats or without degrees of freedom.
 double LackOfFitP(const Observations& observations, const std::vector<double>& residuals, double parameters);
 
 // Repeats enough for an F test.
 bool HasRepeats(const PureError& error);
 
-// Of the model of a fit (or of part of its effects), on all touches. `heldout_share`: error on touches left out
-// over that on all, from the search. `surface`: judge what a surface error leaves (searched touches).
+// Of the model of a fit (or of part of its effects), on all touches. `heldout_share`: error on touches left
+// out over that on all, from the search. `surface`: judge what a surface error leaves (searched touches).
 v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
                       const std::vector<double>& residuals, bool surface);
 

@@ -16,7 +16,8 @@ TEST(Rmse, EqualsSigmaWhereTheModelIsPerfect) {
 
 TEST(PureError, IsTheScatterOfRepeatsWhateverTheMisfit) {
   MadeUpSet set(5, 48, 4, 0.005, 2);
-  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
+  for (int k = 0; k < set.size(); ++k)
+    set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
   set.Finish();
   const PureError error = PureErrorOf(set.observations, set.residuals);
   EXPECT_EQ(error.degrees, 5 * 48 * (4 - 1) * 2);
@@ -36,7 +37,8 @@ TEST(LackOfFit, IsUniformWhereNothingIsMissing) {
 
 TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
   MadeUpSet set(5, 48, 4, 0.005, 3);
-  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3] += 0.005 * std::sin(set.observations.pose[k]);
+  for (int k = 0; k < set.size(); ++k)
+    set.observations.time_s[k * 3] += 0.005 * std::sin(set.observations.pose[k]);
   set.Finish();
   EXPECT_LT(LackOfFitP(set.observations, set.residuals, 0), 1e-6);
 }

@@ -47,9 +47,8 @@ double Search::HeldoutRmse(const Fit& fit) const {
   if (p == 0) return std::sqrt(r.squaredNorm() / n);
 
   // Left out by object; by pose where objects are few or have values of their own.
-  const bool own_values =
-      std::any_of(fit.model.coordinates().begin(), fit.model.coordinates().end(),
-                  [](const Coordinate& c) { return !c.object.empty(); });
+  const bool own_values = std::any_of(fit.model.coordinates().begin(), fit.model.coordinates().end(),
+                                      [](const Coordinate& c) { return !c.object.empty(); });
   const bool by_object = o.objects.size() >= 3 && !own_values;
   const int folds = by_object ? static_cast<int>(o.objects.size()) : kFolds;
   std::vector<std::vector<int>> rows(folds);
@@ -92,9 +91,8 @@ absl::StatusOr<std::vector<Move>> Search::Score(const Fit& fit, int given) const
   }
   for (int c = 0; c < static_cast<int>(candidates_.size()); ++c) {
     const std::string name = NameOf(*candidates_[c].effect);
-    const bool present = std::any_of(model.effects.begin(), model.effects.end(), [&](const EffectInstance& e) {
-      return NameOf(*e.effect) == name;
-    });
+    const bool present = std::any_of(model.effects.begin(), model.effects.end(),
+                                     [&](const EffectInstance& e) { return NameOf(*e.effect) == name; });
     if (present) continue;
     Move move;
     move.candidate = c;
@@ -110,9 +108,8 @@ absl::StatusOr<std::vector<Move>> Search::Score(const Fit& fit, int given) const
   std::vector<int> first_column;
   Eigen::MatrixXd wide(fit.columns.values.rows(), 0);
   for (Move& move : moves) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const Eigen::MatrixXd columns,
-        Derivatives(experiment_, move.start, move.start.Start(), fit.time_s, own));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
+                                Derivatives(experiment_, move.start, move.start.Start(), fit.time_s, own));
     first_column.push_back(1 + own + static_cast<int>(wide.cols()));
     const int at = static_cast<int>(wide.cols());
     wide.conservativeResize(Eigen::NoChange, at + columns.cols());
@@ -199,7 +196,8 @@ absl::StatusOr<bool> Search::Grow(Explanation* explanation) const {
     const bool ramp = !move.visible && move.start.coordinates().back().inverse;
     const bool user = move.candidate >= 0 && candidates_[move.candidate].of_user;
     const bool near = move.visible && fitted < rules_.most_refits &&
-                      move.evidence > moves[0].evidence - kNearForecast && move.evidence > explanation->fit.evidence;
+                      move.evidence > moves[0].evidence - kNearForecast &&
+                      move.evidence > explanation->fit.evidence;
     if (!near && !ramp && !user) continue;
     progress_(absl::StrCat("fitting ", move.name));
     fitted += near;
@@ -227,7 +225,8 @@ absl::StatusOr<bool> Search::Shrink(Explanation* explanation) const {
   return false;
 }
 
-absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation& explanation, int index) const {
+absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation& explanation,
+                                                              int index) const {
   const Effect& own = *explanation.fit.model.base().effects[index].effect;
   // The other effects stay where they are: what takes this one's place finds them so.
   TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without,

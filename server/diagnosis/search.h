@@ -1,5 +1,5 @@
-// The search for what is missing: effects are added, values set free, taken back and exchanged, as long as the
-// evidence grows by enough that chance would not do it in one set of a hundred.
+// The search for what is missing: effects are added, values set free, taken back and exchanged, as long as
+// the evidence grows by enough that chance would not do it in one set of a hundred.
 #pragma once
 
 #include <functional>
@@ -15,23 +15,23 @@ namespace touchstone {
 
 // Thresholds, chosen on the tuning seeds of tests/hidden_effects.
 struct SearchRules {
-  double enter_nats = 4.5;            // gain in log evidence that a step needs
-  double family_wise_p = 2e-3;      // of the likelihood ratio, over all moves
-  double practical = 0.003;         // share by which the error on touches left out must fall
-  double equivalent_nats = 3;       // explanations as near as this are named together
-  double formula_nats = 11;         // price of a term that was picked from a dictionary
-  int least_rows_a_value = 8;       // contrasts that each fitted value needs
+  double enter_nats = 4.5;      // gain in log evidence that a step needs
+  double family_wise_p = 2e-3;  // of the likelihood ratio, over all moves
+  double practical = 0.003;     // share by which the error on touches left out must fall
+  double equivalent_nats = 3;   // explanations as near as this are named together
+  double formula_nats = 11;     // price of a term that was picked from a dictionary
+  int least_rows_a_value = 8;   // contrasts that each fitted value needs
   int most_steps = 6;
-  int most_refits = 6;              // candidates that are fitted in full a step
+  int most_refits = 6;  // candidates that are fitted in full a step
 };
 
 // One way on from a fit.
 struct Move {
-  int candidate = -1;       // index into the candidates, or -1: sets free
-  int refit = -1;           // ... this effect of the model
-  std::string name;         // of the effect
-  bool visible = false;     // false: this experiment cannot see it
-  double evidence = 0;      // linear prediction, nats
+  int candidate = -1;    // index into the candidates, or -1: sets free
+  int refit = -1;        // ... this effect of the model
+  std::string name;      // of the effect
+  bool visible = false;  // false: this experiment cannot see it
+  double evidence = 0;   // linear prediction, nats
   double log_likelihood = 0;
   FreeModel start;
 };
@@ -59,7 +59,8 @@ class Search {
         rules_(rules),
         progress_(std::move(progress)) {}
 
-  // From a start (the given model, perhaps with a formula), the best explanation. `given`: effects of the model.
+  // From a start (the given model, perhaps with a formula), the best explanation. `given`: effects of the
+  // model.
   absl::StatusOr<Explanation> Run(FreeModel start, int given) const;
 
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit foretells.

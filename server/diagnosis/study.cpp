@@ -12,16 +12,17 @@
 namespace touchstone {
 namespace {
 
-constexpr double kMostMissed = 0.5;      // share of an object's touches
+constexpr double kMostMissed = 0.5;  // share of an object's touches
 constexpr double kWarnMissed = 0.05;
-constexpr double kUnitFactor = 100;      // measured over predicted spread that no effect could give
-constexpr double kEdgeM = 0.3e-3;        // contacts this near an edge are left out
-constexpr double kEdgeJumpM = 0.5e-3;    // what makes a step an edge: second difference of the travel
+constexpr double kUnitFactor = 100;    // measured over predicted spread that no effect could give
+constexpr double kEdgeM = 0.3e-3;      // contacts this near an edge are left out
+constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
 constexpr int kRepeatsSearched = 4;
-constexpr double kFloorM = 0.3e-6;       // what mesh files and CSV numbers are rounded to, about
+constexpr double kFloorM = 0.3e-6;  // what mesh files and CSV numbers are rounded to, about
 
 // A mesh that most touches miss is not the mesh that was touched.
-absl::Status CheckMeshes(const Observations& o, const Prediction& nominal, std::vector<std::string>* warnings) {
+absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
+                         std::vector<std::string>* warnings) {
   std::vector<int> touches(o.objects.size()), missed(o.objects.size());
   std::vector<double> off_m(o.objects.size());
   for (int k = 0; k < o.size(); ++k) {
@@ -41,14 +42,15 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal, std::
     const Bounds& bounds = o.surfaces[object]->bounds();
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * 1e3;
     const std::string text = absl::StrFormat(
-        "object '%s': in %d of %d touches a finger reported that misses the mesh in the model. The mesh measures "
+        "object '%s': in %d of %d touches a finger reported that misses the mesh in the model. The mesh "
+        "measures "
         "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
         off_m[object] * 1e3);
     if (missed[object] > kMostMissed * touches[object])
-      return absl::InvalidArgumentError(absl::StrCat(
-          o.set->origin, ": ", text, ". Is it this object's mesh, in mm, with z up? (--mesh ", o.objects[object],
-          "=FILE,unit=mm,up=z)"));
+      return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
+                                                     ". Is it this object's mesh, in mm, with z up? (--mesh ",
+                                                     o.objects[object], "=FILE,unit=mm,up=z)"));
     warnings->push_back(text + ".");
   }
   return absl::OkStatus();
@@ -77,7 +79,8 @@ absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
   if (!(m > 0 && p > 0) || (m < kUnitFactor * p && p < kUnitFactor * m)) return absl::OkStatus();
   const double speed_mm_s = o.set->speed_m_s[0] * 1e3;
   return absl::InvalidArgumentError(absl::StrFormat(
-      "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g us: no "
+      "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g "
+      "us: no "
       "effect makes a factor of %.3g. t_*_us are microseconds, speed_mm_s is mm/s; does the file have %s?",
       o.set->origin, m * 1e6, speed_mm_s, p * 1e6, m > p ? m / p : p / m,
       m < p ? "milliseconds (multiply by 1000) or seconds" : "nanoseconds, or speeds in m/s"));
@@ -226,11 +229,13 @@ absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_r
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context) {
   auto study = std::make_unique<Study>();
   study->input = input;
   study->context = context;
-  if (context.progress && !context.progress("reading", 0)) return absl::CancelledError("the diagnosis was cancelled");
+  if (context.progress && !context.progress("reading", 0))
+    return absl::CancelledError("the diagnosis was cancelled");
   TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
   study->observations = std::make_unique<Observations>(std::move(observations));
   Observations& o = *study->observations;

@@ -20,7 +20,7 @@ struct Study {
   DiagnosisContext context;
   std::unique_ptr<Observations> observations;  // every touch
   std::unique_ptr<Predictor> predictor;
-  Prediction nominal;                          // of the given model, with details
+  Prediction nominal;  // of the given model, with details
   std::vector<std::string> warnings;
 
   // What the search sees.
@@ -34,7 +34,8 @@ struct Study {
 };
 
 // Errors: input that contradicts itself, a mesh that most touches miss, times in the wrong unit.
-absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input, const DiagnosisContext& context);
+absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context);
 
 // Chooses the touches of the search anew, after some were left out. `weights` of the touches of
 // study->searched->row (empty: all 1).

@@ -39,9 +39,10 @@ std::string Values(const Parameters& parameters) {
 std::string HowWrong(const v1::Report& report) {
   const double rmse = report.initial().rmse_us(), floor = report.noise_floor_us();
   if (!(floor > 0)) return absl::StrCat("The model is off by ", Time(rmse), ".");
-  return absl::StrFormat("The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
-                         Time(rmse), Time(floor), report.noise_floor().from_repeats() ? "" : " at most",
-                         report.reducible_share() * 100);
+  return absl::StrFormat(
+      "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
+      Time(rmse), Time(floor), report.noise_floor().from_repeats() ? "" : " at most",
+      report.reducible_share() * 100);
 }
 
 }  // namespace
@@ -61,7 +62,8 @@ void DescribeData(const Observations& o, v1::Report* report) {
   std::set<double> speeds;
   uint32_t used = 0, missed = 0;
   for (int k = 0; k < o.size(); ++k) {
-    for (int i = 0; i < o.fingers; ++i) missed += std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
+    for (int i = 0; i < o.fingers; ++i)
+      missed += std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
     if (!o.used[k]) continue;
     ++used;
     poses.insert(o.pose[k]);
@@ -87,7 +89,8 @@ void AddWarnings(const Observations& o, v1::Report* report) {
                                       " touches took part: weak effects stay unseen, and errors are rough."));
   if (data.objects_size() == 1)
     report->add_warnings(
-        "One object only: what belongs to the rig and what to this object cannot be told apart well. Touch at least "
+        "One object only: what belongs to the rig and what to this object cannot be told apart well. Touch "
+        "at least "
         "three objects.");
   if (data.repeats() == 0)
     report->add_warnings(
@@ -95,15 +98,16 @@ void AddWarnings(const Observations& o, v1::Report* report) {
   uint32_t unused = 0;
   for (const v1::UnusedRows& rows : data.unused()) unused += rows.rows();
   if (unused * 5 > data.rows())
-    report->add_warnings(absl::StrFormat("%d of %d rows could not be used; see the reasons.", unused, data.rows()));
+    report->add_warnings(
+        absl::StrFormat("%d of %d rows could not be used; see the reasons.", unused, data.rows()));
 }
 
 std::string Summary(const v1::Report& report) {
   if (report.touches() == 0) return "No touch could be used: nothing can be said of the model.";
   std::vector<std::string> sentences = {HowWrong(report)};
   for (const v1::Refit& refit : report.refitted())
-    sentences.push_back(absl::StrCat("In the model ", refit.effect(), " has another value: ",
-                                     Values(refit.parameters()), "."));
+    sentences.push_back(absl::StrCat("In the model ", refit.effect(),
+                                     " has another value: ", Values(refit.parameters()), "."));
   for (const v1::Step& step : report.steps()) {
     std::string name = step.effect();
     for (const std::string& other : step.equivalent()) absl::StrAppend(&name, " or ", other);
@@ -117,13 +121,16 @@ std::string Summary(const v1::Report& report) {
       break;
     case v1::Report::UNEXPLAINED:
       if (!report.unexplained().formula().empty())
-        sentences.push_back(absl::StrCat(
-            "What remains follows no effect of the catalogue; it hangs on ",
-            report.unexplained().covariates_size() > 0 ? report.unexplained().covariates(0).name() : "something",
-            ". A suggestion: ", report.unexplained().formula(), " (", Values(report.unexplained().parameters()),
-            ") would leave ", Time(report.unexplained().rmse_us()), "."));
+        sentences.push_back(absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
+                                         report.unexplained().covariates_size() > 0
+                                             ? report.unexplained().covariates(0).name()
+                                             : "something",
+                                         ". A suggestion: ", report.unexplained().formula(), " (",
+                                         Values(report.unexplained().parameters()), ") would leave ",
+                                         Time(report.unexplained().rmse_us()), "."));
       else
-        sentences.push_back("A structure remains that neither an effect of the catalogue nor a simple formula explains.");
+        sentences.push_back(
+            "A structure remains that neither an effect of the catalogue nor a simple formula explains.");
       break;
     case v1::Report::MISSING_EFFECTS:
     case v1::Report::WRONG_VALUES:
