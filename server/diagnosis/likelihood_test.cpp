@@ -12,9 +12,16 @@
 namespace touchstone {
 namespace {
 
+HiddenRig SmallRig() {
+  HiddenRig rig;
+  rig.objects = {"lat00", "lat20"};
+  rig.samples_per_face = rig.rounds = 2;
+  return rig;
+}
+
 class LikelihoodTest : public ::testing::Test {
  protected:
-  LikelihoodTest() : input(MakeTestInput({{"lat00", "lat20"}, 2, 2})) {
+  LikelihoodTest() : input(MakeTestInput(SmallRig())) {
     observations = std::make_unique<Observations>(*MakeObservations(input));
     details = *Predict(*observations, *input.model, true, false, nullptr);
     contrasts = std::make_unique<Contrasts>(*observations, details.time_s);
