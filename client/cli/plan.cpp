@@ -9,7 +9,7 @@ namespace {
 
 struct Options {
   PlanOptions plan;
-  std::string object;
+  std::vector<std::string> objects;
   uint64_t seed = 0;
   uint64_t first = 0;
   uint32_t count = 10;
@@ -22,7 +22,6 @@ constexpr uint32_t kTouchesPerRequest = 10000;
 absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
   v1::ExpandPlanRequest request;
   TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_plan(), MakePlan(options.plan, nullptr));
-  request.set_object(options.object);
   request.set_seed(options.seed);
   // A plan that ends is written whole unless a part was asked for.
   uint64_t count = options.count;
@@ -32,22 +31,25 @@ absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
 
   std::vector<client::MeasuredTouch> touches;
-  for (uint64_t done = 0; done < count;) {
-    const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
-    request.set_first_index(options.first + done);
-    request.set_count(step);
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const v1::ExpandPlanResponse response,
-        client::Connection::Call(&v1::Source::Stub::ExpandPlan, connection->source(), request));
-    for (const v1::CommandedTouch& touch : response.touches()) {
-      client::MeasuredTouch row;
-      row.touch = options.first + touches.size();
-      row.object = options.object;
-      row.commanded = touch;
-      touches.push_back(std::move(row));
+  for (const std::string& object : SplitCommas(options.objects)) {
+    request.set_object(object);
+    for (uint64_t done = 0; done < count;) {
+      const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
+      request.set_first_index(options.first + done);
+      request.set_count(step);
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          const v1::ExpandPlanResponse response,
+          client::Connection::Call(&v1::Source::Stub::ExpandPlan, connection->source(), request));
+      for (const v1::CommandedTouch& touch : response.touches()) {
+        client::MeasuredTouch row;
+        row.touch = options.first + touches.size();
+        row.object = object;
+        row.commanded = touch;
+        touches.push_back(std::move(row));
+      }
+      if (response.touches_size() == 0) break;  // the plan has ended
+      done += step;
     }
-    if (response.touches_size() == 0) break;  // the plan has ended
-    done += step;
   }
   if (!cli.output().json) return WriteOutput(options.output, client::FormatMeasurements(touches));
 
@@ -79,10 +81,12 @@ void AddPlan(Cli* cli) {
   CLI::App* command = cli->AddCommand(
       nullptr, "plan", "Writes the commanded touches of a plan as CSV, a measurement file without times.",
       "touchstone plan lat20 --count 100 -o plan.csv\n"
-      "touchstone plan lat20 --plan faces --samples-per-face 8 --rounds 4 -o plan.csv\n"
+      "touchstone plan lat00,lat10,lat20 --plan faces --samples-per-face 8 --rounds 4 -o plan.csv\n"
       "touchstone plan lat20 --step-angle-deg 5 --seed 7 --json",
       [cli, options, count] { return RunPlan(*cli, *options, (*count)->count() > 0); });
-  command->add_option("OBJECT", options->object, "The object that is touched (touchstone objects)")
+  command
+      ->add_option("OBJECT", options->objects,
+                   "The object that is touched, or several: a,b,c (touchstone objects lists them)")
       ->type_name("")
       ->required();
   *count = command->add_option("-n,--count", options->count,

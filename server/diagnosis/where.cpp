@@ -15,10 +15,13 @@ namespace {
 
 constexpr int kMostSlices = 6;
 constexpr int kMostTouchesSearched = 30000;
-constexpr int kTries = 8;               // candidates that the other half is asked about, a slice
-constexpr double kLeastShare = 0.03;    // of the excess, for a slice to be worth a line
-constexpr double kLeastZ = 4;           // on the other half, for a slice to be believed
-constexpr int kLeastPoses = 8;          // a half
+constexpr int kTries = 8;             // candidates that the other half is asked about, a slice
+constexpr double kLeastShare = 0.03;  // of the excess, for a slice to be worth a line
+constexpr double kLeastZ = 4;         // on the other half, for a slice to be believed
+// ... and where the excess as a whole stands so many standard deviations above noise: something is there, and
+// a slice of a few poses cannot reach four.
+constexpr double kLeastZOfMisfit = 1.8, kCertainMisfit = 10;
+constexpr int kLeastPoses = 5;          // a half
 constexpr double kCoherentShare = 0.2;  // of a slice's excess in its mean, to call it early or late
 
 struct Half {
@@ -177,6 +180,11 @@ std::vector<v1::Slice> SliceFinder::Find() {
   Collect(touches);
   const double total = TotalExcess();
   if (!(total > 0) || !(search_.excess > 0)) return {};
+  double squares = 0;  // variance of the excess that noise alone would have, over 2 sigma^4
+  for (int k = 0; k < observations_.size(); ++k)
+    if (observations_.used[k]) squares += std::max(0, FingersCompared(observations_, residuals_, k) - 1);
+  const bool certain = total > kCertainMisfit * sigma_s_ * sigma_s_ * std::sqrt(2 * squares);
+  const double least_z = certain ? kLeastZOfMisfit : kLeastZ;
 
   // A part must be large enough to picture; in a small set a fifth of it is.
   const double least_touches =
@@ -193,8 +201,8 @@ std::vector<v1::Slice> SliceFinder::Find() {
     for (const SliceCandidate& candidate : candidates) {
       if (candidate.score < kLeastShare * search_.excess) break;
       const Verdict there = Judge(candidate, search_.live), here = Judge(candidate, check_.live);
-      const bool same_bias = there.z_mean * here.z_mean > 0 && std::abs(here.z_mean) > kLeastZ;
-      found = here.z_excess > kLeastZ || same_bias;
+      const bool same_bias = there.z_mean * here.z_mean > 0 && std::abs(here.z_mean) > least_z;
+      found = here.z_excess > least_z || same_bias;
       if (found) {
         chosen = Simplified(bins_, cells_, live, candidate);
         break;
