@@ -10,6 +10,7 @@
 
 #include "server/diagnosis/contrasts.h"
 #include "server/diagnosis/free_model.h"
+#include "server/diagnosis/judgement.h"
 #include "server/diagnosis/likelihood.h"
 #include "server/diagnosis/predictor.h"
 
@@ -37,25 +38,6 @@ struct Fit {
   double sigma_s = 0;
   Eigen::MatrixXd covariance;  // of the coordinates
 };
-
-// Further columns that compete: fixed terms with one free factor each (a formula's terms).
-struct Judgement {
-  double evidence = 0;
-  double log_likelihood = 0;
-  int surface = 0;
-  double sigma_s = 0;
-  Eigen::VectorXd step;  // to the optimum of the most probable hypothesis
-  Eigen::MatrixXd covariance;
-};
-
-// Evidence of coordinates whose columns follow the residual in grams[s] (any subset: `members`, with the
-// residual at 0). Values are held within bounds. `point`: where the columns were taken.
-Judgement Judge(const Likelihood& likelihood, const std::vector<Eigen::MatrixXd>& grams,
-                const std::vector<int>& members, const std::vector<Coordinate>& coordinates,
-                const Eigen::VectorXd& point);
-
-// The Gram matrices of columns under every hypothesis.
-std::vector<Eigen::MatrixXd> Grams(const Likelihood& likelihood, const Likelihood::Columns& columns);
 
 // Contrasts of measured minus predicted.
 Eigen::VectorXd ResidualContrasts(const Experiment& experiment, const std::vector<double>& predicted_s);

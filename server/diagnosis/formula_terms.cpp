@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "server/base/text.h"
+#include "server/diagnosis/term_factors.h"
 #include "server/effects/formula.h"
 
 namespace touchstone {
@@ -19,137 +19,6 @@ namespace {
 constexpr double kTypicalTravelM = 0.2e-3;
 constexpr int kPeriods = 40;
 constexpr double kLeastPeriodMm = 1.5, kMostPeriodMm = 40;
-// The expression of a term may be long; what people would try first comes cheaper.
-constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
-
-double ThreeDigits(double value) {
-  if (value == 0) return 0;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 2);
-  return unit >= 1 ? std::round(value / unit) * unit : std::round(value / unit) / std::round(1 / unit);
-}
-
-using Value = std::function<double(int k, int finger)>;
-
-// A covariate or a function of one.
-struct Factor {
-  std::string covariate;
-  std::string expression;
-  bool differs;  // between the fingers of a touch
-  double price;
-  Value value;
-};
-
-struct FingerFactor {
-  std::string expression;  // empty: 1
-  Value value;
-};
-
-std::vector<Factor> ListFactors(const Observations& o, const Prediction& d) {
-  std::vector<Factor> factors;
-  const MeasurementSet& set = *o.set;
-  const auto at = [&o](int k, int i) { return static_cast<size_t>(k) * o.fingers + i; };
-  const auto add = [&](const std::string& covariate, const std::string& expression, bool differs,
-                       double price, Value value) {
-    factors.push_back({covariate, expression, differs, price, std::move(value)});
-  };
-  const auto with_square = [&](const std::string& name, bool differs, const Value& value) {
-    add(name, name, differs, kSimpleNats, value);
-    add(name, name + "^2", differs, kCurvedNats, [value](int k, int i) {
-      const double x = value(k, i);
-      return x * x;
-    });
-  };
-
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::string letter(1, "xyz"[axis]);
-    with_square("approach_" + letter, false, [&, axis](int k, int) { return set.approach[o.row[k]][axis]; });
-    with_square("lateral_" + letter, false, [&, axis](int k, int) { return set.lateral[o.row[k]][axis]; });
-    with_square("normal_" + letter, true, [&d, at, axis](int k, int i) { return d.normal[at(k, i)][axis]; });
-    const Value contact_mm = [&d, at, axis](int k, int i) { return d.contact_m[at(k, i)][axis] * 1e3; };
-    with_square("contact_" + letter + "_mm", true, contact_mm);
-  }
-
-  // Travel, about its middle where it is squared: far from zero a square is all but a line.
-  double mean_mm = 0;
-  int counted = 0;
-  for (const double travel : d.travel_m)
-    if (!std::isnan(travel)) mean_mm += travel * 1e3, ++counted;
-  mean_mm = std::round(mean_mm / std::max(counted, 1));
-  const Value travel_mm = [&d, at](int k, int i) { return d.travel_m[at(k, i)] * 1e3; };
-  add("travel_mm", "travel_mm", true, kSimpleNats, travel_mm);
-  add("travel_mm", absl::StrCat("(travel_mm - ", ShortestNumber(mean_mm), ")^2"), true, kCurvedNats,
-      [travel_mm, mean_mm](int k, int i) { return std::pow(travel_mm(k, i) - mean_mm, 2); });
-  add("travel_mm", absl::StrCat("abs(travel_mm - ", ShortestNumber(mean_mm), ")"), true, kCurvedNats,
-      [travel_mm, mean_mm](int k, int i) { return std::abs(travel_mm(k, i) - mean_mm); });
-
-  const Value cosine = [&d, at](int k, int i) { return std::clamp(d.cos_incidence[at(k, i)], 0.1, 1.0); };
-  const Value tangent = [cosine](int k, int i) { return std::sqrt(1 / std::pow(cosine(k, i), 2) - 1); };
-  add("incidence_deg", "tan(incidence_deg*pi/180)", true, kSimpleNats, tangent);
-  add("incidence_deg", "tan(incidence_deg*pi/180)^2", true, kSimpleNats,
-      [tangent](int k, int i) { return std::pow(tangent(k, i), 2); });
-  add("incidence_deg", "(1/cos(incidence_deg*pi/180) - 1)", true, kCurvedNats,
-      [cosine](int k, int i) { return 1 / cosine(k, i) - 1; });
-  add("incidence_deg", "incidence_deg", true, kSimpleNats,
-      [cosine](int k, int i) { return std::acos(cosine(k, i)) * 180 / kPi; });
-  add("incidence_deg", "sin(incidence_deg*pi/180)", true, kSimpleNats,
-      [cosine](int k, int i) { return std::sqrt(1 - std::pow(cosine(k, i), 2)); });
-  if (!d.curvature_per_m.empty())
-    with_square("curvature_per_m", true, [&d, at](int k, int i) { return d.curvature_per_m[at(k, i)]; });
-
-  // What happens only when a certain finger is first.
-  const double middle = 0.5 * (o.fingers - 1);
-  for (int finger = 0; finger < o.fingers; ++finger)
-    add("first_finger", absl::StrCat("(first_finger == ", ShortestNumber(finger - middle), ")"), false,
-        kSimpleNats, [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
-  add("first_finger", "first_finger", false, kSimpleNats,
-      [&d, middle](int k, int) { return d.first_finger[k] - middle; });
-  with_square("previous_press_mm", true,
-              [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * 1e3; });
-  const auto varies = [&](const std::vector<double>& column) {
-    return !column.empty() &&
-           *std::max_element(column.begin(), column.end()) > *std::min_element(column.begin(), column.end());
-  };
-  if (varies(set.speed_m_s)) {
-    const Value speed_mm_s = [&](int k, int) { return set.speed_m_s[o.row[k]] * 1e3; };
-    with_square("speed_mm_s", false, speed_mm_s);
-    add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats,
-        [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });
-  }
-  // Conditions stand far from zero, and their effect was put to zero somewhere in the middle.
-  const auto centred = [&](const std::string& name, const std::vector<double>& column) {
-    if (!varies(column)) return;
-    double sum = 0;
-    for (const double x : column) sum += x;
-    const double mean = ThreeDigits(sum / static_cast<double>(column.size()));
-    const std::string text =
-        absl::StrCat("(", name, mean < 0 ? " + " : " - ", ShortestNumber(std::abs(mean)), ")");
-    const std::vector<double>* values = &column;
-    const Value plain = [&o, values](int k, int) { return (*values)[o.row[k]]; };
-    const Value shifted = [plain, mean](int k, int i) { return plain(k, i) - mean; };
-    add(name, name, false, kSimpleNats, plain);
-    if (mean == 0) return;
-    add(name, text, false, kSimpleNats, shifted);
-    add(name, text + "^2", false, kCurvedNats,
-        [shifted](int k, int i) { return shifted(k, i) * shifted(k, i); });
-  };
-  if (set.has_session_time) centred("session_time_s", set.session_time_s);
-  for (const auto& [name, column] : set.covariates) centred(name, column);
-  return factors;
-}
-
-std::vector<FingerFactor> ListFingerFactors(const Observations& o, const Prediction& d) {
-  std::vector<FingerFactor> factors;
-  const double middle = 0.5 * (o.fingers - 1);
-  factors.push_back({"", [](int, int) { return 1.0; }});
-  factors.push_back({"finger", [middle](int, int i) { return i - middle; }});
-  for (int finger = 0; finger < o.fingers; ++finger)
-    factors.push_back({absl::StrCat("(finger == ", ShortestNumber(finger - middle), ")"),
-                       [finger](int, int i) { return i == finger ? 1.0 : 0.0; }});
-  if (o.fingers > 3)
-    factors.push_back({"finger^2", [middle](int, int i) { return (i - middle) * (i - middle); }});
-  factors.push_back({"first", [&d](int k, int i) { return d.first_finger[k] == i ? 1.0 : 0.0; }});
-  return factors;
-}
 
 ParameterInfo Bounded(const std::string& name, Unit unit, double most) {
   ParameterInfo parameter;
@@ -261,16 +130,16 @@ class Scorer {
 
 std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit, const Prediction& d) {
   const Observations& o = *experiment.observations;
-  const std::vector<Factor> factors = ListFactors(o, d);
+  const std::vector<TermFactor> factors = ListTermFactors(o, d);
   const std::vector<FingerFactor> fingers = ListFingerFactors(o, d);
   const double speed_m_s = o.set->speed_m_s[o.row[0]];
   const bool several_speeds = std::any_of(factors.begin(), factors.end(),
-                                          [](const Factor& f) { return f.covariate == "speed_mm_s"; });
+                                          [](const TermFactor& f) { return f.covariate == "speed_mm_s"; });
   const int rows = experiment.contrasts->rows();
 
   // Columns of time in s for k = 1 mm (of travel) or 1 us.
   std::vector<double> values(o.time_s.size());
-  const auto column = [&](bool adds_time, const Value& value) {
+  const auto column = [&](bool adds_time, const TermValue& value) {
     for (int k = 0; k < o.size(); ++k)
       for (int i = 0; i < o.fingers; ++i) {
         const size_t e = static_cast<size_t>(k) * o.fingers + i;
@@ -288,7 +157,7 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
   std::vector<double> prices, scales;
   Eigen::MatrixXd columns(rows, 0);
   std::vector<Eigen::VectorXd> list;
-  for (const Factor& factor : factors)
+  for (const TermFactor& factor : factors)
     for (const FingerFactor& finger : fingers) {
       const bool plain = finger.expression.empty();
       if (plain && !factor.differs) continue;  // the same on every finger cannot be seen

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "server/base/random.h"
 #include "server/base/status.h"
@@ -153,68 +155,103 @@ double ScatterAmongRounds(const MeasurementSet& set, const std::vector<UnposedOb
   return *degrees > 0 ? std::sqrt(squares / *degrees) : 0;
 }
 
-absl::StatusOr<std::vector<double>> SimulateUnposed(std::shared_ptr<const Model> model,
-                                                    std::shared_ptr<const Surface> surface, const Plan& plan,
-                                                    const std::vector<uint64_t>& numbers, uint64_t seed) {
+namespace {
+
+void Fill(const std::vector<CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k, int t,
+          TouchBatch* batch) {
+  const CommandedTouch& touch = touches[k];
+  batch->index[t] = numbers[k];
+  batch->target_m[t] = touch.target_m;
+  batch->approach[t] = touch.approach;
+  batch->lateral[t] = touch.lateral;
+  batch->standoff_m[t] = touch.standoff_m;
+  batch->speed_m_s[t] = touch.speed_m_s;
+  batch->session_time_s[t] = touch.session_time_s;
+}
+
+}  // namespace
+
+Plan WithPoses(const Plan& plan, const SupposedPoses& poses) {
+  Plan changed = plan;
+  changed.faces.most_tilt_rad = poses.most_tilt_rad;
+  changed.faces.spread = poses.spread;
+  return changed;
+}
+
+absl::StatusOr<UnposedTouches> DrawUnposed(std::shared_ptr<const Model> model,
+                                           std::shared_ptr<const Surface> surface, const Plan& plan,
+                                           const std::vector<uint64_t>& numbers, uint64_t seed) {
   const TouchSimulator simulator(model);
   const auto generator = MakePoseGenerator(plan, surface->bounds(), seed);
-  const int fingers = model->fingers;
   const uint64_t poses_a_round = 6ull * plan.faces.samples_per_face;
-  std::vector<double> time_s(numbers.size() * fingers, NAN);
+  UnposedTouches drawn;
+  drawn.numbers = numbers;
+  drawn.seed = seed;
+  for (const uint64_t number : numbers) drawn.touches.push_back(TouchOfPlan(plan, *generator, number, 0));
 
   // A pose that misses is drawn again, in all of its rounds; a finger that only failed to report is not.
   std::map<uint64_t, uint32_t> attempt;
-  std::vector<uint32_t> slots(numbers.size());
-  for (size_t k = 0; k < slots.size(); ++k) slots[k] = static_cast<uint32_t>(k);
+  std::vector<size_t> slots(numbers.size());
+  for (size_t k = 0; k < slots.size(); ++k) slots[k] = k;
   TouchBatch batch;
   TouchWorkspace workspace;
   batch.surface = surface;
   batch.seed = seed;
-  const auto fill = [&](size_t k, int t) {
-    const uint64_t number = numbers[k];
-    const auto found = attempt.find(number % poses_a_round);
-    const CommandedTouch touch =
-        TouchOfPlan(plan, *generator, number, found == attempt.end() ? 0 : found->second);
-    batch.index[t] = number;
-    batch.target_m[t] = touch.target_m;
-    batch.approach[t] = touch.approach;
-    batch.lateral[t] = touch.lateral;
-    batch.standoff_m[t] = touch.standoff_m;
-    batch.speed_m_s[t] = touch.speed_m_s;
-    batch.session_time_s[t] = touch.session_time_s;
-  };
-  for (uint32_t n = 0; n < kMostAttempts; ++n) {
+  for (uint32_t n = 0; n < kMostAttempts && !slots.empty(); ++n) {
     simulator.Prepare(static_cast<int>(slots.size()), &batch);
-    for (size_t t = 0; t < slots.size(); ++t) fill(slots[t], static_cast<int>(t));
-    TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
-    std::vector<uint32_t> missed;
-    std::map<uint64_t, bool> missed_pose;
     for (size_t t = 0; t < slots.size(); ++t)
-      for (int i = 0; i < fingers; ++i)
+      Fill(drawn.touches, numbers, slots[t], static_cast<int>(t), &batch);
+    TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
+    std::set<uint64_t> missed_poses;
+    for (size_t t = 0; t < slots.size(); ++t)
+      for (int i = 0; i < model->fingers; ++i)
         if (std::isnan(batch.travel_m[batch.At(i, static_cast<int>(t))]))
-          missed_pose[numbers[slots[t]] % poses_a_round] = true;
-    if (missed_pose.empty() && n == 0) break;
-    for (const auto& [pose, yes] : missed_pose) ++attempt[pose];
-    for (const uint32_t slot : slots)
-      if (missed_pose.count(numbers[slot] % poses_a_round)) missed.push_back(slot);
+          missed_poses.insert(numbers[slots[t]] % poses_a_round);
+    for (const uint64_t pose : missed_poses) ++attempt[pose];
+    std::vector<size_t> missed;
+    for (const size_t slot : slots) {
+      const uint64_t pose = numbers[slot] % poses_a_round;
+      if (!missed_poses.count(pose)) continue;
+      missed.push_back(slot);
+      drawn.touches[slot] = TouchOfPlan(plan, *generator, numbers[slot], attempt[pose]);
+    }
     slots.swap(missed);
-    if (slots.empty()) break;
   }
+  return drawn;
+}
 
+absl::StatusOr<std::vector<double>> PlayUnposed(std::shared_ptr<const Model> model,
+                                                std::shared_ptr<const Surface> surface,
+                                                const UnposedTouches& drawn) {
+  const TouchSimulator simulator(model);
+  const size_t count = drawn.touches.size();
+  const int fingers = model->fingers;
+  TouchBatch batch;
+  TouchWorkspace workspace;
+  batch.surface = std::move(surface);
+  batch.seed = drawn.seed;
   // All together in the order of the session, so that a press reaches the next touch.
-  simulator.Prepare(static_cast<int>(numbers.size()), &batch);
-  for (size_t k = 0; k < numbers.size(); ++k) fill(k, static_cast<int>(k));
+  simulator.Prepare(static_cast<int>(count), &batch);
+  for (size_t k = 0; k < count; ++k) Fill(drawn.touches, drawn.numbers, k, static_cast<int>(k), &batch);
   TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
-  for (size_t k = 1; k < numbers.size(); ++k)
+  for (size_t k = 1; k < count; ++k)
     for (int i = 0; i < fingers; ++i) {
       const double press_m = batch.press_m[batch.At(i, static_cast<int>(k) - 1)];
       batch.previous_press_m[batch.At(i, static_cast<int>(k))] = std::isnan(press_m) ? 0 : press_m;
     }
   TOUCHSTONE_RETURN_IF_ERROR(simulator.RunSensor(&batch, &workspace));
-  for (size_t k = 0; k < numbers.size(); ++k)
+  std::vector<double> time_s(count * fingers, NAN);
+  for (size_t k = 0; k < count; ++k)
     for (int i = 0; i < fingers; ++i)
       time_s[k * fingers + i] = batch.reported_time_s[batch.At(i, static_cast<int>(k))];
   return time_s;
+}
+
+absl::StatusOr<std::vector<double>> SimulateUnposed(std::shared_ptr<const Model> model,
+                                                    std::shared_ptr<const Surface> surface, const Plan& plan,
+                                                    const std::vector<uint64_t>& numbers, uint64_t seed) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedTouches drawn, DrawUnposed(model, surface, plan, numbers, seed));
+  return PlayUnposed(std::move(model), std::move(surface), drawn);
 }
 
 }  // namespace touchstone
