@@ -147,8 +147,11 @@ std::string HtmlDistributions(const v1::Report& report) {
                     Escape(Join(effects, "or")), ". Touches with poses would tell which.</p>\n");
   }
   body +=
-      "<p class=\"note\">p of the energy distance between descriptors by permutation; of each statistic by a "
-      "Kolmogorov-Smirnov test with permutations.</p>\n";
+      "<p class=\"note\">p: how often a set that the model makes alike (same objects, touches and rounds, "
+      "other "
+      "poses) lies as far from a large simulated one; by the energy distance between descriptors, and of "
+      "each "
+      "statistic by the Kolmogorov-Smirnov distance.</p>\n";
   return Section("distributions", "Distributions",
                  "The set has no poses, so touches cannot be compared one by one.", body);
 }

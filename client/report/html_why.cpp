@@ -155,8 +155,10 @@ std::string HtmlUnexplained(const v1::Report& report) {
                     "<pre id=\"formula\">",
                     Escape(rest.formula_yaml()), "</pre>\n");
   }
-  return Section("unexplained", "What no built-in effect explains",
-                 "A structure that is left after all steps, by permutation tests that respect poses.", body);
+  return Section(
+      "unexplained", "What no built-in effect explains",
+      "A structure that is left after all steps. p: likelihood ratio of the best term, all terms paid for.",
+      body);
 }
 
 }  // namespace touchstone::client

@@ -17,6 +17,17 @@ namespace {
 constexpr int kRanked = 8;  // candidates that are fitted in full
 constexpr int kMostCovariates = 6;
 constexpr double kCovariateP = 0.01;
+constexpr char kUnseen[] = "this experiment cannot see it";
+constexpr char kNeutral[] = "fits best where it changes nothing";
+
+// Whether every value of the effect ended at its neutral, usually a bound.
+bool ChangesNothing(const Fit& fit, int index) {
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const Coordinate& c = fit.model.coordinates()[i];
+    if (c.effect == index && std::abs(fit.point[i] - c.neutral) > 1e-9 * c.scale) return false;
+  }
+  return true;
+}
 
 // Cosine between a column and the nearest point of the span of others, all without `own`.
 double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const Eigen::MatrixXd& span) {
@@ -63,7 +74,7 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
     candidate.set_effect(move.name);
     candidate.set_scope(search.candidates()[move.candidate].per_object ? "object" : "rig");
     if (!move.visible) {
-      candidate.set_note("this experiment cannot see it");
+      candidate.set_note(kUnseen);
       candidates.push_back(std::move(candidate));
       continue;
     }
@@ -73,6 +84,12 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
       TOUCHSTONE_ASSIGN_OR_RETURN(const Fit fit, search.FitMove(move));
       candidate.set_gain_nats(fit.evidence - given.evidence);
       const int index = static_cast<int>(fit.model.base().effects.size()) - 1;
+      if (ChangesNothing(fit, index)) {
+        candidate.set_gain_nats(0);
+        candidate.set_note(kNeutral);
+        candidates.push_back(std::move(candidate));
+        continue;
+      }
       for (v1::ParameterValue& value : fit.model.Describe(index, fit.point, fit.covariance))
         *candidate.add_parameters() = std::move(value);
       const Eigen::VectorXd r = fit.columns.values.col(0);
@@ -86,10 +103,11 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
     candidates.push_back(std::move(candidate));
   }
   for (v1::Candidate& candidate : candidates)
-    if (candidate.note() != "this experiment cannot see it")
+    if (candidate.note() != kUnseen && candidate.note() != kNeutral)
       candidate.set_probability(std::exp(std::min(candidate.gain_nats(), 600.0)) / all);
-  std::stable_sort(candidates.begin(), candidates.end(), [](const v1::Candidate& a, const v1::Candidate& b) {
-    return a.gain_nats() > b.gain_nats();
+  const auto explains = [](const v1::Candidate& c) { return c.note() != kUnseen && c.note() != kNeutral; };
+  std::stable_sort(candidates.begin(), candidates.end(), [&](const v1::Candidate& a, const v1::Candidate& b) {
+    return explains(a) != explains(b) ? explains(a) : a.gain_nats() > b.gain_nats();
   });
   for (v1::Candidate& candidate : candidates) *report->add_candidates() = std::move(candidate);
   return absl::OkStatus();

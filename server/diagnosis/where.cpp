@@ -162,7 +162,8 @@ v1::Slice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_s
   v1::Slice message;
   message.set_slice(absl::StrJoin(words, " and "));
   message.set_touches(static_cast<uint32_t>(touches));
-  const double mean_s = sum / cells;
+  // Of whole touches the mean is zero but for rounding.
+  const double mean_s = std::abs(sum / cells) < 1e-9 ? 0 : sum / cells;
   message.set_mean_residual_us(mean_s * 1e6);
   message.set_rmse_us(std::sqrt(squares / cells) * 1e6);
   message.set_share_of_excess_error(std::clamp(excess / all_excess_s2, 0.0, 1.0));
