@@ -205,12 +205,14 @@ TEST(Diagnose, RefusesTimesInTheWrongUnit) {
 
 TEST(Diagnose, RefusesAMeshThatMostTouchesMiss) {
   DiagnosisInput input = MakeTestInput({});
-  TriangleMesh small = TestSurface("lat10")->mesh();
-  for (Eigen::Vector3f& vertex : small.vertices_m) vertex *= 0.1f;
-  input.surfaces["lat10"] = *Surface::Create("lat10", small);
-  const absl::Status status = Diagnose(input, {}).status();
-  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("object 'lat10'"));
+  for (const float scale : {0.1f, 1000.0f}) {  // cm for mm; m for mm
+    TriangleMesh other = TestSurface("lat10")->mesh();
+    for (Eigen::Vector3f& vertex : other.vertices_m) vertex *= scale;
+    input.surfaces["lat10"] = *Surface::Create("lat10", other);
+    const absl::Status status = Diagnose(input, {}).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << scale;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("object 'lat10'"));
+  }
 }
 
 TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {

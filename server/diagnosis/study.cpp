@@ -14,8 +14,9 @@ namespace {
 
 constexpr double kMostMissed = 0.5;  // share of an object's touches
 constexpr double kWarnMissed = 0.05;
-constexpr double kUnitFactor = 100;    // measured over predicted spread that no effect could give
-constexpr double kEdgeM = 0.3e-3;      // contacts this near an edge are left out
+constexpr double kMostTravel = 2.5;  // over the standoff: whoever goes farther has met nothing at the target
+constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
+constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
 constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
 constexpr int kRepeatsSearched = 4;
 constexpr double kFloorM = 0.3e-6;  // what mesh files and CSV numbers are rounded to, about
@@ -30,7 +31,8 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
     ++touches[o.object[k]];
     bool misses = false;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
-      misses |= !std::isnan(o.time_s[e]) && std::isnan(nominal.time_s[e]);
+      misses |=
+          !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMostTravel * o.set->standoff_m[o.row[k]]);
     missed[o.object[k]] += misses;
     const Bounds& bounds = o.surfaces[o.object[k]]->bounds();
     const Eigen::Vector3d& target = o.set->target_m[o.row[k]];
@@ -42,7 +44,8 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
     const Bounds& bounds = o.surfaces[object]->bounds();
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * 1e3;
     const std::string text = absl::StrFormat(
-        "object '%s': in %d of %d touches a finger reported that misses the mesh in the model. The mesh "
+        "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
+        "far behind the target. The mesh "
         "measures "
         "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),

@@ -86,7 +86,8 @@ void AddWarnings(const Observations& o, v1::Report* report) {
   }
   if (report->touches() < kFewTouches)
     report->add_warnings(absl::StrCat("Only ", report->touches(),
-                                      " touches took part: weak effects stay unseen, and errors are rough."));
+                                      report->touches() == 1 ? " touch" : " touches",
+                                      " took part: weak effects stay unseen, and errors are rough."));
   if (data.objects_size() == 1)
     report->add_warnings(
         "One object only: what belongs to the rig and what to this object cannot be told apart well. Touch "
