@@ -47,8 +47,7 @@ absl::Status UnposedCase::Prepare() {
     const auto surface = input.surfaces.find(set.objects[o]);
     if (surface == input.surfaces.end())
       return absl::InvalidArgumentError(absl::StrCat(set.origin, ": object '", set.objects[o],
-                                                     "' has no mesh: give --mesh ", set.objects[o],
-                                                     "=FILE"));
+                                                     "' has no mesh: give --mesh ", set.objects[o], "=FILE"));
     objects.push_back(
         SupposePlan(set, o, surface->second, speed_m_s, std::max(24, kMeasuredTouches / count)));
   }
@@ -71,8 +70,7 @@ absl::Status UnposedCase::CompareSizes() {
     here += spread(MeasuredTimes(static_cast<int>(o)));
     simulated += spread(time_s);
   }
-  if (simulated > 0 && (here > 100 * simulated || here < 0.01 * simulated))
-    size_ratio = here / simulated;
+  if (simulated > 0 && (here > 100 * simulated || here < 0.01 * simulated)) size_ratio = here / simulated;
   return absl::OkStatus();
 }
 
@@ -131,8 +129,7 @@ absl::StatusOr<std::shared_ptr<const UnposedTouches>> UnposedCase::TouchesOfRefe
             together = quick ? kQuickTouches : kReferenceTouches;
   Plan plan = WithPoses(objects[object].plan, poses);
   plan.faces.rounds = 1;
-  plan.faces.samples_per_face =
-      std::clamp(together / 6 / static_cast<int>(set.objects.size()), 10, most / 6);
+  plan.faces.samples_per_face = std::clamp(together / 6 / static_cast<int>(set.objects.size()), 10, most / 6);
   std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
   for (size_t n = 0; n < numbers.size(); ++n) numbers[n] = n;
   const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, kReferenceSeed, object, 7)[0];
@@ -160,9 +157,8 @@ absl::StatusOr<UnposedSamples> UnposedCase::MakeSet(const std::shared_ptr<const 
                                                     const SupposedPoses& poses, uint64_t number) const {
   UnposedSamples samples;
   for (size_t o = 0; o < objects.size(); ++o) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        std::vector<double> time_s,
-        TimesOfSet(of, static_cast<int>(o), poses, kReferenceSeed + 1 + number));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> time_s,
+                                TimesOfSet(of, static_cast<int>(o), poses, kReferenceSeed + 1 + number));
     // A finger that reported nothing in the set does so here.
     const std::vector<double> reported = MeasuredTimes(static_cast<int>(o));
     for (size_t t = 0; t < time_s.size(); ++t)

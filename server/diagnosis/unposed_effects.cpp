@@ -6,16 +6,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone {
 namespace {
 
 constexpr double kCompatibleP = 0.1;
-constexpr double kStrengths[] = {0.25, 0.5, 1, 2, 4};  // of the typical value
+constexpr double kPlainlyCompatibleP = 0.5;      // no need to look for better values
+constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
+constexpr size_t kRefined = 12;                  // effects that are looked at closely
+constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMostTiltRad = 50 * kRadiansPerDegree;
+constexpr double kSpreadStep = 0.1;
 
 // One number of one effect that is varied.
 struct Direction {
@@ -87,46 +91,78 @@ bool Worthwhile(const Effect& effect) {
          effect.needs.covariates.empty();
 }
 
-// The best strength along one direction.
-absl::Status SearchDirection(const Model& model, const Direction& direction, const MisfitOfModel& misfit,
-                             CompatibleEffect* best) {
+// Every number of an effect that says how much, each finger's and each axis's.
+void AddDirections(const std::shared_ptr<const Effect>& effect, int fingers, std::vector<Direction>* list) {
+  int offset = 0;
+  for (size_t p = 0; p < effect->parameters.size(); ++p) {
+    const ParameterInfo& info = effect->parameters[p];
+    const int count = info.Count(fingers);
+    // The length of bumps and the like are no strength: they say how, not how much.
+    if (p == 0 || info.neutral == 0)
+      for (int entry = 0; entry < count; ++entry)
+        list->push_back({effect, static_cast<int>(p), entry, offset});
+    offset += count;
+  }
+}
+
+// One model and the poses it was judged with.
+struct Trial {
+  Direction direction;
+  double amount = 0;
+  SupposedPoses poses;
+  UnposedMisfit misfit{HUGE_VAL, 0};
+};
+
+// Judges a trial; keeps it if it is better than `best`.
+absl::Status Attempt(const Model& model, Trial trial, ReferenceSize size, const MisfitOfModel& misfit,
+                     Trial* best) {
+  const auto varied = Varied(model, trial.direction, trial.amount);
+  if (!varied) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(trial.misfit, misfit(varied, trial.poses, size));
+  if (trial.misfit.distance < best->misfit.distance) *best = trial;
+  return absl::OkStatus();
+}
+
+// The best of a few strengths along one direction, with each of `poses`, at a glance.
+absl::Status Screen(const Model& model, const Direction& direction, const std::vector<SupposedPoses>& poses,
+                    const MisfitOfModel& misfit, Trial* best) {
   const ParameterInfo& info = direction.effect->parameters[direction.parameter];
   const double typical =
       ToSi(info.unit, info.typical != 0 ? std::abs(info.typical) : 0.05 * (info.upper - info.lower));
-  std::map<double, UnposedMisfit> tried;
-  const auto attempt = [&](double amount) -> absl::Status {
-    const auto varied = Varied(model, direction, amount);
-    if (!varied || tried.count(amount)) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(tried[amount], misfit(varied));
-    return absl::OkStatus();
-  };
-  for (const double strength : kStrengths)
-    for (const double sign : {-1.0, 1.0}) TOUCHSTONE_RETURN_IF_ERROR(attempt(sign * strength * typical));
-  if (tried.empty()) return absl::OkStatus();
-  const auto nearest = [&] {
-    return std::min_element(tried.begin(), tried.end(), [](const auto& a, const auto& b) {
-      return a.second.distance < b.second.distance;
-    });
-  };
-  // Between the neighbours of the best: an energy distance is about a parabola there.
-  for (int n = 0; n < 2; ++n) {
-    const auto middle = nearest();
-    if (middle == tried.begin() || std::next(middle) == tried.end()) break;
-    const double a = std::prev(middle)->first, b = middle->first, c = std::next(middle)->first;
-    const double fa = std::prev(middle)->second.distance, fb = middle->second.distance,
-                 fc = std::next(middle)->second.distance;
-    const double numerator = (b - a) * (b - a) * (fb - fc) - (b - c) * (b - c) * (fb - fa);
-    const double denominator = (b - a) * (fb - fc) - (b - c) * (fb - fa);
-    if (denominator == 0) break;
-    const double vertex = b - 0.5 * numerator / denominator;
-    if (!(vertex > a && vertex < c)) break;
-    TOUCHSTONE_RETURN_IF_ERROR(attempt(vertex));
-  }
-  const auto found = nearest();
-  if (found->second.p > best->p) {
-    best->effect = direction.effect->name;
-    best->values = InWords(model, direction, found->first);
-    best->p = found->second.p;
+  for (const SupposedPoses& supposed : poses)
+    for (const double strength : kStrengths)
+      for (const double sign : {-1.0, 1.0})
+        TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, {direction, sign * strength * typical, supposed},
+                                           ReferenceSize::kQuick, misfit, best));
+  return absl::OkStatus();
+}
+
+// Strength and poses together, in shrinking steps: poses that were fitted without the effect have taken a
+// part of what the effect does.
+absl::Status Refine(const Model& model, const MisfitOfModel& misfit, Trial* best) {
+  const Trial start = *best;
+  best->misfit.distance = HUGE_VAL;
+  TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, start, ReferenceSize::kFull, misfit, best));
+  for (const double step : {1.0, 0.5, 0.25}) {
+    for (const double sign : {-1.0, 1.0}) {
+      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
+      Trial trial = *best;
+      trial.amount *= std::exp2(sign * step);
+      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+    }
+    for (const double sign : {-1.0, 1.0}) {
+      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
+      Trial trial = *best;
+      trial.poses.most_tilt_rad =
+          std::clamp(trial.poses.most_tilt_rad + sign * step * kTiltStepRad, 0.0, kMostTiltRad);
+      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+    }
+    for (const double sign : {-1.0, 1.0}) {
+      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
+      Trial trial = *best;
+      trial.poses.spread = std::clamp(trial.poses.spread + sign * step * kSpreadStep, 0.1, 1.0);
+      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+    }
   }
   return absl::OkStatus();
 }
@@ -134,46 +170,55 @@ absl::Status SearchDirection(const Model& model, const Direction& direction, con
 }  // namespace
 
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
-    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also, const MisfitOfModel& misfit,
-    ThreadPool* pool, const std::function<bool(double done)>& progress) {
+    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also,
+    const std::vector<SupposedPoses>& poses, const MisfitOfModel& misfit, ThreadPool* pool,
+    const std::function<bool(double done)>& progress) {
   std::vector<std::shared_ptr<const Effect>> effects = Catalogue().All();
   effects.insert(effects.end(), also.begin(), also.end());
-  effects.erase(
-      std::remove_if(effects.begin(), effects.end(), [](const auto& effect) { return !Worthwhile(*effect); }),
-      effects.end());
+  std::vector<Direction> directions;
+  for (const auto& effect : effects)
+    if (Worthwhile(*effect)) AddDirections(effect, model.fingers, &directions);
 
-  std::vector<CompatibleEffect> best(effects.size());
-  std::vector<absl::Status> status(effects.size());
-  const auto search = [&](int begin, int end) {
-    for (int e = begin; e < end; ++e) {
-      int offset = 0;
-      for (size_t p = 0; p < effects[e]->parameters.size() && status[e].ok(); ++p) {
-        const ParameterInfo& info = effects[e]->parameters[p];
-        const int count = info.Count(model.fingers);
-        // The length of bumps and the like are no strength: they say how, not how much.
-        if (p == 0 || info.neutral == 0)
-          for (int entry = 0; entry < count && status[e].ok(); ++entry)
-            status[e] =
-                SearchDirection(model, {effects[e], static_cast<int>(p), entry, offset}, misfit, &best[e]);
-        offset += count;
-      }
-    }
-  };
   // In portions, so that progress and cancelling stay with this thread.
-  const int portion = pool ? 2 * (pool->size() + 1) : 1;
-  for (int begin = 0; begin < static_cast<int>(effects.size()); begin += portion) {
-    if (progress && !progress(double(begin) / effects.size())) return absl::CancelledError("cancelled");
-    const int end = std::min<int>(effects.size(), begin + portion);
-    if (pool)
-      pool->ParallelFor(end - begin, 1, [&](int from, int to) { search(begin + from, begin + to); });
-    else
-      search(begin, end);
+  const auto in_portions = [&](size_t count, double from, double to, const auto& body) -> absl::Status {
+    std::vector<absl::Status> status(count);
+    const size_t portion = pool ? pool->size() + 1 : 1;
+    for (size_t begin = 0; begin < count; begin += portion) {
+      if (progress && !progress(from + (to - from) * begin / count)) return absl::CancelledError("cancelled");
+      const size_t end = std::min(count, begin + portion);
+      const auto run = [&](int a, int b) {
+        for (int n = a; n < b; ++n) status[begin + n] = body(begin + n);
+      };
+      if (pool)
+        pool->ParallelFor(static_cast<int>(end - begin), 1, run);
+      else
+        run(0, static_cast<int>(end - begin));
+      for (size_t n = begin; n < end; ++n) TOUCHSTONE_RETURN_IF_ERROR(status[n]);
+    }
+    return absl::OkStatus();
+  };
+  std::vector<Trial> screened(directions.size());
+  TOUCHSTONE_RETURN_IF_ERROR(in_portions(directions.size(), 0, 0.5, [&](size_t d) {
+    return Screen(model, directions[d], poses, misfit, &screened[d]);
+  }));
+
+  // The best direction of every effect, closer: the best effects only.
+  std::stable_sort(screened.begin(), screened.end(),
+                   [](const Trial& a, const Trial& b) { return a.misfit.distance < b.misfit.distance; });
+  std::vector<Trial> best;
+  for (const Trial& trial : screened) {
+    if (best.size() == kRefined || trial.misfit.distance == HUGE_VAL) break;
+    if (std::none_of(best.begin(), best.end(),
+                     [&](const Trial& b) { return b.direction.effect == trial.direction.effect; }))
+      best.push_back(trial);
   }
+  TOUCHSTONE_RETURN_IF_ERROR(
+      in_portions(best.size(), 0.5, 1, [&](size_t n) { return Refine(model, misfit, &best[n]); }));
   std::vector<CompatibleEffect> compatible;
-  for (size_t e = 0; e < effects.size(); ++e) {
-    TOUCHSTONE_RETURN_IF_ERROR(status[e]);
-    if (best[e].p > kCompatibleP) compatible.push_back(best[e]);
-  }
+  for (const Trial& trial : best)
+    if (trial.misfit.p > kCompatibleP)
+      compatible.push_back(
+          {trial.direction.effect->name, InWords(model, trial.direction, trial.amount), trial.misfit.p});
   std::stable_sort(compatible.begin(), compatible.end(),
                    [](const CompatibleEffect& a, const CompatibleEffect& b) { return a.p > b.p; });
   return compatible;

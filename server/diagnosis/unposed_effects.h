@@ -9,6 +9,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/base/thread_pool.h"
+#include "server/diagnosis/unposed_case.h"
 #include "server/model/model.h"
 
 namespace touchstone {
@@ -19,18 +20,21 @@ struct CompatibleEffect {
   double p = 0;
 };
 
-// The distance of the measured set to a reference that a model makes, and its p.
+// How far the measured set is from a reference that a model makes, of all measures together, and its p.
 struct UnposedMisfit {
   double distance = 0;
   double p = 0;
 };
-using MisfitOfModel = std::function<absl::StatusOr<UnposedMisfit>(std::shared_ptr<const Model>)>;
+using MisfitOfModel = std::function<absl::StatusOr<UnposedMisfit>(const std::shared_ptr<const Model>&,
+                                                                  const SupposedPoses&, ReferenceSize)>;
 
-// Every effect of the catalogue and of `also`, one parameter at a time, with both signs and a few strengths
-// around its typical one; the best strength of each, if its p is above 0.1. Most compatible first. `misfit`
-// is called from several threads. Returns CANCELLED if `progress` (0 to 1, one call at a time) returns false.
+// Every effect of the catalogue and of `also`, one number at a time, with both signs and a few strengths,
+// first at a glance with each of `poses`; then the most promising closely, strength and poses together. Those
+// whose p is above 0.1, most compatible first. `misfit` is called from several threads. Returns CANCELLED if
+// `progress` (0 to 1, one call at a time) returns false.
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
-    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also, const MisfitOfModel& misfit,
-    ThreadPool* pool, const std::function<bool(double done)>& progress);
+    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also,
+    const std::vector<SupposedPoses>& poses, const MisfitOfModel& misfit, ThreadPool* pool,
+    const std::function<bool(double done)>& progress);
 
 }  // namespace touchstone
