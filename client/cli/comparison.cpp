@@ -12,6 +12,7 @@
 #include <iterator>
 #include <map>
 #include <random>
+#include <set>
 
 #include "client/report/report.h"
 #include "server/base/status.h"
@@ -54,10 +55,12 @@ absl::StatusOr<SetText> ReadSet(const Cli& cli, const std::string& text) {
 }
 
 // The mesh files of these objects in --mesh-dir; other files there are left alone.
-absl::Status AddMeshesOfFolder(const std::string& folder, const std::vector<std::string>& objects,
+absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
+                               const std::vector<std::string>& objects,
                                std::map<std::string, MeshSource>* meshes) {
   const std::vector<std::string> formats = MeshFormatNames();
   std::map<std::string, std::string> paths;
+  std::set<std::string> twice;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().stem().string();
@@ -67,12 +70,20 @@ absl::Status AddMeshesOfFolder(const std::string& folder, const std::vector<std:
         std::find(objects.begin(), objects.end(), name) == objects.end())
       continue;
     const auto [other, is_new] = paths.emplace(name, entry.path().string());
-    if (!is_new && meshes->count(name) == 0)
-      return absl::InvalidArgumentError(absl::StrCat("--mesh-dir: ", other->second, " and ",
-                                                     entry.path().string(), " are both '", name,
-                                                     "': say which with --mesh ", name, "=FILE"));
+    if (is_new || meshes->count(name) > 0) continue;
+    // The same object in two formats: the format that MeshFormatNames names first, and the user is told.
+    const auto rank = [&](const fs::path& path) {
+      return std::find(formats.begin(), formats.end(),
+                       absl::AsciiStrToLower(path.extension().string()).substr(1)) -
+             formats.begin();
+    };
+    if (rank(entry.path()) < rank(other->second)) other->second = entry.path().string();
+    twice.insert(name);
   }
   if (error) return absl::NotFoundError(absl::StrCat("--mesh-dir: '", folder, "': ", error.message()));
+  for (const std::string& name : twice)
+    cli.Log(absl::StrCat("note: --mesh-dir: several files are named '", name, "'; ", paths[name],
+                         " is taken (--mesh ", name, "=FILE takes another)"));
   for (const auto& [name, path] : paths) {
     MeshSource source;
     source.name = name;
@@ -97,7 +108,7 @@ absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vect
     }
   }
   if (!cli.source().mesh_folder.empty())
-    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli.source().mesh_folder, objects, &meshes));
+    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, &meshes));
   std::vector<MeshSource> list;
   for (const auto& [name, source] : meshes) list.push_back(source);
   return list;
