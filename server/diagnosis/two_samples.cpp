@@ -39,18 +39,21 @@ double MeanDistance(const TimePoints& a, const TimePoints& b) {
   std::vector<double> column(b.value.size()), squares(count);
   for (int n = 0; n < count; ++n)
     for (int d = 0; d < dimensions; ++d) column[size_t(d) * count + n] = b.value[size_t(n) * dimensions + d];
+  // Among a sample's own every pair comes twice.
+  const bool own = &a == &b;
   double sum = 0;
   for (int m = 0; m < a.size(); ++m) {
+    const int first = own ? m + 1 : 0;
     std::fill(squares.begin(), squares.end(), 0);
     for (int d = 0; d < dimensions; ++d) {
       const double at = a.value[size_t(m) * dimensions + d];
       const double* other = &column[size_t(d) * count];
-      for (int n = 0; n < count; ++n) squares[n] += (other[n] - at) * (other[n] - at);
+      for (int n = first; n < count; ++n) squares[n] += (other[n] - at) * (other[n] - at);
     }
-    for (int n = 0; n < count; ++n) squares[n] = std::sqrt(squares[n]);
-    for (int n = 0; n < count; ++n) sum += squares[n];
+    for (int n = first; n < count; ++n) squares[n] = std::sqrt(squares[n]);
+    for (int n = first; n < count; ++n) sum += squares[n];
   }
-  return sum / (double(a.size()) * count);
+  return (own ? 2 : 1) * sum / (double(a.size()) * count);
 }
 
 double EnergyDistance(const TimePoints& a, const TimePoints& b, double within_b) {

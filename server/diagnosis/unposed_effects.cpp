@@ -17,9 +17,15 @@ namespace {
 constexpr double kCompatibleP = 0.1;
 constexpr double kPlainlyCompatibleP = 0.5;      // no need to look for better values
 constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
-constexpr size_t kRefined = 12;                  // effects that are looked at closely
+constexpr size_t kRefined = 14;                  // directions that are looked at closely
+constexpr int kRefinedOfAnEffect = 2;
 constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMostTiltRad = 50 * kRadiansPerDegree;
 constexpr double kSpreadStep = 0.1;
+// Octaves of the strength, and of the steps above. A strength has to be right to a few percent: curvature
+// shows that much. Poses do not.
+constexpr double kSteps[] = {1, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
+constexpr double kFineStep = 0.2;
+constexpr double kHopelessP = 0.01;
 
 // One number of one effect that is varied.
 struct Direction {
@@ -137,30 +143,27 @@ absl::Status Screen(const Model& model, const Direction& direction, const std::v
   return absl::OkStatus();
 }
 
-// Strength and poses together, in shrinking steps: poses that were fitted without the effect have taken a
-// part of what the effect does.
-absl::Status Refine(const Model& model, const MisfitOfModel& misfit, Trial* best) {
-  const Trial start = *best;
-  best->misfit.distance = HUGE_VAL;
-  TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, start, ReferenceSize::kFull, misfit, best));
-  for (const double step : {1.0, 0.5, 0.25}) {
+// A step up or down of the strength, then of the poses' tilt and spread: poses that were fitted without the
+// effect have taken a part of what the effect does. Stops where the sets are plainly alike.
+// `promising`: poses that suit another effect.
+absl::Status Refine(const Model& model, double step, const SupposedPoses& promising,
+                    const MisfitOfModel& misfit, Trial* best) {
+  if (best->misfit.p <= kPlainlyCompatibleP) {
+    Trial trial = *best;
+    trial.poses = promising;
+    TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+  }
+  for (int what = 0; what < (step < kFineStep ? 1 : 3); ++what) {
+    const Trial start = *best;
     for (const double sign : {-1.0, 1.0}) {
       if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
-      Trial trial = *best;
-      trial.amount *= std::exp2(sign * step);
-      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
-    }
-    for (const double sign : {-1.0, 1.0}) {
-      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
-      Trial trial = *best;
-      trial.poses.most_tilt_rad =
-          std::clamp(trial.poses.most_tilt_rad + sign * step * kTiltStepRad, 0.0, kMostTiltRad);
-      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
-    }
-    for (const double sign : {-1.0, 1.0}) {
-      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
-      Trial trial = *best;
-      trial.poses.spread = std::clamp(trial.poses.spread + sign * step * kSpreadStep, 0.1, 1.0);
+      if (best->misfit.distance < start.misfit.distance) break;  // that was the way
+      Trial trial = start;
+      if (what == 0) trial.amount *= std::exp2(sign * step);
+      double& tilt_rad = trial.poses.most_tilt_rad;
+      if (what == 1) tilt_rad = std::clamp(tilt_rad + sign * step * kTiltStepRad, 0.0, kMostTiltRad);
+      if (what == 2)
+        trial.poses.spread = std::clamp(trial.poses.spread + sign * step * kSpreadStep, 0.1, 1.0);
       TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
     }
   }
@@ -202,25 +205,51 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     return Screen(model, directions[d], poses, misfit, &screened[d]);
   }));
 
-  // The best direction of every effect, closer: the best effects only.
+  // The best directions of the best effects, closer.
   std::stable_sort(screened.begin(), screened.end(),
                    [](const Trial& a, const Trial& b) { return a.misfit.distance < b.misfit.distance; });
   std::vector<Trial> best;
   for (const Trial& trial : screened) {
     if (best.size() == kRefined || trial.misfit.distance == HUGE_VAL) break;
-    if (std::none_of(best.begin(), best.end(),
-                     [&](const Trial& b) { return b.direction.effect == trial.direction.effect; }))
-      best.push_back(trial);
+    const auto alike = std::count_if(best.begin(), best.end(), [&](const Trial& b) {
+      return b.direction.effect == trial.direction.effect;
+    });
+    if (alike < kRefinedOfAnEffect) best.push_back(trial);
   }
-  TOUCHSTONE_RETURN_IF_ERROR(
-      in_portions(best.size(), 0.5, 1, [&](size_t n) { return Refine(model, misfit, &best[n]); }));
+  TOUCHSTONE_RETURN_IF_ERROR(in_portions(best.size(), 0.5, 0.55, [&](size_t n) {
+    const Trial start = best[n];
+    best[n].misfit.distance = HUGE_VAL;  // of the quick reference: not comparable
+    return Attempt(model, start, ReferenceSize::kFull, misfit, &best[n]);
+  }));
+  double done = 0.55;
+  for (const double step : kSteps) {
+    if (best.empty()) break;
+    const Trial leader = *std::min_element(best.begin(), best.end(), [](const Trial& a, const Trial& b) {
+      return a.misfit.distance < b.misfit.distance;
+    });
+    TOUCHSTONE_RETURN_IF_ERROR(in_portions(best.size(), done, done + 0.06, [&](size_t n) {
+      return Refine(model, step, leader.poses, misfit, &best[n]);
+    }));
+    done += 0.06;
+    // Who is far behind by now does not catch up.
+    double least = HUGE_VAL;
+    for (const Trial& trial : best) least = std::min(least, trial.misfit.distance);
+    best.erase(std::remove_if(best.begin(), best.end(),
+                              [&](const Trial& trial) {
+                                return trial.misfit.p < kHopelessP && trial.misfit.distance > 2 * least + 2;
+                              }),
+               best.end());
+  }
+  std::stable_sort(best.begin(), best.end(),
+                   [](const Trial& a, const Trial& b) { return a.misfit.p > b.misfit.p; });
   std::vector<CompatibleEffect> compatible;
-  for (const Trial& trial : best)
-    if (trial.misfit.p > kCompatibleP)
-      compatible.push_back(
-          {trial.direction.effect->name, InWords(model, trial.direction, trial.amount), trial.misfit.p});
-  std::stable_sort(compatible.begin(), compatible.end(),
-                   [](const CompatibleEffect& a, const CompatibleEffect& b) { return a.p > b.p; });
+  for (const Trial& trial : best) {
+    const std::string& name = trial.direction.effect->name;
+    if (trial.misfit.p > kCompatibleP &&
+        std::none_of(compatible.begin(), compatible.end(),
+                     [&](const CompatibleEffect& effect) { return effect.effect == name; }))
+      compatible.push_back({name, InWords(model, trial.direction, trial.amount), trial.misfit.p});
+  }
   return compatible;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "server/base/random.h"
 #include "server/base/status.h"
@@ -189,10 +188,12 @@ absl::StatusOr<UnposedTouches> DrawUnposed(std::shared_ptr<const Model> model,
   drawn.seed = seed;
   for (const uint64_t number : numbers) drawn.touches.push_back(TouchOfPlan(plan, *generator, number, 0));
 
-  // A pose that misses is drawn again, in all of its rounds; a finger that only failed to report is not.
+  // The first touch of every pose tells whether the pose misses and is drawn again, in all of its rounds; a
+  // finger that only failed to report does not count.
   std::map<uint64_t, uint32_t> attempt;
-  std::vector<size_t> slots(numbers.size());
-  for (size_t k = 0; k < slots.size(); ++k) slots[k] = k;
+  std::vector<size_t> slots;
+  for (size_t k = 0; k < numbers.size(); ++k)
+    if (attempt.emplace(numbers[k] % poses_a_round, 0).second) slots.push_back(k);
   TouchBatch batch;
   TouchWorkspace workspace;
   batch.surface = surface;
@@ -202,20 +203,21 @@ absl::StatusOr<UnposedTouches> DrawUnposed(std::shared_ptr<const Model> model,
     for (size_t t = 0; t < slots.size(); ++t)
       Fill(drawn.touches, numbers, slots[t], static_cast<int>(t), &batch);
     TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
-    std::set<uint64_t> missed_poses;
-    for (size_t t = 0; t < slots.size(); ++t)
-      for (int i = 0; i < model->fingers; ++i)
-        if (std::isnan(batch.travel_m[batch.At(i, static_cast<int>(t))]))
-          missed_poses.insert(numbers[slots[t]] % poses_a_round);
-    for (const uint64_t pose : missed_poses) ++attempt[pose];
     std::vector<size_t> missed;
-    for (const size_t slot : slots) {
-      const uint64_t pose = numbers[slot] % poses_a_round;
-      if (!missed_poses.count(pose)) continue;
-      missed.push_back(slot);
-      drawn.touches[slot] = TouchOfPlan(plan, *generator, numbers[slot], attempt[pose]);
+    for (size_t t = 0; t < slots.size(); ++t) {
+      bool hit = true;
+      for (int i = 0; i < model->fingers; ++i)
+        hit &= !std::isnan(batch.travel_m[batch.At(i, static_cast<int>(t))]);
+      if (hit) continue;
+      const uint64_t number = numbers[slots[t]];
+      drawn.touches[slots[t]] = TouchOfPlan(plan, *generator, number, ++attempt[number % poses_a_round]);
+      missed.push_back(slots[t]);
     }
     slots.swap(missed);
+  }
+  for (size_t k = 0; k < numbers.size(); ++k) {
+    const uint32_t draws = attempt[numbers[k] % poses_a_round];
+    if (draws > 0) drawn.touches[k] = TouchOfPlan(plan, *generator, numbers[k], draws);
   }
   return drawn;
 }
