@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kSuspicious = 0.1;
 constexpr double kSmallP = 0.005;  // below it the model is not compatible
+const SupposedPoses kWidePoses{32 * kRadiansPerDegree, 0.62};
 constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5;  // of the work
 
 // The noise that the rounds show is known for certain, whatever else is wrong. Returns what to say about it.
@@ -82,11 +83,10 @@ absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const UnposedCas
                                    ReferenceSize size) -> absl::StatusOr<UnposedMisfit> {
     TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference, the_case.MakeReference(model, poses, size));
     const std::vector<double> distances = UnposedDistances(the_case.measured, reference);
-    return UnposedMisfit{null.Largest(distances), null.P(distances)};
+    return UnposedMisfit{null.Together(distances), null.P(distances)};
   };
-  std::vector<SupposedPoses> poses = {SupposedPoses()};
-  if (rank.poses().most_tilt_rad != poses[0].most_tilt_rad || rank.poses().spread != poses[0].spread)
-    poses.push_back(rank.poses());
+  // Poses that were fitted to a model that lacks an effect may be far from the right ones.
+  const std::vector<SupposedPoses> poses = {SupposedPoses(), kWidePoses, rank.poses()};
   return FindCompatibleEffects(
       *the_case.model, the_case.input.also, poses, misfit, the_case.context.pool, [&](double done) {
         return the_case.Progress("trying effects", kBeforeEffects + (1 - kBeforeEffects) * done);

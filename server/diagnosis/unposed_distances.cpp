@@ -63,17 +63,26 @@ double UnposedNull::P(int measure, double distance) const {
   return (1.0 + (values.end() - at)) / (1.0 + values.size());
 }
 
+// A statistic that never varies (a finger that is never first) speaks only where it does.
+double UnposedNull::InScatters(size_t measure, double distance) const {
+  const double apart = distance - mean_[measure];
+  if (scatter_[measure] > 0) return apart / scatter_[measure];
+  return apart > 1e-12 ? HUGE_VAL : -HUGE_VAL;
+}
+
 double UnposedNull::Largest(const std::vector<double>& distances) const {
   double largest = -HUGE_VAL;
-  for (size_t m = 0; m < mean_.size(); ++m) {
-    // A statistic that never varies (a finger that is never first) speaks only where it does.
-    const double apart = distances[m] - mean_[m];
-    if (scatter_[m] > 0)
-      largest = std::max(largest, apart / scatter_[m]);
-    else if (apart > 1e-12)
-      largest = HUGE_VAL;
-  }
+  for (size_t m = 0; m < mean_.size(); ++m) largest = std::max(largest, InScatters(m, distances[m]));
   return largest;
+}
+
+double UnposedNull::Together(const std::vector<double>& distances) const {
+  double squares = 0;
+  for (size_t m = 0; m < mean_.size(); ++m) {
+    const double apart = std::max(0.0, InScatters(m, distances[m]));
+    squares += apart * apart;
+  }
+  return std::sqrt(squares);
 }
 
 double UnposedNull::P(const std::vector<double>& distances) const {

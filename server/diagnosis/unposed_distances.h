@@ -35,8 +35,12 @@ class UnposedNull {
   // Of all measures together: the rank of the largest distance, each in units of its scatter among the sets.
   double P(const std::vector<double>& distances) const;
   double Largest(const std::vector<double>& distances) const;
+  // Root of the sum of squares of what all measures are too large, in the same units: smoother to search on.
+  double Together(const std::vector<double>& distances) const;
 
  private:
+  double InScatters(size_t measure, double distance) const;
+
   std::vector<std::vector<double>> sorted_;  // [measure]
   std::vector<double> mean_, scatter_;       // a measure
   std::vector<double> largest_;              // of every set, sorted

@@ -17,10 +17,11 @@ namespace {
 constexpr double kCompatibleP = 0.1;
 constexpr double kPlainlyCompatibleP = 0.5;      // no need to look for better values
 constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
-constexpr size_t kRefined = 14;                  // directions that are looked at closely
+constexpr size_t kRefined = 12;                  // directions that are looked at closely
 constexpr int kRefinedOfAnEffect = 2;
 constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMostTiltRad = 50 * kRadiansPerDegree;
 constexpr double kSpreadStep = 0.1;
+constexpr int kMovesAStep = 3;  // in one direction
 // Octaves of the strength, and of the steps above. A strength has to be right to a few percent: curvature
 // shows that much. Poses do not.
 constexpr double kSteps[] = {1, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
@@ -34,9 +35,10 @@ struct Direction {
   int offset = 0;  // of the parameter in the flat values
 };
 
-// The model with `amount` (SI) added to one number, or set where the neutral value stands for infinity.
-// Null if the value would leave its bounds.
-std::shared_ptr<const Model> Varied(const Model& model, const Direction& direction, double amount) {
+// The model with `amounts` (SI, an entry each) added to one parameter, or set where the neutral value stands
+// for infinity. Null if a value would leave its bounds.
+std::shared_ptr<const Model> Varied(const Model& model, const Direction& direction,
+                                    const std::vector<double>& amounts) {
   auto varied = std::make_shared<Model>(model);
   EffectInstance* instance = nullptr;
   for (EffectInstance& candidate : varied->effects)
@@ -63,12 +65,16 @@ std::shared_ptr<const Model> Varied(const Model& model, const Direction& directi
   const auto vary = [&](std::vector<double>* values) {
     if (static_cast<int>(values->size()) < direction.offset + count) return false;
     double* value = values->data() + direction.offset;
-    if (info.neutral == info.upper && info.neutral != 0)
-      value[direction.entry] = amount;  // an acceleration, degrees of freedom: less is more
-    else
-      value[direction.entry] += amount;
+    double sum = 0;
+    for (int i = 0; i < count; ++i) {
+      sum += amounts[i];
+      if (info.neutral == info.upper && info.neutral != 0 && amounts[i] != 0)
+        value[i] = amounts[i];  // an acceleration, degrees of freedom: less is more
+      else
+        value[i] += amounts[i];
+    }
     if (info.sum_zero)
-      for (int i = 0; i < count; ++i) value[i] -= amount / count;
+      for (int i = 0; i < count; ++i) value[i] -= sum / count;
     for (int i = 0; i < count; ++i)
       if (value[i] < ToSi(info.unit, info.lower) || value[i] > ToSi(info.unit, info.upper)) return false;
     return true;
@@ -79,16 +85,19 @@ std::shared_ptr<const Model> Varied(const Model& model, const Direction& directi
   return varied;
 }
 
-std::string InWords(const Model& model, const Direction& direction, double amount) {
+std::string InWords(const Model& model, const Direction& direction, const std::vector<double>& amounts) {
   const ParameterInfo& info = direction.effect->parameters[direction.parameter];
-  std::string entry;
-  if (info.arity == Arity::kVector3) entry = absl::StrCat(" ", std::string(1, "xyz"[direction.entry]));
-  if (info.arity == Arity::kPerFinger) entry = absl::StrCat(" of finger ", direction.entry + 1);
+  double mean = 0;
+  if (info.sum_zero)
+    for (const double amount : amounts) mean += amount / amounts.size();
+  std::vector<std::string> values;
+  for (const double amount : amounts)
+    values.push_back(absl::StrFormat("%.3g", FromSi(info.unit, amount - mean)));
   const auto model_has =
       std::any_of(model.effects.begin(), model.effects.end(),
                   [&](const EffectInstance& e) { return e.effect->name == direction.effect->name; });
-  return absl::StrCat(info.name, entry, model_has && info.neutral == 0 ? " changed by " : " = ",
-                      absl::StrFormat("%.3g", FromSi(info.unit, amount)));
+  return absl::StrCat(info.name, model_has && info.neutral == 0 ? " changed by " : " = ",
+                      values.size() == 1 ? values[0] : absl::StrCat("[", absl::StrJoin(values, ", "), "]"));
 }
 
 // What is missing cannot be seen in complete touches; "formula" alone changes nothing.
@@ -114,7 +123,7 @@ void AddDirections(const std::shared_ptr<const Effect>& effect, int fingers, std
 // One model and the poses it was judged with.
 struct Trial {
   Direction direction;
-  double amount = 0;
+  std::vector<double> amounts;  // an entry of the parameter each; the direction's own first of all
   SupposedPoses poses;
   UnposedMisfit misfit{HUGE_VAL, 0};
 };
@@ -122,7 +131,7 @@ struct Trial {
 // Judges a trial; keeps it if it is better than `best`.
 absl::Status Attempt(const Model& model, Trial trial, ReferenceSize size, const MisfitOfModel& misfit,
                      Trial* best) {
-  const auto varied = Varied(model, trial.direction, trial.amount);
+  const auto varied = Varied(model, trial.direction, trial.amounts);
   if (!varied) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(trial.misfit, misfit(varied, trial.poses, size));
   if (trial.misfit.distance < best->misfit.distance) *best = trial;
@@ -137,34 +146,54 @@ absl::Status Screen(const Model& model, const Direction& direction, const std::v
       ToSi(info.unit, info.typical != 0 ? std::abs(info.typical) : 0.05 * (info.upper - info.lower));
   for (const SupposedPoses& supposed : poses)
     for (const double strength : kStrengths)
-      for (const double sign : {-1.0, 1.0})
-        TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, {direction, sign * strength * typical, supposed},
-                                           ReferenceSize::kQuick, misfit, best));
+      for (const double sign : {-1.0, 1.0}) {
+        Trial trial{direction, std::vector<double>(info.Count(model.fingers)), supposed};
+        trial.amounts[direction.entry] = sign * strength * typical;
+        TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kQuick, misfit, best));
+      }
   return absl::OkStatus();
 }
 
-// A step up or down of the strength, then of the poses' tilt and spread: poses that were fitted without the
-// effect have taken a part of what the effect does. Stops where the sets are plainly alike.
+// A trial moved by `step` up or down: 0: its strength, 1: the poses' tilt, 2: their spread, 3...: the other
+// entries of its parameter.
+Trial Moved(const Trial& trial, size_t what, double step) {
+  Trial moved = trial;
+  double& amount = moved.amounts[trial.direction.entry];
+  double& tilt_rad = moved.poses.most_tilt_rad;
+  if (what == 0)
+    amount *= std::exp2(step);
+  else if (what == 1)
+    tilt_rad = std::clamp(tilt_rad + step * kTiltStepRad, 0.0, kMostTiltRad);
+  else if (what == 2)
+    moved.poses.spread = std::clamp(moved.poses.spread + step * kSpreadStep, 0.1, 1.0);
+  else
+    moved.amounts[(trial.direction.entry + what - 2) % trial.amounts.size()] += 0.5 * step * amount;
+  return moved;
+}
+
+// Steps of the strength, of the poses' tilt and spread (poses that were fitted without the effect have taken
+// a part of what the effect does), of the other fingers or axes. Stops where the sets are plainly alike.
 // `promising`: poses that suit another effect.
 absl::Status Refine(const Model& model, double step, const SupposedPoses& promising,
                     const MisfitOfModel& misfit, Trial* best) {
-  if (best->misfit.p <= kPlainlyCompatibleP) {
-    Trial trial = *best;
-    trial.poses = promising;
-    TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
-  }
-  for (int what = 0; what < (step < kFineStep ? 1 : 3); ++what) {
-    const Trial start = *best;
+  if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
+  Trial trial = *best;
+  trial.poses = promising;
+  TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+  const ParameterInfo& info = trial.direction.effect->parameters[trial.direction.parameter];
+  const size_t free = trial.amounts.size() - (info.sum_zero ? 1 : 0);
+  for (size_t what = 0; what < 2 + free; ++what) {
+    if (step < kFineStep && (what == 1 || what == 2)) continue;
+    bool moved = false;
     for (const double sign : {-1.0, 1.0}) {
-      if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
-      if (best->misfit.distance < start.misfit.distance) break;  // that was the way
-      Trial trial = start;
-      if (what == 0) trial.amount *= std::exp2(sign * step);
-      double& tilt_rad = trial.poses.most_tilt_rad;
-      if (what == 1) tilt_rad = std::clamp(tilt_rad + sign * step * kTiltStepRad, 0.0, kMostTiltRad);
-      if (what == 2)
-        trial.poses.spread = std::clamp(trial.poses.spread + sign * step * kSpreadStep, 0.1, 1.0);
-      TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
+      for (int n = 0; n < kMovesAStep && !(moved && n == 0); ++n) {
+        if (best->misfit.p > kPlainlyCompatibleP) return absl::OkStatus();
+        const double before = best->misfit.distance;
+        TOUCHSTONE_RETURN_IF_ERROR(
+            Attempt(model, Moved(*best, what, sign * step), ReferenceSize::kFull, misfit, best));
+        if (!(best->misfit.distance < before)) break;
+        moved = true;
+      }
     }
   }
   return absl::OkStatus();
@@ -248,7 +277,7 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     if (trial.misfit.p > kCompatibleP &&
         std::none_of(compatible.begin(), compatible.end(),
                      [&](const CompatibleEffect& effect) { return effect.effect == name; }))
-      compatible.push_back({name, InWords(model, trial.direction, trial.amount), trial.misfit.p});
+      compatible.push_back({name, InWords(model, trial.direction, trial.amounts), trial.misfit.p});
   }
   return compatible;
 }

@@ -95,8 +95,8 @@ absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const Unpose
     const SupposedPoses poses{tilt_deg * kRadiansPerDegree, spread};
     TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference,
                                 the_case.MakeReference(the_case.model, poses, size));
-    const double largest = null.Largest(UnposedDistances(the_case.measured, reference));
-    if (largest < least) least = largest, best = poses;
+    const double apart = null.Together(UnposedDistances(the_case.measured, reference));
+    if (apart < least) least = apart, best = poses;
     return absl::OkStatus();
   };
   for (const double tilt_deg : {5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0})
@@ -105,7 +105,7 @@ absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const Unpose
   const SupposedPoses coarse = best;
   // Never worse than the poses that one supposes without looking.
   best = rank.poses();
-  least = null.Largest(rank.distances());
+  least = null.Together(rank.distances());
   for (const double tilt_deg : {-2.5, 0.0, 2.5})
     for (const double spread : {-0.1, 0.0, 0.1})
       TOUCHSTONE_RETURN_IF_ERROR(attempt(coarse.most_tilt_rad / kRadiansPerDegree + tilt_deg,
