@@ -20,7 +20,8 @@ namespace {
 constexpr double kSuspicious = 0.1;
 constexpr double kSmallP = 0.005;  // below it the model is not compatible
 const SupposedPoses kWidePoses{32 * kRadiansPerDegree, 0.62};
-constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5;  // of the work
+constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5,
+                 kBeforeRenewal = 0.85;  // of the work
 
 // The noise that the rounds show is known for certain, whatever else is wrong. Returns what to say about it.
 std::string FillNoiseChange(const UnposedCase& the_case, double p, v1::Report* report) {
@@ -78,17 +79,26 @@ std::string DifferenceInWords(const std::vector<CompatibleEffect>& compatible) {
 // What would make the sets alike.
 absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const UnposedCase& the_case,
                                                                 const UnposedRank& rank) {
-  const UnposedNull null = rank.Null(the_case.objects.size());
-  const MisfitOfModel misfit = [&](const std::shared_ptr<const Model>& model, const SupposedPoses& poses,
-                                   ReferenceSize size) -> absl::StatusOr<UnposedMisfit> {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference, the_case.MakeReference(model, poses, size));
-    const std::vector<double> distances = UnposedDistances(the_case.measured, reference);
-    return UnposedMisfit{null.Together(distances), null.P(distances)};
+  const auto misfit_under = [&](UnposedNull null) -> MisfitOfModel {
+    return [&the_case, null = std::move(null)](const std::shared_ptr<const Model>& model,
+                                               const SupposedPoses& poses,
+                                               ReferenceSize size) -> absl::StatusOr<UnposedMisfit> {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference, the_case.MakeReference(model, poses, size));
+      const std::vector<double> distances = UnposedDistances(the_case.measured, reference);
+      return UnposedMisfit{null.Together(distances), null.P(distances)};
+    };
+  };
+  const auto renew = [&](const std::shared_ptr<const Model>& model,
+                         const SupposedPoses& poses) -> absl::StatusOr<MisfitOfModel> {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedRank own, UnposedRank::Make(the_case, model, poses, true,
+                                                                         kBeforeRenewal, kBeforeRenewal));
+    return misfit_under(own.Null(the_case.objects.size()));
   };
   // Poses that were fitted to a model that lacks an effect may be far from the right ones.
   const std::vector<SupposedPoses> poses = {SupposedPoses(), kWidePoses, rank.poses()};
   return FindCompatibleEffects(
-      *the_case.model, the_case.input.also, poses, misfit, the_case.context.pool, [&](double done) {
+      *the_case.model, the_case.input.also, poses, misfit_under(rank.Null(the_case.objects.size())), renew,
+      the_case.context.pool, [&](double done) {
         return the_case.Progress("trying effects", kBeforeEffects + (1 - kBeforeEffects) * done);
       });
 }
@@ -129,12 +139,13 @@ absl::StatusOr<v1::Report> CompareUnposed(const DiagnosisInput& input, const Dia
         absl::StrCat(the_case.set.origin,
                      ": no touch has a time of every finger; without poses there is nothing to compare"));
 
-  TOUCHSTONE_ASSIGN_OR_RETURN(UnposedRank rank,
-                              UnposedRank::Make(the_case, SupposedPoses(), true, 0, kBeforeFit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      UnposedRank rank, UnposedRank::Make(the_case, the_case.model, SupposedPoses(), true, 0, kBeforeFit));
   const bool fitted = rank.p() <= kSuspicious;
   if (fitted) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const SupposedPoses poses, FitPoses(the_case, rank, kBeforeFit, kBeforeRank));
-    TOUCHSTONE_ASSIGN_OR_RETURN(rank, UnposedRank::Make(the_case, poses, false, kBeforeRank, kBeforeEffects));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        rank, UnposedRank::Make(the_case, the_case.model, poses, false, kBeforeRank, kBeforeEffects));
   }
   FillUnposedComparison(the_case, rank, fitted, &report);
   if (diagnose) {

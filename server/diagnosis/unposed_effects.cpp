@@ -24,7 +24,8 @@ constexpr double kSpreadStep = 0.1;
 constexpr int kMovesAStep = 3;  // in one direction
 // Octaves of the strength, and of the steps above. A strength has to be right to a few percent: curvature
 // shows that much. Poses do not.
-constexpr double kSteps[] = {1, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
+constexpr double kSteps[] = {1, 0.5, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
+constexpr size_t kStepsBeforeRenewal = 2;
 constexpr double kFineStep = 0.2;
 constexpr double kHopelessP = 0.01;
 
@@ -203,7 +204,7 @@ absl::Status Refine(const Model& model, double step, const SupposedPoses& promis
 
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     const Model& model, const std::vector<std::shared_ptr<const Effect>>& also,
-    const std::vector<SupposedPoses>& poses, const MisfitOfModel& misfit, ThreadPool* pool,
+    const std::vector<SupposedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
     const std::function<bool(double done)>& progress) {
   std::vector<std::shared_ptr<const Effect>> effects = Catalogue().All();
   effects.insert(effects.end(), also.begin(), also.end());
@@ -245,24 +246,37 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     });
     if (alike < kRefinedOfAnEffect) best.push_back(trial);
   }
-  TOUCHSTONE_RETURN_IF_ERROR(in_portions(best.size(), 0.5, 0.55, [&](size_t n) {
-    const Trial start = best[n];
-    best[n].misfit.distance = HUGE_VAL;  // of the quick reference: not comparable
-    return Attempt(model, start, ReferenceSize::kFull, misfit, &best[n]);
-  }));
-  double done = 0.55;
-  for (const double step : kSteps) {
-    if (best.empty()) break;
-    const Trial leader = *std::min_element(best.begin(), best.end(), [](const Trial& a, const Trial& b) {
+  if (best.empty()) return std::vector<CompatibleEffect>();
+  const auto judge_anew = [&](double from, double to) {
+    return in_portions(best.size(), from, to, [&](size_t n) {
+      const Trial start = best[n];
+      best[n].misfit = {HUGE_VAL, 0};  // by another measure: not comparable
+      return Attempt(model, start, ReferenceSize::kFull, misfit, &best[n]);
+    });
+  };
+  const auto leader = [&] {
+    return *std::min_element(best.begin(), best.end(), [](const Trial& a, const Trial& b) {
       return a.misfit.distance < b.misfit.distance;
     });
-    TOUCHSTONE_RETURN_IF_ERROR(in_portions(best.size(), done, done + 0.06, [&](size_t n) {
-      return Refine(model, step, leader.poses, misfit, &best[n]);
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(judge_anew(0.5, 0.55));
+  double done = 0.55;
+  for (size_t n = 0; n < std::size(kSteps); ++n) {
+    const double step = kSteps[n];
+    if (n == kStepsBeforeRenewal) {
+      const Trial best_so_far = leader();
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          misfit, renew(Varied(model, best_so_far.direction, best_so_far.amounts), best_so_far.poses));
+      TOUCHSTONE_RETURN_IF_ERROR(judge_anew(done, done + 0.04));
+      done += 0.04;
+    }
+    const SupposedPoses promising = leader().poses;
+    TOUCHSTONE_RETURN_IF_ERROR(in_portions(best.size(), done, done + 0.04, [&](size_t n) {
+      return Refine(model, step, promising, misfit, &best[n]);
     }));
-    done += 0.06;
+    done += 0.04;
     // Who is far behind by now does not catch up.
-    double least = HUGE_VAL;
-    for (const Trial& trial : best) least = std::min(least, trial.misfit.distance);
+    const double least = leader().misfit.distance;
     best.erase(std::remove_if(best.begin(), best.end(),
                               [&](const Trial& trial) {
                                 return trial.misfit.p < kHopelessP && trial.misfit.distance > 2 * least + 2;

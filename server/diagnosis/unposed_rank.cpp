@@ -33,12 +33,13 @@ UnposedNull UnposedRank::Null(size_t object) const {
   return UnposedNull(std::move(distances));
 }
 
-absl::StatusOr<UnposedRank> UnposedRank::Make(const UnposedCase& the_case, const SupposedPoses& poses,
-                                              bool doubt_only, double from, double to) {
+absl::StatusOr<UnposedRank> UnposedRank::Make(const UnposedCase& the_case,
+                                              const std::shared_ptr<const Model>& model,
+                                              const SupposedPoses& poses, bool doubt_only, double from,
+                                              double to) {
   UnposedRank rank;
   rank.poses_ = poses;
-  TOUCHSTONE_ASSIGN_OR_RETURN(rank.reference_,
-                              the_case.MakeReference(the_case.model, poses, ReferenceSize::kFull));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rank.reference_, the_case.MakeReference(model, poses, ReferenceSize::kFull));
   rank.distances_ = UnposedDistances(the_case.measured, rank.reference_);
 
   const size_t objects = the_case.objects.size();
@@ -46,7 +47,7 @@ absl::StatusOr<UnposedRank> UnposedRank::Make(const UnposedCase& the_case, const
   std::vector<absl::Status> status(most);
   const auto make = [&](int begin, int end) {
     for (int n = begin; n < end; ++n) {
-      const auto set = the_case.MakeSet(the_case.model, poses, n);
+      const auto set = the_case.MakeSet(model, poses, n);
       if (!set.ok()) {
         status[n] = set.status();
         continue;

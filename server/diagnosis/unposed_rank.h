@@ -10,13 +10,15 @@ namespace touchstone {
 // stops making sets at the k-th (Besag and Clifford 1991).
 double SequentialP(const std::vector<double>& simulated, double measured, int k);
 
-// The rank of the measured set among sets of the case's model.
+// The rank of the measured set among sets that a model makes.
 class UnposedRank {
  public:
   // `doubt_only`: sets are made until it is clear whether p is above 0.1, no more. `from` and `to`: progress.
   // Returns CANCELLED if progress says so.
-  static absl::StatusOr<UnposedRank> Make(const UnposedCase& the_case, const SupposedPoses& poses,
-                                          bool doubt_only, double from, double to);
+  static absl::StatusOr<UnposedRank> Make(const UnposedCase& the_case,
+                                          const std::shared_ptr<const Model>& model,
+                                          const SupposedPoses& poses, bool doubt_only, double from,
+                                          double to);
 
   // Of all measures together.
   double p() const { return p_; }
