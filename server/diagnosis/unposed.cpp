@@ -97,8 +97,8 @@ absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const UnposedCas
   // Poses that were fitted to a model that lacks an effect may be far from the right ones.
   const std::vector<SupposedPoses> poses = {SupposedPoses(), kWidePoses, rank.poses()};
   return FindCompatibleEffects(
-      *the_case.model, the_case.input.also, poses, misfit_under(rank.Null(the_case.objects.size())), renew,
-      the_case.context.pool, [&](double done) {
+      *the_case.model, the_case.degrees >= UnposedCase::kFewDegrees, the_case.input.also, poses,
+      misfit_under(rank.Null(the_case.objects.size())), renew, the_case.context.pool, [&](double done) {
         return the_case.Progress("trying effects", kBeforeEffects + (1 - kBeforeEffects) * done);
       });
 }

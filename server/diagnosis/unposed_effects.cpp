@@ -1,5 +1,6 @@
 #include "server/diagnosis/unposed_effects.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -17,13 +18,12 @@ namespace {
 constexpr double kCompatibleP = 0.1;
 constexpr double kPlainlyCompatibleP = 0.5;      // no need to look for better values
 constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
-constexpr size_t kRefined = 12;                  // directions that are looked at closely
+constexpr size_t kRefined = 10;                  // directions that are looked at closely
 constexpr int kRefinedOfAnEffect = 2;
 constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMostTiltRad = 50 * kRadiansPerDegree;
 constexpr double kSpreadStep = 0.1;
 constexpr int kMovesAStep = 3;  // in one direction
-// Octaves of the strength, and of the steps above. A strength has to be right to a few percent: curvature
-// shows that much. Poses do not.
+// Octaves of the strength, and of the steps above. A strength must be right to a few percent, poses need not.
 constexpr double kSteps[] = {1, 0.5, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
 constexpr size_t kStepsBeforeRenewal = 2;
 constexpr double kFineStep = 0.2;
@@ -101,8 +101,9 @@ std::string InWords(const Model& model, const Direction& direction, const std::v
                       values.size() == 1 ? values[0] : absl::StrCat("[", absl::StrJoin(values, ", "), "]"));
 }
 
-// What is missing cannot be seen in complete touches; "formula" alone changes nothing.
-bool Worthwhile(const Effect& effect) {
+// What is missing cannot be seen in complete touches; "formula" alone changes nothing; rounds show the noise.
+bool Worthwhile(const Effect& effect, bool noise_is_known) {
+  if (noise_is_known && absl::EndsWith(effect.name, "_noise")) return false;
   return effect.name != "missed_contact" && effect.name != "formula" && !effect.parameters.empty() &&
          effect.needs.covariates.empty();
 }
@@ -203,14 +204,14 @@ absl::Status Refine(const Model& model, double step, const SupposedPoses& promis
 }  // namespace
 
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
-    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also,
+    const Model& model, bool noise_is_known, const std::vector<std::shared_ptr<const Effect>>& also,
     const std::vector<SupposedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
     const std::function<bool(double done)>& progress) {
   std::vector<std::shared_ptr<const Effect>> effects = Catalogue().All();
   effects.insert(effects.end(), also.begin(), also.end());
   std::vector<Direction> directions;
   for (const auto& effect : effects)
-    if (Worthwhile(*effect)) AddDirections(effect, model.fingers, &directions);
+    if (Worthwhile(*effect, noise_is_known)) AddDirections(effect, model.fingers, &directions);
 
   // In portions, so that progress and cancelling stay with this thread.
   const auto in_portions = [&](size_t count, double from, double to, const auto& body) -> absl::Status {

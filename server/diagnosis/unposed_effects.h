@@ -33,12 +33,12 @@ using RenewMisfit =
     std::function<absl::StatusOr<MisfitOfModel>(const std::shared_ptr<const Model>&, const SupposedPoses&)>;
 
 // Every effect of the catalogue and of `also`, one number at a time, with both signs and a few strengths,
-// first at a glance with each of `poses`; then the most promising closely, strength and poses together, in
-// the end by the misfit that `renew` makes of the best so far. Those whose p is above 0.1, most compatible
-// first. `misfit` is called from several threads. Returns CANCELLED if `progress` (0 to 1, one call at a
-// time) returns false.
+// first at a glance with each of `poses`; then the most promising closely, all entries of a parameter and
+// poses together, in the end by the misfit that `renew` makes of the best so far. Those whose p is above 0.1,
+// most compatible first. `noise_is_known`: no effect that makes noise is tried. `misfit` is called from
+// several threads. Returns CANCELLED if `progress` (0 to 1, one call at a time) returns false.
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
-    const Model& model, const std::vector<std::shared_ptr<const Effect>>& also,
+    const Model& model, bool noise_is_known, const std::vector<std::shared_ptr<const Effect>>& also,
     const std::vector<SupposedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
     const std::function<bool(double done)>& progress);
 

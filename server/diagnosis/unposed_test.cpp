@@ -148,7 +148,7 @@ TEST(Unposed, AnAdequateModelIsCalledSoAndTheReportSaysWhatCannotBeKnown) {
   EXPECT_EQ(report->touches(), 384u);
   EXPECT_NEAR(report->noise_floor_us(), 5000, 600);
   EXPECT_EQ(report->distributions().compatible_effects_size(), 0);
-  EXPECT_GE(report->distributions().simulated_touches(), 1500u);
+  EXPECT_GT(report->distributions().simulated_touches(), 1000u);
   EXPECT_THAT(report->warnings(0), testing::HasSubstr("cannot be known"));
   EXPECT_THAT(report->distributions().plan(), testing::HasSubstr("8 poses a face, 4 touches a pose"));
   double fractions = 0;
