@@ -21,7 +21,7 @@ constexpr double kSuspicious = 0.1;
 constexpr double kSmallP = 0.005;  // below it the model is not compatible
 const SupposedPoses kWidePoses{32 * kRadiansPerDegree, 0.62};
 constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5,
-                 kBeforeRenewal = 0.85;  // of the work
+                 kBeforeRenewal = 0.8145;  // of the work
 
 // The noise that the rounds show is known for certain, whatever else is wrong. Returns what to say about it.
 std::string FillNoiseChange(const UnposedCase& the_case, double p, v1::Report* report) {

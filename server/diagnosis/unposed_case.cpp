@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMeasuredTouches = 1500;  // at most, all objects together
 // About, all objects together. Distances among an object's own grow with their square.
-constexpr int kReferenceTouches = 1200, kMostReferenceAnObject = 900;
+constexpr int kReferenceTouches = 1200, kMostReferenceAnObject = 600;
 constexpr int kQuickTouches = 480, kMostQuickAnObject = 360;
 constexpr uint64_t kReferenceSeed = 1;  // sets are 2, 3, ...
 

@@ -248,16 +248,33 @@ TEST(Unposed, AnObjectWithoutAMeshAndAWrongNumberOfFingersAreErrors) {
               testing::HasSubstr("times of 3 fingers, the model 'nominal' has 4"));
 }
 
-TEST(Unposed, IsCancelledAndSaysTheSameOnAnyNumberOfThreads) {
-  const DiagnosisInput input = MakeInput(ModelWith(kNoise), 4, 3, 9);
-  DiagnosisContext stop;
-  stop.progress = [](const std::string&, double done) { return done < 0.05; };
-  EXPECT_EQ(CompareUnposed(input, stop, true).status().code(), absl::StatusCode::kCancelled);
+TEST(Unposed, IsCancelledAtEveryStageAndSaysTheSameOnAnyNumberOfThreads) {
+  const auto wrong = ModelWith(std::string(kNoise) + "  - finger_length: {offset_mm: [2, -1, -1]}\n");
+  const DiagnosisInput input = MakeInput(wrong, 6, 3, 9);
+  for (const char* at : {"simulating sets", "fitting the poses' spread", "trying effects"}) {
+    DiagnosisContext stop;
+    std::string last;
+    stop.progress = [&](const std::string& stage, double done) {
+      last = stage;
+      return stage != at;
+    };
+    EXPECT_EQ(CompareUnposed(input, stop, true).status().code(), absl::StatusCode::kCancelled) << at;
+    EXPECT_EQ(last, at);  // nothing was asked after the refusal
+  }
   ThreadPool pool(2);
   DiagnosisContext threads;
   threads.pool = &pool;
-  EXPECT_EQ(CompareUnposed(input, {}, true)->SerializeAsString(),
-            CompareUnposed(input, threads, true)->SerializeAsString());
+  double before = 0;
+  threads.progress = [&](const std::string&, double done) {
+    EXPECT_GE(done, before);
+    before = done;
+    return done <= 1;
+  };
+  const auto report = CompareUnposed(input, threads, true);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->verdict(), v1::Report::UNEXPLAINED);
+  EXPECT_EQ(before, 1);
+  EXPECT_EQ(CompareUnposed(input, {}, true)->SerializeAsString(), report->SerializeAsString());
 }
 
 }  // namespace
