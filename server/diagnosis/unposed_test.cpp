@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
-
 #include "server/base/random.h"
 #include "server/base/units.h"
 #include "server/diagnosis/unposed_distances.h"
@@ -36,13 +34,6 @@ std::shared_ptr<const Model> ModelWith(const std::string& effects) {
   EXPECT_TRUE(model.ok()) << model.status();
   return std::make_shared<const Model>(*std::move(model));
 }
-
-// Builds that check memory are this much slower.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSlowness = 20;
-#else
-constexpr double kSlowness = 2;
-#endif
 
 const char kNoise[] = "  - gaussian_noise: {sigma_us: 5000}\n";
 
@@ -165,13 +156,10 @@ std::vector<std::string> CompatibleIn(const v1::Report& report) {
 
 TEST(Unposed, AGrossErrorIsFoundWithWhatIsCompatibleAndNoCulpritIsNamed) {
   const auto wrong = ModelWith(std::string(kNoise) + "  - finger_length: {offset_mm: [1, -0.5, -0.5]}\n");
-  auto last = std::chrono::steady_clock::now();
-  double longest_silence_s = 0;
+  int told = 0;
   DiagnosisContext context;
   context.progress = [&](const std::string&, double) {
-    const auto now = std::chrono::steady_clock::now();
-    longest_silence_s = std::max(longest_silence_s, std::chrono::duration<double>(now - last).count());
-    last = now;
+    ++told;
     return true;
   };
   const auto report = CompareUnposed(MakeInput(wrong, 16, 2, 4, kNoise, 2), context, true);
@@ -184,7 +172,7 @@ TEST(Unposed, AGrossErrorIsFoundWithWhatIsCompatibleAndNoCulpritIsNamed) {
   EXPECT_THAT(CompatibleIn(*report), testing::Not(testing::Contains("gaussian_noise")));
   EXPECT_THAT(report->summary(), testing::HasSubstr("write down the poses"));
   EXPECT_EQ(report->steps_size(), 0);
-  EXPECT_LT(longest_silence_s, 1 * kSlowness);
+  EXPECT_GT(told, 30);  // a few seconds of work are told of many times a second
 }
 
 TEST(Unposed, PosesThatAreNotTheUsualOnesAreFittedNeitherBlamedNorInTheWayOfAnError) {
