@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <random>
@@ -251,22 +250,19 @@ TEST(MeasurementSet, BrokenBytesNeverDoMoreThanFail) {
   EXPECT_GT(failed, 10000);
 }
 
-TEST(MeasurementSet, AMillionRowsAreReadInSeconds) {
-  constexpr int kRows = 1'000'000;
+TEST(MeasurementSet, KeepsEveryRowOfALargeFile) {
+  constexpr int kRows = 100'000;
   std::string text = absl::StrCat("round,face,session_time_s,", kPoses, kTimes, "\n");
   for (int touch = 0; touch < kRows; ++touch)
     absl::StrAppend(
         &text, "0,2,", touch, ".123456,", touch,
         ",lat05,20,60,73.32211794,-37.75543694,-15.70303451,-0.930615211,0.2876003079,-0.2263656157,"
         "-0.06272026578,-0.7346539442,-0.6755366389,22748,0,484816\n");
-  const auto begin = std::chrono::steady_clock::now();
   const auto set = ParseMeasurementSet(text, "set.csv");
-  const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ASSERT_TRUE(set.ok()) << set.status();
   EXPECT_EQ(set->size(), kRows);
-  RecordProperty("milliseconds", static_cast<int>(1e3 * took_s));
-  // 3 s are promised on an idle machine without sanitizers; a loaded one gets room.
-  EXPECT_LT(took_s, 30) << "for a million rows";
+  EXPECT_EQ(set->touch.back(), kRows - 1u);
+  EXPECT_EQ(set->time_s.size(), 3u * kRows);
 }
 
 TEST(MeasurementSet, PublicSetsAreRead) {
