@@ -57,7 +57,8 @@ Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, co
     }
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(c.rows(), entries);
   for (size_t t = 0; t < c.touches().size(); ++t)
-    h.block(c.FirstRow(static_cast<int>(t)), c.touches()[t] * 3, 2, 3) = c.MatrixOf(static_cast<int>(t));
+    h.block(c.FirstRow(static_cast<int>(t)), c.touches()[t] * 3, c.MatrixOf(static_cast<int>(t)).rows(), 3) =
+        c.MatrixOf(static_cast<int>(t));
   return Eigen::MatrixXd::Identity(c.rows(), c.rows()) + h * field * h.transpose();
 }
 
