@@ -70,4 +70,12 @@ void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int,
   shared->done.wait(lock, [&] { return shared->finished == pieces; });
 }
 
+void ParallelFor(ThreadPool* pool, int count, int grain,
+                 const std::function<void(int begin, int end)>& body) {
+  if (pool != nullptr)
+    pool->ParallelFor(count, grain, body);
+  else
+    body(0, count);
+}
+
 }  // namespace touchstone

@@ -32,4 +32,7 @@ class ThreadPool {
   std::vector<std::thread> threads_;
 };
 
+// The same on a pool that may be missing: then body(0, count) runs here.
+void ParallelFor(ThreadPool* pool, int count, int grain, const std::function<void(int begin, int end)>& body);
+
 }  // namespace touchstone

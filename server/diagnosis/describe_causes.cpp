@@ -102,10 +102,10 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
     all += std::exp(std::min(candidate.gain_nats(), 600.0));
     candidates.push_back(std::move(candidate));
   }
-  for (v1::Candidate& candidate : candidates)
-    if (candidate.note() != kUnseen && candidate.note() != kNeutral)
-      candidate.set_probability(std::exp(std::min(candidate.gain_nats(), 600.0)) / all);
   const auto explains = [](const v1::Candidate& c) { return c.note() != kUnseen && c.note() != kNeutral; };
+  for (v1::Candidate& candidate : candidates)
+    if (explains(candidate))
+      candidate.set_probability(std::exp(std::min(candidate.gain_nats(), 600.0)) / all);
   std::stable_sort(candidates.begin(), candidates.end(), [&](const v1::Candidate& a, const v1::Candidate& b) {
     return explains(a) != explains(b) ? explains(a) : a.gain_nats() > b.gain_nats();
   });
@@ -113,8 +113,8 @@ absl::Status DescribeCandidates(const Study& study, const Explained& explained, 
   return absl::OkStatus();
 }
 
-absl::Status DescribeUnexplained(const Study& study, const Explained& explained, const Ladder& ladder,
-                                 double floor_us, v1::Report* report) {
+absl::Status DescribeUnexplained(const Study& study, const Explained& explained, double floor_us,
+                                 v1::Report* report) {
   v1::Unexplained* unexplained = report->mutable_unexplained();
   std::vector<FormulaTerm> terms = explained.terms;
   if (terms.empty()) {

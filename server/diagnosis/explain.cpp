@@ -25,8 +25,16 @@ struct WithTerm {
   bool found = false;
   FormulaTerm term;
   Explanation explanation;
-  int formula = -1;
 };
+
+// The index of the formula of this name among the effects that were added; -1: there is none.
+int FindFormula(const Fit& fit, int given, const std::string& name) {
+  for (int index = given; index < static_cast<int>(fit.model.base().effects.size()); ++index) {
+    const Effect& effect = *fit.model.base().effects[index].effect;
+    if (effect.formula != nullptr && effect.formula->name == name) return index;
+  }
+  return -1;
+}
 
 absl::StatusOr<WithTerm> TryTerms(const Study& study, const Search& search, const Explanation& without,
                                   const FormulaTerm* first) {
@@ -45,17 +53,14 @@ absl::StatusOr<WithTerm> TryTerms(const Study& study, const Search& search, cons
     if (first != nullptr) {
       // The second term joins the first in one expression.
       term = Sum(*first, candidate);
-      for (int index = static_cast<int>(base.base().effects.size()) - 1; index >= without.given; --index)
-        if (base.base().effects[index].effect->formula != nullptr &&
-            base.base().effects[index].effect->formula->name == FormulaName(*first))
-          base = base.Without(index);
+      const int at = FindFormula(without.fit, without.given, FormulaName(*first));
+      if (at >= 0) base = base.Without(at);
       term.covariate = first->covariate;
     }
     const auto effect = MakeTermEffect(FormulaName(term), term);
     if (!effect.ok()) return effect.status();
     FreeModel start = base;
     start.Add(*effect, false);
-    const int formula = static_cast<int>(start.base().effects.size()) - 1;
     absl::StatusOr<Fit> fit = FitModel(experiment, std::move(start));
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit.status();
     if (!fit.ok() || fit->evidence <= best_evidence) continue;
@@ -64,19 +69,10 @@ absl::StatusOr<WithTerm> TryTerms(const Study& study, const Search& search, cons
     best_evidence = fit->evidence;
     best.found = true;
     best.term = term;
-    best.formula = formula;
     best.explanation.fit = *std::move(fit);
     best.explanation.given = without.given;
   }
   return best;
-}
-
-int FindFormula(const Fit& fit, int given, const std::string& name) {
-  for (int index = given; index < static_cast<int>(fit.model.base().effects.size()); ++index) {
-    const Effect& effect = *fit.model.base().effects[index].effect;
-    if (effect.formula != nullptr && effect.formula->name == name) return index;
-  }
-  return -1;
 }
 
 // Effects of the catalogue first; what they leave may follow a formula; with the formula in place some of the
@@ -133,7 +129,7 @@ absl::Status FindRivals(Explained* explained) {
     const std::string own = NameOf(*explained->fit.model.base().effects[index].effect);
     double all = std::exp(-std::min(step.gain_nats, 700.0)), alike = 0;
     for (const Alternative& alternative : alternatives) {
-      const double evidence = alternative.evidence - explained->fit.evidence;
+      const double evidence = alternative.fit.evidence - explained->fit.evidence;
       const bool same = alternative.name == own;
       // Alike: as probable, or as likely with no more parameters, whatever rigs usually show.
       const bool equivalent =
@@ -186,9 +182,9 @@ double SurfaceEvidence(const Study& study, const Fit& fit) {
 absl::StatusOr<Explained> Explain(Study* study) {
   Explained explained;
   std::vector<double> weights;
+  // The share that is done stays where the caller has put it.
   const auto progress = [study](const std::string& what) {
-    if (study->context.progress) study->experiment.cancelled();
-    (void)what;
+    if (study->context.progress) study->context.progress(what, 0);
   };
   for (int pass = 0; pass < kPasses; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(study, weights));

@@ -94,10 +94,7 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
       }
     }
   };
-  if (experiment.pool != nullptr)
-    experiment.pool->ParallelFor(static_cast<int>(tasks.size()), 1, run);
-  else
-    run(0, static_cast<int>(tasks.size()));
+  ParallelFor(experiment.pool, static_cast<int>(tasks.size()), 1, run);
   for (const absl::Status& status : statuses) TOUCHSTONE_RETURN_IF_ERROR(status);
   if (experiment.cancelled && experiment.cancelled())
     return absl::CancelledError("the diagnosis was cancelled");

@@ -228,14 +228,14 @@ absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1:
     ladder.improved.effects.push_back(std::move(instance));
     ladder.changed = true;
   }
-  AddNoise(*study, explained, &ladder, report);
+  AddNoise(explained.noise, &ladder, report);
 
   TOUCHSTONE_RETURN_IF_ERROR(DescribeCandidates(*study, explained, report));
   const double floor_us = report->noise_floor_us();
   const bool rest = explained.formula < 0 && report->final().lack_of_fit_p() < kUnexplainedP &&
                     report->final().rmse_us() > (1 + kUnexplainedShare) * floor_us;
   if (explained.formula >= 0 || rest)
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeUnexplained(*study, explained, ladder, floor_us, report));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeUnexplained(*study, explained, floor_us, report));
   report->set_verdict(explained.formula >= 0 || rest ? v1::Report::UNEXPLAINED
                       : report->steps_size() > 0     ? v1::Report::MISSING_EFFECTS
                       : ladder.values_wrong          ? v1::Report::WRONG_VALUES

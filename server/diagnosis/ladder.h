@@ -20,11 +20,10 @@ struct Ladder {
 absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1::Report* report);
 
 // Its parts.
-void AddNoise(const Study& study, const Explained& explained, Ladder* ladder,
-              v1::Report* report);  // noise_steps.cpp
+void AddNoise(const NoiseFindings& noise, Ladder* ladder, v1::Report* report);  // noise_steps.cpp
 absl::Status DescribeCandidates(const Study& study, const Explained& explained, v1::Report* report);
-absl::Status DescribeUnexplained(const Study& study, const Explained& explained, const Ladder& ladder,
-                                 double floor_us, v1::Report* report);
+absl::Status DescribeUnexplained(const Study& study, const Explained& explained, double floor_us,
+                                 v1::Report* report);
 
 // Values that a person can read: three more digits than the standard error leaves uncertain.
 double RoundedTo(double value, double std_error);

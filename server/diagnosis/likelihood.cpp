@@ -123,10 +123,7 @@ Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const 
       energies[l][object] = eigen.eigenvalues().tail(kept);
     }
   };
-  if (pool != nullptr)
-    pool->ParallelFor(lengths * objects, 1, make);
-  else
-    make(0, lengths * objects);
+  ParallelFor(pool, lengths * objects, 1, make);
 
   for (int l = 0; l < lengths; ++l) {
     Eigen::VectorXd& all = bases_[l].energies;

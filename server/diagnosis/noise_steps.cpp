@@ -14,11 +14,11 @@ constexpr double kLeastSigmaS = 1.5e-6;  // less is the rounding of the file
 
 class NoiseWriter {
  public:
-  NoiseWriter(const Explained& explained, Ladder* ladder, v1::Report* report)
-      : explained_(explained), ladder_(ladder), report_(report) {}
+  NoiseWriter(Ladder* ladder, v1::Report* report) : ladder_(ladder), report_(report) {}
 
-  // One effect with one parameter that was found. `absent_ok`: without it the model's effect stays as it is.
+  // One effect with one parameter; nothing is written unless it is claimed.
   void Write(const char* name, const NoiseEstimate& found, bool claimed) {
+    if (!claimed) return;
     EffectInstance* present = nullptr;
     for (EffectInstance& instance : ladder_->improved.effects)
       if (instance.effect->name == name) present = &instance;
@@ -27,7 +27,6 @@ class NoiseWriter {
     const double value = FromSi(parameter.unit, std::clamp(found.value, ToSi(parameter.unit, parameter.lower),
                                                            ToSi(parameter.unit, parameter.upper)));
     const double error = FromSi(parameter.unit, found.std_error);
-    if (!claimed) return;
     v1::ParameterValue described;
     described.set_name(parameter.name);
     described.set_unit(std::string(UnitSymbol(parameter.unit)));
@@ -71,16 +70,14 @@ class NoiseWriter {
   }
 
  private:
-  const Explained& explained_;
   Ladder* ladder_;
   v1::Report* report_;
 };
 
 }  // namespace
 
-void AddNoise(const Study& study, const Explained& explained, Ladder* ladder, v1::Report* report) {
-  NoiseWriter writer(explained, ladder, report);
-  const NoiseFindings& noise = explained.noise;
+void AddNoise(const NoiseFindings& noise, Ladder* ladder, v1::Report* report) {
+  NoiseWriter writer(ladder, report);
   const bool has_sigma =
       std::any_of(ladder->improved.effects.begin(), ladder->improved.effects.end(),
                   [](const EffectInstance& e) { return e.effect->name == "gaussian_noise"; });

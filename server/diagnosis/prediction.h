@@ -35,7 +35,16 @@ absl::StatusOr<Prediction> Predict(const Observations& observations, const Model
 // i]
 std::vector<double> Residuals(const Observations& observations, const Prediction& prediction);
 
-// sqrt(sum ||residual||^2 / sum (fingers - 1)) over the touches used; 0 without any.
+// Squares of residuals and what they are free to be.
+struct SumOfSquares {
+  double sum_of_squares = 0;
+  double degrees = 0;
+};
+
+// sum ||residual||^2 and sum (fingers - 1) over the touches used.
+SumOfSquares TotalSquares(const Observations& observations, const std::vector<double>& residuals);
+
+// The square root of their ratio; 0 without any.
 double Rmse(const Observations& observations, const std::vector<double>& residuals);
 
 }  // namespace touchstone

@@ -98,10 +98,7 @@ void Predictor::ForBlocks(const std::vector<Block>& blocks,
     for (int b = begin; b < end; ++b) body(blocks[b]);
   };
   const int count = static_cast<int>(blocks.size());
-  if (pool_ != nullptr && count > 1)
-    pool_->ParallelFor(count, 1, run);
-  else
-    run(0, count);
+  ParallelFor(count > 1 ? pool_ : nullptr, count, 1, run);
 }
 
 absl::StatusOr<Prediction> Predictor::Run(const Model& model, bool details, bool curvature) const {
@@ -272,18 +269,23 @@ std::vector<double> Residuals(const Observations& observations, const Prediction
   return residuals;
 }
 
-double Rmse(const Observations& observations, const std::vector<double>& residuals) {
-  double sum = 0, degrees = 0;
+SumOfSquares TotalSquares(const Observations& observations, const std::vector<double>& residuals) {
+  SumOfSquares total;
   for (int k = 0; k < observations.size(); ++k) {
     if (!observations.used[k]) continue;
     int count = 0;
     for (int i = 0; i < observations.fingers; ++i) {
       const double residual = residuals[static_cast<size_t>(k) * observations.fingers + i];
-      if (!std::isnan(residual)) sum += residual * residual, ++count;
+      if (!std::isnan(residual)) total.sum_of_squares += residual * residual, ++count;
     }
-    degrees += std::max(count - 1, 0);
+    total.degrees += std::max(count - 1, 0);
   }
-  return degrees > 0 ? std::sqrt(sum / degrees) : 0;
+  return total;
+}
+
+double Rmse(const Observations& observations, const std::vector<double>& residuals) {
+  const SumOfSquares total = TotalSquares(observations, residuals);
+  return total.degrees > 0 ? std::sqrt(total.sum_of_squares / total.degrees) : 0;
 }
 
 }  // namespace touchstone

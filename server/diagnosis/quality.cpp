@@ -11,29 +11,14 @@ namespace {
 
 constexpr double kLeastDegrees = 8;
 
-// Sum of squares and degrees of freedom of residuals of used touches.
-PureError Total(const Observations& o, const std::vector<double>& residuals) {
-  PureError total;
-  for (int k = 0; k < o.size(); ++k) {
-    if (!o.used[k]) continue;
-    int count = 0;
-    for (int i = 0; i < o.fingers; ++i) {
-      const double r = residuals[static_cast<size_t>(k) * o.fingers + i];
-      if (!std::isnan(r)) total.sum_of_squares += r * r, ++count;
-    }
-    total.degrees += std::max(count - 1, 0);
-  }
-  return total;
-}
-
 }  // namespace
 
-bool HasRepeats(const PureError& error) {
+bool HasRepeats(const SumOfSquares& error) {
   return error.degrees >= kLeastDegrees;
 }
 
 double LackOfFitP(const Observations& o, const std::vector<double>& residuals, double parameters) {
-  const PureError pure = PureErrorOf(o, residuals), total = Total(o, residuals);
+  const SumOfSquares pure = PureErrorOf(o, residuals), total = TotalSquares(o, residuals);
   const double degrees = total.degrees - pure.degrees - parameters;
   if (!HasRepeats(pure) || degrees < 1 || !(pure.sum_of_squares > 0)) return 1;
   const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / degrees /
@@ -49,11 +34,11 @@ v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
   const double own = std::sqrt(fit.columns.values.col(0).squaredNorm() /
                                std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
   const double share = own > 0 ? search.HeldoutRmse(fit) / own : 1;
-  const PureError pure = PureErrorOf(o, residuals);
+  const SumOfSquares pure = PureErrorOf(o, residuals);
   if (surface) {
     const std::vector<double> left = ResidualsWithoutSurface(study, fit);
     const double taken = study.likelihood->surfaces()[fit.surface].degrees + fit.model.size();
-    const PureError total = Total(*study.searched, left);
+    const SumOfSquares total = TotalSquares(*study.searched, left);
     rmse = std::sqrt(total.sum_of_squares / std::max(total.degrees - taken, 1.0));
     quality.set_lack_of_fit_p(LackOfFitP(*study.searched, left, taken));
   } else if (HasRepeats(pure)) {
@@ -73,10 +58,10 @@ v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
 v1::NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best,
                             double fitted_parameters) {
   v1::NoiseFloor floor;
-  PureError error = PureErrorOf(o, best);
+  SumOfSquares error = PureErrorOf(o, best);
   floor.set_from_repeats(HasRepeats(error));
   if (!floor.from_repeats()) {
-    error = Total(o, best);
+    error = TotalSquares(o, best);
     error.degrees = std::max(error.degrees - fitted_parameters, 1.0);
   }
   const double sigma = error.degrees > 0 ? std::sqrt(error.sum_of_squares / error.degrees) : 0;

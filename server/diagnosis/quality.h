@@ -10,7 +10,7 @@ namespace touchstone {
 double LackOfFitP(const Observations& observations, const std::vector<double>& residuals, double parameters);
 
 // Repeats enough for an F test.
-bool HasRepeats(const PureError& error);
+bool HasRepeats(const SumOfSquares& error);
 
 // Of the model of a fit (or of part of its effects), on all touches. `heldout_share`: error on touches left
 // out over that on all, from the search. `surface`: judge what a surface error leaves (searched touches).

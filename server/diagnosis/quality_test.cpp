@@ -19,7 +19,7 @@ TEST(PureError, IsTheScatterOfRepeatsWhateverTheMisfit) {
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
   set.Finish();
-  const PureError error = PureErrorOf(set.observations, set.residuals);
+  const SumOfSquares error = PureErrorOf(set.observations, set.residuals);
   EXPECT_EQ(error.degrees, 5 * 48 * (4 - 1) * 2);
   EXPECT_NEAR(std::sqrt(error.sum_of_squares / error.degrees), 0.005, 0.0003);
   EXPECT_GT(Rmse(set.observations, set.residuals), 0.015);

@@ -83,7 +83,6 @@ absl::StatusOr<std::vector<Move>> Search::Score(const Fit& fit, int given) const
   for (int index = 0; index < given; ++index) {
     if (fit.model.IsFree(index) || IsRandomEffect(*model.effects[index].effect)) continue;
     Move move;
-    move.refit = index;
     move.name = NameOf(*model.effects[index].effect);
     move.start = fit.model;
     move.start.Free(index, true);
@@ -124,10 +123,7 @@ absl::StatusOr<std::vector<Move>> Search::Score(const Fit& fit, int given) const
   const auto gram = [&](int begin, int end) {
     for (int s = begin; s < end; ++s) grams[s] = likelihood.Gram(all, s);
   };
-  if (experiment_.pool != nullptr)
-    experiment_.pool->ParallelFor(static_cast<int>(grams.size()), 4, gram);
-  else
-    gram(0, static_cast<int>(grams.size()));
+  ParallelFor(experiment_.pool, static_cast<int>(grams.size()), 4, gram);
 
   const auto judge = [&](int begin, int end) {
     for (int m = begin; m < end; ++m) {
@@ -135,16 +131,11 @@ absl::StatusOr<std::vector<Move>> Search::Score(const Fit& fit, int given) const
       std::vector<int> members;
       for (int i = 0; i <= own; ++i) members.push_back(i);
       for (int i = own; i < move.start.size(); ++i) members.push_back(first_column[m] + i - own);
-      const Judgement judgement =
-          Judge(likelihood, grams, members, move.start.coordinates(), move.start.Start());
-      move.evidence = judgement.evidence;
-      move.log_likelihood = judgement.log_likelihood;
+      move.evidence =
+          Judge(likelihood, grams, members, move.start.coordinates(), move.start.Start()).evidence;
     }
   };
-  if (experiment_.pool != nullptr)
-    experiment_.pool->ParallelFor(static_cast<int>(moves.size()), 1, judge);
-  else
-    judge(0, static_cast<int>(moves.size()));
+  ParallelFor(experiment_.pool, static_cast<int>(moves.size()), 1, judge);
   return moves;
 }
 
@@ -234,8 +225,8 @@ absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation&
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Move> moves, Score(without, explanation.given));
   std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.evidence > b.evidence; });
   std::vector<Alternative> alternatives;
-  alternatives.push_back({NameOf(own), explanation.fit.model.base().effects[index].per_object,
-                          explanation.fit.evidence, explanation.fit, index});
+  alternatives.push_back(
+      {NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
   int fitted = 0;
   for (const Move& move : moves) {
     if (move.candidate < 0 || !move.visible || fitted >= rules_.most_refits) continue;
@@ -246,12 +237,10 @@ absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation&
     progress_(absl::StrCat("trying ", move.name, " instead of ", NameOf(own)));
     ++fitted;
     TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitMove(move));
-    const double evidence = fit.evidence;
-    const int at = static_cast<int>(fit.model.base().effects.size()) - 1;
-    alternatives.push_back({move.name, candidates_[move.candidate].per_object, evidence, std::move(fit), at});
+    alternatives.push_back({move.name, candidates_[move.candidate].per_object, std::move(fit)});
   }
   std::sort(alternatives.begin() + 1, alternatives.end(),
-            [](const Alternative& a, const Alternative& b) { return a.evidence > b.evidence; });
+            [](const Alternative& a, const Alternative& b) { return a.fit.evidence > b.fit.evidence; });
   return alternatives;
 }
 
@@ -260,7 +249,7 @@ absl::StatusOr<bool> Search::Exchange(Explanation* explanation) const {
        ++index) {
     if (explanation->fit.model.base().effects[index].effect->formula != nullptr) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Alternative> alternatives, Alternatives(*explanation, index));
-    if (alternatives.size() < 2 || alternatives[1].evidence <= explanation->fit.evidence + 0.5) continue;
+    if (alternatives.size() < 2 || alternatives[1].fit.evidence <= explanation->fit.evidence + 0.5) continue;
     explanation->fit = std::move(alternatives[1].fit);
     return true;
   }
@@ -271,7 +260,6 @@ absl::StatusOr<Explanation> Search::Run(FreeModel start, int given) const {
   Explanation explanation;
   explanation.given = given;
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation.fit, FitModel(experiment_, std::move(start)));
-  const int before = explanation.fit.model.size();
   for (int step = 0; step < rules_.most_steps; ++step) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool grown, Grow(&explanation));
     if (!grown) break;
@@ -283,7 +271,6 @@ absl::StatusOr<Explanation> Search::Run(FreeModel start, int given) const {
       if (!exchanged && !shrunk) break;
     }
   }
-  (void)before;
   return explanation;
 }
 

@@ -27,12 +27,10 @@ struct SearchRules {
 
 // One way on from a fit.
 struct Move {
-  int candidate = -1;    // index into the candidates, or -1: sets free
-  int refit = -1;        // ... this effect of the model
+  int candidate = -1;    // index into the candidates; -1: sets an effect of the model free
   std::string name;      // of the effect
   bool visible = false;  // false: this experiment cannot see it
   double evidence = 0;   // linear prediction, nats
-  double log_likelihood = 0;
   FreeModel start;
 };
 
@@ -40,9 +38,7 @@ struct Move {
 struct Alternative {
   std::string name;
   bool per_object = false;
-  double evidence = 0;
   Fit fit;
-  int effect = -1;  // its index in fit.model
 };
 
 struct Explanation {

@@ -139,7 +139,7 @@ absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model
   return left_out;
 }
 
-PureError PureErrorOf(const Observations& o, const std::vector<double>& residuals) {
+SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& residuals) {
   // Groups of one pose and one set of reporting fingers: sums of residuals and of squares.
   struct Group {
     int touches = 0, members = 0;
@@ -162,7 +162,7 @@ PureError PureErrorOf(const Observations& o, const std::vector<double>& residual
     for (int i = 0; i < o.fingers; ++i)
       if (!std::isnan(r[i])) group.sum[i] += r[i], group.squares += r[i] * r[i];
   }
-  PureError error;
+  SumOfSquares error;
   for (const auto& [key, group] : groups) {
     double mean_squares = 0;
     for (const double sum : group.sum) mean_squares += sum * sum / group.touches;

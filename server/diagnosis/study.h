@@ -46,10 +46,6 @@ absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_r
 absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* observations);
 
 // Pure error of residuals (contrasts) among repeats: touches of one pose with the same fingers.
-struct PureError {
-  double sum_of_squares = 0;
-  double degrees = 0;
-};
-PureError PureErrorOf(const Observations& observations, const std::vector<double>& residuals);
+SumOfSquares PureErrorOf(const Observations& observations, const std::vector<double>& residuals);
 
 }  // namespace touchstone

@@ -223,10 +223,7 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
       const auto run = [&](int a, int b) {
         for (int n = a; n < b; ++n) status[begin + n] = body(begin + n);
       };
-      if (pool)
-        pool->ParallelFor(static_cast<int>(end - begin), 1, run);
-      else
-        run(0, static_cast<int>(end - begin));
+      ParallelFor(pool, static_cast<int>(end - begin), 1, run);
       for (size_t n = begin; n < end; ++n) TOUCHSTONE_RETURN_IF_ERROR(status[n]);
     }
     return absl::OkStatus();
