@@ -27,14 +27,7 @@ std::string Pill(const v1::Report& report) {
 }
 
 std::string Facts(const v1::Report& report) {
-  const v1::DataSummary& data = report.data();
-  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
-  if (data.objects_size() > 0) {
-    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
-  }
-  if (data.poses() > 0)
-    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
-  if (data.poses() > 0 && data.rounds() > 1) absl::StrAppend(&text, " \u00d7 ", data.rounds(), " rounds");
+  std::string text = DataInWords(report, "\u00d7");
   text += ".";
   const Floor floor = NoiseFloorOf(report);
   if (floor.sigma_us > 0) {
@@ -42,8 +35,8 @@ std::string Facts(const v1::Report& report) {
     absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
     if (floor.bound) absl::StrAppend(&text, ", an upper bound without repeats");
-    if (!floor.bound && data.repeats() > 0)
-      absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats");
+    if (!floor.bound && report.data().repeats() > 0)
+      absl::StrAppend(&text, ", from ", Count(report.data().repeats()), " repeats");
     text += ".";
   }
   if (report.initial().rmse_us() > 0 && floor.sigma_us > 0) {

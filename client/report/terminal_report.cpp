@@ -17,14 +17,7 @@ namespace {
 using Cell = TextLayout::Cell;
 
 void AddOpening(const v1::Report& report, TextLayout* out) {
-  const v1::DataSummary& data = report.data();
-  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
-  if (data.objects_size() > 0) {
-    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
-  }
-  if (data.poses() > 0)
-    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
-  if (data.poses() > 0 && data.rounds() > 1) absl::StrAppend(&text, " x ", data.rounds(), " rounds");
+  std::string text = DataInWords(report, "x");
   absl::StrAppend(&text, ".");
   const Floor floor = NoiseFloorOf(report);
   if (floor.sigma_us > 0) {
@@ -33,8 +26,8 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
     if (floor.bound) {
       absl::StrAppend(&text, ", an upper bound without repeats.");
-    } else if (data.repeats() > 0) {
-      absl::StrAppend(&text, ", from ", Count(data.repeats()), " repeats.");
+    } else if (report.data().repeats() > 0) {
+      absl::StrAppend(&text, ", from ", Count(report.data().repeats()), " repeats.");
     } else {
       absl::StrAppend(&text, ".");
     }

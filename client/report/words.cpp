@@ -265,4 +265,17 @@ std::string SummaryToShow(const v1::Report& report) {
   return report.initial().rmse_us() > 0 ? "" : report.summary();
 }
 
+std::string DataInWords(const v1::Report& report, const std::string& times) {
+  const v1::DataSummary& data = report.data();
+  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
+  if (data.objects_size() > 0) {
+    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
+  }
+  if (data.poses() > 0)
+    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
+  if (data.poses() > 0 && data.rounds() > 1)
+    absl::StrAppend(&text, " ", times, " ", data.rounds(), " rounds");
+  return text;
+}
+
 }  // namespace touchstone::client

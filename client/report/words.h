@@ -76,4 +76,7 @@ std::string SummaryToShow(const v1::Report& report);
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 
+// "960 touches, 5 objects, 240 poses x 4 rounds"; `times` is the sign between poses and rounds.
+std::string DataInWords(const v1::Report& report, const std::string& times);
+
 }  // namespace touchstone::client
