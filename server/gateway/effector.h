@@ -1,0 +1,77 @@
+// The end effector: contact times of the fingers over a serial line (firmware/PROTOCOL.md).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "server/gateway/clock_sync.h"
+#include "server/gateway/signal.h"
+
+namespace touchstone {
+
+struct EffectorFinger {
+  std::string sensor = "optical";  // "optical", "microswitch", "resistor"
+  bool active_high = true;
+  double debounce_s = 0.005;  // microswitch
+  int threshold = 512, hysteresis = 16;  // resistor, ADC counts
+};
+
+struct EffectorOptions {
+  std::string port;  // "/dev/ttyACM0"
+  int baud = 115200;
+  std::vector<EffectorFinger> fingers = std::vector<EffectorFinger>(3);
+  double reply_timeout_s = 0.25;  // of one try; a request is tried 8 times
+  double silence_s = 1.0;         // without a heartbeat: the line is lost
+  double clock_query_s = 0.05;    // between two queries of its clock; 0.05 finds the shortest delay soon
+  double time_scale = 1;          // rig seconds in one host second
+};
+
+// What was heard of one touch so far. Times in seconds of the device's clock (ticks / tick_hz, 64 bits).
+struct EffectorTouch {
+  uint32_t touch = 0;
+  uint32_t boot_id = 0;
+  uint64_t armed_ticks = 0;
+  std::vector<std::optional<uint64_t>> contact_ticks;  // one a finger
+  int Contacts() const;
+};
+
+struct EffectorState {
+  bool connected = false;
+  std::string why;       // if not connected
+  std::string firmware;  // "nano33ble 0.1.0"
+  uint32_t boot_id = 0;
+  uint32_t tick_hz = 0;
+  std::vector<bool> pressed;
+  uint64_t bad_frames = 0, repeated_events = 0, reconnections = 0;
+};
+
+// A thread of its own reads the line, acknowledges, keeps the clock, and opens the port again when it was lost. All
+// functions may be called from any thread.
+class Effector {
+ public:
+  // Opens the port and agrees on version and fingers; goes on trying in the background if nothing answers.
+  static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, Signal* news);
+  virtual ~Effector() = default;
+
+  // Begins a touch (id above 0) and returns once the device has said so. FAILED_PRECONDITION names the fingers that are
+  // pressed already; UNAVAILABLE: the line is lost.
+  virtual absl::Status Arm(uint32_t touch) = 0;
+  virtual absl::Status Disarm() = 0;
+  // What was heard of the armed or last touch; news->Notify() after every change. UNAVAILABLE if the line was lost
+  // since, or the device was reset, in which case its record is gone.
+  virtual absl::StatusOr<EffectorTouch> Touch() const = 0;
+  // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has another one.
+  virtual absl::StatusOr<EffectorTouch> Recall(uint32_t touch) = 0;
+
+  virtual EffectorState State() const = 0;
+  virtual ClockEstimate Clock() const = 0;  // device seconds on host seconds
+};
+
+}  // namespace touchstone
