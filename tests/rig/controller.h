@@ -17,7 +17,7 @@ struct ControllerOptions {
   int dashboard_port = 0, primary_port = 0, secondary_port = 0, rtde_port = 0;
   std::array<double, 6> joints_rad{{0, -1.5708, -1.5708, -1.5708, 1.5708, 0}};
   bool powered = false;              // begins with power off, as a controller that was just switched on
-  double finger_give_m = 0.010;      // pushed further than this beyond a contact: protective stop (C153)
+  double finger_give_m = 0.050;      // pushed further than this beyond a contact: protective stop (C153)
   double position_noise_m = 5e-6, joint_noise_rad = 2e-5;  // of what it reports
   uint64_t seed = 1;
 };
