@@ -1,10 +1,13 @@
 // What the parts of the emulated rig share: the simulated clock, and what the arm does to the fingers.
 //
-// The emulator is a test tool. What it reports was never measured on anything; nothing that it makes is called real.
+// The emulator is a test tool. What it reports was never measured on anything; nothing that it makes is
+// called real.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +22,8 @@ class SimClock {
   explicit SimClock(double speedup = 1);
   double NowS() const;
   double speedup() const { return speedup_; }
-  // Blocks the calling thread until then, or until `wake` (if given) returns true; it is asked every 0.2 ms of host time.
+  // Blocks the calling thread until then, or until `wake` (if given) returns true; it is asked every 0.2 ms
+  // of host time.
   void SleepUntil(double sim_s, const std::function<bool()>& wake = nullptr) const;
 
  private:
@@ -27,9 +31,10 @@ class SimClock {
   double began_host_s_;
 };
 
-// One straight motion of the tip, or the end of one, as the controller plans it. Base frame, SI, simulated time.
+// One straight motion of the tip, or the end of one, as the controller plans it. Base frame, SI, simulated
+// time.
 struct StraightMotion {
-  uint64_t number = 0;          // counts all straight motions
+  uint64_t number = 0;  // counts all straight motions
   double start_s = 0;
   Eigen::Isometry3d from = Eigen::Isometry3d::Identity();  // base_from_tip
   Eigen::Isometry3d to = Eigen::Isometry3d::Identity();
@@ -43,22 +48,25 @@ class TipListener {
   virtual ~TipListener() = default;
   // A straight motion has begun.
   virtual void OnMotionBegan(const StraightMotion& motion) = 0;
-  // The motion has come so far along its line by now (m); called at every control cycle and exactly at its end or
-  // stop. `distance_at` gives the distance at any time up to now, for the exact moment of a contact: monotone.
-  // Returns how far the most pressed finger is pushed beyond its contact, m.
+  // The motion has come so far along its line by now (m); called at every control cycle and exactly at its
+  // end or stop. `distance_at` gives the distance at any time up to now, for the exact moment of a contact:
+  // monotone. Returns how far the most pressed finger is pushed beyond its contact, m.
   virtual double OnProgress(uint64_t number, double now_s, double distance_m,
                             const std::function<double(double)>& distance_at) = 0;
   // It ended or was stopped; the arm rests.
   virtual void OnMotionEnded(uint64_t number, double now_s) = 0;
 };
 
-// Faults that can be switched on while it runs, by name, each with a number (a probability, a length, a finger):
-//   line (end effector): drop_bytes, corrupt_bytes, duplicate_bytes (probability a byte), unplug (seconds of host time),
+// Faults that can be switched on while it runs, by name, each with a number (a probability, a length, a
+// finger):
+//   line (end effector): drop_bytes, corrupt_bytes, duplicate_bytes (probability a byte), unplug (seconds of
+//   host time),
 //     line_delay_ms (jitter, uniform up to)
 //   fingers: stuck_finger (index; -1: none), missing_finger (index), bounce (1: on), clock_drift_ppm
-//   controller: late_packets_ms, skip_packets (probability), freeze (seconds of host time: accepts but sends nothing and
-//     moves nothing), disconnect (closes every connection once), protective_stop (1: now), emergency_stop (1: now; 0:
-//     released), speed_scaling (0 to 1)
+//   controller: late_packets_ms, skip_packets (probability), freeze (seconds of host time: accepts but sends
+//   nothing and
+//     moves nothing), disconnect (closes every connection once), protective_stop (1: now), emergency_stop (1:
+//     now; 0: released), speed_scaling (0 to 1)
 //   camera: stale_frame (1: repeats the last picture), camera_unplug (seconds)
 // Thread-safe.
 class Faults {
@@ -69,12 +77,14 @@ class Faults {
   double Get(const std::string& name) const;
   // Takes a one-time fault: its value, and back to 0.
   double Take(const std::string& name);
-  // Host seconds (steady clock) until which a timed fault (unplug, freeze, camera_unplug) lasts; 0: it does not.
+  // Host seconds (steady clock) until which a timed fault (unplug, freeze, camera_unplug) lasts; 0: it does
+  // not.
   double UntilHostS(const std::string& name) const;
 
  private:
-  struct State;
-  static State& TheState();  // the implementer may give it another shape
+  mutable std::mutex mutex_;
+  std::map<std::string, double> values_;
+  std::map<std::string, double> until_host_s_;
 };
 
 }  // namespace touchstone::rig
