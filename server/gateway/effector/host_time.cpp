@@ -1,0 +1,9 @@
+#include "server/gateway/signal.h"
+
+namespace touchstone {
+
+double HostNowS() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace touchstone
