@@ -1,5 +1,5 @@
-// Frames on the serial line (PROTOCOL.md): COBS(payload | CRC-16 of it, big endian) | 0x00. Nothing but frames is on
-// the line; whatever is between two zeros and is no frame is garbage, counted and skipped.
+// Frames on the serial line (PROTOCOL.md): COBS(payload | CRC-16 of it, big endian) | 0x00. Nothing but
+// frames is on the line; whatever is between two zeros and is no frame is garbage, counted and skipped.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@ constexpr size_t kMaxFrame = kMaxPayload + 2 + 2 + 1;  // CRC, COBS overhead, de
 // CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF; "123456789" gives 0x29B1.
 uint16_t Crc16(const uint8_t* data, size_t size);
 
-// Writes the whole frame, delimiter included; returns its size, 0 if the payload is empty or too long. `out` has room
-// for kMaxFrame bytes.
+// Writes the whole frame, delimiter included; returns its size, 0 if the payload is empty or too long. `out`
+// has room for kMaxFrame bytes.
 size_t EncodeFrame(const uint8_t* payload, size_t size, uint8_t* out);
 
 // Takes the bytes of the line one at a time.

@@ -1,5 +1,6 @@
-// The messages of the serial line (PROTOCOL.md): one a frame, u8 type, then the fields in the order given here, little
-// endian, packed. Both ends use these functions.
+// The messages of the serial line (PROTOCOL.md): one a frame, u8 type, then the fields in the order given
+// here, little endian, packed; of an array with one entry a finger only as many as there are fingers. Both
+// ends use these functions.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,9 @@ namespace touchstone::firmware {
 constexpr uint8_t kProtocolVersion = 1;
 constexpr int kMaxFingers = 8;
 constexpr uint8_t kNoTouch = 0;  // touch ids are never 0
+constexpr uint64_t kMostTicks =
+    (uint64_t{1} << 53) - 1;  // 17 years at 16 MHz; later ones are refused by Decode
+constexpr uint32_t kMostDebounceUs = 1000000;
 
 enum class Type : uint8_t {
   // Host to device.
@@ -37,11 +41,13 @@ enum class Sensor : uint8_t { kOptical = 0, kMicroswitch = 1, kResistor = 2 };
 
 struct FingerConfig {
   Sensor sensor = Sensor::kOptical;
-  uint8_t active_level = 1;   // the pin's level while pressed: optical, microswitch
-  uint32_t debounce_us = 0;   // microswitch: a press counts if it is not undone for this long in all; its time is that
-                              // of the first edge
-  uint16_t threshold = 512;   // resistor: pressed at or above
-  uint16_t hysteresis = 16;   // resistor: released below threshold - hysteresis
+  uint8_t active_level = 1;  // the pin's level while pressed: optical, microswitch
+  // Microswitch, at most kMostDebounceUs: a press counts once the pin has been active for this much longer
+  // than inactive; its time is that of the first edge of the bounce, which lasts no longer than this either
+  // (debouncer.h).
+  uint32_t debounce_us = 0;
+  uint16_t threshold = 512;  // resistor: pressed at or above
+  uint16_t hysteresis = 16;  // resistor: released below threshold - hysteresis; less than the threshold
 };
 
 enum class EventKind : uint8_t { kContact = 1, kRelease = 2 };
@@ -98,10 +104,10 @@ struct ClockReply {
   uint64_t send_ticks = 0;     // just before the first byte of this was written
 };
 
-// A finger's first contact, or its first release after it, of the armed touch. Sent again every 50 ms until it is
-// acknowledged.
+// A finger's first contact, or its first release after it, of the armed touch. Sent again every 50 ms until
+// it is acknowledged.
 struct Event {
-  uint32_t number = 0;  // counts since reset; with the boot id the event's name
+  uint32_t number = 0;  // counts from 1 since reset; with the boot id the event's name
   uint32_t touch = 0;
   uint8_t finger = 0;
   EventKind kind = EventKind::kContact;
@@ -119,8 +125,8 @@ struct Recalled {
   uint32_t touch = 0;
   uint8_t armed = 0;  // 1: still going on
   uint8_t fingers = 0;
-  uint8_t contact_mask = 0;           // bit i: finger i made contact
-  uint64_t ticks[kMaxFingers] = {};   // its contact
+  uint8_t contact_mask = 0;          // bit i: finger i made contact
+  uint64_t ticks[kMaxFingers] = {};  // its contact
 };
 
 // Sent on request, and by itself every 250 ms: the heartbeat.
@@ -130,8 +136,8 @@ struct Status {
   uint64_t ticks = 0;
   uint32_t touch = 0;  // the armed one; 0: none
   uint8_t pressed_mask = 0;
-  uint32_t bad_frames = 0;    // received
-  uint32_t lost_events = 0;   // not kept for lack of room: always 0 unless something is broken
+  uint32_t bad_frames = 0;   // received
+  uint32_t lost_events = 0;  // not kept for lack of room: always 0 unless something is broken
 };
 
 struct Refused {
@@ -140,9 +146,9 @@ struct Refused {
   uint32_t detail = 0;
 };
 
-// Encode writes the payload (type and fields) and returns its size; `out` has room for kMaxPayload bytes. Decode
-// returns false if the type or the length is wrong or a value is out of its range, and then leaves `message` alone.
-// TypeOf is the first byte.
+// Encode writes the payload (type and fields) and returns its size; `out` has room for kMaxPayload bytes.
+// Decode returns false if the type or the length is wrong or a value is out of its range, and then leaves
+// `message` alone. TypeOf is the first byte.
 #define TOUCHSTONE_FIRMWARE_MESSAGE(Name)           \
   size_t Encode(const Name& message, uint8_t* out); \
   bool Decode(const uint8_t* payload, size_t size, Name* message)
