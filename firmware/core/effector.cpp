@@ -10,7 +10,7 @@ constexpr uint32_t kLateEdgeMs = 1;
 
 constexpr uint8_t kFromDevice = 0x80;  // bit of the types that only the device sends
 
-// Whether the length is what the type asks for, as far as can be told; `expected` is that length.
+// Whether the length, without the check, is what the type asks for; `expected` is that length.
 bool GoodLength(const uint8_t* payload, size_t size, size_t* expected) {
   switch (static_cast<Type>(payload[0])) {
     case Type::kHello:
@@ -127,6 +127,10 @@ void Effector::OnFrame(uint64_t received) {
   const uint8_t* payload = parser_.payload();
   const size_t size = parser_.size();
   const uint8_t type = payload[0];
+  if (!IsIntact(payload, size)) {
+    ++damaged_messages_;
+    return;
+  }
   // Our own messages, come back over a loop: an answer would go round for ever.
   if (type & kFromDevice) return;
 
@@ -197,7 +201,7 @@ void Effector::OnFrame(uint64_t received) {
       return Refuse(type, RefusedReason::kUnknownType, 0);
   }
   size_t expected = 0;
-  if (GoodLength(payload, size, &expected)) return Refuse(type, RefusedReason::kBadValue, 0);
+  if (GoodLength(payload, size - kCheckSize, &expected)) return Refuse(type, RefusedReason::kBadValue, 0);
   Refuse(type, RefusedReason::kBadLength, static_cast<uint32_t>(expected));
 }
 
@@ -321,7 +325,7 @@ void Effector::SendStatus(uint64_t now) {
   status.ticks = now;
   status.touch = armed_ ? record_.touch : kNoTouch;
   status.pressed_mask = PressedMask();
-  status.bad_frames = parser_.bad_frames();
+  status.bad_frames = parser_.bad_frames() + damaged_messages_;
   status.lost_events = lost_events_;
   Send(Encode(status, payload_));
 }

@@ -78,6 +78,7 @@ class Effector {
   void* context_;
   TickExtender ticks_;
   FrameParser parser_;
+  uint32_t damaged_messages_ = 0;  // in good frames
 
   int finger_count_ = 0;  // 0: not configured
   Finger fingers_[kMaxFingers];

@@ -1,7 +1,5 @@
 #include "firmware/core/messages.h"
 
-#include "firmware/core/frame.h"
-
 namespace touchstone::firmware {
 namespace {
 
@@ -16,7 +14,11 @@ class Writer {
       out_[size_++] = static_cast<uint8_t>(rest & 0xFF);
     return *this;
   }
-  size_t size() const { return size_; }
+  // Ends the message with its check; returns the size.
+  size_t Finish() {
+    Put(Crc32(out_, size_));
+    return size_;
+  }
 
  private:
   uint8_t* out_;
@@ -26,7 +28,9 @@ class Writer {
 // Takes them off again. Whether they fitted is asked once, at the end.
 class Reader {
  public:
-  Reader(Type type, const uint8_t* payload, size_t size) : payload_(payload), size_(size) {
+  Reader(Type type, const uint8_t* payload, size_t size) : payload_(payload) {
+    good_ = IsIntact(payload, size);
+    size_ = good_ ? size - kCheckSize : 0;
     uint8_t first = 0;
     Get(&first);
     good_ = good_ && first == static_cast<uint8_t>(type);
@@ -46,7 +50,7 @@ class Reader {
 
  private:
   const uint8_t* payload_;
-  size_t size_;
+  size_t size_ = 0;
   size_t at_ = 0;
   bool good_ = true;
 };
@@ -84,8 +88,25 @@ bool Accept(bool good, const Message& result, Message* message) {
 
 }  // namespace
 
+uint32_t Crc32(const uint8_t* data, size_t size) {
+  uint32_t crc = 0xFFFFFFFF;
+  for (size_t i = 0; i < size; ++i) {
+    crc ^= data[i];
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xEDB88320 : 0);
+  }
+  return ~crc;
+}
+
+bool IsIntact(const uint8_t* payload, size_t size) {
+  if (size < 1 + kCheckSize) return false;
+  const uint8_t* check = payload + size - kCheckSize;
+  uint32_t told = 0;
+  for (size_t i = kCheckSize; i-- > 0;) told = told << 8 | check[i];
+  return told == Crc32(payload, size - kCheckSize);
+}
+
 size_t Encode(const Hello& m, uint8_t* out) {
-  return Writer(Type::kHello, out).Put(m.version).Put(m.nonce).size();
+  return Writer(Type::kHello, out).Put(m.version).Put(m.nonce).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Hello* message) {
   Hello m;
@@ -97,7 +118,7 @@ size_t Encode(const HelloReply& m, uint8_t* out) {
   Writer writer(Type::kHelloReply, out);
   writer.Put(m.version).Put(m.nonce).Put(m.boot_id).Put(m.tick_hz).Put(m.most_fingers);
   for (char letter : m.firmware) writer.Put(static_cast<uint8_t>(letter));
-  return writer.size();
+  return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, HelloReply* message) {
   HelloReply m;
@@ -120,7 +141,7 @@ size_t Encode(const Configure& m, uint8_t* out) {
     writer.Put(static_cast<uint8_t>(finger.sensor)).Put(finger.active_level).Put(finger.debounce_us);
     writer.Put(finger.threshold).Put(finger.hysteresis);
   }
-  return writer.size();
+  return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Configure* message) {
   Configure m;
@@ -140,7 +161,7 @@ bool Decode(const uint8_t* payload, size_t size, Configure* message) {
 }
 
 size_t Encode(const Configured& m, uint8_t* out) {
-  return Writer(Type::kConfigured, out).Put(m.fingers).size();
+  return Writer(Type::kConfigured, out).Put(m.fingers).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Configured* message) {
   Configured m;
@@ -149,7 +170,7 @@ bool Decode(const uint8_t* payload, size_t size, Configured* message) {
 }
 
 size_t Encode(const Arm& m, uint8_t* out) {
-  return Writer(Type::kArm, out).Put(m.touch).size();
+  return Writer(Type::kArm, out).Put(m.touch).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Arm* message) {
   Arm m;
@@ -158,7 +179,7 @@ bool Decode(const uint8_t* payload, size_t size, Arm* message) {
 }
 
 size_t Encode(const Armed& m, uint8_t* out) {
-  return Writer(Type::kArmed, out).Put(m.touch).Put(m.ticks).size();
+  return Writer(Type::kArmed, out).Put(m.touch).Put(m.ticks).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Armed* message) {
   Armed m;
@@ -167,21 +188,21 @@ bool Decode(const uint8_t* payload, size_t size, Armed* message) {
 }
 
 size_t Encode(const Disarm&, uint8_t* out) {
-  return Writer(Type::kDisarm, out).size();
+  return Writer(Type::kDisarm, out).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Disarm* message) {
   return Accept(Reader(Type::kDisarm, payload, size).Done(), Disarm{}, message);
 }
 
 size_t Encode(const Disarmed&, uint8_t* out) {
-  return Writer(Type::kDisarmed, out).size();
+  return Writer(Type::kDisarmed, out).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Disarmed* message) {
   return Accept(Reader(Type::kDisarmed, payload, size).Done(), Disarmed{}, message);
 }
 
 size_t Encode(const Clock& m, uint8_t* out) {
-  return Writer(Type::kClock, out).Put(m.query).size();
+  return Writer(Type::kClock, out).Put(m.query).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Clock* message) {
   Clock m;
@@ -190,7 +211,7 @@ bool Decode(const uint8_t* payload, size_t size, Clock* message) {
 }
 
 size_t Encode(const ClockReply& m, uint8_t* out) {
-  return Writer(Type::kClockReply, out).Put(m.query).Put(m.receive_ticks).Put(m.send_ticks).size();
+  return Writer(Type::kClockReply, out).Put(m.query).Put(m.receive_ticks).Put(m.send_ticks).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, ClockReply* message) {
   ClockReply m;
@@ -202,7 +223,7 @@ bool Decode(const uint8_t* payload, size_t size, ClockReply* message) {
 size_t Encode(const Event& m, uint8_t* out) {
   Writer writer(Type::kEvent, out);
   writer.Put(m.number).Put(m.touch).Put(m.finger).Put(static_cast<uint8_t>(m.kind)).Put(m.ticks);
-  return writer.size();
+  return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Event* message) {
   Event m;
@@ -216,7 +237,7 @@ bool Decode(const uint8_t* payload, size_t size, Event* message) {
 }
 
 size_t Encode(const Acknowledge& m, uint8_t* out) {
-  return Writer(Type::kAcknowledge, out).Put(m.number).size();
+  return Writer(Type::kAcknowledge, out).Put(m.number).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Acknowledge* message) {
   Acknowledge m;
@@ -225,7 +246,7 @@ bool Decode(const uint8_t* payload, size_t size, Acknowledge* message) {
 }
 
 size_t Encode(const Recall& m, uint8_t* out) {
-  return Writer(Type::kRecall, out).Put(m.touch).size();
+  return Writer(Type::kRecall, out).Put(m.touch).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Recall* message) {
   Recall m;
@@ -237,7 +258,7 @@ size_t Encode(const Recalled& m, uint8_t* out) {
   Writer writer(Type::kRecalled, out);
   writer.Put(m.touch).Put(m.armed).Put(m.fingers).Put(m.contact_mask);
   for (int i = 0; i < m.fingers && i < kMaxFingers; ++i) writer.Put(m.ticks[i]);
-  return writer.size();
+  return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Recalled* message) {
   Recalled m;
@@ -254,7 +275,7 @@ bool Decode(const uint8_t* payload, size_t size, Recalled* message) {
 }
 
 size_t Encode(const StatusRequest&, uint8_t* out) {
-  return Writer(Type::kStatusRequest, out).size();
+  return Writer(Type::kStatusRequest, out).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, StatusRequest* message) {
   return Accept(Reader(Type::kStatusRequest, payload, size).Done(), StatusRequest{}, message);
@@ -263,7 +284,7 @@ bool Decode(const uint8_t* payload, size_t size, StatusRequest* message) {
 size_t Encode(const Status& m, uint8_t* out) {
   Writer writer(Type::kStatus, out);
   writer.Put(m.boot_id).Put(m.ticks).Put(m.touch).Put(m.pressed_mask).Put(m.bad_frames).Put(m.lost_events);
-  return writer.size();
+  return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Status* message) {
   Status m;
@@ -278,7 +299,7 @@ bool Decode(const uint8_t* payload, size_t size, Status* message) {
 }
 
 size_t Encode(const Refused& m, uint8_t* out) {
-  return Writer(Type::kRefused, out).Put(m.type).Put(static_cast<uint8_t>(m.reason)).Put(m.detail).size();
+  return Writer(Type::kRefused, out).Put(m.type).Put(static_cast<uint8_t>(m.reason)).Put(m.detail).Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, Refused* message) {
   Refused m;
