@@ -1,0 +1,89 @@
+#include "server/gateway/effector/touch_record.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace touchstone {
+
+int EffectorTouch::Contacts() const {
+  return static_cast<int>(
+      std::count_if(contact_ticks.begin(), contact_ticks.end(),
+                    [](const std::optional<uint64_t>& ticks) { return ticks.has_value(); }));
+}
+
+std::vector<std::optional<uint64_t>> ContactsOf(const firmware::Recalled& recalled) {
+  std::vector<std::optional<uint64_t>> contacts(recalled.fingers);
+  for (int i = 0; i < recalled.fingers && i < firmware::kMaxFingers; ++i)
+    if ((recalled.contact_mask >> i & 1) != 0) contacts[i] = recalled.ticks[i];
+  return contacts;
+}
+
+bool Agree(const firmware::Recalled& earlier, const firmware::Recalled& later) {
+  if (earlier.touch != later.touch || earlier.fingers != later.fingers) return false;
+  if ((earlier.contact_mask & ~later.contact_mask) != 0) return false;
+  for (int i = 0; i < firmware::kMaxFingers; ++i)
+    if ((earlier.contact_mask >> i & 1) != 0 && earlier.ticks[i] != later.ticks[i]) return false;
+  return true;
+}
+
+void TouchRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
+  *this = TouchRecord();
+  touch_.touch = touch;
+  touch_.boot_id = boot_id;
+  touch_.contact_ticks.resize(fingers);
+  waiting_ = true;
+}
+
+bool TouchRecord::Arm(const firmware::Armed& armed, uint64_t least_ticks, uint64_t most_ticks) {
+  if (!waiting_ || armed.touch != touch_.touch) return false;
+  if (armed.ticks < least_ticks || armed.ticks > most_ticks) return false;
+  touch_.armed_ticks = armed.ticks;
+  waiting_ = false;
+  armed_ = true;
+  return true;
+}
+
+void TouchRecord::Lose(std::string why) {
+  if (Final()) return;
+  armed_ = false;
+  lost_ = std::move(why);
+}
+
+TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t most_ticks) {
+  if (event.touch != touch_.touch) return Verdict::kStale;
+  // Before Armed came it is not known what is too early; the event will come again.
+  if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kUnbelievable;
+  if (event.ticks < touch_.armed_ticks || event.ticks > most_ticks) return Verdict::kUnbelievable;
+  if (event.kind == firmware::EventKind::kRelease) return Verdict::kNews;  // nobody asks for it
+  std::optional<uint64_t>& contact = touch_.contact_ticks[event.finger];
+  if (contact.has_value()) {
+    if (*contact == event.ticks) return Verdict::kRepeated;
+    if (!settled_) doubtful_ = true;
+    return Verdict::kUnbelievable;
+  }
+  if (settled_ || !armed_) {
+    // The device kept no such contact when its record was read, or is not armed: read it again.
+    settled_ = false;
+    doubtful_ = true;
+  }
+  contact = event.ticks;
+  return Verdict::kNews;
+}
+
+bool TouchRecord::Settle(const firmware::Recalled& recalled, uint64_t most_ticks) {
+  if (recalled.touch != touch_.touch || recalled.fingers != touch_.contact_ticks.size()) return false;
+  for (int i = 0; i < recalled.fingers; ++i) {
+    if ((recalled.contact_mask >> i & 1) == 0) continue;
+    if (recalled.ticks[i] < touch_.armed_ticks || recalled.ticks[i] > most_ticks) return false;
+  }
+  const bool agreed = has_reading_ && Agree(reading_, recalled);
+  reading_ = recalled;
+  has_reading_ = !agreed;
+  if (!agreed) return false;
+  touch_.contact_ticks = ContactsOf(recalled);
+  settled_ = true;
+  doubtful_ = false;
+  return true;
+}
+
+}  // namespace touchstone
