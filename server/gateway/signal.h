@@ -1,8 +1,10 @@
-// What the threads of the rig wake each other with: news came from the arm, the end effector, the lease or a client.
+// What the threads of the rig wake each other with: news came from the arm, the end effector, the lease or a
+// client.
 #pragma once
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
 
 namespace touchstone {
@@ -10,26 +12,32 @@ namespace touchstone {
 // Seconds of the host's steady clock: the time that everything in the gateway is told in.
 double HostNowS();
 
+// Nobody's lock is held while it waits, so that whoever is woken may look at anything.
 class Signal {
  public:
-  // Any thread, after the state that others look at has changed.
+  // Any thread, after what others look at has changed.
   void Notify() {
-    { std::lock_guard<std::mutex> lock(mutex_); }
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      ++count_;
+    }
     changed_.notify_all();
   }
-  // Waits until `done` (called without any lock of the caller's held, after every Notify) or for so long; whether done.
-  template <typename Done>
-  bool WaitFor(double seconds, Done done) {
-    const auto until = std::chrono::steady_clock::now() +
-                       std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                           std::chrono::duration<double>(seconds));
+  // How often Notify was called: read it before looking at the state.
+  uint64_t count() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return count_;
+  }
+  // Waits until there is news since `seen`, at most so long.
+  void WaitForNews(uint64_t seen, double most_s) const {
     std::unique_lock<std::mutex> lock(mutex_);
-    return changed_.wait_until(lock, until, done);
+    changed_.wait_for(lock, std::chrono::duration<double>(most_s), [&] { return count_ != seen; });
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  uint64_t count_ = 0;
 };
 
 }  // namespace touchstone

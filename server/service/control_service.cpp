@@ -1,93 +1,12 @@
 #include "server/service/control_service.h"
 
 #include <absl/strings/str_cat.h>
-#include <openssl/rand.h>
 #include <spdlog/spdlog.h>
 
 #include "server/base/status.h"
 #include "server/service/convert.h"
 
 namespace touchstone {
-namespace {
-
-// 128 random bits: a token cannot be guessed.
-std::string NewToken() {
-  unsigned char bytes[16];
-  RAND_bytes(bytes, sizeof bytes);
-  std::string token;
-  for (unsigned char byte : bytes) absl::StrAppend(&token, absl::Hex(byte, absl::kZeroPad2));
-  return token;
-}
-
-}  // namespace
-
-bool LeaseBook::Held(Clock::time_point now) const {
-  return !token_.empty() && now < until_;
-}
-
-v1::Lease LeaseBook::Describe() const {
-  v1::Lease lease;
-  lease.set_token(token_);
-  lease.set_holder(holder_);
-  lease.set_epoch(epoch_);
-  lease.set_window_s(window_s_);
-  return lease;
-}
-
-absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, Clock::time_point now) {
-  if (holder.empty() || holder.size() > 256)
-    return absl::InvalidArgumentError(
-        "holder: say who asks, in 1 to 256 characters, for instance 'ana@bench2'");
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (Held(now) && !take)
-    return absl::FailedPreconditionError(
-        absl::StrCat("the lease is held by '", holder_, "' (epoch ", epoch_,
-                     "): ask them to release it, or take it with take = true"));
-  token_ = NewToken();
-  holder_ = holder;
-  ++epoch_;
-  until_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s_));
-  return Describe();
-}
-
-absl::Status LeaseBook::CheckToken(const std::string& token, Clock::time_point now) const {
-  if (Held(now) && token == token_) return absl::OkStatus();
-  return absl::AbortedError(
-      Held(now) ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
-                : std::string("this lease is stale: it ran out or was released; acquire a new one"));
-}
-
-absl::StatusOr<v1::Lease> LeaseBook::Renew(const std::string& token, Clock::time_point now) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token, now));
-  until_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s_));
-  return Describe();
-}
-
-absl::Status LeaseBook::Release(const std::string& token, Clock::time_point now) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token, now));
-  token_.clear();
-  holder_.clear();
-  return absl::OkStatus();
-}
-
-absl::Status LeaseBook::Check(const std::string& token, Clock::time_point now) const {
-  if (token.empty()) return absl::OkStatus();
-  std::lock_guard<std::mutex> lock(mutex_);
-  return CheckToken(token, now);
-}
-
-std::string LeaseBook::Holder(Clock::time_point now) const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return Held(now) ? holder_ : "";
-}
-
-uint64_t LeaseBook::epoch() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return epoch_;
-}
-
 grpc::Status ControlService::AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request,
                                           v1::Lease* response) {
   auto lease = leases_->Acquire(request->holder(), request->take());

@@ -54,6 +54,27 @@ v1::CommandedTouch ToProto(const CommandedTouch& touch) {
   return message;
 }
 
+absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where) {
+  switch (view.view_case()) {
+    case v1::View::kTouch: {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(view.touch(), where + ".touch"));
+      return CameraOfTouch(touch.target_m, touch.approach, touch.lateral, touch.standoff_m);
+    }
+    case v1::View::kCamera: {
+      Camera camera;
+      camera.eye_m = FromProto(view.camera().eye_m());
+      camera.at_m = FromProto(view.camera().at_m());
+      camera.up = FromProto(view.camera().up());
+      camera.near_m = view.camera().near_m();
+      camera.far_m = view.camera().far_m();
+      return camera;
+    }
+    case v1::View::VIEW_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrCat(where, " is empty: set touch or camera"));
+}
+
 absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
   Plan plan;
   if (message.speed_m_s() != 0) plan.speed_m_s = message.speed_m_s();
@@ -196,6 +217,21 @@ v1::Column ColumnToProto(const ColumnInfo& info) {
   }
   column.mutable_shape()->Add(info.shape.begin(), info.shape.end());
   return column;
+}
+
+v1::DatasetHeader HeaderOf(const DatasetSpecification& specification) {
+  v1::DatasetHeader header;
+  header.set_samples(specification.samples);
+  header.set_model_name(specification.model->name);
+  header.set_model_hash(specification.model->Hash());
+  header.set_model_yaml(FormatModel(*specification.model));
+  for (const auto& object : specification.objects) header.add_mesh_hashes(object->hash());
+  header.set_fingers(specification.model->fingers);
+  header.set_spacing_m(specification.model->spacing_m);
+  for (const ColumnInfo& column : ColumnsOf(specification)) *header.add_columns() = ColumnToProto(column);
+  if (specification.columns.image) header.set_renderer(RendererKindOf(*specification.image.renderer));
+  header.set_version(kVersion);
+  return header;
 }
 
 v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns) {

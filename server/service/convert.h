@@ -20,6 +20,8 @@ grpc::Status ToGrpc(const absl::Status& status);
 absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where);
 v1::CommandedTouch ToProto(const CommandedTouch& touch);
 
+absl::StatusOr<Camera> FromProto(const v1::View& message, const std::string& where);
+
 absl::StatusOr<Plan> FromProto(const v1::Plan& message);
 absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message,
                                                        const Resources& resources);
@@ -32,6 +34,8 @@ absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::
 
 v1::RendererKind RendererKindOf(const Renderer& renderer);
 v1::Column ColumnToProto(const ColumnInfo& info);
+// What a dataset is, resolved: the first message of its stream.
+v1::DatasetHeader HeaderOf(const DatasetSpecification& specification);
 v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns);
 v1::Effect ToProto(const Effect& effect);
 v1::Model ToProto(const Model& model);

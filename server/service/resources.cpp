@@ -145,14 +145,18 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::s
       absl::StrCat("model.hash: no model has the hash '", prefix, "'", DidYouMean(prefix, known)));
 }
 
-absl::Status ModelStore::CheckName(const std::string& name) {
+absl::Status CheckResourceName(const std::string& name, const std::string& field) {
   const bool plain =
       !name.empty() && name.size() <= 64 && name[0] != '.' &&
       name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
           std::string::npos;
   if (plain) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
-      "model.name = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+      field, " = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+}
+
+absl::Status ModelStore::CheckName(const std::string& name) {
+  return CheckResourceName(name, "model.name");
 }
 
 absl::Status ModelStore::Create(const Model& model) {

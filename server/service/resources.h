@@ -22,6 +22,9 @@ namespace touchstone {
 
 inline constexpr char kVersion[] = "0.1.0";
 
+// 1 to 64 letters, digits, '_', '-' or '.', not '.' first. `field` is named in the error.
+absl::Status CheckResourceName(const std::string& name, const std::string& field);
+
 struct ServedObject {
   std::shared_ptr<const Surface> surface;
   bool closed = false;

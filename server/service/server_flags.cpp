@@ -1,29 +1,18 @@
 #include "server/service/server_flags.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_replace.h>
-#include <toml++/toml.h>
 #include <CLI/CLI.hpp>
 
-#include <functional>
-#include <set>
-#include <variant>
+#include <algorithm>
 #include <vector>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/option_table.h"
 #include "server/service/resources.h"
 
 namespace touchstone {
 namespace {
-
-// One option: a key of the file, and with dashes a flag.
-using Target = std::variant<std::string*, int*, double*, bool*, std::vector<std::string>*>;
-struct Option {
-  std::string key;
-  std::string meaning;
-  Target target;
-};
 
 // What the user says of meshes and renderers before it is checked.
 struct Raw {
@@ -66,66 +55,6 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };
-}
-
-absl::Status Assign(const toml::node& node, const std::string& where, const Target& target) {
-  const auto wrong = [&](const char* expected) {
-    return absl::InvalidArgumentError(absl::StrCat(where, ": must be ", expected));
-  };
-  if (auto* text = std::get_if<std::string*>(&target)) {
-    if (!node.is_string()) return wrong("a text in quotes");
-    **text = *node.value<std::string>();
-  } else if (auto* whole = std::get_if<int*>(&target)) {
-    const auto value = node.value_exact<int64_t>();
-    if (!value || *value < INT32_MIN || *value > INT32_MAX) return wrong("a whole number");
-    **whole = static_cast<int>(*value);
-  } else if (auto* real = std::get_if<double*>(&target)) {
-    if (!node.is_number()) return wrong("a number");
-    **real = *node.value<double>();
-  } else if (auto* yes = std::get_if<bool*>(&target)) {
-    if (!node.is_boolean()) return wrong("true or false");
-    **yes = *node.value<bool>();
-  } else {
-    std::vector<std::string>& list = *std::get<std::vector<std::string>*>(target);
-    if (node.is_string()) {
-      list = {*node.value<std::string>()};
-      return absl::OkStatus();
-    }
-    const toml::array* array = node.as_array();
-    if (array == nullptr) return wrong("a text, or a list of texts");
-    list.clear();
-    for (const toml::node& entry : *array) {
-      if (!entry.is_string()) return wrong("a list of texts");
-      list.push_back(*entry.value<std::string>());
-    }
-  }
-  return absl::OkStatus();
-}
-
-// `set` holds the keys that flags gave: those win.
-absl::Status ReadToml(const std::string& text, const std::string& origin, const std::vector<Option>& options,
-                      const std::set<std::string>& set) {
-  toml::table table;
-  try {
-    table = toml::parse(text, origin);
-  } catch (const toml::parse_error& error) {
-    return absl::InvalidArgumentError(absl::StrCat(origin, ":", error.source().begin.line, ":",
-                                                   error.source().begin.column, ": ",
-                                                   std::string(error.description())));
-  }
-  std::vector<std::string> known;
-  for (const Option& option : options) known.push_back(option.key);
-  for (const auto& [key, node] : table) {
-    const std::string name(key.str());
-    const std::string where = absl::StrCat(origin, ":", key.source().begin.line, ": ", name);
-    const auto option =
-        std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.key == name; });
-    if (option == options.end())
-      return absl::InvalidArgumentError(absl::StrCat(where, ": unknown key", DidYouMean(name, known)));
-    if (set.count(name)) continue;
-    TOUCHSTONE_RETURN_IF_ERROR(Assign(node, where, option->target));
-  }
-  return absl::OkStatus();
 }
 
 absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
@@ -178,34 +107,15 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
   app.add_option("--config", config,
                  "TOML file; its keys are the flags below with underscores (listen = \"127.0.0.1:0\")");
   app.add_flag("--version", version, "Print the version");
-  for (const Option& option : options) {
-    const std::string flag = "--" + absl::StrReplaceAll(option.key, {{"_", "-"}});
-    std::visit(
-        [&](auto* target) {
-          using Value = std::remove_pointer_t<decltype(target)>;
-          if constexpr (std::is_same_v<Value, bool>) {
-            app.add_flag(flag, *target, option.meaning);
-          } else if constexpr (std::is_same_v<Value, std::vector<std::string>>) {
-            app.add_option(flag, *target, option.meaning)->allow_extra_args(false);
-          } else {
-            app.add_option(flag, *target, option.meaning)->capture_default_str();
-          }
-        },
-        option.target);
-  }
+  AddFlags(options, &app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     std::fputs(app.help().c_str(), stdout);
     flags.done = true;
     return flags;
-  } catch (const CLI::ExtrasError& error) {
-    std::vector<std::string> known = {"--config", "--version", "--help"};
-    for (const Option& option : options)
-      known.push_back("--" + absl::StrReplaceAll(option.key, {{"_", "-"}}));
-    const std::vector<std::string> extras = app.remaining();
-    const std::string word = extras.empty() ? "" : extras[0].substr(0, extras[0].find('='));
-    return absl::InvalidArgumentError(absl::StrCat("unknown flag ", word, DidYouMean(word, known)));
+  } catch (const CLI::ExtrasError&) {
+    return UnknownFlag(options, app);
   } catch (const CLI::ParseError& error) {
     return absl::InvalidArgumentError(error.what());
   }
@@ -215,11 +125,8 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
     return flags;
   }
   if (!config.empty()) {
-    std::set<std::string> set;
-    for (const Option& option : options)
-      if (app.count("--" + absl::StrReplaceAll(option.key, {{"_", "-"}})) > 0) set.insert(option.key);
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(config, 1 << 20));
-    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, set));
+    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, GivenKeys(options, app)));
   }
   TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));
   return flags;

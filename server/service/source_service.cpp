@@ -32,27 +32,6 @@ void AppendResults(const TouchBatch& batch, v1::TouchResponse* response) {
   }
 }
 
-absl::StatusOr<Camera> CameraOfView(const v1::View& view, const std::string& where) {
-  switch (view.view_case()) {
-    case v1::View::kTouch: {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(view.touch(), where + ".touch"));
-      return CameraOfTouch(touch.target_m, touch.approach, touch.lateral, touch.standoff_m);
-    }
-    case v1::View::kCamera: {
-      Camera camera;
-      camera.eye_m = FromProto(view.camera().eye_m());
-      camera.at_m = FromProto(view.camera().at_m());
-      camera.up = FromProto(view.camera().up());
-      camera.near_m = view.camera().near_m();
-      camera.far_m = view.camera().far_m();
-      return camera;
-    }
-    case v1::View::VIEW_NOT_SET:
-      break;
-  }
-  return absl::InvalidArgumentError(absl::StrCat(where, " is empty: set touch or camera"));
-}
-
 }  // namespace
 
 grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeRequest*,
@@ -231,7 +210,7 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
   std::vector<Camera> cameras;
   for (int k = 0; k < request.views_size(); ++k) {
     TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera,
-                                CameraOfView(request.views(k), absl::StrCat("views[", k, "]")));
+                                FromProto(request.views(k), absl::StrCat("views[", k, "]")));
     camera.vertical_fov_rad = image.vertical_fov_rad;
     if (const absl::Status status = ValidateImageRequest(camera, image.options); !status.ok())
       return absl::Status(status.code(), absl::StrCat("views[", k, "]: ", status.message()));
@@ -290,18 +269,8 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
                               DatasetStream::Create(specification, part, resources_->pool.get()));
 
   v1::StreamDatasetResponse response;
-  v1::DatasetHeader* header = response.mutable_header();
-  header->set_samples(specification->samples);
-  header->set_model_name(specification->model->name);
-  header->set_model_hash(specification->model->Hash());
-  header->set_model_yaml(FormatModel(*specification->model));
-  for (const auto& object : specification->objects) header->add_mesh_hashes(object->hash());
-  header->set_fingers(specification->model->fingers);
-  header->set_spacing_m(specification->model->spacing_m);
+  *response.mutable_header() = HeaderOf(*specification);
   const std::vector<ColumnInfo> columns = ColumnsOf(*specification);
-  for (const ColumnInfo& column : columns) *header->add_columns() = ColumnToProto(column);
-  if (specification->columns.image) header->set_renderer(RendererKindOf(*specification->image.renderer));
-  header->set_version(kVersion);
   if (!writer->Write(response)) return absl::CancelledError("the client is gone");
   response.clear_header();
 

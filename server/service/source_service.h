@@ -7,7 +7,7 @@
 
 namespace touchstone {
 
-class SourceService final : public v1::Source::Service {
+class SourceService : public v1::Source::Service {
  public:
   SourceService(Resources* resources, LeaseBook* leases) : resources_(resources), leases_(leases) {}
 

@@ -1,0 +1,68 @@
+#include "server/gateway/recorded_source.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/base/status.h"
+#include "server/image/encode.h"
+
+namespace touchstone {
+
+absl::StatusOr<std::unique_ptr<RecordedSource>> RecordedSource::Open(const std::string& path) {
+  std::unique_ptr<RecordedSource> source(new RecordedSource);
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->journal_, Journal::Open(path, Journal::Mode::kReadOnly));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, source->journal_->Sessions());
+  if (sessions.empty()) return absl::InvalidArgumentError(absl::StrCat(path, ": holds no session to serve"));
+  source->fingers_ = sessions[0].fingers;
+  source->spacing_m_ = sessions[0].spacing_m;
+  for (const JournalSession& session : sessions) {
+    if (session.fingers != source->fingers_ || session.spacing_m != source->spacing_m_)
+      return absl::InvalidArgumentError(absl::StrCat(path, ": session '", session.name, "' has ", session.fingers,
+                                                     " fingers, '", sessions[0].name, "' has ", source->fingers_,
+                                                     ": export one of them into a journal of its own"));
+    TOUCHSTONE_RETURN_IF_ERROR(source->journal_->ForEachImage(session.name, [&](const JournalImage& image) {
+      source->images_[image.id] = image;
+      return true;
+    }));
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, RecordedTouches::Create(*source->journal_));
+  return source;
+}
+
+absl::StatusOr<JournalTouch> RecordedSource::Touch(const TouchOrder& order, const Permit& permit) {
+  TOUCHSTONE_RETURN_IF_ERROR(permit());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> same, journal_->Find(order.session, order.id));
+  if (same.has_value() && same->stage == TouchStage::kDone && same->object == order.object &&
+      same->command == order.command)
+    return *same;
+  const JournalTouch* touch = touches_->Find(order.object, order.touch, order.repeat);
+  if (touch == nullptr)
+    return absl::NotFoundError(
+        absl::StrCat("this is a recorded session, and no such touch of '", order.object, "' was recorded"));
+  return *touch;
+}
+
+absl::StatusOr<Frame> RecordedSource::Photograph(const ViewOrder& order, const Permit& permit) {
+  TOUCHSTONE_RETURN_IF_ERROR(permit());
+  const auto found = images_.find(ViewId(order));
+  if (found == images_.end())
+    return absl::NotFoundError(
+        absl::StrCat("this is a recorded session, and no picture of '", order.object, "' was taken from there"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Image image, DecodePng(found->second.png));
+  Frame frame;
+  frame.width = image.width, frame.height = image.height;
+  frame.rgb = std::move(image.pixels);
+  return frame;
+}
+
+Intrinsics RecordedSource::IntrinsicsOf(const Frame& frame) const {
+  return PinholeIntrinsics(frame.width, frame.height, CameraOptions().vertical_fov_rad);
+}
+
+PhysicalFacts RecordedSource::Facts() const {
+  PhysicalFacts facts;
+  facts.touches = touches_->size();
+  facts.images = images_.size();
+  return facts;
+}
+
+}  // namespace touchstone

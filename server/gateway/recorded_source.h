@@ -1,0 +1,41 @@
+// A journal served again: the third source. It gives what was recorded, and says so where nothing was.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "server/gateway/physical_source.h"
+#include "server/session/recorded_touches.h"
+
+namespace touchstone {
+
+class RecordedSource : public PhysicalSource {
+ public:
+  // All sessions of the journal; they must have the same fingers.
+  static absl::StatusOr<std::unique_ptr<RecordedSource>> Open(const std::string& path);
+
+  // By its id; else by its command, the repeats of it in the order in which they were made and round again. NOT_FOUND:
+  // nothing like it was recorded.
+  absl::StatusOr<JournalTouch> Touch(const TouchOrder& order, const Permit& permit) override;
+  absl::StatusOr<Frame> Photograph(const ViewOrder& order, const Permit& permit) override;
+  bool has_camera() const override { return has_images_; }
+  Intrinsics IntrinsicsOf(const Frame& frame) const override;
+  int fingers() const override { return fingers_; }
+  double spacing_m() const override { return spacing_m_; }
+  bool moves() const override { return false; }
+  PhysicalFacts Facts() const override;
+  std::string State() const override { return "idle"; }
+  Journal& journal() { return *journal_; }
+
+ private:
+  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<RecordedTouches> touches_;
+  std::map<std::string, JournalImage> images_;  // by id
+  bool has_images_ = false;
+  int fingers_ = 3;
+  double spacing_m_ = 0.03;
+};
+
+}  // namespace touchstone

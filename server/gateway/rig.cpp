@@ -1,0 +1,349 @@
+#include "server/gateway/rig.h"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_replace.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/gateway/run_command.h"
+#include "server/image/encode.h"
+
+namespace touchstone {
+namespace {
+
+double UnixNowS() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+// Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens.
+constexpr uint32_t kProgramIdBlock = 1000;
+constexpr uint32_t kMostProgramId = (1u << 28) - kProgramIdBlock;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts parts) {
+  std::unique_ptr<Rig> rig(new Rig(std::move(options), std::move(parts)));
+  Journal& journal = rig->journal();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string next, journal.Fact("next_program_id"));
+  if (!next.empty() && !absl::SimpleAtoi(next, &rig->next_program_id_))
+    return absl::DataLossError(
+        absl::StrCat("the journal's next_program_id is '", next, "': a number was expected"));
+  rig->reserved_program_id_ = rig->next_program_id_;
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->facts_.object, journal.Fact("mounted_object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->facts_.placement, journal.Fact("mounted_placement"));
+  TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
+  return rig;
+}
+
+Rig::~Rig() {
+  if (motions_ > 0) parts_.arm->Stop().IgnoreError();
+}
+
+uint32_t Rig::NextProgramId() {
+  if (next_program_id_ >= kMostProgramId) next_program_id_ = reserved_program_id_ = 1;
+  if (next_program_id_ >= reserved_program_id_) {
+    reserved_program_id_ = next_program_id_ + kProgramIdBlock;
+    const absl::Status kept = journal().SetFact("next_program_id", absl::StrCat(reserved_program_id_));
+    if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
+  }
+  return next_program_id_++;
+}
+
+absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const Permit& permit) {
+  const uint64_t stops = stops_;
+  for (;;) {
+    TOUCHSTONE_RETURN_IF_ERROR(Allowed(permit, stops));
+    std::unique_lock<std::timed_mutex> lock(moving_, std::chrono::milliseconds(10));
+    if (lock.owns_lock()) return lock;
+  }
+}
+
+absl::Status Rig::Allowed(const Permit& permit, uint64_t stops) const {
+  if (stops_ != stops || stopped_)
+    return absl::AbortedError("stopped: Control.Stop was called; acquire a lease to go on");
+  return permit();
+}
+
+void Rig::Remember(const absl::Status& status) {
+  std::lock_guard<std::mutex> lock(facts_mutex_);
+  facts_.last_error = std::string(status.message());
+}
+
+PhysicalFacts Rig::Facts() const {
+  PhysicalFacts facts;
+  {
+    std::lock_guard<std::mutex> lock(facts_mutex_);
+    facts = facts_;
+  }
+  const ClockEstimate clock = parts_.effector->Clock();
+  if (clock.valid) facts.clock_uncertainty_s = clock.offset_uncertainty_s / clock.rate * options_.time_scale;
+  return facts;
+}
+
+absl::Status Rig::EnsureSession(const std::string& name) {
+  if (sessions_.count(name) > 0) return absl::OkStatus();
+  JournalSession session;
+  session.name = name;
+  session.created_unix_s = UnixNowS();
+  session.source = SourceInWords();
+  session.calibration = FormatCalibration(parts_.planner->calibration());
+  session.fingers = options_.fingers;
+  session.spacing_m = options_.spacing_m;
+  TOUCHSTONE_RETURN_IF_ERROR(journal().EnsureSession(session));
+  sessions_.insert(name);
+  return absl::OkStatus();
+}
+
+std::string Rig::SourceInWords() const {
+  const EffectorState effector = parts_.effector->State();
+  return absl::StrCat(options_.source_note, options_.source_note.empty() ? "" : "; ", parts_.arm->Model(),
+                      " at ", parts_.arm->Address(), ", end effector ", effector.firmware, " at ",
+                      options_.effector_port);
+}
+
+absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchOrder& order) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> touch,
+                              parts_.journal->Find(order.session, order.id));
+  if (!touch.has_value()) return touch;
+  if (touch->object != order.object || touch->command != order.command)
+    return absl::AlreadyExistsError(absl::StrCat("touch id '", order.id, "' of session '", order.session,
+                                                 "' stands for another touch already: take a new id"));
+  if (touch->stage != TouchStage::kDone) return std::optional<JournalTouch>();
+  return touch;
+}
+
+absl::StatusOr<JournalTouch> Rig::Touch(const TouchOrder& order, const Permit& permit) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(order));
+  if (known.has_value()) return *std::move(known);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(order));  // made while this one waited
+  if (known.has_value()) return *std::move(known);
+
+  // Everything that can forbid it, before anything is written or moved.
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  if (const EffectorState effector = parts_.effector->State(); !effector.connected)
+    return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
+  const std::string placement = PlacementFor(order.touch.approach);
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(order.object, placement, permit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(PlannedTouch plan,
+                              parts_.planner->Plan(from, order.object, order.bounds, placement, order.touch,
+                                                   "touch '" + order.id + "'"));
+
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
+  const double began_s = HostNowS(), began_unix_s = UnixNowS();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const JournalTouch intent,
+      journal().Begin(order.session, order.id, order.object, placement, order.command));
+  if (intent.stage == TouchStage::kDone) return intent;
+  const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      journal().Executing(order.session, order.id, program_id, parts_.effector->State().boot_id));
+  ++motions_;
+  absl::StatusOr<JournalResult> result = MakeTouch(plan, program_id, order, permit);
+  --motions_;
+  if (!result.ok()) {
+    Remember(result.status());
+    spdlog::warn("touch '{}' of session '{}': {}", order.id, order.session,
+                 std::string(result.status().message()));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        journal().Failed(order.session, order.id, std::string(result.status().message())));
+    audit()
+        .Write(
+            "touch_failed",
+            {{"session", order.session}, {"id", order.id}, {"why", std::string(result.status().message())}})
+        .IgnoreError();
+    return result.status();
+  }
+
+  result->start_unix_s = began_unix_s;
+  TOUCHSTONE_ASSIGN_OR_RETURN(result->session_time_s, SessionTimeS(order.session, began_unix_s));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().Done(order.session, order.id, *result));
+  {
+    std::lock_guard<std::mutex> facts_lock(facts_mutex_);
+    const double took_s = HostNowS() - began_s;
+    facts_.touch_duration_s = facts_.touches == 0 ? took_s : 0.9 * facts_.touch_duration_s + 0.1 * took_s;
+    ++facts_.touches;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(order));
+  if (!known.has_value()) return absl::InternalError("the journal lost a result that it had acknowledged");
+  return *std::move(known);
+}
+
+absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix_s) {
+  const std::string key = "first_touch_unix_s " + session;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, journal().Fact(key));
+  double first_s = unix_s;
+  if (text.empty()) {
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact(key, absl::StrFormat("%.6f", unix_s)));
+  } else if (!absl::SimpleAtod(text, &first_s)) {
+    return absl::DataLossError(
+        absl::StrCat("the journal's '", key, "' is '", text, "': a number was expected"));
+  }
+  return (unix_s - first_s) * options_.time_scale;
+}
+
+absl::StatusOr<Frame> Rig::Photograph(const ViewOrder& order, const Permit& permit) {
+  if (parts_.camera == nullptr)
+    return absl::FailedPreconditionError(
+        "this rig has no camera: set camera.source in the gateway's configuration");
+  if (!parts_.planner->calibration().has_camera)
+    return absl::FailedPreconditionError(
+        "the calibration file has no flange_from_camera: where the camera sits");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  const std::string placement = PlacementFor(order.object_from_camera.rotation().col(2));
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(order.object, placement, permit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
+                              parts_.planner->ObjectPose(order.object, order.bounds, placement));
+  const Eigen::Isometry3d base_from_camera = base_from_object * order.object_from_camera;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const PlannedTouch plan,
+      parts_.planner->PlanView(from, base_from_camera, order.object, order.bounds, placement, "view"));
+  TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transfer, {}, plan.motion.duration_s, permit));
+  const absl::StatusOr<Frame> frame = parts_.camera->Take(HostNowS());
+  if (!frame.ok()) {
+    Remember(frame.status());
+    return frame;
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
+  JournalImage image;
+  image.id = ViewId(order);
+  image.object = order.object, image.placement = placement;
+  const Eigen::AngleAxisd turn(base_from_camera.rotation());
+  for (int i = 0; i < 3; ++i) {
+    image.base_from_camera[i] = base_from_camera.translation()[i];
+    image.base_from_camera[3 + i] = turn.angle() * turn.axis()[i];
+  }
+  image.unix_s = UnixNowS();
+  image.width = frame->width, image.height = frame->height;
+  TOUCHSTONE_ASSIGN_OR_RETURN(image.png, EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(order.session, image));
+  std::lock_guard<std::mutex> facts_lock(facts_mutex_);
+  ++facts_.images;
+  facts_.image_width = frame->width, facts_.image_height = frame->height;
+  return frame;
+}
+
+Intrinsics Rig::IntrinsicsOf(const Frame& frame) const {
+  if (parts_.intrinsics.has_value()) return *parts_.intrinsics;
+  return PinholeIntrinsics(frame.width, frame.height, parts_.vertical_fov_rad);
+}
+
+absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
+                              const std::vector<std::array<double, 6>>& joints, double duration_s,
+                              const Permit& permit) {
+  const uint32_t program_id = NextProgramId();
+  ++motions_;
+  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
+  if (status.ok())
+    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", permit,
+                       [](const ArmState& state) -> absl::StatusOr<bool> {
+                         return state.phase == static_cast<int>(MotionPhase::kDone);
+                       });
+  --motions_;
+  if (!status.ok()) Remember(status);
+  return status;
+}
+
+absl::Status Rig::Home(const Permit& permit) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
+  return MoveHome(permit);
+}
+
+absl::Status Rig::MoveHome(const Permit& permit) {
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
+  return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, permit);
+}
+
+absl::Status Rig::EnsureMounted(const std::string& object, const std::string& placement,
+                                const Permit& permit) {
+  const PhysicalFacts now = Facts();
+  if (now.object == object && now.placement == placement) return absl::OkStatus();
+  if (options_.mount_command.empty())
+    return absl::FailedPreconditionError(absl::StrCat(
+        now.object.empty()
+            ? "nobody has told what lies on the fixture"
+            : absl::StrCat("'", now.object, "' lies on the fixture with its face ", now.placement, " up"),
+        ": put '", object, "' there with its face ", placement, " up, then: touchstone rig mount ", object,
+        " ", placement));
+  // The tool leaves before anything is moved there.
+  TOUCHSTONE_RETURN_IF_ERROR(MoveHome(permit));
+  std::vector<std::string> command = options_.mount_command;
+  for (std::string& word : command)
+    word = absl::StrReplaceAll(word, {{"{object}", object}, {"{placement}", placement}});
+  TOUCHSTONE_RETURN_IF_ERROR(RunCommand(command, options_.mount_timeout_s, permit));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
+  audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
+  std::lock_guard<std::mutex> lock(facts_mutex_);
+  facts_.object = object, facts_.placement = placement;
+  return absl::OkStatus();
+}
+
+absl::Status Rig::Mount(const std::string& object, const std::string& placement, const Permit& permit) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
+  if (!options_.mount_command.empty()) return EnsureMounted(object, placement, permit);
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
+  audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
+  std::lock_guard<std::mutex> facts_lock(facts_mutex_);
+  facts_.object = object, facts_.placement = placement;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PlannedTouch> Rig::Check(const std::string& object, const Bounds& bounds,
+                                        const CommandedTouch& touch, const ArmState* from,
+                                        const std::string& where) const {
+  ArmState here;
+  if (from != nullptr) {
+    here = *from;
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(here, parts_.arm->State());
+  }
+  return parts_.planner->Plan(here, object, bounds, PlacementFor(touch.approach), touch, where);
+}
+
+uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
+  const uint32_t motions = motions_;
+  stopped_ = true;
+  ++stops_;
+  const absl::Status status = parts_.arm->Stop();
+  parts_.news->Notify();
+  if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
+  audit()
+      .Write("stop", {{"who", who},
+                      {"reason", reason},
+                      {"motions", absl::StrCat(motions)},
+                      {"sent", status.ok() ? "yes" : std::string(status.message())}})
+      .IgnoreError();
+  return motions;
+}
+
+void Rig::Resume() {
+  stopped_ = false;
+}
+
+std::string Rig::State() const {
+  const absl::StatusOr<ArmState> arm = parts_.arm->State();
+  if (!arm.ok()) return "disconnected";
+  if (arm->safety_mode == 3) return "protective_stop";
+  if (arm->safety_mode == 6 || arm->safety_mode == 7) return "emergency_stop";
+  if (arm->safety_mode > 3) return "fault";
+  if (arm->robot_mode < 7) return "powered_off";
+  if (stopped_) return "stopped";
+  if (!parts_.effector->State().connected) return "disconnected";
+  return motions_ > 0 ? "busy" : "idle";
+}
+
+}  // namespace touchstone

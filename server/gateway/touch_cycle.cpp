@@ -1,0 +1,130 @@
+// One touch from its program to its result, and the watch over everything that moves.
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kBeatEveryS = 0.01;   // host time; also how soon a lost lease is noticed
+constexpr double kProgramStartsS = 2;  // host time that a program may take until it tells its phase
+
+}  // namespace
+
+absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what, const Permit& permit,
+                            const std::function<absl::StatusOr<bool>(const ArmState&)>& done) {
+  const uint64_t stops = stops_;
+  const double began_s = HostNowS();
+  double at_rest_since_s = 0;
+  bool seen = false;  // the program told its phase
+  // Whatever ends the watch before it is done stops the arm first.
+  const auto give_up = [&](absl::Status status) {
+    const absl::Status stop = parts_.arm->Stop();
+    if (!stop.ok())
+      status = absl::Status(status.code(), absl::StrCat(status.message(), " (and: ", stop.message(), ")"));
+    return status;
+  };
+  for (;;) {
+    const uint64_t news = parts_.news->count();
+    const double now_s = HostNowS();
+    if (now_s - last_beat_s_ >= kBeatEveryS) {
+      parts_.arm->Beat();
+      last_beat_s_ = now_s;
+    }
+    if (const absl::Status allowed = Allowed(permit, stops); !allowed.ok()) return give_up(allowed);
+    const absl::StatusOr<ArmState> state = parts_.arm->State();
+    if (!state.ok()) return give_up(state.status());
+    if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok()) return give_up(safety);
+    seen = seen || state->program_id == program_id;
+    if (seen) {
+      const absl::StatusOr<bool> over = done(*state);
+      if (!over.ok()) return give_up(over.status());
+      if (*over) return absl::OkStatus();
+    }
+
+    // A program that ended by itself, or never began.
+    const bool rests = state->runtime_state == 1 && now_s - began_s > 0.5;
+    at_rest_since_s = !rests ? 0 : at_rest_since_s == 0 ? now_s : at_rest_since_s;
+    if (seen && rests && now_s - at_rest_since_s > 0.5)
+      return give_up(absl::UnavailableError(absl::StrCat("the arm's program ended during ", what,
+                                                         " at phase '", PhaseName(state->phase), "'")));
+    if (!seen && now_s - began_s > kProgramStartsS + 1)
+      return give_up(
+          absl::UnavailableError(absl::StrCat("the arm never began program ", program_id, " (", what,
+                                              "): is it in remote control, and no pop-up open?")));
+    if (now_s - began_s > limit_s)
+      return give_up(absl::UnavailableError(absl::StrCat(
+          what, " took longer than ", ShortestNumber(std::round(limit_s)), " s and was stopped")));
+    parts_.news->WaitForNews(news, kBeatEveryS);
+  }
+}
+
+absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t program_id,
+                                             const TouchOrder& order, const Permit& permit) {
+  TouchRecord record;
+  record.motion = plan.motion;
+  record.motion.program_id = program_id;
+  record.acceleration_m_s2 = parts_.planner->limits().acceleration_m_s2;
+  record.time_scale = options_.time_scale;
+  const double host_per_rig = 1 / options_.time_scale;
+  const double limit_s = 2 * plan.motion.duration_s * host_per_rig + 15;
+  const auto phase_is = [](MotionPhase phase) {
+    return [phase](const ArmState& state) -> absl::StatusOr<bool> {
+      return state.phase == static_cast<int>(phase);
+    };
+  };
+
+  // To the start. The end effector is armed there, at rest and free.
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      Supervise(program_id, limit_s, "the way to the start", permit, phase_is(MotionPhase::kReady)));
+  if (const absl::Status armed = parts_.effector->Arm(program_id); !armed.ok()) {
+    parts_.arm->Stop().IgnoreError();
+    return armed;
+  }
+
+  // The approach: until every finger has reported, the first one is pushed far enough, or the stroke ends.
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->BeginApproach(program_id));
+  const Eigen::Vector3d approach =
+      (plan.motion.end.translation() - plan.motion.transfer.back().translation()).normalized();
+  bool ended = false;
+  std::optional<double> pressed_from_m;
+  TOUCHSTONE_RETURN_IF_ERROR(Supervise(
+      program_id, limit_s, "the approach", permit, [&](const ArmState& state) -> absl::StatusOr<bool> {
+        if (state.phase == static_cast<int>(MotionPhase::kDone)) return true;
+        TOUCHSTONE_ASSIGN_OR_RETURN(const EffectorTouch contacts, parts_.effector->Touch());
+        const int count = contacts.Contacts();
+        const double way_m = approach.dot(state.base_from_tip.translation());
+        if (count > 0 && !pressed_from_m.has_value()) pressed_from_m = way_m;
+        const bool pressed = pressed_from_m.has_value() && way_m - *pressed_from_m > options_.most_press_m;
+        if (!ended && (count == options_.fingers || pressed)) {
+          TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->EndApproach(program_id));
+          ended = true;
+        }
+        return false;
+      }));
+
+  // What was heard; where a finger is missing, the device itself has the last word.
+  TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
+  if (record.contacts.Contacts() < options_.fingers) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Recall(program_id));
+  }
+  parts_.effector->Disarm().IgnoreError();  // the next Arm does it anyway
+  record.contacts.contact_ticks.resize(options_.fingers);
+  record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
+  record.effector_clock = parts_.effector->Clock();
+  record.controller_clock = parts_.arm->ControllerClock();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, parts_.arm->State());
+  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
+  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+  return ResultOf(record);
+}
+
+}  // namespace touchstone

@@ -1,0 +1,219 @@
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/service/gateway_options.h"
+#include "server/service/option_table.h"
+#include "server/service/resources.h"
+
+namespace touchstone {
+namespace {
+
+// Options in the units of files, and lists that become arrays, before they are checked.
+struct Raw {
+  std::vector<std::string> mesh, mesh_dir;
+  std::vector<std::string> sensor;
+  int fingers = 3;
+  bool active_high = true;
+  double debounce_ms = 5;
+  int threshold = 512, hysteresis = 16;
+  double vertical_fov_deg = 45;
+  double most_speed_mm_s = 100, transfer_speed_mm_s = 250, acceleration_mm_s2 = 1200;
+  double most_standoff_mm = 150, stroke_beyond_target_mm = 30, most_tilt_deg = 60, clearance_mm = 50;
+  std::vector<double> box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
+};
+
+std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
+  GatewayOptions& o = flags->options;
+  return {
+      {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.common.listen},
+      {"replay", "Serve this journal instead of a rig", &o.replay},
+      {"journal", "The SQLite file that keeps every touch", &o.journal},
+      {"audit_log", "JSON lines of what was done with the rig, and by whom; empty: none", &o.audit_log},
+      {"calibration", "Where tool, objects and camera stand (YAML)", &o.calibration},
+      {"source_note", "Kept with every session; an emulator says here that it is one", &o.source_note},
+      {"time_scale", "Rig seconds in one second: 1, but with an emulator on a faster clock", &o.time_scale},
+      {"mount_command", "Program and arguments that put {object} down with its face {placement} up; none: a person does",
+       &o.mount_command},
+      {"mount_timeout_s", "Seconds that it may take", &o.mount_timeout_s},
+      {"mesh", "An object that can be touched, NAME=FILE[,unit=..][,up=..][,scale=..]; may be repeated", &raw->mesh},
+      {"mesh_dir", "Every mesh file of a folder; may be repeated", &raw->mesh_dir},
+      {"supershape_triangles", "About how many triangles each built-in supershape has", &o.common.supershape_triangles},
+      {"arm.model", "ur3 (CB3) or ur3e", &o.arm.model},
+      {"arm.address", "Host name or address of the controller", &o.arm.address},
+      {"arm.dashboard_port", "", &o.arm.dashboard_port},
+      {"arm.primary_port", "", &o.arm.primary_port},
+      {"arm.secondary_port", "", &o.arm.secondary_port},
+      {"arm.rtde_port", "", &o.arm.rtde_port},
+      {"arm.silence_s", "Seconds without a state after which the controller counts as frozen", &o.arm.silence_s},
+      {"effector.port", "Serial port of the end effector, /dev/ttyACM0", &o.effector.port},
+      {"effector.baud", "", &o.effector.baud},
+      {"effector.fingers", "1 to 8", &raw->fingers},
+      {"effector.spacing_mm", "Between neighbouring fingers", &o.spacing_mm},
+      {"effector.sensor", "optical, microswitch or resistor: one for all fingers, or one each", &raw->sensor},
+      {"effector.active_high", "Optical, microswitch: the pin is high while pressed", &raw->active_high},
+      {"effector.debounce_ms", "Microswitch", &raw->debounce_ms},
+      {"effector.threshold", "Resistor: pressed at or above this reading", &raw->threshold},
+      {"effector.hysteresis", "Resistor: released so far below", &raw->hysteresis},
+      {"effector.most_press_mm", "How far the first finger may be pushed while the others are on their way",
+       &o.most_press_mm},
+      {"effector.reply_timeout_s", "Of one try of a request", &o.effector.reply_timeout_s},
+      {"effector.silence_s", "Without a heartbeat for so long the line is lost", &o.effector.silence_s},
+      {"effector.clock_query_s", "Between two queries of its clock", &o.effector.clock_query_s},
+      {"camera.source", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.source},
+      {"camera.width", "Asked of the camera; 0: as it comes", &o.camera.width},
+      {"camera.height", "", &o.camera.height},
+      {"camera.intrinsics", "OpenCV's calibration file; empty: the field of view below", &o.camera.intrinsics},
+      {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
+      {"camera.timeout_s", "", &o.camera.timeout_s},
+      {"limits.most_speed_mm_s", "Limit of an approach's speed", &raw->most_speed_mm_s},
+      {"limits.transfer_speed_mm_s", "Speed between touches", &raw->transfer_speed_mm_s},
+      {"limits.acceleration_mm_s2", "", &raw->acceleration_mm_s2},
+      {"limits.most_standoff_mm", "", &raw->most_standoff_mm},
+      {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target", &raw->stroke_beyond_target_mm},
+      {"limits.most_tilt_deg", "Of an approach, from straight down", &raw->most_tilt_deg},
+      {"limits.clearance_mm", "Transfers cross so far above the object", &raw->clearance_mm},
+      {"limits.box_min_mm", "Corner of the box that the tip must stay in, base frame", &raw->box_min_mm},
+      {"limits.box_max_mm", "Its other corner", &raw->box_max_mm},
+      {"limits.joint_min_deg", "Six joints", &raw->joint_min_deg},
+      {"limits.joint_max_deg", "Six joints", &raw->joint_max_deg},
+      {"limits.home_deg", "Six joints", &raw->home_deg},
+      {"limits.payload_kg", "Of the end effector", &o.limits.payload_kg},
+      {"most_batch_size", "Limit: samples a batch", &o.common.most_batch_size},
+      {"most_touches_per_request", "Limit: explicit touches a request", &o.common.most_touches_per_request},
+      {"most_images_per_request", "Limit: photographs a request", &o.common.most_images_per_request},
+      {"most_streams", "Limit: dataset streams at once", &o.common.most_streams},
+      {"most_message_mib", "Limit: size of one message, MiB", &o.common.most_message_mib},
+      {"lease_window_s", "Seconds within which a lease must be renewed", &o.common.lease_window_s},
+      {"drain_s", "Seconds that running calls get after SIGTERM", &o.common.drain_s},
+      {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
+      {"log_json", "Log lines as JSON", &flags->log_json},
+  };
+}
+
+// `count` numbers in the unit of files into SI; none given: `numbers` stays.
+template <typename Array>
+absl::Status TakeList(const std::vector<double>& list, double si_per_unit, const char* key, Array* numbers) {
+  if (list.empty()) return absl::OkStatus();
+  if (list.size() != static_cast<size_t>(numbers->size()))
+    return absl::InvalidArgumentError(
+        absl::StrCat(key, " has ", list.size(), " numbers: ", numbers->size(), " would be right"));
+  for (size_t k = 0; k < list.size(); ++k) (*numbers)[k] = list[k] * si_per_unit;
+  return absl::OkStatus();
+}
+
+absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
+  GatewayOptions& o = flags->options;
+  for (const std::string& folder : raw.mesh_dir) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSource> sources, MeshSourcesOfFolder(folder));
+    o.common.meshes.insert(o.common.meshes.end(), sources.begin(), sources.end());
+  }
+  for (const std::string& text : raw.mesh) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource source, ParseMeshSource(text));
+    o.common.meshes.push_back(std::move(source));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(raw.fingers, 1, 8, "effector.fingers"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.spacing_mm, 1, 1000, "effector.spacing_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.most_press_mm, 0.1, 1000, "effector.most_press_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.time_scale, 1e-3, 1e5, "time_scale"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.silence_s, 0.05, 60, "arm.silence_s"));
+  if (raw.sensor.size() > 1 && static_cast<int>(raw.sensor.size()) != raw.fingers)
+    return absl::InvalidArgumentError(absl::StrCat("effector.sensor has ", raw.sensor.size(),
+                                                   " names: one, or one for each of ", raw.fingers, " fingers"));
+  EffectorFinger finger;
+  finger.active_high = raw.active_high;
+  finger.debounce_s = raw.debounce_ms / 1000;
+  finger.threshold = raw.threshold;
+  finger.hysteresis = raw.hysteresis;
+  o.effector.fingers.assign(raw.fingers, finger);
+  for (int k = 0; k < raw.fingers && !raw.sensor.empty(); ++k)
+    o.effector.fingers[k].sensor = raw.sensor[raw.sensor.size() == 1 ? 0 : k];
+  o.effector.time_scale = o.time_scale;
+
+  o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
+  MotionLimits& limits = o.limits;
+  limits.most_speed_m_s = raw.most_speed_mm_s / 1000;
+  limits.transfer_speed_m_s = raw.transfer_speed_mm_s / 1000;
+  limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
+  limits.most_standoff_m = raw.most_standoff_mm / 1000;
+  limits.stroke_beyond_target_m = raw.stroke_beyond_target_mm / 1000;
+  limits.most_tilt_rad = raw.most_tilt_deg * kRadiansPerDegree;
+  limits.clearance_m = raw.clearance_mm / 1000;
+  TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_min_mm, 1e-3, "limits.box_min_mm", &limits.box_min_m));
+  TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_max_mm, 1e-3, "limits.box_max_mm", &limits.box_max_m));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      TakeList(raw.joint_min_deg, kRadiansPerDegree, "limits.joint_min_deg", &limits.joint_min_rad));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      TakeList(raw.joint_max_deg, kRadiansPerDegree, "limits.joint_max_deg", &limits.joint_max_rad));
+  TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.home_deg, kRadiansPerDegree, "limits.home_deg", &limits.home_rad));
+
+  const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
+  if (std::find(levels.begin(), levels.end(), flags->log_level) == levels.end())
+    return absl::InvalidArgumentError(
+        absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
+  if (o.replay.empty() && (o.arm.address.empty() || o.effector.port.empty()))
+    return absl::InvalidArgumentError(
+        "arm.address and effector.port say where the rig is: give --config FILE, or both; --replay FILE serves a "
+        "recorded session instead");
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv) {
+  GatewayFlags flags;
+  Raw raw;
+  const std::vector<Option> options = OptionsOf(&flags, &raw);
+  CLI::App app(
+      "Examples:\n"
+      "  touchstone-gateway --config rig.toml\n"
+      "  touchstone-gateway --arm-address 192.168.0.10 --arm-model ur3e --effector-port /dev/ttyACM0\n"
+      "  touchstone-gateway --replay session.db\n"
+      "\nThe physical source: drives a UR3 arm, the end effector and a camera behind the same services as\n"
+      "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software stop and\n"
+      "not safety-rated: keep the emergency stop within reach.",
+      "touchstone-gateway");
+  std::string config;
+  bool version = false;
+  app.add_option("--config", config, "TOML file; its keys are the flags below: arm.address = --arm-address");
+  app.add_flag("--version", version, "Print the version");
+  AddFlags(options, &app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    flags.done = true;
+    return flags;
+  } catch (const CLI::ExtrasError&) {
+    return UnknownFlag(options, app);
+  } catch (const CLI::ParseError& error) {
+    return absl::InvalidArgumentError(error.what());
+  }
+  if (version) {
+    std::printf("touchstone-gateway %s\n", kVersion);
+    flags.done = true;
+    return flags;
+  }
+  if (!config.empty()) {
+    const std::set<std::string> given = GivenKeys(options, app);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(config, 1 << 20));
+    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, given));
+    const std::filesystem::path folder = std::filesystem::path(config).parent_path();
+    for (const auto& [key, path] : {std::pair("journal", &flags.options.journal),
+                                    std::pair("audit_log", &flags.options.audit_log),
+                                    std::pair("calibration", &flags.options.calibration),
+                                    std::pair("replay", &flags.options.replay),
+                                    std::pair("camera.intrinsics", &flags.options.camera.intrinsics)})
+      if (given.count(key) == 0 && !path->empty()) *path = (folder / *path).string();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));
+  return flags;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,54 @@
+// Everything that can be set about a physical source. Each field is a key of the gateway's TOML file, in the table that
+// its group is named after, and a flag of touchstone-gateway.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/gateway/camera.h"
+#include "server/gateway/effector.h"
+#include "server/gateway/motion_planner.h"
+#include "server/service/server_options.h"
+
+namespace touchstone {
+
+struct ArmOptions {
+  std::string model = "ur3e";  // or "ur3"
+  std::string address;         // "192.168.0.10"
+  int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
+  double silence_s = 0.5;      // host time without a state: the controller counts as frozen
+};
+
+struct GatewayOptions {
+  ServerOptions common;           // listen, meshes, limits, lease window, drain
+  std::string replay;             // a journal to serve instead of a rig
+  std::string journal = "rig.db";
+  std::string audit_log = "rig.audit.jsonl";
+  std::string calibration = "calibration.yaml";
+  std::string source_note;
+  double time_scale = 1;
+  std::vector<std::string> mount_command;
+  double mount_timeout_s = 120;
+  ArmOptions arm;
+  EffectorOptions effector;
+  double spacing_mm = 30;
+  double most_press_mm = 45;
+  CameraOptions camera;
+  MotionLimits limits;
+
+  GatewayOptions() { common.listen = "127.0.0.1:50061"; }
+};
+
+struct GatewayFlags {
+  GatewayOptions options;
+  std::string log_level = "info";
+  bool log_json = false;
+  bool done = false;  // help or version was printed
+};
+
+// Command line and TOML file; flags win. Paths in the file are relative to its folder. Errors name file, line and key.
+absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv);
+
+}  // namespace touchstone

@@ -1,0 +1,74 @@
+#include "server/service/journal_sessions_service.h"
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/service/convert.h"
+#include "server/session/session_files.h"
+
+namespace touchstone {
+namespace {
+
+constexpr size_t kPiece = 1 << 20;
+
+v1::Session ToProto(const JournalSession& session, const std::string& csv) {
+  v1::Session message;
+  message.set_name(session.name);
+  message.set_hash(Sha256Hex(csv));
+  message.set_bytes(csv.size());
+  message.set_touches(session.done);
+  message.set_fingers(session.fingers);
+  for (const std::string& object : session.objects) message.add_objects(object);
+  message.set_has_poses(true);
+  return message;
+}
+
+}  // namespace
+
+grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
+                                                   grpc::ServerReader<v1::CreateSessionRequest>*, v1::Session*) {
+  return grpc::Status(grpc::UNIMPLEMENTED,
+                      "a gateway's sessions come from touching; touchstone session import FILE -o SESSION.db makes one "
+                      "from a file, which touchstone-gateway --replay serves");
+}
+
+grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
+                                                  v1::ListSessionsResponse* response) {
+  const auto sessions = journal_->Sessions();
+  if (!sessions.ok()) return ToGrpc(sessions.status());
+  for (const JournalSession& session : *sessions) {
+    const auto csv = ExportCsv(*journal_, session.name);
+    if (!csv.ok()) return ToGrpc(csv.status());
+    *response->add_sessions() = ToProto(session, *csv);
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::GetSessionRequest* request,
+                                                v1::Session* response) {
+  const auto session = journal_->Session(request->name());
+  if (!session.ok()) return ToGrpc(session.status());
+  const auto csv = ExportCsv(*journal_, session->name);
+  if (!csv.ok()) return ToGrpc(csv.status());
+  *response = ToProto(*session, *csv);
+  return grpc::Status::OK;
+}
+
+grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*, const v1::ExportSessionRequest* request,
+                                                   grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
+  const auto csv = ExportCsv(*journal_, request->name());
+  if (!csv.ok()) return ToGrpc(csv.status());
+  v1::ExportSessionResponse response;
+  for (size_t begin = 0; begin < csv->size(); begin += kPiece) {
+    response.set_csv(csv->substr(begin, kPiece));
+    if (!writer->Write(response)) break;
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status JournalSessionsService::DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest* request,
+                                                   v1::DeleteSessionResponse*) {
+  if (!writable_) return grpc::Status(grpc::FAILED_PRECONDITION, "a recorded session is served read-only");
+  return ToGrpc(journal_->DeleteSession(request->name()));
+}
+
+}  // namespace touchstone

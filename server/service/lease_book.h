@@ -1,0 +1,45 @@
+// Who may move a source: the lease that touchstone.v1.Control grants.
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "touchstone/v1/control.pb.h"
+
+namespace touchstone {
+
+// One writer at a time, by a token that goes stale when another lease is granted or the window passes.
+class LeaseBook {
+ public:
+  using Clock = std::chrono::steady_clock;
+  explicit LeaseBook(double window_s, bool required = false) : window_s_(window_s), required_(required) {}
+
+  absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take,
+                                    Clock::time_point now = Clock::now());
+  absl::StatusOr<v1::Lease> Renew(const std::string& token, Clock::time_point now = Clock::now());
+  absl::Status Release(const std::string& token, Clock::time_point now = Clock::now());
+  // Whether a request that carries `token` may act. A stale one is refused. None is right at a virtual
+  // source, which needs no lease; at a physical one that is refused too.
+  absl::Status Check(const std::string& token, Clock::time_point now = Clock::now()) const;
+
+  // Who holds it; empty if nobody.
+  std::string Holder(Clock::time_point now = Clock::now()) const;
+  uint64_t epoch() const;
+
+ private:
+  bool Held(Clock::time_point now) const;
+  absl::Status CheckToken(const std::string& token, Clock::time_point now) const;
+  v1::Lease Describe() const;
+
+  const double window_s_;
+  const bool required_;
+  mutable std::mutex mutex_;
+  std::string token_, holder_;
+  uint64_t epoch_ = 0;
+  Clock::time_point until_{};
+};
+
+}  // namespace touchstone

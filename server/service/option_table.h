@@ -1,0 +1,43 @@
+// Options that are keys of a TOML file and flags of a command at once.
+#pragma once
+
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <absl/status/status.h>
+
+namespace CLI {
+class App;
+}
+
+namespace touchstone {
+
+// One option. A key "arm.address" stands in the file's table [arm]; its flag is --arm-address.
+struct Option {
+  using Target = std::variant<std::string*, int*, double*, bool*, std::vector<std::string>*, std::vector<double>*>;
+  std::string key;
+  std::string meaning;
+  Target target;
+};
+
+// "--arm-address".
+std::string FlagOf(const Option& option);
+
+// Reads the keys of a TOML text into the targets, but those in `set` (which flags gave: those win). Errors name
+// `origin`, the line, the key, and what would be right; an unknown key is one.
+absl::Status ReadToml(const std::string& text, const std::string& origin, const std::vector<Option>& options,
+                      const std::set<std::string>& set);
+
+// Adds a flag for every option.
+void AddFlags(const std::vector<Option>& options, CLI::App* app);
+// The keys whose flags were given.
+std::set<std::string> GivenKeys(const std::vector<Option>& options, const CLI::App& app);
+// What is wrong with the first word that no flag took; suggests a near one.
+absl::Status UnknownFlag(const std::vector<Option>& options, const CLI::App& app);
+
+// "must be from 1 to 9".
+absl::Status CheckRange(double value, double lower, double upper, const std::string& name);
+
+}  // namespace touchstone

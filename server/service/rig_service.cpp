@@ -1,0 +1,205 @@
+#include "server/service/rig_service.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/gateway/arm/ur_modes.h"
+#include "server/service/convert.h"
+
+namespace touchstone {
+namespace {
+
+v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
+  v1::BasePose message;
+  const Eigen::AngleAxisd turn(pose.rotation());
+  *message.mutable_position_m() = ToProto(Eigen::Vector3d(pose.translation()));
+  *message.mutable_rotation_rad() = ToProto(Eigen::Vector3d(turn.angle() * turn.axis()));
+  return message;
+}
+
+}  // namespace
+
+grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context, const v1::AcquireLeaseRequest* request,
+                                             v1::Lease* response) {
+  const grpc::Status status = ControlService::AcquireLease(context, request, response);
+  if (status.ok()) {
+    rig_->Resume();
+    rig_->audit()
+        .Write("lease_acquired", {{"holder", request->holder()},
+                                  {"epoch", absl::StrCat(response->epoch())},
+                                  {"taken", request->take() ? "yes" : "no"},
+                                  {"peer", context->peer()}})
+        .IgnoreError();
+  }
+  return status;
+}
+
+grpc::Status RigControlService::ReleaseLease(grpc::ServerContext* context, const v1::ReleaseLeaseRequest* request,
+                                             v1::ReleaseLeaseResponse* response) {
+  const std::string holder = leases_->Holder();
+  const grpc::Status status = ControlService::ReleaseLease(context, request, response);
+  if (status.ok()) rig_->audit().Write("lease_released", {{"holder", holder}}).IgnoreError();
+  return status;
+}
+
+grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::StopRequest* request,
+                                     v1::StopResponse* response) {
+  // The arm first, then words.
+  response->set_aborted_touches(
+      rig_->Stop(request->reason().empty() ? "no reason given" : request->reason(), context->peer()));
+  spdlog::warn("stop from {}: {}", context->peer(), request->reason());
+  return grpc::Status::OK;
+}
+
+grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1::GetStateRequest* request,
+                                         v1::State* response) {
+  const grpc::Status status = ControlService::GetState(context, request, response);
+  if (!resources_->draining) response->set_state(rig_->State());
+  return status;
+}
+
+Permit RigService::PermitOf(grpc::ServerContext* context, const std::string& lease_token) const {
+  return [this, context, lease_token]() -> absl::Status {
+    if (context->IsCancelled()) return absl::CancelledError("the client is gone, or the call's deadline has passed");
+    if (resources_->draining) return absl::UnavailableError("the gateway is being shut down");
+    return leases_->Check(lease_token);
+  };
+}
+
+void RigService::Describe(v1::RigState* state) const {
+  const Arm& arm = rig_->arm();
+  v1::ArmStatus* a = state->mutable_arm();
+  a->set_model(arm.Model());
+  a->set_address(arm.Address());
+  a->set_version(arm.Version());
+  a->set_rate_hz(arm.StateRateHz());
+  const absl::StatusOr<ArmState> now = arm.State();
+  a->set_connected(now.ok());
+  if (now.ok()) {
+    a->set_robot_mode(RobotModeName(now->robot_mode));
+    a->set_safety_mode(SafetyModeName(now->safety_mode));
+    a->set_state_age_s(HostNowS() - now->host_time_s);
+    *a->mutable_base_from_tip() = PoseToProto(now->base_from_tip);
+    for (const double q : now->joints_rad) a->add_joints_rad(q);
+    a->set_program_id(now->program_id);
+    a->set_phase(PhaseName(now->phase));
+    a->set_speed_scaling(now->speed_scaling);
+  }
+  const double scale = rig_->options().time_scale;
+  if (const ClockEstimate clock = arm.ControllerClock(); clock.valid) {
+    a->set_clock_drift(clock.rate / scale - 1);
+    a->set_clock_uncertainty_s(clock.offset_uncertainty_s);
+  }
+
+  const EffectorState effector = rig_->effector().State();
+  v1::EffectorStatus* e = state->mutable_effector();
+  e->set_connected(effector.connected);
+  e->set_port(rig_->options().effector_port);
+  e->set_firmware(effector.firmware);
+  e->set_fingers(rig_->options().fingers);
+  for (const bool pressed : effector.pressed) e->add_pressed(pressed);
+  if (const ClockEstimate clock = rig_->effector().Clock(); clock.valid) {
+    e->set_clock_drift(clock.rate / scale - 1);
+    e->set_clock_drift_uncertainty(clock.rate_uncertainty / scale);
+    e->set_clock_uncertainty_s(clock.offset_uncertainty_s);
+    e->set_round_trips(clock.round_trips);
+    e->set_shortest_round_trip_s(clock.shortest_round_trip_s);
+  }
+  e->set_bad_frames(effector.bad_frames);
+  e->set_repeated_events(effector.repeated_events);
+  e->set_reconnections(effector.reconnections);
+
+  if (const CameraDevice* camera = rig_->camera(); camera != nullptr) {
+    v1::CameraStatus* c = state->mutable_camera();
+    c->set_connected(true);
+    c->set_description(camera->Description());
+    c->set_width(rig_->Facts().image_width);
+    c->set_height(rig_->Facts().image_height);
+    c->set_frames(camera->frames());
+    c->set_stale_frames(camera->stale_frames());
+  }
+  const PhysicalFacts facts = rig_->Facts();
+  state->set_object(facts.object);
+  state->set_placement(facts.placement);
+  state->set_mounts_itself(!rig_->options().mount_command.empty());
+  state->set_recovered_touches(facts.recovered_touches);
+  state->set_interrupted_touches(facts.interrupted_touches);
+  state->set_last_error(!now.ok()              ? std::string(now.status().message())
+                        : !effector.connected ? effector.why
+                                              : facts.last_error);
+  state->set_time_scale(scale);
+  state->set_safety_notice(
+      "Stop is a software stop: it is not safety-rated. Keep the emergency stop within reach.");
+}
+
+grpc::Status RigService::GetRig(grpc::ServerContext*, const v1::GetRigRequest*, v1::RigState* response) {
+  Describe(response);
+  return grpc::Status::OK;
+}
+
+grpc::Status RigService::CheckTouches(grpc::ServerContext*, const v1::CheckTouchesRequest* request,
+                                      v1::CheckTouchesResponse* response) {
+  return ToGrpc(DoCheck(*request, response));
+}
+
+absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
+  const int most = resources_->options.most_touches_per_request;
+  if (request.touches_size() > most)
+    return absl::InvalidArgumentError(
+        absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(ArmState from, rig_->arm().State());
+  const Bounds bounds = object->surface->bounds();
+  for (int k = 0; k < request.touches_size(); ++k) {
+    const std::string where = absl::StrCat("touches[", k, "]");
+    TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(request.touches(k), where));
+    v1::TouchCheck* check = response->add_checks();
+    check->set_placement(PlacementFor(touch.approach));
+    const absl::StatusOr<PlannedTouch> plan = rig_->Check(request.object(), bounds, touch, &from, where);
+    check->set_possible(plan.ok());
+    if (!plan.ok()) {
+      check->set_reason(std::string(plan.status().message()));
+      continue;
+    }
+    check->set_duration_s(plan->motion.duration_s);
+    // The next one begins where this one ends: at its start.
+    from.base_from_tip = plan->motion.transfer.back();
+    if (!request.path()) continue;
+    for (const Eigen::Isometry3d& pose : plan->motion.transfer) *check->add_path() = PoseToProto(pose);
+    *check->add_path() = PoseToProto(plan->motion.end);
+    check->set_transfer_poses(plan->motion.transfer.size());
+  }
+  return absl::OkStatus();
+}
+
+grpc::Status RigService::MountObject(grpc::ServerContext* context, const v1::MountObjectRequest* request,
+                                     v1::RigState* response) {
+  const absl::Status status = DoMount(context, *request);
+  if (status.ok()) Describe(response);
+  return ToGrpc(status);
+}
+
+absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountObjectRequest& request) {
+  TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
+  TOUCHSTONE_RETURN_IF_ERROR(resources_->objects.Find(request.object(), "object").status());
+  const std::string placement = request.placement().empty() ? "+z" : request.placement();
+  const std::vector<std::string>& known = Placements();
+  if (std::find(known.begin(), known.end(), placement) == known.end())
+    return absl::InvalidArgumentError(absl::StrCat("placement = '", placement, "': the face that points up, one of ",
+                                                   absl::StrJoin(known, ", ")));
+  return rig_->Mount(request.object(), placement, PermitOf(context, request.lease_token()));
+}
+
+grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request, v1::RigState* response) {
+  absl::Status status = leases_->Check(request->lease_token());
+  if (status.ok()) status = rig_->Home(PermitOf(context, request->lease_token()));
+  if (status.ok()) Describe(response);
+  return ToGrpc(status);
+}
+
+}  // namespace touchstone

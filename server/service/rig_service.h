@@ -1,0 +1,48 @@
+// touchstone.v1.Control and touchstone.v1.Rig of a rig.
+#pragma once
+
+#include "server/gateway/rig.h"
+#include "server/service/control_service.h"
+#include "touchstone/v1/rig.grpc.pb.h"
+
+namespace touchstone {
+
+// Leases as everywhere; stopping and the state are the rig's.
+class RigControlService final : public ControlService {
+ public:
+  RigControlService(Resources* resources, LeaseBook* leases, Rig* rig)
+      : ControlService(resources, leases), rig_(rig) {}
+
+  // Also ends a stop.
+  grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest*, v1::Lease*) override;
+  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*, v1::ReleaseLeaseResponse*) override;
+  grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest*, v1::StopResponse*) override;
+  grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
+
+ private:
+  Rig* rig_;
+};
+
+class RigService final : public v1::Rig::Service {
+ public:
+  RigService(Resources* resources, LeaseBook* leases, Rig* rig)
+      : resources_(resources), leases_(leases), rig_(rig) {}
+
+  grpc::Status GetRig(grpc::ServerContext*, const v1::GetRigRequest*, v1::RigState*) override;
+  grpc::Status CheckTouches(grpc::ServerContext*, const v1::CheckTouchesRequest*,
+                            v1::CheckTouchesResponse*) override;
+  grpc::Status MountObject(grpc::ServerContext*, const v1::MountObjectRequest*, v1::RigState*) override;
+  grpc::Status Home(grpc::ServerContext*, const v1::HomeRequest*, v1::RigState*) override;
+
+ private:
+  absl::Status DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response);
+  absl::Status DoMount(grpc::ServerContext* context, const v1::MountObjectRequest& request);
+  Permit PermitOf(grpc::ServerContext* context, const std::string& lease_token) const;
+  void Describe(v1::RigState* state) const;
+
+  Resources* resources_;
+  LeaseBook* leases_;
+  Rig* rig_;
+};
+
+}  // namespace touchstone

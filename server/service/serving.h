@@ -1,0 +1,31 @@
+// What every process does to serve: health checking, reflection, one port, message limits, draining.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include "server/service/server_options.h"
+
+namespace touchstone {
+
+struct ServedService {
+  std::string name;  // "touchstone.v1.Source"
+  grpc::Service* service;
+};
+
+struct Serving {
+  std::unique_ptr<grpc::Server> server;
+  int port = 0;
+};
+
+// Errors name the option.
+absl::Status CheckServing(const ServerOptions& options);
+absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services);
+// NOT_SERVING, no more calls, up to drain_s for running ones.
+void StopServing(const ServerOptions& options, grpc::Server* server);
+
+}  // namespace touchstone
