@@ -1,6 +1,7 @@
-// The session store of a rig: one SQLite file (WAL, synchronous FULL). Every touch is written as intent before anything
-// moves, as executing when its program is sent, and as result before a client hears of it; each step is on the disk when
-// the function returns. A file that was exported is a journal too, and can be served again.
+// The session store of a rig: one SQLite file (WAL, synchronous FULL). Every touch is written as intent
+// before anything moves, as executing when its program is sent, and as result before a client hears of it;
+// each step is on the disk when the function returns. A file that was exported is a journal too, and can be
+// served again.
 #pragma once
 
 #include <array>
@@ -27,14 +28,14 @@ enum class TouchStage {
 
 // One finger's part of a result. NaN where it is unknown.
 struct JournalFinger {
-  double contact_time_s = 0;  // since the approach began; NaN: reported nothing
+  double contact_time_s = 0;              // since the approach began; NaN: reported nothing
   std::array<double, 6> base_from_tip{};  // position (m) and rotation vector (rad) at its contact
   uint64_t ticks = 0;
 };
 
 struct JournalResult {
   std::vector<JournalFinger> fingers;
-  double speed_m_s = 0;         // measured; 0: unknown
+  double speed_m_s = 0;  // measured; 0: unknown
   double session_time_s = 0;
   double start_unix_s = 0;
   double time_uncertainty_s = 0, synchronisation_uncertainty_s = 0, effector_drift = 0;
@@ -42,19 +43,21 @@ struct JournalResult {
 };
 
 struct JournalTouch {
-  std::string id;         // the client's
-  uint64_t number = 0;    // in its session, in the order of the intents, from 0
+  std::string id;       // the client's
+  uint64_t number = 0;  // in its session, in the order of the intents, from 0
   std::string object, placement;
-  std::string command;    // serialised touchstone.v1.CommandedTouch: the bytes that say whether an id is used again
+  // Serialised touchstone.v1.CommandedTouch (command_bytes.h): what says whether an id is used again.
+  std::string command;
   TouchStage stage = TouchStage::kIntent;
   int attempt = 1;
   uint32_t program_id = 0, boot_id = 0;  // of the arm's program and of the end effector, while executing
-  JournalResult result;   // if done
-  std::string error;      // if failed
+  JournalResult result;                  // if done
+  std::string error;                     // if failed
+  std::optional<int> round, face;        // of a measurement file that was imported
 };
 
 struct JournalImage {
-  std::string id;         // the client's, or made
+  std::string id;  // the client's, or made
   uint64_t number = 0;
   std::string object, placement;
   std::array<double, 6> base_from_camera{};
@@ -66,8 +69,9 @@ struct JournalImage {
 struct JournalSession {
   std::string name;
   double created_unix_s = 0;
-  std::string source;        // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"; an emulator says that it is one
-  std::string calibration;   // the calibration file, whole
+  // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"; an emulator says that it is one.
+  std::string source;
+  std::string calibration;  // the calibration file, whole
   int fingers = 3;
   double spacing_m = 0.03;
   uint64_t touches = 0, done = 0, failed = 0, images = 0;
@@ -78,8 +82,8 @@ struct JournalSession {
 class Journal {
  public:
   enum class Mode { kReadWrite, kCreateOrReadWrite, kReadOnly };
-  // Errors say whether the file is missing, is no journal, or is of another version. Another process that has it open
-  // for writing is an error too (one gateway a journal).
+  // Errors say whether the file is missing, is no journal, or is of another version. Another process that has
+  // it open for writing is an error too (one gateway a journal).
   static absl::StatusOr<std::unique_ptr<Journal>> Open(const std::string& path, Mode mode);
   virtual ~Journal() = default;
 
@@ -90,18 +94,28 @@ class Journal {
   // With all its touches and images. No touch of it may be executing.
   virtual absl::Status DeleteSession(const std::string& name) = 0;
 
-  // Begins a touch: writes the intent and returns it. If the id is there with the same object and command: the touch as
-  // it stands, kDone ones without change, kFailed ones as a new intent with attempt + 1. Another object or command:
-  // ALREADY_EXISTS. kIntent or kExecuting: ABORTED, since it is under way or not yet reconciled.
-  virtual absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id, const std::string& object,
-                                             const std::string& placement, const std::string& command) = 0;
+  // Begins a touch: writes the intent and returns it. If the id is there with the same object and command:
+  // the touch as it stands, kDone ones without change, kFailed ones as a new intent with attempt + 1. Another
+  // object or command: ALREADY_EXISTS. kIntent or kExecuting: ABORTED, since it is under way or not yet
+  // reconciled.
+  virtual absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
+                                             const std::string& object, const std::string& placement,
+                                             const std::string& command) = 0;
   virtual absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                                  uint32_t boot_id) = 0;
-  virtual absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result) = 0;
-  virtual absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) = 0;
+  virtual absl::Status Done(const std::string& session, const std::string& id,
+                            const JournalResult& result) = 0;
+  virtual absl::Status Failed(const std::string& session, const std::string& id,
+                              const std::string& error) = 0;
 
-  virtual absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session, const std::string& id) const = 0;
-  // In the order of their approaches (number of the intent of the attempt that was done); `each` returns false to end.
+  // Touches that were made elsewhere, kDone or kFailed, in the order of their approaches: all in one step, or
+  // none. Their numbers are given anew, after those that are there. ALREADY_EXISTS names an id that is.
+  virtual absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) = 0;
+
+  virtual absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
+                                                           const std::string& id) const = 0;
+  // In the order of their approaches (number of the intent of the attempt that was done); `each` returns
+  // false to end.
   virtual absl::Status ForEachTouch(const std::string& session,
                                     const std::function<bool(const JournalTouch&)>& each) const = 0;
   // Every session's touches that are kIntent or kExecuting: what an interruption left behind.

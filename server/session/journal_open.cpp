@@ -1,0 +1,148 @@
+#include "server/session/journal_open.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "server/base/status.h"
+#include "server/session/journal_schema.h"
+
+namespace touchstone {
+namespace {
+
+bool IsThere(const std::string& path) {
+  struct stat facts {};
+  return stat(path.c_str(), &facts) == 0;
+}
+
+// A relative path could be one of SQLite's special names.
+std::string PlainName(const std::string& path) {
+  return path[0] == '/' ? path : "./" + path;
+}
+
+// The URI of a file that nobody writes: neither locks nor a file beside it are needed.
+std::string ImmutableUri(const std::string& path) {
+  std::string uri = "file:";
+  for (const unsigned char c : PlainName(path)) {
+    if (c == '?' || c == '#' || c == '%' || c <= ' ' || c >= 0x7F)
+      absl::StrAppendFormat(&uri, "%%%02x", c);
+    else
+      uri += static_cast<char>(c);
+  }
+  return uri + "?immutable=1";
+}
+
+absl::StatusOr<std::unique_ptr<SqliteFile>> OpenForReading(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<SqliteFile> file,
+                              SqliteFile::Open(path, PlainName(path), SQLITE_OPEN_READONLY));
+  // In a folder that may not be written, SQLite cannot make its shared memory; without a log it needs none.
+  const absl::Status readable = file->Number("PRAGMA schema_version").status();
+  struct stat log {};
+  const bool has_log = stat((path + "-wal").c_str(), &log) == 0 && log.st_size > 0;
+  if (readable.ok() || has_log || absl::IsInvalidArgument(readable) || absl::IsDataLoss(readable)) {
+    if (!readable.ok()) return readable;
+    return file;
+  }
+  return SqliteFile::Open(path, ImmutableUri(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+}
+
+// Whether the file is a journal of this version; an empty one may become one.
+absl::Status CheckIdentity(SqliteFile* file, bool may_create) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t application, file->Number("PRAGMA application_id"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t version, file->Number("PRAGMA user_version"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t tables, file->Number("SELECT count(*) FROM sqlite_master"));
+  const std::string& path = file->path();
+  if (application == 0 && version == 0 && tables == 0) {
+    if (!may_create)
+      return absl::InvalidArgumentError(
+          absl::StrCat("journal ", path, " is empty; name one that a gateway or an export has written"));
+    return file->Transact([&] {
+      TOUCHSTONE_RETURN_IF_ERROR(file->Run(kJournalSchema));
+      static const std::string identity = absl::StrCat("PRAGMA application_id = ", kJournalApplicationId,
+                                                       "; PRAGMA user_version = ", kJournalVersion);
+      return file->Run(identity.c_str());
+    });
+  }
+  if (application != kJournalApplicationId)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "journal ", path, " is no journal but another program's SQLite file; name another file"));
+  if (version != kJournalVersion)
+    return absl::FailedPreconditionError(absl::StrCat(
+        "journal ", path, " is of version ", version, "; this program reads version ", kJournalVersion,
+        version > kJournalVersion ? ": use the newer program that wrote it"
+                                  : ": export it with the older program that wrote it"));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Take(const std::string& path) {
+  const std::string lock_path = path + ".lock";
+  const int descriptor = open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (descriptor < 0)
+    return absl::PermissionDeniedError(absl::StrCat(
+        "journal ", path, " may not be written: ", lock_path, " cannot be made (", std::strerror(errno),
+        "); name a file in a folder that is there and may be written, or open it for reading only"));
+  std::unique_ptr<WriterLock> lock(new WriterLock(descriptor));
+  char writer[32] = {};
+  if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    const ssize_t length = pread(descriptor, writer, sizeof writer - 1, 0);
+    return absl::FailedPreconditionError(
+        absl::StrCat("journal ", path, " is open for writing by process ", length > 0 ? writer : "(unknown)",
+                     "; one gateway writes a journal: end that process, or name another file"));
+  }
+  // Who it is, for that message.
+  const std::string process = std::to_string(getpid());
+  if (ftruncate(descriptor, 0) == 0 &&
+      pwrite(descriptor, process.data(), process.size(), 0) != static_cast<ssize_t>(process.size()))
+    (void)ftruncate(descriptor, 0);
+  return lock;
+}
+
+WriterLock::~WriterLock() {
+  close(descriptor_);
+}
+
+absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::Mode mode) {
+  if (path.empty()) return absl::InvalidArgumentError("a journal needs a file name, for example session.db");
+  const bool may_create = mode == Journal::Mode::kCreateOrReadWrite;
+  if (!may_create && !IsThere(path))
+    return absl::NotFoundError(
+        absl::StrCat("journal ", path, ": there is no such file (", std::strerror(errno), ")"));
+  OpenedJournal opened;
+  if (mode == Journal::Mode::kReadOnly) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(opened.file, OpenForReading(path));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckIdentity(opened.file.get(), false));
+    return opened;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(opened.lock, WriterLock::Take(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      opened.file,
+      SqliteFile::Open(path, PlainName(path), SQLITE_OPEN_READWRITE | (may_create ? SQLITE_OPEN_CREATE : 0)));
+  SqliteFile& file = *opened.file;
+  // Before the first write: another program's file is left as it is. SQLite opens a write-protected file all
+  // the same.
+  TOUCHSTONE_RETURN_IF_ERROR(file.Number("PRAGMA schema_version").status());
+  TOUCHSTONE_RETURN_IF_ERROR(CheckIdentity(&file, may_create));
+  if (access(path.c_str(), W_OK) != 0)
+    return absl::PermissionDeniedError(
+        absl::StrCat("journal ", path, " may not be written (", std::strerror(errno),
+                     "); change its permissions, or open it for reading only"));
+  TOUCHSTONE_RETURN_IF_ERROR(file.Run("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
+  SqliteStatement check = file.Prepare("PRAGMA quick_check(1)");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool has_row, check.Step());
+  if (has_row && check.Text(0) != "ok")
+    return absl::DataLossError(
+        absl::StrCat("journal ", path, " is damaged (", check.Text(0),
+                     "); keep a copy, then rescue what is whole with: sqlite3 FILE .recover | "
+                     "sqlite3 NEW; work on with NEW"));
+  return opened;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,267 @@
+#include "server/session/journal_rows.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/base/status.h"
+#include "server/session/command_bytes.h"
+
+namespace touchstone {
+namespace {
+
+void BindPose(const std::array<double, 6>& pose, SqliteStatement* statement) {
+  for (const double value : pose) statement->Bind(value);
+}
+
+std::array<double, 6> ReadPose(const SqliteStatement& statement, int column) {
+  std::array<double, 6> pose;
+  for (int i = 0; i < 6; ++i) pose[i] = statement.Double(column + i);
+  return pose;
+}
+
+void BindOptional(const std::optional<int>& value, SqliteStatement* statement) {
+  if (value)
+    statement->Bind(int64_t{*value});
+  else
+    statement->BindNull();
+}
+
+std::optional<int> ReadOptional(const SqliteStatement& statement, int column) {
+  if (statement.IsNull(column)) return std::nullopt;
+  return static_cast<int>(statement.Integer(column));
+}
+
+// The eleven columns that say to people what the bytes say; nothing where they are no command.
+void BindCommand(const std::string& bytes, SqliteStatement* statement) {
+  statement->BindBlob(bytes);
+  const auto command = ParseCommandBytes(bytes);
+  if (!command || !command->has_approach()) {
+    for (int i = 0; i < 11; ++i) statement->BindNull();
+    return;
+  }
+  for (const v1::Vector3* vector : {&command->target_m(), &command->approach(), &command->lateral()})
+    statement->Bind(vector->x()).Bind(vector->y()).Bind(vector->z());
+  statement->Bind(command->standoff_m()).Bind(command->speed_m_s());
+}
+
+absl::StatusOr<std::vector<int64_t>> Numbers(SqliteStatement statement) {
+  std::vector<int64_t> numbers;
+  while (true) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool row, statement.Step());
+    if (!row) return numbers;
+    numbers.push_back(statement.Integer(0));
+  }
+}
+
+absl::Status Gone(const SqliteFile& file, absl::string_view what) {
+  return absl::InternalError(absl::StrCat("journal ", file.path(), ": a ", what, " has gone; read it again"));
+}
+
+}  // namespace
+
+absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& session) {
+  SqliteStatement insert = file->Prepare(
+      "INSERT INTO session(name, created_unix_s, source, calibration, fingers, spacing_m) VALUES(?, ?, ?, ?, "
+      "?, ?)");
+  insert.Bind(session.name).Bind(session.created_unix_s).Bind(session.source).Bind(session.calibration);
+  insert.Bind(int64_t{session.fingers}).Bind(session.spacing_m);
+  TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
+  return file->Number("SELECT last_insert_rowid()");
+}
+
+absl::Status InsertObject(SqliteFile* file, int64_t session_id, const std::string& object) {
+  return file
+      ->Prepare(
+          "INSERT OR IGNORE INTO session_object(session_id, position, name) "
+          "SELECT ?1, count(*), ?2 FROM session_object WHERE session_id = ?1")
+      .Bind(session_id)
+      .Bind(object)
+      .Run();
+}
+
+absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouch& touch) {
+  TOUCHSTONE_RETURN_IF_ERROR(InsertObject(file, session_id, touch.object));
+  int64_t touch_id = 0;
+  {
+    SqliteStatement insert = file->Prepare(
+        "INSERT INTO touch(session_id, id, number, object, placement, stage, attempt, program_id, boot_id, "
+        "error, "
+        "round, face, command, target_x_m, target_y_m, target_z_m, approach_x, approach_y, approach_z, "
+        "lateral_x, lateral_y, lateral_z, standoff_m, commanded_speed_m_s, measured_speed_m_s, "
+        "session_time_s, "
+        "start_unix_s, time_uncertainty_s, synchronisation_uncertainty_s, effector_drift, recovered) "
+        "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+        "?)");
+    insert.Bind(session_id).Bind(touch.id).Bind(static_cast<int64_t>(touch.number));
+    insert.Bind(touch.object).Bind(touch.placement).Bind(static_cast<int64_t>(touch.stage));
+    insert.Bind(int64_t{touch.attempt}).Bind(int64_t{touch.program_id}).Bind(int64_t{touch.boot_id});
+    insert.Bind(touch.error);
+    BindOptional(touch.round, &insert);
+    BindOptional(touch.face, &insert);
+    BindCommand(touch.command, &insert);
+    if (touch.stage == TouchStage::kDone) {
+      const JournalResult& result = touch.result;
+      insert.Bind(result.speed_m_s).Bind(result.session_time_s).Bind(result.start_unix_s);
+      insert.Bind(result.time_uncertainty_s)
+          .Bind(result.synchronisation_uncertainty_s)
+          .Bind(result.effector_drift);
+      insert.Bind(int64_t{result.recovered});
+    } else {
+      for (int i = 0; i < 6; ++i) insert.BindNull();
+      insert.Bind(int64_t{0});
+    }
+    TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
+    TOUCHSTONE_ASSIGN_OR_RETURN(touch_id, file->Number("SELECT last_insert_rowid()"));
+  }
+  if (touch.stage != TouchStage::kDone) return absl::OkStatus();
+  return InsertFingers(file, touch_id, touch.result.fingers);
+}
+
+absl::Status InsertFingers(SqliteFile* file, int64_t touch_id, const std::vector<JournalFinger>& fingers) {
+  for (size_t i = 0; i < fingers.size(); ++i) {
+    SqliteStatement insert = file->Prepare(
+        "INSERT INTO touch_finger(touch_id, finger, contact_time_s, x_m, y_m, z_m, rotation_x_rad, "
+        "rotation_y_rad, "
+        "rotation_z_rad, ticks) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+    insert.Bind(touch_id).Bind(static_cast<int64_t>(i)).Bind(fingers[i].contact_time_s);
+    BindPose(fingers[i].base_from_tip, &insert);
+    insert.Bind(static_cast<int64_t>(fingers[i].ticks));
+    TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImage& image) {
+  SqliteStatement insert = file->Prepare(
+      "INSERT INTO image(session_id, id, number, object, placement, x_m, y_m, z_m, rotation_x_rad, "
+      "rotation_y_rad, "
+      "rotation_z_rad, unix_s, width_px, height_px, png) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+      "?)");
+  insert.Bind(session_id).Bind(image.id).Bind(static_cast<int64_t>(image.number));
+  insert.Bind(image.object).Bind(image.placement);
+  BindPose(image.base_from_camera, &insert);
+  insert.Bind(image.unix_s).Bind(int64_t{image.width}).Bind(int64_t{image.height}).BindBlob(image.png);
+  return insert.Run();
+}
+
+absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id) {
+  JournalTouch touch;
+  {
+    SqliteStatement row = file->Prepare(
+        "SELECT id, number, object, placement, stage, attempt, program_id, boot_id, error, round, face, "
+        "command, "
+        "measured_speed_m_s, session_time_s, start_unix_s, time_uncertainty_s, "
+        "synchronisation_uncertainty_s, "
+        "effector_drift, recovered FROM touch WHERE touch_id = ?");
+    row.Bind(touch_id);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return Gone(*file, "touch");
+    touch.id = row.Text(0);
+    touch.number = static_cast<uint64_t>(row.Integer(1));
+    touch.object = row.Text(2);
+    touch.placement = row.Text(3);
+    touch.stage = static_cast<TouchStage>(row.Integer(4));
+    touch.attempt = static_cast<int>(row.Integer(5));
+    touch.program_id = static_cast<uint32_t>(row.Integer(6));
+    touch.boot_id = static_cast<uint32_t>(row.Integer(7));
+    touch.error = row.Text(8);
+    touch.round = ReadOptional(row, 9);
+    touch.face = ReadOptional(row, 10);
+    touch.command = row.Text(11);
+    if (touch.stage != TouchStage::kDone) return touch;
+    touch.result.speed_m_s = row.Double(12);
+    touch.result.session_time_s = row.Double(13);
+    touch.result.start_unix_s = row.Double(14);
+    touch.result.time_uncertainty_s = row.Double(15);
+    touch.result.synchronisation_uncertainty_s = row.Double(16);
+    touch.result.effector_drift = row.Double(17);
+    touch.result.recovered = row.Integer(18) != 0;
+  }
+  SqliteStatement row = file->Prepare(
+      "SELECT contact_time_s, x_m, y_m, z_m, rotation_x_rad, rotation_y_rad, rotation_z_rad, ticks "
+      "FROM touch_finger WHERE touch_id = ? ORDER BY finger");
+  row.Bind(touch_id);
+  while (true) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return touch;
+    JournalFinger& finger = touch.result.fingers.emplace_back();
+    finger.contact_time_s = row.Double(0);
+    finger.base_from_tip = ReadPose(row, 1);
+    finger.ticks = static_cast<uint64_t>(row.Integer(7));
+  }
+}
+
+absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
+  SqliteStatement row = file->Prepare(
+      "SELECT id, number, object, placement, x_m, y_m, z_m, rotation_x_rad, rotation_y_rad, rotation_z_rad, "
+      "unix_s, "
+      "width_px, height_px, png FROM image WHERE image_id = ?");
+  row.Bind(image_id);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+  if (!found) return Gone(*file, "picture");
+  JournalImage image;
+  image.id = row.Text(0);
+  image.number = static_cast<uint64_t>(row.Integer(1));
+  image.object = row.Text(2);
+  image.placement = row.Text(3);
+  image.base_from_camera = ReadPose(row, 4);
+  image.unix_s = row.Double(10);
+  image.width = static_cast<int>(row.Integer(11));
+  image.height = static_cast<int>(row.Integer(12));
+  image.png = row.Text(13);
+  return image;
+}
+
+absl::StatusOr<std::vector<int64_t>> TouchIds(SqliteFile* file, int64_t session_id) {
+  SqliteStatement rows = file->Prepare("SELECT touch_id FROM touch WHERE session_id = ? ORDER BY number");
+  rows.Bind(session_id);
+  return Numbers(std::move(rows));
+}
+
+absl::StatusOr<std::vector<int64_t>> ImageIds(SqliteFile* file, int64_t session_id) {
+  SqliteStatement rows = file->Prepare("SELECT image_id FROM image WHERE session_id = ? ORDER BY number");
+  rows.Bind(session_id);
+  return Numbers(std::move(rows));
+}
+
+absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id) {
+  JournalSession session;
+  {
+    SqliteStatement row = file->Prepare(
+        "SELECT name, created_unix_s, source, calibration, fingers, spacing_m, "
+        "(SELECT count(*) FROM image WHERE session_id = ?1) FROM session WHERE session_id = ?1");
+    row.Bind(session_id);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return Gone(*file, "session");
+    session.name = row.Text(0);
+    session.created_unix_s = row.Double(1);
+    session.source = row.Text(2);
+    session.calibration = row.Text(3);
+    session.fingers = static_cast<int>(row.Integer(4));
+    session.spacing_m = row.Double(5);
+    session.images = static_cast<uint64_t>(row.Integer(6));
+  }
+  {
+    SqliteStatement row =
+        file->Prepare("SELECT stage, count(*) FROM touch WHERE session_id = ? GROUP BY stage");
+    row.Bind(session_id);
+    while (true) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+      if (!found) break;
+      const auto stage = static_cast<TouchStage>(row.Integer(0));
+      const uint64_t count = static_cast<uint64_t>(row.Integer(1));
+      session.touches += count;
+      if (stage == TouchStage::kDone) session.done = count;
+      if (stage == TouchStage::kFailed) session.failed = count;
+    }
+  }
+  SqliteStatement row =
+      file->Prepare("SELECT name FROM session_object WHERE session_id = ? ORDER BY position");
+  row.Bind(session_id);
+  while (true) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return session;
+    session.objects.push_back(row.Text(0));
+  }
+}
+
+}  // namespace touchstone

@@ -1,0 +1,32 @@
+// Rows of a journal's tables and what they stand for. Internal to session/.
+#pragma once
+
+#include <cstdint>
+
+#include <absl/status/statusor.h>
+
+#include "server/session/journal.h"
+#include "server/session/sqlite_file.h"
+
+namespace touchstone {
+
+// What is inserted is new: the caller has checked.
+absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& session);
+absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouch& touch);
+absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImage& image);
+// Notes that a session has an object, if it is its first touch of it.
+absl::Status InsertObject(SqliteFile* file, int64_t session_id, const std::string& object);
+absl::Status InsertFingers(SqliteFile* file, int64_t touch_id, const std::vector<JournalFinger>& fingers);
+
+// By row id; INTERNAL if there is none.
+absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id);
+absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id);
+
+// The row ids of a session's touches or images in the order of their numbers.
+absl::StatusOr<std::vector<int64_t>> TouchIds(SqliteFile* file, int64_t session_id);
+absl::StatusOr<std::vector<int64_t>> ImageIds(SqliteFile* file, int64_t session_id);
+
+// A session with its counts and objects.
+absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id);
+
+}  // namespace touchstone
