@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/hidden_effects/generator/bumps.h"
@@ -30,6 +31,10 @@ class Rig {
   // The session's next touch. Touches must come in the order of the session: fingers remember.
   std::vector<Finger> Touch(const Command& command, double speed_mm_s, double session_time_s,
                             double temperature);
+
+  // Corrects what the fingers remember of the last touch, where it was not the whole approach that Touch supposed: how
+  // far each was pressed, mm.
+  void Remember(std::vector<double> pressed_mm) { pressed_mm_ = std::move(pressed_mm); }
 
   double clock_factor() const { return 1 + Value("clock_skew"); }
   // A value of a hidden effect; `neutral` if it is not there.

@@ -1,0 +1,134 @@
+#include "tests/rig/world/camera.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "server/image/encode.h"
+
+namespace touchstone::rig {
+namespace {
+
+constexpr int kGroundLevel = 14, kNoiseLevels = 5;
+constexpr int kJpegQuality = 90;
+constexpr double kLookAheadM = 0.2;
+constexpr char kBoundary[] = "touchstone-emulated-frame";
+
+}  // namespace
+
+EmulatedCamera::EmulatedCamera(const CameraOptions& options, std::function<CameraView()> look,
+                               const Faults* faults)
+    : options_(options), look_(std::move(look)), faults_(faults), random_(options.seed) {
+  auto renderer = CreateCpuRenderer();
+  if (!renderer.ok()) throw std::runtime_error(std::string(renderer.status().message()));
+  renderer_ = *renderer;
+  server_ = std::make_unique<TcpServer>(options.address, options.port,
+                                        [this](Connection& connection) { Serve(connection); });
+  thread_ = std::thread([this] { Run(); });
+}
+
+EmulatedCamera::~EmulatedCamera() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  server_.reset();
+}
+
+uint64_t EmulatedCamera::frames() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return rendered_;
+}
+
+std::string EmulatedCamera::Picture() {
+  const CameraView view = look_();
+  std::vector<uint8_t> pixels(static_cast<size_t>(options_.width) * options_.height, 0);
+  if (view.surface) {
+    Camera camera;
+    camera.eye_m = view.mesh_from_camera.translation();
+    const Eigen::Vector3d ahead = view.mesh_from_camera.linear().col(2).normalized();
+    camera.at_m = camera.eye_m + ahead * kLookAheadM;
+    camera.up = -view.mesh_from_camera.linear().col(1);
+    camera.vertical_fov_rad = options_.vertical_fov_rad;
+    ImageOptions image;
+    image.width = options_.width, image.height = options_.height;
+    // An object that is not before the camera at all gives no picture, but a dark one.
+    if (auto rendered = renderer_->Render(view.surface, camera, image); rendered.ok())
+      pixels = rendered->pixels;
+  }
+  for (uint8_t& level : pixels) {
+    const int noise = static_cast<int>(random_() % (2 * kNoiseLevels + 1)) - kNoiseLevels;
+    level = static_cast<uint8_t>(std::clamp(std::max<int>(level, kGroundLevel) + noise, 0, 255));
+  }
+  auto jpeg = EncodeJpeg(pixels.data(), options_.width, options_.height, 1, kJpegQuality);
+  return jpeg.ok() ? *jpeg : std::string();
+}
+
+void EmulatedCamera::Run() {
+  const auto period = std::chrono::duration<double>(1 / options_.frames_per_host_s);
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopping_ || watchers_ > 0; });
+    if (stopping_) return;
+    const bool stale = faults_->Get("stale_frame") > 0 && !jpeg_.empty();
+    if (!stale) {
+      lock.unlock();
+      std::string jpeg = Picture();
+      lock.lock();
+      jpeg_ = std::move(jpeg), ++rendered_;
+    }
+    ++number_;
+    changed_.notify_all();
+    changed_.wait_for(lock, period, [this] { return stopping_; });
+  }
+}
+
+std::string EmulatedCamera::Next(uint64_t* number) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  ++watchers_;
+  changed_.notify_all();
+  const uint64_t after = std::max(*number, number_);
+  changed_.wait(lock, [&] { return stopping_ || number_ > after; });
+  --watchers_;
+  *number = number_;
+  return stopping_ || faults_->UntilHostS("camera_unplug") > 0 ? std::string() : jpeg_;
+}
+
+void EmulatedCamera::Serve(Connection& connection) {
+  if (faults_->UntilHostS("camera_unplug") > 0) return;
+  std::string request, line;
+  if (!connection.ReadLine(&request)) return;
+  while (connection.ReadLine(&line) && !line.empty()) {
+  }
+  uint64_t number = 0;
+  if (request.rfind("GET /frame.jpg", 0) == 0) {
+    const std::string jpeg = Next(&number);
+    if (jpeg.empty()) return;
+    connection.Send(
+        "HTTP/1.0 200 OK\r\nContent-Type: image/jpeg\r\nX-Source: emulated camera\r\nConnection: close\r\n"
+        "Content-Length: " +
+        std::to_string(jpeg.size()) + "\r\n\r\n" + jpeg);
+  } else if (request.rfind("GET /video.mjpg", 0) == 0) {
+    bool open = connection.Send(
+        std::string(
+            "HTTP/1.0 200 OK\r\nX-Source: emulated camera\r\nConnection: close\r\nCache-Control: no-cache\r\n"
+            "Content-Type: multipart/x-mixed-replace; boundary=") +
+        kBoundary + "\r\n\r\n");
+    while (open) {
+      const std::string jpeg = Next(&number);
+      open = !jpeg.empty() && connection.Send(std::string("--") + kBoundary +
+                                              "\r\nContent-Type: image/jpeg\r\nContent-Length: " +
+                                              std::to_string(jpeg.size()) + "\r\n\r\n" + jpeg + "\r\n");
+    }
+  } else {
+    connection.Send(
+        "HTTP/1.0 404 Not Found\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
+        "This emulated camera has /video.mjpg and /frame.jpg.\n");
+  }
+}
+
+}  // namespace touchstone::rig

@@ -1,0 +1,74 @@
+// The emulated camera, carried by the flange: pictures of the mounted object from where the arm truly is, as
+// MJPEG over HTTP ("/video.mjpg") and one by one ("/frame.jpg"). A plain matt object on a dark ground with a
+// little noise, so that no two pictures are equal; not a likeness of any real camera.
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+
+#include <Eigen/Geometry>
+
+#include "server/geometry/surface.h"
+#include "server/image/renderer.h"
+#include "tests/rig/world.h"
+#include "tests/rig/world/tcp_server.h"
+
+namespace touchstone::rig {
+
+struct CameraOptions {
+  std::string address = "127.0.0.1";
+  int port = 0;
+  int width = 640, height = 480;
+  double vertical_fov_rad = 0.7853981633974483;
+  double frames_per_host_s = 10;
+  uint64_t seed = 1;
+};
+
+// What is before the camera now.
+struct CameraView {
+  std::shared_ptr<const Surface> surface;                          // none: nothing is mounted
+  Eigen::Affine3d mesh_from_camera = Eigen::Affine3d::Identity();  // z looks ahead, y down
+};
+
+class EmulatedCamera {
+ public:
+  // `look` is asked for every picture, from the camera's thread. Faults: stale_frame, camera_unplug. Throws
+  // std::runtime_error.
+  EmulatedCamera(const CameraOptions& options, std::function<CameraView()> look, const Faults* faults);
+  ~EmulatedCamera();
+
+  int port() const { return server_->port(); }
+  uint64_t frames() const;  // rendered so far: none while nobody watches
+
+ private:
+  void Run();
+  std::string Picture();
+  void Serve(Connection& connection);
+  // The first picture after number *number, which is then its number; empty: it ends, or the camera is
+  // unplugged.
+  std::string Next(uint64_t* number);
+
+  const CameraOptions options_;
+  const std::function<CameraView()> look_;
+  const Faults* const faults_;
+  std::shared_ptr<Renderer> renderer_;
+  std::mt19937_64 random_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string jpeg_;
+  uint64_t number_ = 0, rendered_ = 0;
+  int watchers_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;
+  std::unique_ptr<TcpServer> server_;
+};
+
+}  // namespace touchstone::rig
