@@ -1,0 +1,302 @@
+#include "tests/rig/controller.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <list>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+#include "tests/rig/controller/dashboard.h"
+#include "tests/rig/controller/machine.h"
+#include "tests/rig/controller/net.h"
+#include "tests/rig/controller/primary_packets.h"
+#include "tests/rig/controller/program_reader.h"
+#include "tests/rig/controller/rtde_session.h"
+
+namespace touchstone::rig {
+namespace {
+
+constexpr double kStateEveryS = 0.1;    // primary and secondary, host time
+constexpr double kLeastCycleS = 0.001;  // of the control loop, host time
+constexpr double kMostIdleS = 0.005;    // between two looks at the faults, host time
+constexpr size_t kMostConnections = 64, kMostLine = 65536;
+
+enum Port { kDashboard, kPrimary, kSecondary, kRtde, kPorts };
+
+struct Client {
+  Client(Port the_port, int fd) : port(the_port), connection(fd) {}
+  Port port;
+  Connection connection;
+  std::string received;
+  ProgramReader programs;
+  std::unique_ptr<RtdeSession> rtde;
+  double next_data_s = 0;
+};
+
+// One thread serves the sockets and moves the arm.
+class EmulatedController : public Controller {
+ public:
+  EmulatedController(const ControllerOptions& options, const SimClock* clock, Faults* faults,
+                     TipListener* tip)
+      : options_(options),
+        clock_(clock),
+        faults_(faults),
+        machine_(options, faults, tip),
+        random_(options.seed + 1) {
+    const int wanted[kPorts] = {options.dashboard_port, options.primary_port, options.secondary_port,
+                                options.rtde_port};
+    int bound[kPorts] = {};
+    try {
+      for (int port = 0; port < kPorts; ++port)
+        listeners_[port] = Listen(options.address, wanted[port], &bound[port]);
+      wake_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+      if (wake_ < 0) throw std::runtime_error("emulated controller: no descriptor is left for its events");
+    } catch (...) {
+      CloseListeners();
+      throw;
+    }
+    ports_ = {bound[kDashboard], bound[kPrimary], bound[kSecondary], bound[kRtde]};
+    thread_ = std::thread([this] { Loop(); });
+  }
+
+  ~EmulatedController() override {
+    stop_ = true;
+    const uint64_t one = 1;
+    if (write(wake_, &one, sizeof one) < 0) {
+      // The loop wakes by itself soon.
+    }
+    thread_.join();
+    clients_.clear();
+    CloseListeners();
+  }
+
+  Ports ports() const override { return ports_; }
+
+  Eigen::Isometry3d BaseFromTip() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.FlangeAt(clock_->NowS()) * machine_.flange_from_tip();
+  }
+  Eigen::Isometry3d BaseFromFlange() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.FlangeAt(clock_->NowS());
+  }
+  bool Moving() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.Moving();
+  }
+  uint64_t Count(const std::string& what) const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.Count(what);
+  }
+
+ private:
+  void CloseListeners() {
+    for (int& fd : listeners_)
+      if (fd >= 0) close(fd);
+    if (wake_ >= 0) close(wake_);
+  }
+
+  void Loop() {
+    while (!stop_) {
+      std::vector<pollfd> polled = Polled();
+      const double wait_s = std::clamp(NextWakeHostS() - HostNowS(), 0.0, kMostIdleS);
+      const timespec timeout{0, static_cast<long>(wait_s * 1e9)};
+      ppoll(polled.data(), polled.size(), &timeout, nullptr);
+      std::lock_guard<std::recursive_mutex> lock(mutex_);
+      Turn();
+    }
+  }
+
+  std::vector<pollfd> Polled() const {
+    std::vector<pollfd> polled = {{wake_, POLLIN, 0}};
+    const bool room = clients_.size() < kMostConnections;
+    for (const int fd : listeners_)
+      if (room) polled.push_back({fd, POLLIN, 0});
+    if (frozen_) return polled;
+    for (const Client& client : clients_)
+      polled.push_back({client.connection.fd(),
+                        static_cast<short>(POLLIN | (client.connection.Blocked() ? POLLOUT : 0)), 0});
+    return polled;
+  }
+
+  double NextWakeHostS() const {
+    const double host_s = HostNowS(), sim_s = clock_->NowS();
+    double next = host_s + kMostIdleS;
+    if (frozen_) return std::min(next, faults_ ? faults_->UntilHostS("freeze") : next);
+    next = std::min(next, next_state_s_);
+    next = std::min(next, host_s + (machine_.NextEventS() - sim_s) / clock_->speedup());
+    if (machine_.NeedsCycles()) {
+      next = std::min(
+          next, std::max(last_turn_s_ + kLeastCycleS, host_s + CycleBoundaryIn(sim_s) / clock_->speedup()));
+      // An input that a program may be waiting for is seen at the very next cycle.
+      if (input_came_ && clock_->speedup() > 1)
+        next = std::min(next, host_s + (machine_.NextCycleS() - sim_s) / clock_->speedup());
+    }
+    for (const Client& client : clients_) {
+      if (client.rtde && client.rtde->started()) next = std::min(next, client.next_data_s);
+      next = std::min(next, client.connection.NextReleaseS());
+    }
+    return next;
+  }
+
+  double CycleBoundaryIn(double sim_s) const {
+    return (std::floor(sim_s / machine_.cycle_s()) + 1) * machine_.cycle_s() - sim_s;
+  }
+
+  void Turn() {
+    last_turn_s_ = HostNowS();
+    Accept();
+    const bool freeze = faults_ && faults_->UntilHostS("freeze") > 0;
+    if (freeze && !frozen_) machine_.Freeze(clock_->NowS());
+    if (!freeze && frozen_) machine_.Thaw(clock_->NowS());
+    frozen_ = freeze;
+    if (faults_ && faults_->Take("disconnect") != 0) clients_.clear();
+    if (frozen_) return;
+
+    // What was due before now comes first; then what clients have sent; watchdogs last.
+    const auto changed = [this] {
+      if (clock_->speedup() > 1) SendData(true);
+    };
+    machine_.Advance(clock_->NowS(), changed);
+    input_came_ = false;
+    for (Client& client : clients_) Receive(&client);
+    machine_.Advance(machine_.now_s(), changed);
+    machine_.CheckWatchdogs(changed);
+    for (const Announcement& announcement : machine_.TakeAnnouncements()) {
+      const std::string packet = AnnouncementPacket(announcement, machine_.now_s());
+      for (Client& client : clients_)
+        if (client.port == kPrimary || client.port == kSecondary) client.connection.Send(packet);
+    }
+    SendData(false);
+    SendStates();
+    const double host_s = HostNowS();
+    for (auto client = clients_.begin(); client != clients_.end();) {
+      client->connection.Flush(host_s);
+      client = client->connection.open() ? std::next(client) : clients_.erase(client);
+    }
+  }
+
+  void Accept() {
+    for (int port = 0; port < kPorts; ++port) {
+      while (clients_.size() < kMostConnections) {
+        const int fd = accept4(listeners_[port], nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+        if (fd < 0) break;
+        Client& client = clients_.emplace_back(static_cast<Port>(port), fd);
+        if (port == kDashboard) client.connection.Send(std::string(kDashboardBanner) + "\n");
+        if (port == kRtde) client.rtde = std::make_unique<RtdeSession>(&machine_, options_.model, &taken_);
+        if (port == kPrimary || port == kSecondary) {
+          client.connection.Send(VersionPacket(options_.model));
+          client.connection.Send(StatePacket(machine_.State(), machine_.geometry(), options_.model));
+        }
+      }
+    }
+  }
+
+  void Receive(Client* client) {
+    const size_t before = client->received.size();
+    client->connection.Read(&client->received);
+    if (client->received.size() == before) return;
+    switch (client->port) {
+      case kDashboard:
+        return ReceiveDashboard(client);
+      case kPrimary:
+      case kSecondary:
+        for (const std::string& program : client->programs.Feed(std::exchange(client->received, {})))
+          machine_.StartProgram(program);
+        return;
+      default: {
+        const bool was_started = client->rtde->started();
+        client->connection.Send(client->rtde->Receive(&client->received));
+        input_came_ = true;
+        if (!was_started && client->rtde->started()) client->next_data_s = HostNowS();
+        if (client->rtde->broken()) client->connection.CloseWhenSent();
+      }
+    }
+  }
+
+  void ReceiveDashboard(Client* client) {
+    size_t end;
+    while ((end = client->received.find('\n')) != std::string::npos) {
+      const std::string line = client->received.substr(0, end);
+      client->received.erase(0, end + 1);
+      bool quit = false;
+      client->connection.Send(AnswerDashboard(line, options_.model, &machine_, &quit) + "\n");
+      if (quit) {
+        client->connection.CloseWhenSent();
+        return;
+      }
+    }
+    if (client->received.size() > kMostLine) client->connection.Close();
+  }
+
+  // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest once
+  // it does.
+  void SendData(bool all) {
+    const double host_s = HostNowS();
+    std::optional<RobotState> state;
+    for (Client& client : clients_) {
+      if (!client.rtde || !client.rtde->started()) continue;
+      if (!all) {
+        if (client.next_data_s > host_s) continue;
+        const double period_s = 1 / client.rtde->rate_hz();
+        client.next_data_s += period_s;
+        if (client.next_data_s <= host_s) client.next_data_s = host_s + period_s;  // late: skips
+      }
+      if (client.connection.Busy()) continue;
+      double release_s = 0;
+      if (faults_) {
+        std::uniform_real_distribution<double> uniform;
+        if (uniform(random_) < faults_->Get("skip_packets")) continue;
+        if (const double late_ms = faults_->Get("late_packets_ms"); late_ms > 0)
+          release_s = host_s + uniform(random_) * late_ms * 1e-3;
+      }
+      if (!state) state = machine_.State();
+      client.connection.Send(client.rtde->Data(*state), release_s);
+    }
+  }
+
+  void SendStates() {
+    const double host_s = HostNowS();
+    if (host_s < next_state_s_) return;
+    next_state_s_ = std::max(next_state_s_ + kStateEveryS, host_s + kStateEveryS / 2);
+    std::string packet;
+    for (Client& client : clients_) {
+      if ((client.port != kPrimary && client.port != kSecondary) || client.connection.Busy()) continue;
+      if (packet.empty()) packet = StatePacket(machine_.State(), machine_.geometry(), options_.model);
+      client.connection.Send(packet);
+    }
+  }
+
+  const ControllerOptions options_;
+  const SimClock* const clock_;
+  Faults* const faults_;
+  mutable std::recursive_mutex mutex_;  // a listener may ask for the pose while it is told of a motion
+  Machine machine_;
+  std::mt19937_64 random_;
+  RtdeSession::Taken taken_;
+  std::list<Client> clients_;
+  int listeners_[kPorts] = {-1, -1, -1, -1};
+  int wake_ = -1;
+  Ports ports_;
+  bool frozen_ = false, input_came_ = false;
+  double next_state_s_ = 0, last_turn_s_ = 0;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<Controller> Controller::Start(const ControllerOptions& options, const SimClock* clock,
+                                              Faults* faults, TipListener* tip) {
+  return std::make_unique<EmulatedController>(options, clock, faults, tip);
+}
+
+}  // namespace touchstone::rig

@@ -1,0 +1,97 @@
+#include "tests/rig/controller/dashboard.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace touchstone::rig {
+namespace {
+
+std::string ModeName(int mode) {
+  switch (mode) {
+    case kPowerOff:
+      return "POWER_OFF";
+    case kPowerOn:
+      return "POWER_ON";
+    case kIdle:
+      return "IDLE";
+    case kRunning:
+      return "RUNNING";
+  }
+  return "NO_CONTROLLER";
+}
+
+std::string SafetyName(int mode, bool status) {
+  switch (mode) {
+    case kNormal:
+      return "NORMAL";
+    case kProtectiveStop:
+      return "PROTECTIVE_STOP";
+    case kRobotEmergencyStop:
+      return "ROBOT_EMERGENCY_STOP";
+  }
+  return status ? "UNDEFINED" : "FAULT";
+}
+
+bool StartsWith(const std::string& text, const std::string& with) {
+  return text.compare(0, with.size(), with) == 0;
+}
+
+}  // namespace
+
+std::string AnswerDashboard(const std::string& line, const std::string& model, Machine* machine, bool* quit) {
+  std::string command = line;
+  while (!command.empty() && std::isspace(static_cast<unsigned char>(command.back()))) command.pop_back();
+  std::string lower = command;
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  const bool e_series = model == "ur3e";
+
+  if (lower == "robotmode") return "Robotmode: " + ModeName(machine->robot_mode());
+  if (lower == "safetymode") return "Safetymode: " + SafetyName(machine->LaggingSafetyMode(), false);
+  if (lower == "safetystatus") return "Safetystatus: " + SafetyName(machine->LaggingSafetyMode(), true);
+  if (lower == "power on") {
+    machine->PowerOn();
+    return "Powering on";
+  }
+  if (lower == "power off") {
+    machine->PowerOff();
+    return "Powering off";
+  }
+  if (lower == "brake release") {
+    machine->ReleaseBrakes();
+    return "Brake releasing";
+  }
+  // No program was ever loaded on this controller.
+  if (lower == "play") return "Failed to execute: play";
+  if (lower == "pause") return "Failed to execute: pause";
+  if (lower == "stop") {
+    machine->StopProgram();
+    return "Stopped";
+  }
+  if (lower == "running")
+    return std::string("Program running: ") + (machine->program_running() ? "true" : "false");
+  if (lower == "programstate") return "STOPPED";
+  if (lower == "get loaded program") return "No program loaded";
+  if (StartsWith(lower, "load ")) return "File not found: " + command.substr(5);
+  if (lower == "unlock protective stop") {
+    if (machine->Unlock()) return "Protective stop releasing";
+    return "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop "
+           "before "
+           "unlocking";
+  }
+  if (lower == "close popup") return "closing popup";
+  if (lower == "close safety popup") return "closing safety popup";
+  if (StartsWith(lower, "popup ")) return "showing popup";
+  if (StartsWith(lower, "addtolog ")) return "Added log message";
+  if (lower == "polyscopeversion")
+    return e_series ? "URSoftware 5.11.0.108249 (Sep 01 2021)" : "URSoftware 3.15.8.106339 (Jun 20 2022)";
+  if (lower == "get robot model") return "UR3";
+  if (lower == "get serial number") return e_series ? "20200300000" : "2014300000";
+  if (e_series && lower == "is in remote control") return "true";
+  if (lower == "quit") {
+    *quit = true;
+    return "Disconnected";
+  }
+  return "could not understand: '" + command + "'";
+}
+
+}  // namespace touchstone::rig

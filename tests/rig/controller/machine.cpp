@@ -1,0 +1,346 @@
+#include "tests/rig/controller/machine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tests/rig/controller/machine_motion.h"
+
+namespace touchstone::rig {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kPowerOnS = 1.0, kBootS = 1.5, kBrakesS = 1.0, kUnlockS = 0.5;
+constexpr double kUnlockAfterS = 5, kDashboardLagS = 0.6;
+// A late host catches up with that many control cycles of a waiting program at most; the rest are skipped.
+constexpr double kMostCyclesAtOnce = 8;
+constexpr double kProgressEveryM = 0.002;
+constexpr int kMostProgressSteps = 64;
+
+}  // namespace
+
+Machine::Machine(const ControllerOptions& options, Faults* faults, TipListener* tip)
+    : options_(options),
+      faults_(faults),
+      tip_(tip),
+      geometry_(GeometryOf(options.model)),
+      cycle_s_(options.model == "ur3" ? 0.008 : 0.002),
+      random_(options.seed) {
+  for (int i = 0; i < 6; ++i) joints_[i] = options.joints_rad[i];
+  if (options.powered) robot_mode_ = kRunning;
+  safety_history_ = {{-kNever, kNormal}};
+}
+
+Machine::~Machine() = default;
+
+void Machine::Later(double seconds, std::function<void()> action) {
+  later_.push_back({now_s_ + seconds, std::move(action)});
+}
+
+double Machine::NextEventS() const {
+  if (frozen_) return kNever;
+  double next = NextMotionEventS();
+  for (const auto& [time_s, action] : later_) next = std::min(next, time_s);
+  if (script_) {
+    next = std::min(next, script_fresh_ ? now_s_ : script_->NextWakeS());
+    for (const Watchdog& watchdog : watchdogs_)
+      if (watchdog.trips) next = std::min(next, watchdog.fed_s + watchdog.period_s);
+  }
+  return next;
+}
+
+bool Machine::NeedsCycles() const {
+  return !frozen_ && (motion_ || (script_ && script_->NextCycleS() < kNever));
+}
+
+void Machine::Advance(double now_s, const std::function<void()>& changed) {
+  if (frozen_) return;
+  for (;;) {
+    double next = NextMotionEventS();
+    for (const auto& [time_s, action] : later_) next = std::min(next, time_s);
+    if (script_) {
+      if (script_fresh_) next = now_s_;
+      next = std::min(next, script_->NextWakeS());
+      const double others_s = std::min(next, now_s);
+      if (others_s - script_->NextCycleS() > kMostCyclesAtOnce * cycle_s_) script_->SkipCyclesTo(others_s);
+      next = std::min(next, script_->NextCycleS());
+    }
+    if (motion_ && motion_->number) {
+      const double speed = std::max(motion_->speed * scaling_ * motion_->line->MetresPerLength(), 1e-9);
+      next = std::min(
+          next, last_progress_s_ + std::max(kProgressEveryM / speed, (now_s - now_s_) / kMostProgressSteps));
+    }
+    if (next > now_s) break;
+    now_s_ = std::max(now_s_, next);
+    Progress(now_s_);
+    if (motion_ && motion_->profile->EndS() <= now_s_) {
+      FinishMotion(now_s_);
+    } else if (motion_ && !motion_->stopping && motion_->profile->TimeOf(motion_->obstacle_at) <= now_s_) {
+      ProtectiveStop(0, motion_->obstacle);
+    }
+    for (size_t i = 0; i < later_.size(); ++i) {
+      if (later_[i].first > now_s_) continue;
+      const auto action = std::move(later_[i].second);
+      later_.erase(later_.begin() + i--);
+      action();
+    }
+    RunScript();
+    Tell(changed);
+  }
+  now_s_ = std::max(now_s_, now_s);
+  Progress(now_s_);
+  LookAtFaults();
+  Tell(changed);
+}
+
+void Machine::Tell(const std::function<void()>& changed) {
+  if (changed_ && changed) changed();
+  changed_ = false;
+}
+
+void Machine::CheckWatchdogs(const std::function<void()>& changed) {
+  if (frozen_ || !script_) return;
+  for (const Watchdog& watchdog : watchdogs_) {
+    if (!watchdog.trips || now_s_ - watchdog.fed_s < watchdog.period_s) continue;
+    ++watchdog_stops_;
+    ProtectiveStop(0, "RTDE watchdog: '" + std::string(watchdog.variable) + "' was not updated in time");
+    break;  // the program has ended, and its watchdogs with it
+  }
+  Tell(changed);
+}
+
+double Machine::NextCycleS() const {
+  return script_ && !frozen_ ? script_->NextCycleS() : kNever;
+}
+
+void Machine::Freeze(double now_s) {
+  if (frozen_) return;
+  frozen_ = true;
+  frozen_at_s_ = now_s;
+  if (motion_) motion_->profile->Hold(now_s);
+}
+
+void Machine::Thaw(double now_s) {
+  if (!frozen_) return;
+  frozen_ = false;
+  now_s_ = std::max(now_s_, now_s);
+  last_progress_s_ = now_s_;
+  for (Watchdog& watchdog : watchdogs_) watchdog.fed_s += now_s - frozen_at_s_;
+  if (!motion_) return;
+  if (motion_->stopping)
+    motion_->profile->Stop(now_s_, motion_->acceleration);
+  else
+    motion_->profile->Cruise(now_s_, motion_->speed * scaling_, motion_->acceleration);
+}
+
+void Machine::StartProgram(const std::string& script) {
+  ScriptProgram program;
+  try {
+    program = Compile(script, Builtins());
+  } catch (const CompileError& error) {
+    Announce({Announcement::kException, "", error.what(), error.line, error.column});
+    return;
+  }
+  if (robot_mode_ != kRunning || safety_mode_ != kNormal) {
+    Announce({Announcement::kError, "",
+              "program '" + program.name + "' was not started: robot mode " + std::to_string(robot_mode_) +
+                  ", safety mode " + std::to_string(safety_mode_),
+              0, 0});
+    return;
+  }
+  if (program.secondary) {  // beside the running program, without feedback; it must not wait for anything
+    ScriptMachine machine(std::move(program), this, cycle_s_);
+    in_secondary_ = true;
+    machine.Run(now_s_);
+    in_secondary_ = false;
+    return;
+  }
+  if (script_) EndProgram();
+  ++programs_;
+  Announce({Announcement::kKey, "PROGRAM_XXX_STARTED", program.name});
+  script_ = std::make_unique<ScriptMachine>(std::move(program), this, cycle_s_);
+  script_fresh_ = true;
+  changed_ = true;
+}
+
+bool Machine::StopProgram() {
+  const bool was_running = script_ != nullptr;
+  if (script_) EndProgram();
+  Halt();
+  return was_running;
+}
+
+void Machine::RunScript() {
+  if (!script_) return;
+  script_fresh_ = false;
+  const bool goes_on = script_->Run(now_s_);
+  // A motion whose thread has ended belongs to nobody; unless stopl has taken it over, it ends now.
+  if (motion_ && motion_->thread >= 0 && !script_->Lives(motion_->thread)) motion_->thread = -1;
+  if (!goes_on) {
+    if (const auto& failure = script_->failure())
+      Announce({Announcement::kException, "", failure->what, failure->line, failure->column});
+    EndProgram();
+  }
+  if (motion_ && motion_->thread < 0) Halt();
+}
+
+void Machine::EndProgram() {
+  Announce({Announcement::kKey, "PROGRAM_XXX_STOPPED", script_->program().name});
+  script_.reset();
+  watchdogs_.clear();
+  if (motion_) motion_->thread = -1;
+  changed_ = true;
+}
+
+void Machine::PowerOn() {
+  if (robot_mode_ != kPowerOff || safety_mode_ == kRobotEmergencyStop) return;
+  later_.clear();
+  Later(kPowerOnS, [this] {
+    robot_mode_ = kPowerOn;
+    changed_ = true;
+    Later(kBootS, [this] {
+      robot_mode_ = kIdle;
+      changed_ = true;
+    });
+  });
+}
+
+void Machine::ReleaseBrakes() {
+  if (robot_mode_ == kRunning || safety_mode_ == kRobotEmergencyStop) return;
+  later_.clear();
+  const double wait_s = robot_mode_ == kIdle ? 0 : robot_mode_ == kPowerOn ? kBootS : kPowerOnS + kBootS;
+  if (robot_mode_ == kPowerOff) Later(kPowerOnS, [this] { robot_mode_ = kPowerOn; });
+  Later(wait_s, [this] { robot_mode_ = kIdle; });
+  Later(wait_s + kBrakesS, [this] {
+    robot_mode_ = kRunning;
+    changed_ = true;
+  });
+}
+
+void Machine::PowerOff() {
+  later_.clear();
+  if (script_) EndProgram();
+  // Without power the brakes hold at once.
+  if (motion_) {
+    Progress(now_s_);
+    motion_->profile->Stop(now_s_, 1e9);
+    FinishMotion(now_s_);
+  }
+  robot_mode_ = kPowerOff;
+  changed_ = true;
+}
+
+void Machine::SetSafety(int mode) {
+  safety_mode_ = mode;
+  safety_history_.push_back({now_s_, mode});
+  if (safety_history_.size() > 64) safety_history_.erase(safety_history_.begin());
+  changed_ = true;
+}
+
+int Machine::LaggingSafetyMode() const {
+  int mode = safety_history_.front().second;
+  for (const auto& [since_s, each] : safety_history_)
+    if (since_s <= now_s_ - kDashboardLagS) mode = each;
+  return mode;
+}
+
+void Machine::ProtectiveStop(int code, const std::string& why) {
+  if (safety_mode_ != kNormal) return;
+  ++protective_stops_;
+  stopped_at_s_ = now_s_;
+  SetSafety(kProtectiveStop);
+  Announce({Announcement::kError, "", why, code, 0});
+  if (script_) EndProgram();
+  Halt();
+}
+
+bool Machine::Unlock() {
+  if (safety_mode_ != kProtectiveStop) return true;
+  if (now_s_ < stopped_at_s_ + kUnlockAfterS) return false;
+  Later(kUnlockS, [this] {
+    if (safety_mode_ == kProtectiveStop) SetSafety(kNormal);
+  });
+  return true;
+}
+
+void Machine::EmergencyStop(bool pressed) {
+  emergency_ = pressed;
+  if (pressed) {
+    PowerOff();
+    SetSafety(kRobotEmergencyStop);
+  } else {
+    SetSafety(kNormal);
+  }
+}
+
+void Machine::LookAtFaults() {
+  if (!faults_) return;
+  if (faults_->Take("protective_stop") != 0) ProtectiveStop(153, "emulated protective stop");
+  const bool pressed = faults_->Get("emergency_stop") != 0;
+  if (pressed != emergency_) EmergencyStop(pressed);
+  Rescale();
+}
+
+void Machine::InputWritten(const std::string& name) {
+  for (Watchdog& watchdog : watchdogs_)
+    if (watchdog.variable == name) watchdog.fed_s = now_s_;
+}
+
+void Machine::SetWatchdog(const std::string& variable, double least_hz, const std::string& action) {
+  watchdogs_.erase(std::remove_if(watchdogs_.begin(), watchdogs_.end(),
+                                  [&](const Watchdog& watchdog) { return watchdog.variable == variable; }),
+                   watchdogs_.end());
+  // A trip is a protective stop whether the action is "stop" or "pause"; "ignore" watches without one.
+  if (least_hz > 0) watchdogs_.push_back({variable, 1 / least_hz, action != "ignore", now_s_});
+}
+
+void Machine::WriteOutput(int index, int32_t value) {
+  changed_ |= registers_.output_int[index] != value;
+  registers_.output_int[index] = value;
+}
+
+void Machine::WriteOutput(int index, double value) {
+  changed_ |= registers_.output_double[index] != value;
+  registers_.output_double[index] = value;
+}
+
+void Machine::WriteOutput(int index, bool value) {
+  changed_ |= registers_.output_bit[index] != value;
+  registers_.output_bit[index] = value;
+}
+
+void Machine::SetDigitalOutputs(uint32_t mask, uint32_t values) {
+  digital_outputs_ = (digital_outputs_ & ~static_cast<uint64_t>(mask)) | (values & mask);
+}
+
+void Machine::SetSpeedSlider(double fraction) {
+  slider_ = std::clamp(fraction, 0.0, 1.0);
+  Rescale();
+}
+
+void Machine::SetTool(const Eigen::Isometry3d& flange_from_tip) {
+  flange_from_tip_ = flange_from_tip;
+}
+
+void Machine::SetPayload(double kg, const Eigen::Vector3d& cog_m) {
+  payload_kg_ = kg;
+  payload_cog_m_ = cog_m;
+}
+
+void Machine::Announce(Announcement announcement) {
+  if (announcements_.size() < 1000) announcements_.push_back(std::move(announcement));
+}
+
+std::vector<Announcement> Machine::TakeAnnouncements() {
+  return std::exchange(announcements_, {});
+}
+
+uint64_t Machine::Count(const std::string& what) const {
+  if (what == "programs") return programs_;
+  if (what == "motions") return motions_;
+  if (what == "protective_stops") return protective_stops_;
+  if (what == "watchdog_stops") return watchdog_stops_;
+  return 0;
+}
+
+}  // namespace touchstone::rig

@@ -1,0 +1,192 @@
+// What the emulated controller is without its sockets: the arm, its motions, its safety, its registers and
+// its program, on simulated time. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/rig/controller.h"
+#include "tests/rig/controller/kinematics.h"
+#include "tests/rig/controller/motion.h"
+#include "tests/rig/controller/script_machine.h"
+
+namespace touchstone::rig {
+
+enum RobotMode { kPowerOff = 3, kPowerOn = 4, kIdle = 5, kRunning = 7 };
+enum SafetyMode { kNormal = 1, kProtectiveStop = 3, kRobotEmergencyStop = 7 };
+enum RuntimeState { kStopping = 0, kStopped = 1, kPlaying = 2 };
+
+struct Registers {
+  std::array<int32_t, 48> input_int{}, output_int{};
+  std::array<double, 48> input_double{}, output_double{};
+  std::array<bool, 128> input_bit{}, output_bit{};
+};
+
+// A message on the primary and secondary interfaces (RIG.md: kinds).
+struct Announcement {
+  enum Kind { kText = 0, kPopup = 2, kError = 6, kKey = 7, kException = 10 };
+  Kind kind;
+  std::string title, text;
+  int first = 0, second = 0;  // code and argument of an error; line and column of an exception
+};
+
+// Everything that RTDE and the primary interface tell, at one time. "actual" is the target with noise.
+struct RobotState {
+  double timestamp_s = 0;
+  Joints target_q, target_qd, target_qdd, actual_q, actual_qd;
+  Vector6 target_tcp_pose, target_tcp_speed, actual_tcp_pose, actual_tcp_speed, actual_tcp_force, tcp_offset;
+  int robot_mode = 0, safety_mode = 0, runtime_state = 0;
+  uint32_t robot_status_bits = 0, safety_status_bits = 0;
+  double speed_scaling = 0, target_speed_fraction = 0;
+  uint64_t digital_inputs = 0, digital_outputs = 0;
+  double payload_kg = 0;
+  Eigen::Vector3d payload_cog_m = Eigen::Vector3d::Zero(), elbow_m = Eigen::Vector3d::Zero();
+  int script_line = 0;
+  bool program_running = false;
+  Registers registers;
+};
+
+class Machine : public ScriptHost {
+ public:
+  Machine(const ControllerOptions& options, Faults* faults, TipListener* tip);
+  ~Machine() override;
+
+  double cycle_s() const { return cycle_s_; }
+  double now_s() const { return now_s_; }
+
+  // Lets everything happen up to then, each thing at its own time. `changed` is called whenever output
+  // registers or a mode have changed, at the time when they did.
+  void Advance(double now_s, const std::function<void()>& changed);
+  // Trips those watchdogs whose input has not come by now: to be called once what has come was taken.
+  void CheckWatchdogs(const std::function<void()>& changed);
+  // When the next thing happens by itself; infinite if nothing is due.
+  double NextEventS() const;
+  // A motion or a program that waits for cycles wants to be advanced every control cycle.
+  bool NeedsCycles() const;
+  double NextCycleS() const;  // of a program that waits for one; infinite if none does
+  // Stands still and does nothing, or goes on.
+  void Freeze(double now_s);
+  void Thaw(double now_s);
+
+  // Programs. Errors become announcements.
+  void StartProgram(const std::string& script);
+  bool StopProgram();
+  bool program_running() const { return script_ != nullptr; }
+
+  // Dashboard.
+  void PowerOn();
+  void PowerOff();
+  void ReleaseBrakes();
+  bool Unlock();  // false: not within 5 s of the stop
+  int LaggingSafetyMode() const;
+  int robot_mode() const { return robot_mode_; }
+  int safety_mode() const { return safety_mode_; }
+
+  // RTDE.
+  Registers& registers() { return registers_; }
+  void InputWritten(const std::string& name);  // feeds the watchdog
+  void SetSpeedSlider(double fraction);
+  uint32_t slider_mask = 0, digital_output_mask = 0;  // as clients last wrote them
+  void SetDigitalOutputs(uint32_t mask, uint32_t values);
+  RobotState State();
+  std::vector<Announcement> TakeAnnouncements();
+  void Announce(Announcement announcement);
+
+  Eigen::Isometry3d FlangeAt(double time_s) const;
+  const Eigen::Isometry3d& flange_from_tip() const { return flange_from_tip_; }
+  bool Moving() const { return motion_ != nullptr; }
+  uint64_t Count(const std::string& what) const;
+  const ArmGeometry& geometry() const { return geometry_; }
+
+  // For the functions of scripts (script_functions.cpp).
+  Outcome CallBuiltin(int index, const std::vector<Value>& arguments, int thread) override;
+  bool Resting() const override { return motion_ == nullptr; }
+  Outcome MoveLine(const Eigen::Isometry3d& base_from_tip, double speed, double acceleration,
+                   double duration_s, int thread);
+  Outcome MoveJoints(const Joints& joints, double speed, double acceleration, double duration_s, int thread);
+  Outcome MoveAlong(const Vector6& twist, double acceleration, double duration_s, int thread);
+  Outcome StopMotion(double deceleration);
+  void SetTool(const Eigen::Isometry3d& flange_from_tip);
+  void SetPayload(double kg, const Eigen::Vector3d& cog_m);
+  void SetWatchdog(const std::string& variable, double least_hz, const std::string& action);
+  void WriteOutput(int index, int32_t value);
+  void WriteOutput(int index, double value);
+  void WriteOutput(int index, bool value);
+  void SetDigitalOutput(int index, bool on) { SetDigitalOutputs(1u << index, on ? 1u << index : 0); }
+  uint64_t digital_inputs() const { return 0; }
+  uint64_t digital_outputs() const { return digital_outputs_; }
+  Joints JointsAt(double time_s) const;
+  double scaling() const { return scaling_; }
+
+ private:
+  struct Motion;
+  Outcome Begin(std::unique_ptr<Motion> motion, double speed, double acceleration, double duration_s,
+                double first_speed);
+  // Empty: the thread may begin a motion now. Otherwise it has to wait.
+  bool MustWaitToMove(int thread, bool keeps_going);
+  void RequireReady() const;
+  void FinishMotion(double time_s);
+  void Progress(double time_s);
+  void Tell(const std::function<void()>& changed);
+  void RunScript();
+  void EndProgram();
+  void Halt();  // brings the arm to rest as fast as it can
+  void ProtectiveStop(int code, const std::string& why);
+  void EmergencyStop(bool pressed);
+  void LookAtFaults();
+  void Rescale();
+  void SetSafety(int mode);
+  double NextMotionEventS() const;
+  void Later(double seconds, std::function<void()> action);
+
+  ControllerOptions options_;
+  Faults* faults_;
+  TipListener* tip_;
+  ArmGeometry geometry_;
+  double cycle_s_;
+  double now_s_ = 0;
+  std::mt19937_64 random_;
+
+  Joints joints_;
+  Eigen::Isometry3d flange_from_tip_ = Eigen::Isometry3d::Identity();
+  double payload_kg_ = 0;
+  Eigen::Vector3d payload_cog_m_ = Eigen::Vector3d::Zero();
+  std::unique_ptr<Motion> motion_;
+  uint64_t straight_motions_ = 0;
+  double last_progress_s_ = 0;
+
+  int robot_mode_ = kPowerOff, safety_mode_ = kNormal;
+  double stopped_at_s_ = -1e9;
+  bool emergency_ = false, frozen_ = false;
+  double frozen_at_s_ = 0;
+  std::vector<std::pair<double, int>> safety_history_;
+  std::vector<std::pair<double, std::function<void()>>> later_;
+  double slider_ = 1, scaling_ = 1;
+
+  Registers registers_;
+  uint64_t digital_outputs_ = 0;
+  bool changed_ = false;
+  std::vector<Announcement> announcements_;
+
+  std::unique_ptr<ScriptMachine> script_;
+  bool script_fresh_ = false, in_secondary_ = false;
+  struct Watchdog {
+    std::string variable;
+    double period_s;
+    bool trips;
+    double fed_s;
+  };
+  std::vector<Watchdog> watchdogs_;
+  uint64_t programs_ = 0, motions_ = 0, protective_stops_ = 0, watchdog_stops_ = 0;
+};
+
+// The functions that scripts may call, in the order of their indices.
+const std::vector<BuiltinSignature>& Builtins();
+
+}  // namespace touchstone::rig

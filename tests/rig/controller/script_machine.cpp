@@ -1,0 +1,343 @@
+#include "tests/rig/controller/script_machine.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchstone::rig {
+namespace {
+
+constexpr int kMostInstructions = 200000;  // without waiting, in one go: an endless loop
+constexpr size_t kMostFrames = 200, kMostThreads = 50, kMostItems = 10000;
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+ScriptMachine::ScriptMachine(ScriptProgram program, ScriptHost* host, double cycle_s)
+    : program_(std::move(program)), host_(host), cycle_s_(cycle_s) {
+  globals_.resize(program_.globals.size());
+  globals_set_.resize(program_.globals.size());
+  Begin(0, {});
+}
+
+void ScriptMachine::Begin(int function, std::vector<Value> arguments) {
+  auto thread = std::make_unique<Thread>();
+  thread->id = begun_++;
+  const size_t locals = program_.functions[function].locals.size();
+  Frame frame{function, 0, std::move(arguments), {}, 0};
+  frame.set.assign(locals, false);
+  for (size_t i = 0; i < frame.locals.size(); ++i) frame.set[i] = true;
+  frame.locals.resize(locals);
+  thread->frames.push_back(std::move(frame));
+  threads_.push_back(std::move(thread));
+}
+
+bool ScriptMachine::Lives(int thread) const {
+  for (const auto& each : threads_)
+    if (each->id == thread) return !each->ended;
+  return false;
+}
+
+bool ScriptMachine::MayGoOn(const Thread& thread, double now_s) const {
+  if (thread.ended) return false;
+  if (thread.joins >= 0 && Lives(thread.joins)) return false;
+  switch (thread.wait) {
+    case Outcome::Wait::kNone:
+      return true;
+    case Outcome::Wait::kUntil:
+    case Outcome::Wait::kCycle:
+      return now_s >= thread.until_s;
+    case Outcome::Wait::kRest:
+    case Outcome::Wait::kRetry:
+      return host_->Resting();
+  }
+  return false;
+}
+
+bool ScriptMachine::Run(double now_s) {
+  // A thread that ends or is killed may free another that joins it: goes round until nobody can go on.
+  bool again = true;
+  while (again && !halted_) {
+    again = false;
+    for (size_t i = 0; i < threads_.size() && !halted_; ++i) {
+      if (!MayGoOn(*threads_[i], now_s)) continue;
+      Execute(*threads_[i], now_s);
+      again = true;
+    }
+    if (threads_[0]->ended) halted_ = true;
+    for (size_t i = threads_.size(); i-- > 1;)
+      if (threads_[i]->ended) threads_.erase(threads_.begin() + i);
+  }
+  return !halted_;
+}
+
+double ScriptMachine::NextWakeS() const {
+  double next = kNever;
+  for (const auto& thread : threads_)
+    if (!thread->ended && thread->wait == Outcome::Wait::kUntil) next = std::min(next, thread->until_s);
+  return next;
+}
+
+double ScriptMachine::NextCycleS() const {
+  double next = kNever;
+  for (const auto& thread : threads_)
+    if (!thread->ended && thread->wait == Outcome::Wait::kCycle) next = std::min(next, thread->until_s);
+  return next;
+}
+
+void ScriptMachine::SkipCyclesTo(double time_s) {
+  for (const auto& thread : threads_)
+    if (thread->wait == Outcome::Wait::kCycle) thread->until_s = std::max(thread->until_s, time_s);
+}
+
+bool ScriptMachine::WaitsForRest() const {
+  for (const auto& thread : threads_)
+    if (!thread->ended && (thread->wait == Outcome::Wait::kRest || thread->wait == Outcome::Wait::kRetry))
+      return true;
+  return false;
+}
+
+Value ScriptMachine::Pop(Thread& thread) {
+  if (thread.stack.empty()) throw ScriptError("the stack is empty");
+  Value value = std::move(thread.stack.back());
+  thread.stack.pop_back();
+  return value;
+}
+
+void ScriptMachine::Execute(Thread& thread, double now_s) {
+  thread.wait = Outcome::Wait::kNone;
+  thread.joins = -1;
+  try {
+    for (int count = 0;; ++count) {
+      Frame& frame = thread.frames.back();
+      const Instruction code = program_.functions[frame.function].code[frame.at];
+      line_ = code.line;
+      column_ = code.column;
+      if (count > kMostInstructions)
+        throw ScriptError("infinite loop: the thread does not wait, e.g. with sync()");
+      ++frame.at;
+      switch (code.op) {
+        case Op::kConstant:
+          thread.stack.push_back(program_.constants[code.a]);
+          break;
+        case Op::kLoadLocal:
+          if (!frame.set[code.a])
+            throw ScriptError("variable '" + program_.functions[frame.function].locals[code.a] +
+                              "' has no value yet");
+          thread.stack.push_back(frame.locals[code.a]);
+          break;
+        case Op::kStoreLocal:
+          frame.locals[code.a] = Pop(thread);
+          frame.set[code.a] = true;
+          break;
+        case Op::kLoadGlobal:
+          if (!globals_set_[code.a])
+            throw ScriptError("variable '" + program_.globals[code.a] + "' has no value yet");
+          thread.stack.push_back(globals_[code.a]);
+          break;
+        case Op::kStoreGlobal:
+          globals_[code.a] = Pop(thread);
+          globals_set_[code.a] = true;
+          break;
+        case Op::kStoreItemLocal:
+        case Op::kStoreItemGlobal: {
+          Value value = Pop(thread);
+          const int index = Pop(thread).AsInteger("an index");
+          Value& list = code.op == Op::kStoreItemLocal ? frame.locals[code.a] : globals_[code.a];
+          if (index < 0 || index >= static_cast<int>(list.items.size()))
+            throw ScriptError("index " + std::to_string(index) + " is out of range");
+          list.items[index] = std::move(value);
+          break;
+        }
+        case Op::kJump:
+          frame.at = code.a;
+          break;
+        case Op::kJumpIfFalse:
+          if (!Pop(thread).AsBool("a condition")) frame.at = code.a;
+          break;
+        case Op::kCall:
+        case Op::kRun: {
+          std::vector<Value> arguments(code.b);
+          for (int i = code.b; i-- > 0;) arguments[i] = Pop(thread);
+          if (code.op == Op::kRun) {
+            if (threads_.size() >= kMostThreads) throw ScriptError("too many threads");
+            thread.stack.push_back({Value::Kind::kThread, static_cast<double>(begun_), {}, {}});
+            Begin(code.a, std::move(arguments));
+            break;
+          }
+          if (thread.frames.size() >= kMostFrames) throw ScriptError("calls are nested too deeply");
+          const size_t locals = program_.functions[code.a].locals.size();
+          Frame next{code.a, 0, std::move(arguments), {}, thread.stack.size()};
+          next.set.assign(locals, false);
+          for (size_t i = 0; i < next.locals.size(); ++i) next.set[i] = true;
+          next.locals.resize(locals);
+          thread.frames.push_back(std::move(next));
+          break;
+        }
+        case Op::kBuiltin: {
+          const std::vector<Value> arguments(thread.stack.end() - code.b, thread.stack.end());
+          Outcome outcome = host_->CallBuiltin(code.a, arguments, thread.id);
+          if (outcome.wait == Outcome::Wait::kRetry) {
+            --frame.at;
+            thread.wait = outcome.wait;
+            return;
+          }
+          thread.stack.resize(thread.stack.size() - code.b);
+          thread.stack.push_back(std::move(outcome.value));
+          if (outcome.wait != Outcome::Wait::kNone) {
+            thread.wait = outcome.wait;
+            thread.until_s = outcome.until_s;
+            // The next cycle, also if rounding makes `now` its own boundary.
+            if (outcome.wait == Outcome::Wait::kCycle)
+              thread.until_s = std::max(std::floor(now_s / cycle_s_ + 1e-6) + 1, 1.0) * cycle_s_;
+            return;
+          }
+          break;
+        }
+        case Op::kKill:
+        case Op::kJoin: {
+          const Value handle = Pop(thread);
+          if (handle.kind != Value::Kind::kThread)
+            throw ScriptError("kill and join take what run has returned");
+          const int id = static_cast<int>(handle.number);
+          if (code.op == Op::kJoin) {
+            if (id == thread.id) throw ScriptError("a thread cannot join itself");
+            thread.joins = id;
+            if (Lives(id)) return;
+            break;
+          }
+          for (const auto& each : threads_)
+            if (each->id == id) each->ended = true;
+          if (thread.ended) return;
+          break;
+        }
+        case Op::kReturn: {
+          Value value = Pop(thread);
+          thread.stack.resize(frame.stack_base);
+          thread.frames.pop_back();
+          if (thread.frames.empty()) {
+            thread.ended = true;
+            return;
+          }
+          thread.stack.push_back(std::move(value));
+          break;
+        }
+        case Op::kPop:
+          Pop(thread);
+          break;
+        case Op::kMakeList:
+        case Op::kMakePose: {
+          const int size = code.op == Op::kMakePose ? 6 : code.a;
+          Value list = Value::List(std::vector<Value>(thread.stack.end() - size, thread.stack.end()));
+          if (code.op == Op::kMakePose) {
+            list.kind = Value::Kind::kPose;
+            for (const Value& item : list.items) item.AsNumber("a number of a pose");
+          }
+          thread.stack.resize(thread.stack.size() - size);
+          thread.stack.push_back(std::move(list));
+          break;
+        }
+        case Op::kIndex: {
+          const int index = Pop(thread).AsInteger("an index");
+          const Value list = Pop(thread);
+          if (list.kind != Value::Kind::kList && list.kind != Value::Kind::kPose)
+            throw ScriptError("only lists and poses have items, not " + list.ToText());
+          if (index < 0 || index >= static_cast<int>(list.items.size()))
+            throw ScriptError("index " + std::to_string(index) + " is out of range");
+          thread.stack.push_back(list.items[index]);
+          break;
+        }
+        case Op::kHalt:
+          halted_ = true;
+          return;
+        default:
+          Calculate(thread, code.op);
+      }
+      if (thread.stack.size() > kMostItems) throw ScriptError("too many values");
+    }
+  } catch (const ScriptError& error) {
+    failure_ = Failure{error.what(), line_, column_};
+    halted_ = true;
+  }
+}
+
+void ScriptMachine::Calculate(Thread& thread, Op op) {
+  const Value right = Pop(thread);
+  if (op == Op::kNegate) {
+    thread.stack.push_back(Value::Number(-right.AsNumber("what '-' is put before")));
+    return;
+  }
+  if (op == Op::kNot) {
+    thread.stack.push_back(Value::Bool(!right.AsBool("what 'not' is put before")));
+    return;
+  }
+  const Value left = Pop(thread);
+  const auto numbers = [&](const char* sign) {
+    const std::string what = std::string("an operand of '") + sign + "'";
+    return std::make_pair(left.AsNumber(what), right.AsNumber(what));
+  };
+  const auto bools = [&](const char* sign) {
+    const std::string what = std::string("an operand of '") + sign + "'";
+    return std::make_pair(left.AsBool(what), right.AsBool(what));
+  };
+  const auto push = [&](Value value) { thread.stack.push_back(std::move(value)); };
+  switch (op) {
+    case Op::kAnd: {
+      const auto [x, y] = bools("and");
+      return push(Value::Bool(x && y));
+    }
+    case Op::kOr: {
+      const auto [x, y] = bools("or");
+      return push(Value::Bool(x || y));
+    }
+    case Op::kXor: {
+      const auto [x, y] = bools("xor");
+      return push(Value::Bool(x != y));
+    }
+    case Op::kEqual:
+      return push(Value::Bool(left == right));
+    case Op::kUnequal:
+      return push(Value::Bool(!(left == right)));
+    case Op::kLess: {
+      const auto [x, y] = numbers("<");
+      return push(Value::Bool(x < y));
+    }
+    case Op::kLessEqual: {
+      const auto [x, y] = numbers("<=");
+      return push(Value::Bool(x <= y));
+    }
+    case Op::kGreater: {
+      const auto [x, y] = numbers(">");
+      return push(Value::Bool(x > y));
+    }
+    case Op::kGreaterEqual: {
+      const auto [x, y] = numbers(">=");
+      return push(Value::Bool(x >= y));
+    }
+    case Op::kAdd: {
+      const auto [x, y] = numbers("+");
+      return push(Value::Number(x + y));
+    }
+    case Op::kSubtract: {
+      const auto [x, y] = numbers("-");
+      return push(Value::Number(x - y));
+    }
+    case Op::kMultiply: {
+      const auto [x, y] = numbers("*");
+      return push(Value::Number(x * y));
+    }
+    case Op::kDivide: {
+      const auto [x, y] = numbers("/");
+      if (y == 0) throw ScriptError("division by zero");
+      return push(Value::Number(x / y));
+    }
+    case Op::kModulo: {
+      const auto [x, y] = numbers("%");
+      if (y == 0) throw ScriptError("division by zero");
+      return push(Value::Number(std::fmod(x, y)));
+    }
+    default:
+      throw ScriptError("unknown instruction");
+  }
+}
+
+}  // namespace touchstone::rig
