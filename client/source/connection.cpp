@@ -55,6 +55,7 @@ Connection::~Connection() {
   control_.reset();
   sessions_.reset();
   diagnosis_.reset();
+  rig_.reset();
   channel_.reset();
 }
 
@@ -105,6 +106,7 @@ void Connection::MakeStubs() {
   control_ = v1::Control::NewStub(channel_);
   sessions_ = v1::Sessions::NewStub(channel_);
   diagnosis_ = v1::Diagnosis::NewStub(channel_);
+  rig_ = v1::Rig::NewStub(channel_);
 }
 
 }  // namespace touchstone::client

@@ -16,6 +16,7 @@
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/diagnosis.grpc.pb.h"
 #include "touchstone/v1/models.grpc.pb.h"
+#include "touchstone/v1/rig.grpc.pb.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
@@ -43,6 +44,8 @@ class Connection {
   v1::Control::Stub& control() { return *control_; }
   v1::Sessions::Stub& sessions() { return *sessions_; }
   v1::Diagnosis::Stub& diagnosis() { return *diagnosis_; }
+  // Served by physical sources only; UNIMPLEMENTED elsewhere.
+  v1::Rig::Stub& rig() { return *rig_; }
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
 
   // "127.0.0.1:50051", or "this process".
@@ -81,6 +84,7 @@ class Connection {
   std::unique_ptr<v1::Control::Stub> control_;
   std::unique_ptr<v1::Sessions::Stub> sessions_;
   std::unique_ptr<v1::Diagnosis::Stub> diagnosis_;
+  std::unique_ptr<v1::Rig::Stub> rig_;
 };
 
 }  // namespace touchstone::client

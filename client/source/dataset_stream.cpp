@@ -72,6 +72,8 @@ absl::Status DatasetStream::Start() {
     if (cancelled_) return absl::CancelledError("the stream was cancelled");
     context_ = std::make_unique<grpc::ClientContext>();
   }
+  if (options_.lease != nullptr && options_.lease->required())
+    request_.set_lease_token(options_.lease->token());
   reader_ = connection_->source().StreamDataset(context_.get(), request_);
   v1::StreamDatasetResponse first;
   if (!reader_->Read(&first)) {
@@ -108,6 +110,9 @@ absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
     const absl::Status status = CloseReader();
     if (cancelled_) return absl::CancelledError("the stream was cancelled");
     if (status.ok()) return false;
+    // Why the lease was lost says more than that it is stale.
+    if (absl::IsAborted(status) && options_.lease != nullptr && !options_.lease->status().ok())
+      return options_.lease->status();
     if (!IsLostServer(status)) return status;
     // Lost after the last batch but before the goodbye: there is nothing left to ask for.
     const uint64_t stop = request_.stop_index() > 0 ? request_.stop_index() : header_.samples();
@@ -123,6 +128,7 @@ absl::Status DatasetStream::Reconnect(absl::Status lost) {
   double backoff_s = kFirstBackoffS;
   while (true) {
     absl::Status status = connection_->ConnectToNext();
+    if (status.ok() && options_.lease != nullptr) status = options_.lease->Follow(connection_);
     if (status.ok()) status = Start();
     if (status.ok()) {
       if (options_.log)

@@ -12,6 +12,7 @@
 
 #include "client/source/batch.h"
 #include "client/source/connection.h"
+#include "client/source/lease_keeper.h"
 
 namespace touchstone::client {
 
@@ -21,6 +22,9 @@ struct DatasetStreamOptions {
   double reconnect_s = 60;
   // Told, from the reading thread, when a server was lost and when the stream goes on.
   std::function<void(const std::string&)> log;
+  // Of a source that needs a lease: its token now, and what keeps it when the stream goes on elsewhere. Null:
+  // none.
+  LeaseKeeper* lease = nullptr;
 };
 
 class DatasetStream {

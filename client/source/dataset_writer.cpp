@@ -172,6 +172,8 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetWriter::OpenStream(uint64_
   DatasetStreamOptions options;
   options.reconnect_s = job_.reconnect_s;
   options.log = on_log;
+  options.lease = job_.lease;
+  request.set_session(job_.session);
   return DatasetStream::Open(connection_, std::move(request), options);
 }
 

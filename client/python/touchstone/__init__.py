@@ -22,13 +22,18 @@ from .errors import (
     TouchstoneError,
 )
 from .images import Camera, ImageOptions, image
+from .lease import Lease
+from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
+from .rig import Rig, TouchCheck
+from .session import Session, touch_id
 from .version import __version__
 
 __all__ = [
     "Batch", "Camera", "Client", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
-    "ImageOptions", "InvalidRequest", "Model", "NotFound", "ObjectInfo", "Parameter", "Refused", "SourceChanged",
-    "SourceFailed", "SourceUnreachable", "SpherePlan", "Touches", "TouchstoneError", "__version__", "connect",
-    "faces", "image", "sphere", "touches",
+    "ImageOptions", "InvalidRequest", "Lease", "Model", "NotFound", "ObjectInfo", "Parameter", "Refused", "Rig", "Row",
+    "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "TouchCheck", "Touches",
+    "TouchstoneError", "__version__", "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches",
+    "write_measurements",
 ]

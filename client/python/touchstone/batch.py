@@ -79,15 +79,17 @@ class Batch(Mapping[str, Any]):
       start_index: index of the first sample.
       rows: number of samples.
       model_hash: of the model that made them; "" if unknown.
+      measured: what a physical source measured of each touch of Client.touch(); empty otherwise.
     """
 
-    __slots__ = ("start_index", "rows", "model_hash", "_columns", "_wire_names")
+    __slots__ = ("start_index", "rows", "model_hash", "measured", "_columns", "_wire_names")
 
     def __init__(self, start_index: int, rows: int, columns: Mapping[str, Column], *, model_hash: str = "",
                  si: bool = False):
         self.start_index = start_index
         self.rows = rows
         self.model_hash = model_hash
+        self.measured: Sequence[types_pb2.Measured] = ()
         # Public name -> name on the wire, as long as the column is not converted yet.
         self._wire_names = {} if si else {units.lab_name(name): name for name in columns}
         self._columns = {name if si else units.lab_name(name): values for name, values in columns.items()}

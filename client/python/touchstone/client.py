@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any, Sequence
+import contextlib
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 
 from . import checks, models, units
 from .batch import Batch
-from .connection import Connection, Targets
+from .connection import Connection, Retry, Targets
 from .dataset import Dataset
-from .errors import InvalidRequest
+from .errors import InvalidRequest, TouchstoneError
 from .images import ImageOptions, Views, image as default_image, to_views
+from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .plans import PlanLike, Touches
+from .rig import Rig
+from .session import Session, check_name
 from .specification import specification
-from .v1 import models_pb2, models_pb2_grpc, source_pb2, source_pb2_grpc
+from .v1 import control_pb2, control_pb2_grpc, models_pb2, models_pb2_grpc, source_pb2, source_pb2_grpc
 
+_CONTROL = control_pb2_grpc.ControlStub
 _SOURCE = source_pb2_grpc.SourceStub
 _MODELS = models_pb2_grpc.ModelsStub
 
@@ -43,6 +48,10 @@ class Client:
     def __init__(self, targets: Targets, *, retry_for_s: float = 60.0):
         self._connection = Connection(targets, checks.number("retry_for_s", retry_for_s))
 
+        self._description: Description | None = None
+        self._leases: list[Lease] = []
+        self.rig = Rig(self)
+
     @property
     def targets(self) -> tuple[str, ...]:
         return self._connection.targets
@@ -67,10 +76,48 @@ class Client:
 
     def describe(self, *, timeout_s: float | None = None, retry_for_s: float | None = None) -> Description:
         """What the source is, its limits, and what it can do."""
-        return Description.from_proto(
+        self._description = Description.from_proto(
             self._connection.call(_SOURCE, "Describe", source_pb2.DescribeRequest(), timeout_s=timeout_s,
                                   retry_for_s=retry_for_s)
         )
+        return self._description
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether the source moves something."""
+        return (self._description or self.describe()).kind == "physical"
+
+    def lease(self, *, take: bool = False) -> Lease:
+        """The right to move the source, for a `with` block; nothing at a source that needs none.
+
+        Touches, pictures and datasets acquire one by themselves for as long as they last. Hold one to keep others out in
+        between.
+
+        Args:
+          take: from whoever holds it; agree with them first.
+        """
+        needed = (self._description or self.describe()).lease_required
+        lease = _Held(self._connection, needed, take, self._leases)
+        return lease
+
+    @contextlib.contextmanager
+    def holding_lease(self) -> Iterator[str]:
+        """The token of the lease that is held, or of one for this block; "" at a source that needs none."""
+        with self._leased() as lease:
+            yield lease.token
+
+    def session(self, name: str = "default", *, take_lease: bool = False) -> Session:
+        """Touches of one session, under ids that make it possible to go on with it. See Session."""
+        return Session(self, name, take_lease)
+
+    def stop(self, reason: str = "") -> int:
+        """Ends every motion now; needs no lease. Not safety-rated. Returns how many touches were under way."""
+        request = control_pb2.StopRequest(reason=reason or f"client.stop() by {lease_holder()}")
+        return self._connection.call(_CONTROL, "Stop", request, timeout_s=5.0, repeat=False).aborted_touches
+
+    def call(self, stub: type, method: str, request: Any, **how: Any) -> Any:
+        """One call of the generated stubs, with this package's errors and retries."""
+        return self._connection.call(stub, method, request, **how)
 
     def objects(self) -> list[ObjectInfo]:
         """The objects that can be touched."""
@@ -117,23 +164,32 @@ class Client:
         return Touches.from_messages(self._connection.call(_SOURCE, "ExpandPlan", request).touches)
 
     def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
-              lease_token: str = "") -> Batch:
+              lease_token: str = "", session: str = "", ids: Sequence[str] | None = None) -> Batch:
         """Touches in the order given, as one session. NaN where a finger reported nothing.
 
         Args:
           start: touch k draws the noise of index start + k.
-          lease_token: for a source that moves something.
+          lease_token: of a lease that is not this client's; by default that of client.lease(), or one for this call
+            where the source needs it.
+          session: that a physical source journals them in.
+          ids: one a touch. A physical source answers an id that the session has from its journal, without motion, so
+            that the call is repeated when the source was lost; without ids it is not.
 
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
-          (N, fingers, 3) `contact_point_mm` and `normal`; (N,) `complete`.
+          (N, fingers, 3) `contact_point_mm` and `normal`; (N,) `complete`. Its attribute `measured` has what a physical
+          source measured, one message a touch (touchstone.v1.Measured).
         """
+        if ids is not None and len(ids) != len(touches):
+            raise InvalidRequest(f"ids has {len(ids)} entries for {len(touches)} touches; give one each.")
+        if session:
+            check_name(session)
         request = source_pb2.TouchRequest(
             object=object, touches=touches.to_messages(), model=model_ref(model), seed=checks.uint64("seed", seed),
-            first_index=checks.uint64("start", start), lease_token=lease_token,
+            first_index=checks.uint64("start", start), lease_token=lease_token, session=session, touch_ids=ids or (),
         )
-        # A touch of a real arm is not repeated without being asked.
-        reply = self._connection.call(_SOURCE, "Touch", request, repeat=not lease_token)
+        with contextlib.nullcontext() if lease_token else self._leased() as lease:
+            reply = self._touch(request, lease)
         columns = {}
         for name, entry in (("descriptor_s", ()), ("contact_time_s", ()), ("travel_m", ()),
                             ("contact_point_m", (3,)), ("normal", (3,))):
@@ -141,7 +197,43 @@ class Client:
             if rows and len(rows[0]):
                 columns[name] = np.array([list(row) for row in rows], float).reshape(len(rows), -1, *entry)
         columns["complete"] = np.array([result.complete for result in reply.results], bool)
-        return Batch(start, len(reply.results), columns, model_hash=reply.model_hash)
+        batch = Batch(start, len(reply.results), columns, model_hash=reply.model_hash)
+        batch.measured = [result.measured for result in reply.results if result.HasField("measured")]
+        return batch
+
+    def _touch(self, request: source_pb2.TouchRequest, lease: Lease | None) -> source_pb2.TouchResponse:
+        if lease is not None:
+            request.lease_token = lease.token
+        if not request.lease_token:
+            return self._connection.call(_SOURCE, "Touch", request)
+        retry = Retry(len(self.targets), self.retry_for_s)
+        again = False
+        while True:
+            try:
+                return self._connection.call(_SOURCE, "Touch", request, repeat=False)
+            except TouchstoneError as error:
+                # A touch of a real arm is not repeated without its id. Asked for again, it may still be under way, or
+                # the lease be that of the process before.
+                passing = error.code == "UNAVAILABLE" or (again and error.code == "ABORTED")
+                if not (passing and request.touch_ids and lease is not None):
+                    if error.code == "ABORTED" and lease is not None:
+                        lease.check()
+                    raise
+                failure = error
+            self._connection.move_on()
+            retry.lost(failure)
+            request.lease_token = lease.follow()
+            again = True
+
+    @contextlib.contextmanager
+    def _leased(self) -> Iterator[Lease]:
+        """The lease that is held, or one for this block."""
+        if self._leases:
+            self._leases[-1].check()
+            yield self._leases[-1]
+            return
+        with self.lease() as lease:
+            yield lease
 
     def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, lease_token: str = "") -> Batch:
         """Photographs: one for each touch (its camera) or each touchstone.Camera.
@@ -149,17 +241,20 @@ class Client:
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
         """
-        request = source_pb2.CaptureRequest(
-            object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=lease_token
-        )
-        reply = self._connection.call(_SOURCE, "Capture", request, repeat=not lease_token)
+        with contextlib.ExitStack() as stack:
+            token = lease_token or stack.enter_context(self.holding_lease())
+            request = source_pb2.CaptureRequest(
+                object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=token
+            )
+            reply = self._connection.call(_SOURCE, "Capture", request, repeat=not token)
         return Batch.from_columns(0, reply.rows, reply.columns)
 
     def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
                 image: ImageOptions | None = None, most_draws: int = 0, batch_size: int | None = None,
-                start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab") -> Dataset:
+                start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab",
+                session: str = "") -> Dataset:
         """A dataset to iterate over; sample i is the same bits whoever asks, however it is cut into batches.
 
         Args:
@@ -179,6 +274,7 @@ class Client:
           stride: of every `stride` batches the first is delivered: worker w of W takes
             start=w * batch_size, stride=W.
           units: "lab" (mm, us, deg, mm/s), or "si": the wire's own columns (descriptor_s, ...), never copied.
+          session: that a physical source journals the touches in.
         """
         si = bool(checks.choice("units", units, {"lab": 0, "si": 1}))
         spec = specification(
@@ -186,4 +282,21 @@ class Client:
             touch_interval_s=touch_interval_s, columns=columns, image=image, most_draws=most_draws,
         )
         # A connection of its own: losing one stream must not close another's channel.
-        return Dataset(self._connection.another(), spec, batch_size=batch_size, start=start, stop=stop, stride=stride, si=si)
+        return Dataset(
+            self._connection.another(), spec, batch_size=batch_size, start=start, stop=stop, stride=stride, si=si,
+            hold_lease=self.holding_lease, session=check_name(session) if session else "",
+        )
+
+
+class _Held(Lease):
+    """A lease that the client's own requests carry while it is held."""
+
+    def __init__(self, connection: Connection, needed: bool, take: bool, held: list[Lease]):
+        super().__init__(connection, needed, take)
+        self._held = held
+        held.append(self)
+
+    def release(self) -> None:
+        if self in self._held:
+            self._held.remove(self)
+        super().release()

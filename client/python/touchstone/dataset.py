@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import warnings
-from typing import Iterator, Mapping
+from typing import Callable, ContextManager, Iterator, Mapping
 
 import grpc
 
@@ -86,7 +87,10 @@ class Dataset:
     """
 
     def __init__(self, connection: Connection, spec: source_pb2.DatasetSpec, *, batch_size: int | None = None,
-                 start: int = 0, stop: int | None = None, stride: int = 1, si: bool = False):
+                 start: int = 0, stop: int | None = None, stride: int = 1, si: bool = False,
+                 hold_lease: Callable[[], ContextManager[str]] = lambda: contextlib.nullcontext(""),
+                 session: str = ""):
+        """`hold_lease`: holds what the source wants to be held while it makes samples, and tells the token."""
         self.spec = spec
         self.batch_size = resolve_batch_size(spec, batch_size)
         self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
@@ -94,6 +98,8 @@ class Dataset:
         self.stride = checks.whole_number("stride", stride, 1, 2**32 - 1)
         self._connection = connection
         self._si = si
+        self._hold_lease = hold_lease
+        self._session = session
         self._header: source_pb2.DatasetHeader | None = None
 
     def __len__(self) -> int:
@@ -109,17 +115,24 @@ class Dataset:
     def raw_header(self) -> source_pb2.DatasetHeader:
         """The header as a message, SI."""
         retry = self._retry()
-        while self._header is None:
-            call = self._open(0)
-            try:
-                self._accept(next(call).header)
-            except grpc.RpcError as error:
-                self._lost(error, retry)
-            finally:
-                call.cancel()
+        if self._header is not None:
+            return self._header
+        with self._hold_lease() as token:
+            while self._header is None:
+                call = self._open(0, token)
+                try:
+                    self._accept(next(call).header)
+                except grpc.RpcError as error:
+                    self._lost(error, retry)
+                finally:
+                    call.cancel()
         return self._header
 
     def __iter__(self) -> Iterator[Batch]:
+        with self._hold_lease() as token:
+            yield from self._batches(token)
+
+    def _batches(self, token: str) -> Iterator[Batch]:
         next_index, step = self.start, self.batch_size * self.stride
         retry = self._retry()
         call = None
@@ -127,7 +140,7 @@ class Dataset:
             while next_index < self.stop:
                 try:
                     if call is None:
-                        call = self._open(next_index)
+                        call = self._open(next_index, token)
                         self._accept(next(call).header)
                     message = next(call).batch
                 except grpc.RpcError as error:
@@ -159,10 +172,10 @@ class Dataset:
     def _retry(self) -> Retry:
         return Retry(len(self._connection.targets), self._connection.retry_for_s)
 
-    def _open(self, index: int):
+    def _open(self, index: int, token: str):
         request = source_pb2.StreamDatasetRequest(
             spec=self.spec, start_index=index, stop_index=self.stop, batch_size=self.batch_size,
-            batch_stride=self.stride,
+            batch_stride=self.stride, lease_token=token, session=self._session,
         )
         if self._header is not None:
             # The source's own choice of a renderer must not change in mid-stream.

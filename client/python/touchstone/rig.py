@@ -1,0 +1,89 @@
+"""What only a physical source has: an arm, an end effector, a camera, and an object that somebody put down."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Callable, Sequence
+
+from . import checks
+from .measurements import Row
+from .plans import Touches
+from .v1 import rig_pb2, rig_pb2_grpc
+
+if TYPE_CHECKING:
+    from .client import Client
+
+_RIG = rig_pb2_grpc.RigStub
+_FACES = {face: face for face in ("+x", "-x", "+y", "-y", "+z", "-z")}
+_CHECKS_A_REQUEST = 100
+
+
+@dataclasses.dataclass(frozen=True)
+class TouchCheck:
+    """Whether a touch is possible; if not, `reason` tells why. `placement` is the face that must point up."""
+
+    possible: bool
+    reason: str
+    placement: str
+    duration_s: float
+
+
+def _ask(object: str, placement: str) -> None:
+    input(f"Put {object} on the fixture with its face {placement} up, then press Enter. ")
+
+
+class Rig:
+    """Client.rig. Moving needs a lease, which is acquired where no `with client.lease()` holds one."""
+
+    def __init__(self, client: Client):
+        self._client = client
+
+    def status(self) -> rig_pb2.RigState:
+        """How every part is, now: the message of proto/touchstone/v1/rig.proto, SI units."""
+        return self._client.call(_RIG, "GetRig", rig_pb2.GetRigRequest())
+
+    def stop(self, reason: str = "") -> int:
+        """Stops every motion now; needs no lease. A software stop: not safety-rated. Returns the touches aborted."""
+        return self._client.stop(reason)
+
+    def home(self) -> rig_pb2.RigState:
+        """Backs the tool out along its own axis and goes to the home joints."""
+        with self._client.holding_lease() as token:
+            return self._client.call(_RIG, "Home", rig_pb2.HomeRequest(lease_token=token), repeat=False)
+
+    def mount(self, object: str, placement: str = "+z") -> rig_pb2.RigState:
+        """Says which object lies on the fixture with which face up; where the rig changes it by itself, it does."""
+        checks.choice("placement", placement, _FACES)
+        with self._client.holding_lease() as token:
+            request = rig_pb2.MountObjectRequest(object=object, placement=placement, lease_token=token)
+            return self._client.call(_RIG, "MountObject", request, repeat=False)
+
+    def prepare(self, object: str, placement: str, ask: Callable[[str, str], None] = _ask) -> None:
+        """mount(), if it does not lie so; where a person must put it down, ask(object, placement) first."""
+        state = self.status()
+        if (state.object, state.placement) == (object, placement):
+            return
+        if not state.mounts_itself:
+            ask(object, placement)
+        self.mount(object, placement)
+
+    def check(self, object: str, touches: Touches) -> list[TouchCheck]:
+        """Every check that these touches pass before anything moves, without motion."""
+        messages, result = touches.to_messages(), []
+        for first in range(0, len(messages), _CHECKS_A_REQUEST):
+            request = rig_pb2.CheckTouchesRequest(object=object, touches=messages[first:first + _CHECKS_A_REQUEST])
+            reply = self._client.call(_RIG, "CheckTouches", request)
+            result += [TouchCheck(c.possible, c.reason, c.placement, c.duration_s) for c in reply.checks]
+        return result
+
+    def groups(self, rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
+        """The rows that are possible, by (object, placement), in the order of the plan; what lies there comes first."""
+        groups: dict[tuple[str, str], list[Row]] = {}
+        for row in rows:
+            [check] = self.check(row.object, row.command)
+            if check.possible:
+                groups.setdefault((row.object, check.placement), []).append(row)
+        state = self.status()
+        objects = list(dict.fromkeys(row.object for row in rows))
+        rank = lambda key: (key[0] != state.object, objects.index(key[0]), key != (state.object, state.placement))
+        return {key: groups[key] for key in sorted(groups, key=rank)}

@@ -1,0 +1,194 @@
+#include "client/source/lease_keeper.h"
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "server/base/status.h"
+
+namespace touchstone::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kRenewalsAWindow = 5;
+constexpr double kShortestAnswerS = 0.5;  // what a call to a busy source gets at the least
+constexpr double kAcquireS = 10;
+
+Clock::duration Seconds(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+// One unary call that ends within `seconds`.
+template <typename Request, typename Response>
+absl::StatusOr<Response> CallWithin(double seconds,
+                                    grpc::Status (v1::Control::Stub::*method)(grpc::ClientContext*,
+                                                                              const Request&, Response*),
+                                    v1::Control::Stub* control, const Request& request) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() +
+                       std::chrono::microseconds(static_cast<int64_t>(seconds * 1e6)));
+  Response response;
+  TOUCHSTONE_RETURN_IF_ERROR(FromGrpc((control->*method)(&context, request, &response)));
+  return response;
+}
+
+}  // namespace
+
+std::string LeaseHolder() {
+  char host[256] = "";
+  ::gethostname(host, sizeof host - 1);
+  const char* user = std::getenv("USER");
+  if (user == nullptr || *user == '\0') user = std::getenv("LOGNAME");
+  const std::string who = user != nullptr && *user != '\0' ? user : absl::StrCat("uid", ::getuid());
+  return absl::StrCat(who, "@", host[0] != '\0' ? host : "localhost").substr(0, 256);
+}
+
+absl::StatusOr<std::unique_ptr<LeaseKeeper>> LeaseKeeper::Acquire(Connection* connection,
+                                                                  const v1::DescribeResponse& source,
+                                                                  LeaseOptions options) {
+  if (options.holder.empty()) options.holder = LeaseHolder();
+  std::unique_ptr<LeaseKeeper> keeper(new LeaseKeeper(std::move(options), source.lease_required()));
+  if (!keeper->required_) return keeper;
+  keeper->control_ = v1::Control::NewStub(connection->channel());
+  TOUCHSTONE_RETURN_IF_ERROR(keeper->AcquireNow(keeper->control_.get(), keeper->options_.take));
+  keeper->thread_ = std::thread(&LeaseKeeper::Run, keeper.get());
+  return keeper;
+}
+
+LeaseKeeper::~LeaseKeeper() {
+  if (!thread_.joinable()) return;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  if (!status_.ok()) return;
+  v1::ReleaseLeaseRequest request;
+  request.set_token(lease_.token());
+  // Unanswered, it runs out by itself.
+  CallWithin(std::max(lease_.window_s(), kShortestAnswerS), &v1::Control::Stub::ReleaseLease, control_.get(),
+             request)
+      .status()
+      .IgnoreError();
+}
+
+std::string LeaseKeeper::token() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return lease_.token();
+}
+
+absl::Status LeaseKeeper::status() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return status_;
+}
+
+absl::Status LeaseKeeper::AcquireNow(v1::Control::Stub* control, bool take) {
+  v1::AcquireLeaseRequest request;
+  request.set_holder(options_.holder);
+  request.set_take(take);
+  const absl::StatusOr<v1::Lease> lease =
+      CallWithin(kAcquireS, &v1::Control::Stub::AcquireLease, control, request);
+  if (absl::IsFailedPrecondition(lease.status())) {
+    const absl::StatusOr<v1::State> state =
+        CallWithin(kAcquireS, &v1::Control::Stub::GetState, control, v1::GetStateRequest());
+    if (!state.ok() || state->lease_holder().empty()) return lease.status();
+    return absl::FailedPreconditionError(absl::StrCat(
+        "'", state->lease_holder(), "' holds the lease of this source (epoch ", state->lease_epoch(),
+        "): wait until they are done, or take it from them with --take-lease"));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(lease.status());
+  std::lock_guard<std::mutex> lock(mutex_);
+  lease_ = *lease;
+  status_ = absl::OkStatus();
+  return absl::OkStatus();
+}
+
+absl::Status LeaseKeeper::Follow(Connection* connection) {
+  if (!required_) return absl::OkStatus();
+  const std::shared_ptr<v1::Control::Stub> control = v1::Control::NewStub(connection->channel());
+  v1::RenewLeaseRequest request;
+  request.set_token(token());
+  const absl::StatusOr<v1::Lease> renewed =
+      CallWithin(kAcquireS, &v1::Control::Stub::RenewLease, control.get(), request);
+  if (renewed.ok()) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    lease_ = *renewed;
+    status_ = absl::OkStatus();
+  } else {
+    if (!absl::IsAborted(renewed.status())) return renewed.status();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state, CallWithin(kAcquireS, &v1::Control::Stub::GetState,
+                                                                  control.get(), v1::GetStateRequest()));
+    if (state.state() == "stopped")
+      return absl::FailedPreconditionError(
+          "somebody stopped the source while the lease was lost: make sure that it may move, then run the "
+          "same "
+          "command again");
+    TOUCHSTONE_RETURN_IF_ERROR(AcquireNow(control.get(), false));
+  }
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    control_ = control;
+  }
+  changed_.notify_all();
+  return absl::OkStatus();
+}
+
+// What people need to know: who has it now.
+absl::Status LeaseKeeper::Lost(v1::Control::Stub* control, const absl::Status& why) const {
+  if (!absl::IsAborted(why))
+    return absl::AbortedError(
+        absl::StrCat("the lease ran out, because the source did not answer: ", why.message()));
+  const absl::StatusOr<v1::State> state =
+      CallWithin(kShortestAnswerS, &v1::Control::Stub::GetState, control, v1::GetStateRequest());
+  if (state.ok() && !state->lease_holder().empty())
+    return absl::AbortedError(absl::StrCat("'", state->lease_holder(), "' took the lease (epoch ",
+                                           state->lease_epoch(),
+                                           "); agree with them, then run the same command again to go on"));
+  return absl::AbortedError(absl::StrCat("the lease was lost: ", why.message()));
+}
+
+void LeaseKeeper::Run() {
+  Clock::time_point renewed_at = Clock::now();
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!ending_) {
+    const double window_s = std::max(lease_.window_s(), 0.01);
+    const std::string token = lease_.token();
+    if (!status_.ok()) {
+      // Lost: until Follow finds another one.
+      changed_.wait(lock, [&] { return ending_ || status_.ok(); });
+      renewed_at = Clock::now();
+      continue;
+    }
+    if (changed_.wait_for(lock, Seconds(window_s / kRenewalsAWindow),
+                          [&] { return ending_ || lease_.token() != token; })) {
+      renewed_at = Clock::now();
+      continue;
+    }
+    const std::shared_ptr<v1::Control::Stub> control = control_;
+    lock.unlock();
+    const Clock::time_point asked_at = Clock::now();
+    v1::RenewLeaseRequest request;
+    request.set_token(token);
+    absl::Status status = CallWithin(std::max(window_s / 2, kShortestAnswerS), &v1::Control::Stub::RenewLease,
+                                     control.get(), request)
+                              .status();
+    // A source that is not to be reached may be there again before the window is over.
+    if (status.ok()) renewed_at = asked_at;
+    const bool over =
+        absl::IsAborted(status) || (!status.ok() && Clock::now() - renewed_at > Seconds(window_s));
+    if (over) status = Lost(control.get(), status);
+    lock.lock();
+    if (!over || ending_ || lease_.token() != token) continue;
+    status_ = status;
+    if (!options_.on_lost) continue;
+    lock.unlock();
+    options_.on_lost(status);
+    lock.lock();
+  }
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,305 @@
+// Leases of the virtual source in this process, which grants them like a rig, and of a source made here.
+#include "client/source/lease_keeper.h"
+
+#include <gmock/gmock.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+
+#include "client/source/leased_source.h"
+
+namespace touchstone::client {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+template <typename Done>
+bool Eventually(Done done) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+class LeaseKeeperTest : public ::testing::Test {
+ protected:
+  LeaseKeeperTest() {
+    auto connection = Connection::Open({});
+    EXPECT_TRUE(connection.ok()) << connection.status();
+    connection_ = *std::move(connection);
+    needs_lease_.set_lease_required(true);
+  }
+  v1::State State() {
+    return *Connection::Call(&v1::Control::Stub::GetState, connection_->control(), v1::GetStateRequest());
+  }
+  absl::StatusOr<std::unique_ptr<LeaseKeeper>> Acquire(const std::string& holder, bool take = false) {
+    LeaseOptions options;
+    options.holder = holder;
+    options.take = take;
+    return LeaseKeeper::Acquire(connection_.get(), needs_lease_, options);
+  }
+
+  std::unique_ptr<Connection> connection_;
+  v1::DescribeResponse needs_lease_;
+};
+
+TEST_F(LeaseKeeperTest, DoesNothingAtASourceThatNeedsNone) {
+  const auto source =
+      Connection::Call(&v1::Source::Stub::Describe, connection_->source(), v1::DescribeRequest());
+  ASSERT_TRUE(source.ok());
+  const auto keeper = LeaseKeeper::Acquire(connection_.get(), *source);
+  ASSERT_TRUE(keeper.ok()) << keeper.status();
+  EXPECT_FALSE((*keeper)->required());
+  EXPECT_EQ((*keeper)->token(), "");
+  EXPECT_TRUE((*keeper)->status().ok());
+  EXPECT_TRUE((*keeper)->Follow(connection_.get()).ok());
+  EXPECT_EQ(State().lease_epoch(), 0u);
+}
+
+TEST_F(LeaseKeeperTest, HoldsTheLeaseUntilItGoes) {
+  {
+    const auto keeper = Acquire("ana@bench2");
+    ASSERT_TRUE(keeper.ok()) << keeper.status();
+    EXPECT_NE((*keeper)->token(), "");
+    EXPECT_EQ(State().lease_holder(), "ana@bench2");
+  }
+  EXPECT_EQ(State().lease_holder(), "") << "given back, not left to run out";
+}
+
+TEST_F(LeaseKeeperTest, RefusesTellWhoHoldsItAndHowToTakeIt) {
+  const auto ana = Acquire("ana@bench2");
+  ASSERT_TRUE(ana.ok());
+  const auto ben = Acquire("ben@desk");
+  EXPECT_EQ(ben.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(ben.status().message()), AllOf(HasSubstr("ana@bench2"), HasSubstr("--take-lease")));
+}
+
+TEST_F(LeaseKeeperTest, TellsItsHolderWhoTookTheLease) {
+  std::atomic<int> told{0};
+  LeaseOptions options;
+  options.holder = "ana@bench2";
+  options.on_lost = [&](const absl::Status&) { ++told; };
+  const auto ana = LeaseKeeper::Acquire(connection_.get(), needs_lease_, options);
+  ASSERT_TRUE(ana.ok());
+  const auto ben = Acquire("ben@desk", true);
+  ASSERT_TRUE(ben.ok()) << ben.status();
+  ASSERT_TRUE(Eventually([&] { return told > 0; }));
+  EXPECT_EQ((*ana)->status().code(), absl::StatusCode::kAborted);
+  EXPECT_THAT(std::string((*ana)->status().message()), HasSubstr("ben@desk"));
+  EXPECT_EQ(told, 1);
+  // It does not come back by itself, and does not take it back either.
+  const absl::Status follow = (*ana)->Follow(connection_.get());
+  EXPECT_EQ(follow.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(follow.message()), HasSubstr("ben@desk"));
+  EXPECT_EQ(State().lease_holder(), "ben@desk");
+}
+
+TEST_F(LeaseKeeperTest, FollowsToANewLeaseOnceTheOldOneIsFree) {
+  const auto ana = Acquire("ana@bench2");
+  ASSERT_TRUE(ana.ok());
+  const std::string before = (*ana)->token();
+  v1::ReleaseLeaseRequest release;
+  release.set_token(before);
+  ASSERT_TRUE(Connection::Call(&v1::Control::Stub::ReleaseLease, connection_->control(), release).ok());
+  ASSERT_TRUE(Eventually([&] { return !(*ana)->status().ok(); }));
+  ASSERT_TRUE((*ana)->Follow(connection_.get()).ok());
+  EXPECT_TRUE((*ana)->status().ok());
+  EXPECT_NE((*ana)->token(), before);
+  EXPECT_EQ(State().lease_holder(), "ana@bench2");
+}
+
+// A source that wants a lease, with a window so short that renewals are many, and that fails where it is told
+// to.
+class FakeRig : public v1::Control::Service {
+ public:
+  class Touches : public v1::Source::Service {
+   public:
+    explicit Touches(FakeRig* rig) : rig_(rig) {}
+    grpc::Status Describe(grpc::ServerContext*, const v1::DescribeRequest*,
+                          v1::DescribeResponse* response) override {
+      response->set_kind("physical");
+      response->set_lease_required(true);
+      response->set_most_touches_per_request(100);
+      return grpc::Status::OK;
+    }
+    grpc::Status Touch(grpc::ServerContext* context, const v1::TouchRequest* request,
+                       v1::TouchResponse* response) override {
+      rig_->touch_tokens.push_back(request->lease_token());
+      rig_->touch_ids.push_back(request->touch_ids_size() > 0 ? request->touch_ids(0) : "");
+      if (rig_->failures-- > 0) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "the arm is not there");
+      rig_->touching = true;
+      while (rig_->hold && !rig_->stopped) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (rig_->stopped) return grpc::Status(grpc::StatusCode::ABORTED, "stopped");
+      response->add_results();
+      return grpc::Status::OK;
+    }
+
+   private:
+    FakeRig* rig_;
+  };
+
+  FakeRig() : touches_(this) {
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
+    builder.RegisterService(this);
+    builder.RegisterService(&touches_);
+    server_ = builder.BuildAndStart();
+  }
+  ~FakeRig() override { server_->Shutdown(std::chrono::system_clock::now()); }
+
+  grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request,
+                            v1::Lease* lease) override {
+    lease->set_token("token" + std::to_string(++acquired));
+    lease->set_holder(request->holder());
+    lease->set_window_s(window_s);
+    return grpc::Status::OK;
+  }
+  grpc::Status RenewLease(grpc::ServerContext*, const v1::RenewLeaseRequest* request,
+                          v1::Lease* lease) override {
+    ++renewed;
+    if (silent) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "unplugged");
+    if (stale) return grpc::Status(grpc::StatusCode::ABORTED, "stale");
+    lease->set_token(request->token());
+    lease->set_window_s(window_s);
+    return grpc::Status::OK;
+  }
+  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*,
+                            v1::ReleaseLeaseResponse*) override {
+    ++released;
+    return grpc::Status::OK;
+  }
+  grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State* state) override {
+    state->set_state(stopped ? "stopped" : "idle");
+    return grpc::Status::OK;
+  }
+  grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest* request, v1::StopResponse*) override {
+    stop_reason = request->reason();
+    stopped = true;
+    return grpc::Status::OK;
+  }
+
+  std::unique_ptr<Connection> Connect() const {
+    ConnectionOptions options;
+    options.servers = {"127.0.0.1:" + std::to_string(port_)};
+    auto connection = Connection::Open(options);
+    EXPECT_TRUE(connection.ok()) << connection.status();
+    return *std::move(connection);
+  }
+
+  double window_s = 0.05;
+  std::atomic<int> acquired{0}, renewed{0}, released{0}, failures{0};
+  std::atomic<bool> silent{false}, stale{false}, stopped{false}, hold{false}, touching{false};
+  std::string stop_reason;
+  std::vector<std::string> touch_tokens, touch_ids;
+
+ private:
+  Touches touches_;
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+v1::TouchRequest OneTouch(const std::string& id) {
+  v1::TouchRequest request;
+  request.set_object("lat20");
+  request.add_touches();
+  if (!id.empty()) request.add_touch_ids(id);
+  return request;
+}
+
+TEST(LeaseKeeper, RenewsAsLongAsItLives) {
+  FakeRig rig;
+  const auto connection = rig.Connect();
+  v1::DescribeResponse source;
+  source.set_lease_required(true);
+  {
+    const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
+    ASSERT_TRUE(keeper.ok());
+    EXPECT_TRUE(Eventually([&] { return rig.renewed >= 10; }));
+    EXPECT_EQ(rig.acquired, 1);
+  }
+  EXPECT_EQ(rig.released, 1);
+}
+
+TEST(LeaseKeeper, IsLostWhenTheSourceStaysSilentForTheWindow) {
+  FakeRig rig;
+  const auto connection = rig.Connect();
+  v1::DescribeResponse source;
+  source.set_lease_required(true);
+  const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
+  ASSERT_TRUE(keeper.ok());
+  rig.silent = true;
+  ASSERT_TRUE(Eventually([&] { return !(*keeper)->status().ok(); }));
+  EXPECT_THAT(std::string((*keeper)->status().message()), HasSubstr("did not answer"));
+  rig.silent = false;
+  EXPECT_TRUE((*keeper)->Follow(connection.get()).ok());
+  EXPECT_TRUE((*keeper)->status().ok());
+  EXPECT_EQ(rig.acquired, 1) << "the old lease stands";
+}
+
+TEST(LeaseKeeper, NeverEndsAStopThatSomebodyElseCalled) {
+  FakeRig rig;
+  const auto connection = rig.Connect();
+  v1::DescribeResponse source;
+  source.set_lease_required(true);
+  const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
+  ASSERT_TRUE(keeper.ok());
+  rig.stale = true;
+  rig.stopped = true;
+  ASSERT_TRUE(Eventually([&] { return !(*keeper)->status().ok(); }));
+  EXPECT_EQ((*keeper)->Follow(connection.get()).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(rig.acquired, 1);
+}
+
+TEST(LeasedSource, AsksForTheSameTouchAgainAfterALoss) {
+  FakeRig rig;
+  rig.window_s = 30;
+  const auto connection = rig.Connect();
+  const auto source = LeasedSource::Open(connection.get());
+  ASSERT_TRUE(source.ok()) << source.status();
+  EXPECT_EQ((*source)->touches_a_request(), 1u);
+  rig.failures = 2;
+  const auto response = (*source)->Touch(OneTouch("monday/lat20/7"));
+  ASSERT_TRUE(response.ok()) << response.status();
+  EXPECT_EQ(rig.touch_ids, std::vector<std::string>(3, "monday/lat20/7"));
+  EXPECT_EQ(rig.touch_tokens, std::vector<std::string>(3, "token1"));
+}
+
+TEST(LeasedSource, NeverRepeatsATouchWithoutAnId) {
+  FakeRig rig;
+  rig.window_s = 30;
+  const auto connection = rig.Connect();
+  const auto source = LeasedSource::Open(connection.get());
+  ASSERT_TRUE(source.ok());
+  rig.failures = 1;
+  EXPECT_EQ((*source)->Touch(OneTouch("")).status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(rig.touch_ids.size(), 1u);
+}
+
+TEST(LeasedSource, StopsTheMotionWhenItIsInterrupted) {
+  FakeRig rig;
+  rig.window_s = 30;
+  rig.hold = true;
+  const auto connection = rig.Connect();
+  const auto source = LeasedSource::Open(connection.get());
+  ASSERT_TRUE(source.ok());
+  std::thread signal([&] {
+    Eventually([&] { return rig.touching.load(); });
+    (*source)->Interrupt("Ctrl-C");
+  });
+  const auto response = (*source)->Touch(OneTouch("a"));
+  signal.join();
+  EXPECT_EQ(response.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_TRUE(rig.stopped);
+  EXPECT_EQ(rig.stop_reason, "Ctrl-C");
+  EXPECT_EQ((*source)->Touch(OneTouch("b")).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(rig.touch_ids.size(), 1u) << "nothing is asked for after the interruption";
+}
+
+}  // namespace
+}  // namespace touchstone::client

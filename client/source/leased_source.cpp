@@ -1,0 +1,159 @@
+#include "client/source/leased_source.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "server/base/status.h"
+
+namespace touchstone::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFirstBackoffS = 0.1;
+constexpr double kLongestBackoffS = 3;
+constexpr std::chrono::seconds kStopAnswer{2};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<LeasedSource>> LeasedSource::Open(Connection* connection,
+                                                                 LeasedSourceOptions options) {
+  std::unique_ptr<LeasedSource> source(new LeasedSource(connection, std::move(options)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      source->description_,
+      Connection::Call(&v1::Source::Stub::Describe, connection->source(), v1::DescribeRequest()));
+  source->channel_ = connection->channel();
+  LeaseOptions lease;
+  lease.take = source->options_.take_lease;
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->lease_,
+                              LeaseKeeper::Acquire(connection, source->description_, std::move(lease)));
+  return source;
+}
+
+size_t LeasedSource::touches_a_request() const {
+  return physical() ? 1 : std::max<uint32_t>(1, description_.most_touches_per_request());
+}
+
+template <typename Stub, typename Request, typename Response>
+absl::StatusOr<Response> LeasedSource::Call(Stub& stub,
+                                            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                                         Response*),
+                                            Request* request) {
+  if (lease_->required()) request->set_lease_token(lease_->token());
+  grpc::ClientContext context;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (interrupted_) return absl::CancelledError("interrupted");
+    running_ = &context;
+  }
+  Response response;
+  absl::Status status = FromGrpc((stub.*method)(&context, *request, &response));
+  std::lock_guard<std::mutex> lock(mutex_);
+  running_ = nullptr;
+  if (interrupted_) return absl::CancelledError("interrupted");
+  // Why the lease was lost says more than that it is stale.
+  if (absl::IsAborted(status) && !lease_->status().ok()) status = lease_->status();
+  if (!status.ok()) return status;
+  return response;
+}
+
+absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) {
+  const Clock::time_point start = Clock::now();
+  double backoff_s = kFirstBackoffS;
+  bool again = false;
+  while (true) {
+    absl::StatusOr<v1::TouchResponse> response =
+        Call(connection_->source(), &v1::Source::Stub::Touch, &request);
+    const int results = response.ok() ? response->results_size() : request.touches_size();
+    if (results != request.touches_size())
+      return absl::InternalError(
+          absl::StrCat("the source gave ", results, " results for ", request.touches_size(), " touches"));
+    // Asked for again, the touch may still be under way, or the lease that of the process before.
+    const bool passing = IsLostServer(response.status()) || (again && absl::IsAborted(response.status()));
+    if (response.ok() || !passing) return response;
+    if (connection_->embedded() || request.touch_ids().empty()) return response;
+    if (Clock::now() - start > std::chrono::duration<double>(options_.reconnect_s)) return response;
+    if (options_.log)
+      options_.log(absl::StrCat(connection_->address(), ": ", response.status().message(),
+                                "; the same touch is asked for again"));
+    TOUCHSTONE_RETURN_IF_ERROR(SleepFor(backoff_s));
+    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+    again = true;
+    const absl::Status found = FindAgain();
+    if (!found.ok() && !IsLostServer(found)) return found;
+  }
+}
+
+absl::StatusOr<v1::CaptureResponse> LeasedSource::Capture(v1::CaptureRequest request) {
+  return Call(connection_->source(), &v1::Source::Stub::Capture, &request);
+}
+
+absl::StatusOr<v1::RigState> LeasedSource::Mount(const std::string& object, const std::string& placement) {
+  v1::MountObjectRequest request;
+  request.set_object(object);
+  request.set_placement(placement);
+  return Call(connection_->rig(), &v1::Rig::Stub::MountObject, &request);
+}
+
+absl::StatusOr<v1::RigState> LeasedSource::Home() {
+  v1::HomeRequest request;
+  return Call(connection_->rig(), &v1::Rig::Stub::Home, &request);
+}
+
+// The next server that answers must be the same kind of source; the lease goes along.
+absl::Status LeasedSource::FindAgain() {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
+  v1::State state;
+  // A part of the rig may have failed while the gateway is there.
+  const bool there = connection_->control().GetState(&context, v1::GetStateRequest(), &state).ok();
+  if (!there) TOUCHSTONE_RETURN_IF_ERROR(connection_->ConnectToNext());
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    channel_ = connection_->channel();
+  }
+  if (there && state.state() == "stopped")
+    return absl::FailedPreconditionError(
+        "somebody stopped the source: make sure that it may move, then run the same command again");
+  return lease_->Follow(connection_);
+}
+
+absl::Status LeasedSource::SleepFor(double seconds) {
+  const Clock::time_point wake = Clock::now() + std::chrono::milliseconds(static_cast<int>(seconds * 1000));
+  while (Clock::now() < wake) {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (interrupted_) return absl::CancelledError("interrupted");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return absl::OkStatus();
+}
+
+void LeasedSource::Interrupt(const std::string& reason) {
+  std::shared_ptr<grpc::Channel> channel;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    interrupted_ = true;
+    channel = channel_;
+  }
+  if (physical()) {
+    // Before anything else: what moves stops.
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
+    v1::StopRequest request;
+    request.set_reason(reason);
+    v1::StopResponse response;
+    const grpc::Status stopped = v1::Control::NewStub(channel)->Stop(&context, request, &response);
+    if (!stopped.ok() && options_.log)
+      options_.log(absl::StrCat("STOP DID NOT REACH THE SOURCE: ", stopped.error_message(),
+                                "; use the emergency stop if anything moves"));
+  }
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (running_ != nullptr) running_->TryCancel();
+}
+
+}  // namespace touchstone::client

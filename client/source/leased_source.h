@@ -1,0 +1,69 @@
+// A source as the commands that touch and photograph use it: with a lease where it needs one, with ids, and
+// with the patience to go on when it was lost. A virtual source and a physical one look the same from here.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "client/source/connection.h"
+#include "client/source/lease_keeper.h"
+
+namespace touchstone::client {
+
+struct LeasedSourceOptions {
+  bool take_lease = false;
+  // How long a lost source is looked for before a touch fails with UNAVAILABLE.
+  double reconnect_s = 60;
+  // Told when a source was lost, found again, or lost its lease.
+  std::function<void(const std::string&)> log;
+};
+
+class LeasedSource {
+ public:
+  // `connection` must outlive it.
+  static absl::StatusOr<std::unique_ptr<LeasedSource>> Open(Connection* connection,
+                                                            LeasedSourceOptions options = {});
+
+  const v1::DescribeResponse& description() const { return description_; }
+  bool physical() const { return description_.kind() == "physical"; }
+  // Touches to send in one request: one where each takes seconds, so that each is seen when it is done.
+  size_t touches_a_request() const;
+
+  // With the lease. A request with touch ids is repeated with the same ids when the source was lost, within
+  // reconnect_s; one without is not, since nobody knows which touches were made.
+  absl::StatusOr<v1::TouchResponse> Touch(v1::TouchRequest request);
+  absl::StatusOr<v1::CaptureResponse> Capture(v1::CaptureRequest request);
+  absl::StatusOr<v1::RigState> Mount(const std::string& object, const std::string& placement);
+  absl::StatusOr<v1::RigState> Home();
+  LeaseKeeper* lease() { return lease_.get(); }
+
+  // Ends what is under way: at a physical source Control.Stop first. Safe from any thread; what runs returns
+  // CANCELLED.
+  void Interrupt(const std::string& reason);
+
+ private:
+  LeasedSource(Connection* connection, LeasedSourceOptions options)
+      : connection_(connection), options_(std::move(options)) {}
+  // One call that Interrupt ends; the lease's own error where the lease was lost.
+  template <typename Stub, typename Request, typename Response>
+  absl::StatusOr<Response> Call(Stub& stub,
+                                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                                Request* request);
+  absl::Status FindAgain();
+  absl::Status SleepFor(double seconds);
+
+  Connection* connection_;
+  LeasedSourceOptions options_;
+  v1::DescribeResponse description_;
+  std::unique_ptr<LeaseKeeper> lease_;
+  std::mutex mutex_;  // guards what Interrupt uses
+  bool interrupted_ = false;
+  grpc::ClientContext* running_ = nullptr;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+}  // namespace touchstone::client
