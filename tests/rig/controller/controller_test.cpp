@@ -1,0 +1,174 @@
+#include "tests/rig/controller.h"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/rig/controller/test_client.h"
+
+namespace touchstone::rig {
+namespace {
+
+// A surface that a single finger meets: how far below z the tip is pushed.
+class Surface : public TipListener {
+ public:
+  explicit Surface(double height_m) : height_m_(height_m) {}
+  void OnMotionBegan(const StraightMotion& motion) override {
+    motion_ = motion;
+    ++begun;
+  }
+  double OnProgress(uint64_t number, double now_s, double distance_m,
+                    const std::function<double(double)>& distance_at) override {
+    EXPECT_EQ(number, motion_.number);
+    EXPECT_NEAR(distance_at(now_s), distance_m, 1e-12);
+    EXPECT_GE(distance_m, 0);
+    const double length = (motion_.to.translation() - motion_.from.translation()).norm();
+    const double slope =
+        length > 0 ? (motion_.to.translation().z() - motion_.from.translation().z()) / length : 0;
+    return height_m_ - (motion_.from.translation().z() + slope * distance_m);
+  }
+  void OnMotionEnded(uint64_t number, double) override {
+    EXPECT_EQ(number, motion_.number);
+    ++ended;
+  }
+  std::atomic<int> begun{0}, ended{0};
+
+ private:
+  double height_m_;
+  StraightMotion motion_;
+};
+
+constexpr char kTouch[] = R"(def touch_7():
+  rtde_set_watchdog("input_int_register_24", 10.0, "stop")
+  set_tcp(p[0,0,0.12,0,0,0])
+  write_output_integer_register(24, 7)
+  write_output_integer_register(25, 1)
+  start = get_target_tcp_pose()
+  goal = pose_trans(start, p[0, 0, 0.02, 0, 0, 0])
+  movel(goal, a=1.2, v=0.25)
+  write_output_integer_register(25, 2)
+  while read_input_integer_register(25) != 29: sync() end
+  write_output_integer_register(25, 3)
+  global arrived = False
+  thread approach():
+    movel(pose_trans(goal, p[0, 0, 0.05, 0, 0, 0]), a=1.2, v=0.02)
+    arrived = True
+  end
+  going = run approach()
+  while not arrived and read_input_integer_register(25) != 30:
+    sync()
+  end
+  kill going
+  stopl(2.0)
+  write_output_integer_register(25, 4)
+  movel(goal, a=1.2, v=0.25)
+  write_output_integer_register(25, 5)
+end
+)";
+
+ControllerOptions Powered() {
+  ControllerOptions options;
+  options.powered = true;
+  return options;
+}
+
+class TouchAtSpeedup : public testing::TestWithParam<double> {};
+
+TEST_P(TouchAtSpeedup, RunsThroughItsPhasesAndKeepsItsRegisters) {
+  SimClock clock(GetParam());
+  Faults faults;
+  Surface surface(-10);
+  const auto controller = Controller::Start(Powered(), &clock, &faults, &surface);
+  {
+    TouchClient touch(controller->ports().rtde);
+    TestClient script(controller->ports().secondary);
+    std::string text = kTouch;
+    // The watchdog counts simulated time: at a thousand times the speed no host beats in time.
+    if (GetParam() > 1) text.replace(text.find("10.0"), 4, "0.01");
+    touch.Beat();
+    script.Send(text);
+    touch.Until([&] { return touch.phase == 2; });
+    EXPECT_EQ(touch.program, 7);
+    EXPECT_EQ(touch.runtime_state, 2u);
+    EXPECT_FALSE(controller->Moving());
+    const double start_z = touch.pose[2];
+    touch.Command(29);
+    touch.Until([&] { return touch.phase == 3; });
+    touch.Until([&] { return touch.pose[2] < start_z - 0.002 || touch.phase > 3; });
+    touch.Command(30);
+    touch.Until([&] { return touch.phase == 5 && touch.runtime_state == 1; });
+    EXPECT_NEAR(touch.pose[2], start_z, 1e-4);
+    EXPECT_EQ(touch.safety_mode, 1);
+  }
+  TouchClient again(controller->ports().rtde);
+  again.Next();
+  EXPECT_EQ(again.program, 7);
+  EXPECT_EQ(again.phase, 5);
+  EXPECT_EQ(controller->Count("programs"), 1u);
+  EXPECT_EQ(controller->Count("motions"), 3u);
+  EXPECT_EQ(surface.begun, 3);
+  EXPECT_EQ(surface.ended, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Speeds, TouchAtSpeedup, testing::Values(1.0, 20.0, 1000.0));
+
+TEST(Controller, StopsProtectivelyWhereAFingerIsPushedTooFar) {
+  SimClock clock(20);
+  Faults faults;
+  Surface surface(-10);
+  auto options = Powered();
+  const auto probe = Controller::Start(options, &clock, &faults, nullptr);
+  const double z = probe->BaseFromFlange().translation().z();
+  Surface near(z - 0.03);
+  const auto controller = Controller::Start(options, &clock, &faults, &near);
+  TouchClient touch(controller->ports().rtde);
+  TestClient script(controller->ports().secondary);
+  script.Send(
+      "def push():\n write_output_integer_register(25, 1)\n"
+      " movel(pose_trans(get_target_tcp_pose(), p[0,0,0.1,0,0,0]), a=1.2, v=0.02)\n"
+      " write_output_integer_register(25, 2)\nend\n");
+  touch.Until([&] { return touch.safety_mode == 3 && touch.runtime_state == 1; });
+  EXPECT_EQ(touch.phase, 1);
+  EXPECT_EQ(controller->Count("protective_stops"), 1u);
+  EXPECT_LT(controller->BaseFromTip().translation().z(), z - 0.04);
+  TestClient dashboard(controller->ports().dashboard);
+  EXPECT_EQ(dashboard.Line(), "Connected: Universal Robots Dashboard Server");
+  // Nothing moves until it is unlocked, which takes 5 s.
+  script.Send("movel(pose_trans(get_target_tcp_pose(), p[0,0,-0.05,0,0,0]))\n");
+  std::string answer;
+  const double begin_s = HostNowS();
+  while ((answer = dashboard.Ask("unlock protective stop")) != "Protective stop releasing") {
+    EXPECT_EQ(answer,
+              "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective "
+              "stop before "
+              "unlocking");
+    ASSERT_LT(HostNowS(), begin_s + 30);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  touch.Until([&] { return touch.safety_mode == 1; });
+  EXPECT_EQ(controller->Count("programs"), 1u);
+}
+
+TEST(Controller, StopsWhenNobodyFeedsTheWatchdog) {
+  SimClock clock(10);
+  Faults faults;
+  const auto controller = Controller::Start(Powered(), &clock, &faults, nullptr);
+  TouchClient touch(controller->ports().rtde);
+  TestClient script(controller->ports().secondary);
+  script.Send(
+      "def watched():\n rtde_set_watchdog(\"input_int_register_24\", 0.5, \"stop\")\n"
+      " write_output_integer_register(25, 1)\n while True: sync() end\nend\n");
+  touch.Until([&] { return touch.phase == 1; });
+  // Fed for longer than its period: goes on.
+  const double fed_until_s = touch.timestamp_s + 6;
+  touch.Until([&] { return touch.timestamp_s > fed_until_s; });
+  EXPECT_EQ(touch.safety_mode, 1);
+  EXPECT_EQ(touch.runtime_state, 2u);
+  touch.Until([&] { return touch.safety_mode == 3; }, false);
+  EXPECT_EQ(controller->Count("watchdog_stops"), 1u);
+  EXPECT_EQ(touch.runtime_state, 1u);
+}
+
+}  // namespace
+}  // namespace touchstone::rig
