@@ -1,0 +1,321 @@
+#include "server/gateway/motion_planner.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/gateway/arm/line_check.h"
+#include "server/gateway/arm/transfer.h"
+#include "server/gateway/arm/ur_script.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kSettleS = 0.05;  // of the arm at the end of a line, and of the program's start
+constexpr double kLeastStandoffM = 1e-3;
+constexpr double kMostTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
+
+absl::Status Invalid(const std::string& what, double value, const std::string& right) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("limits: ", what, " = ", ShortestNumber(value), ": must be ", right));
+}
+
+absl::Status CheckLimits(const MotionLimits& limits) {
+  for (const auto& [what, value] : {std::pair<const char*, double>{"most_speed_m_s", limits.most_speed_m_s},
+                                    {"transfer_speed_m_s", limits.transfer_speed_m_s},
+                                    {"acceleration_m_s2", limits.acceleration_m_s2},
+                                    {"most_standoff_m", limits.most_standoff_m},
+                                    {"stroke_beyond_target_m", limits.stroke_beyond_target_m},
+                                    {"clearance_m", limits.clearance_m}})
+    if (!(value > 0) || !(value <= 10)) return Invalid(what, value, "above 0 and at most 10");
+  if (!(limits.most_tilt_rad >= 0) || !(limits.most_tilt_rad <= kMostTiltRad))
+    return Invalid("most_tilt_rad", limits.most_tilt_rad, "from 0 to 1.4");
+  if (!(limits.outermost_finger_m >= 0) || !(limits.outermost_finger_m <= 0.5))
+    return Invalid("outermost_finger_m", limits.outermost_finger_m, "from 0 to 0.5");
+  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.most_payload_kg))
+    return Invalid("payload_kg", limits.payload_kg,
+                   absl::StrCat("from 0 to most_payload_kg = ", ShortestNumber(limits.most_payload_kg)));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(limits.box_min_m[axis] < limits.box_max_m[axis]))
+      return Invalid(absl::StrCat("box_min_m[", axis, "]"), limits.box_min_m[axis], "below box_max_m");
+  for (size_t i = 0; i < 6; ++i) {
+    if (!(limits.joint_min_rad[i] < limits.joint_max_rad[i]))
+      return Invalid(absl::StrCat("joint_min_rad[", i, "]"), limits.joint_min_rad[i], "below joint_max_rad");
+    if (!(limits.home_rad[i] >= limits.joint_min_rad[i]) || !(limits.home_rad[i] <= limits.joint_max_rad[i]))
+      return Invalid(absl::StrCat("home_rad[", i, "]"), limits.home_rad[i], "within the joint's limits");
+  }
+  return absl::OkStatus();
+}
+
+class UrMotionPlanner final : public MotionPlanner {
+ public:
+  UrMotionPlanner(const std::string& arm_model, const UrKinematics& kinematics, const MotionLimits& limits,
+                  const Calibration& calibration)
+      : limits_(limits),
+        calibration_(calibration),
+        check_(arm_model, kinematics, limits, calibration.flange_from_tip) {}
+
+  absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object, const Bounds& bounds,
+                                    const std::string& placement, const CommandedTouch& touch,
+                                    const std::string& where) const override;
+  absl::StatusOr<PlannedTouch> PlanView(const ArmState& from, const Eigen::Isometry3d& base_from_camera,
+                                        const std::string& object, const Bounds& bounds,
+                                        const std::string& placement,
+                                        const std::string& where) const override;
+  absl::StatusOr<std::vector<Eigen::Isometry3d>> PlanHome(const ArmState& from) const override;
+  absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const Bounds& bounds,
+                                               const std::string& placement) const override;
+  const MotionLimits& limits() const override { return limits_; }
+  const Calibration& calibration() const override { return calibration_; }
+
+ private:
+  absl::Status CheckTouch(const std::string& object, const std::string& placement,
+                          const CommandedTouch& touch) const;
+  // The height of the clearance plane over an object, base frame.
+  double ClearanceHeight(const Eigen::Isometry3d& base_from_object, const Bounds& bounds) const;
+  // Joints where the arm is, as the planner's own kinematics has them.
+  absl::StatusOr<Joints> JointsOf(const ArmState& from) const;
+  // Follows all lines; the joints at the end.
+  absl::StatusOr<Joints> FollowAll(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses,
+                                   Joints joints, int* wrist_3_beyond) const;
+  // A checked way from where the arm is to a pose, over the clearance plane; *joints become those of its end.
+  absl::StatusOr<std::vector<Eigen::Isometry3d>> Transfer(const ArmState& from,
+                                                          const Eigen::Isometry3d& start,
+                                                          double clearance_height_m, Joints* joints) const;
+  double TransferDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
+
+  const MotionLimits limits_;
+  const Calibration calibration_;
+  const LineCheck check_;
+};
+
+absl::Status UrMotionPlanner::CheckTouch(const std::string& object, const std::string& placement,
+                                         const CommandedTouch& touch) const {
+  if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
+      !std::isfinite(touch.stroke_m))
+    return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
+  if (!(touch.speed_m_s > 0) || touch.speed_m_s > limits_.most_speed_m_s)
+    return absl::OutOfRangeError(absl::StrFormat("speed %.4g mm/s: must be above 0 and at most %.4g mm/s",
+                                                 touch.speed_m_s / kMetresPerMillimetre,
+                                                 limits_.most_speed_m_s / kMetresPerMillimetre));
+  if (!(touch.standoff_m >= kLeastStandoffM) || touch.standoff_m > limits_.most_standoff_m)
+    return absl::OutOfRangeError(absl::StrFormat(
+        "standoff %.4g mm: must be from %.4g to %.4g mm", touch.standoff_m / kMetresPerMillimetre,
+        kLeastStandoffM / kMetresPerMillimetre, limits_.most_standoff_m / kMetresPerMillimetre));
+  if (!(touch.stroke_m > 0))
+    return absl::OutOfRangeError(
+        absl::StrFormat("stroke %.4g mm: must be above 0", touch.stroke_m / kMetresPerMillimetre));
+  const std::string needed = PlacementFor(touch.approach);
+  if (placement != needed)
+    return absl::FailedPreconditionError(absl::StrCat("object '", object, "' must lie with its face ", needed,
+                                                      " up for an approach along ", PointText(touch.approach),
+                                                      "; it lies with ", placement, " up"));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string& object, const Bounds& bounds,
+                                                              const std::string& placement) const {
+  const auto found = calibration_.base_from_object.find(object);
+  if (found == calibration_.base_from_object.end()) {
+    std::vector<std::string> known;
+    for (const auto& [name, pose] : calibration_.base_from_object) known.push_back(name);
+    return absl::FailedPreconditionError(absl::StrCat("the calibration has no base_from_object of '", object,
+                                                      "'", DidYouMean(object, known),
+                                                      "; 'touchstone rig calibrate' finds it"));
+  }
+  if (const auto& all = Placements(); std::find(all.begin(), all.end(), placement) == all.end())
+    return absl::InvalidArgumentError(
+        absl::StrCat("placement '", placement, "' is not known", DidYouMean(placement, all)));
+  return BaseFromObject(found->second, bounds, placement);
+}
+
+double UrMotionPlanner::ClearanceHeight(const Eigen::Isometry3d& base_from_object,
+                                        const Bounds& bounds) const {
+  double top_m = -1e300;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d at(corner & 1 ? bounds.min_m.x() : bounds.max_m.x(),
+                             corner & 2 ? bounds.min_m.y() : bounds.max_m.y(),
+                             corner & 4 ? bounds.min_m.z() : bounds.max_m.z());
+    top_m = std::max(top_m, (base_from_object * at).z());
+  }
+  return top_m + limits_.clearance_m;
+}
+
+absl::StatusOr<Joints> UrMotionPlanner::JointsOf(const ArmState& from) const {
+  // Calibrated kinematics differ from the published ones by millimetres: joints a few degrees apart are
+  // another arm.
+  constexpr double kOtherArmRad = 0.15;
+  Joints joints;
+  if (!from.base_from_tip.matrix().allFinite() ||
+      !check_.JointsAt(from.base_from_tip, from.joints_rad, &joints) ||
+      Farthest(joints, from.joints_rad) > kOtherArmRad)
+    return absl::FailedPreconditionError(
+        absl::StrCat("the arm's present pose at ", PointText(from.base_from_tip.translation()),
+                     " m does not fit its joints: are the arm's model and flange_from_tip right? Or the "
+                     "wrist is stretched; move the "
+                     "arm home by hand"));
+  return joints;
+}
+
+absl::StatusOr<Joints> UrMotionPlanner::FollowAll(Eigen::Isometry3d from,
+                                                  const std::vector<Eigen::Isometry3d>& poses, Joints joints,
+                                                  int* wrist_3_beyond) const {
+  *wrist_3_beyond = 0;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const std::string what = i + 1 == poses.size() ? "the way to the start" : "the transfer";
+    TOUCHSTONE_RETURN_IF_ERROR(
+        check_.Follow(from, poses[i], limits_.transfer_speed_m_s, what, &joints, wrist_3_beyond));
+    from = poses[i];
+  }
+  return joints;
+}
+
+absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transfer(const ArmState& from,
+                                                                         const Eigen::Isometry3d& start,
+                                                                         double clearance_height_m,
+                                                                         Joints* joints) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
+  const TransferWay way{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
+  std::vector<Eigen::Isometry3d> poses = way.Poses(0);
+  int beyond = 0;
+  absl::StatusOr<Joints> end = FollowAll(from.base_from_tip, poses, here, &beyond);
+  if (!end.ok() && beyond != 0) {
+    // Wrist 3 would wind the cable up: the tool turns the other way round.
+    const std::vector<Eigen::Isometry3d> unwinding = way.Poses(-beyond);
+    if (absl::StatusOr<Joints> other = FollowAll(from.base_from_tip, unwinding, here, &beyond); other.ok())
+      poses = unwinding, end = other;
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(end.status());
+  *joints = *end;
+  return poses;
+}
+
+double UrMotionPlanner::TransferDuration(Eigen::Isometry3d from,
+                                         const std::vector<Eigen::Isometry3d>& poses) const {
+  double duration_s = kSettleS;
+  for (const Eigen::Isometry3d& pose : poses) {
+    duration_s += LineDuration(from, pose, limits_.transfer_speed_m_s, limits_.acceleration_m_s2);
+    from = pose;
+  }
+  return duration_s;
+}
+
+absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const std::string& object,
+                                                   const Bounds& bounds, const std::string& placement,
+                                                   const CommandedTouch& touch,
+                                                   const std::string& where) const {
+  const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
+    TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(object, placement, touch));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
+                                ObjectPose(object, bounds, placement));
+
+    // The tip's frame: z along the approach, x along the fingers.
+    Eigen::Isometry3d object_from_start = Eigen::Isometry3d::Identity();
+    const Eigen::Vector3d z = touch.approach.normalized();
+    const Eigen::Vector3d x = (touch.lateral - touch.lateral.dot(z) * z).normalized();
+    if (!x.allFinite() || !z.allFinite())
+      return absl::InvalidArgumentError("approach and lateral must not be parallel or zero");
+    object_from_start.linear() << x, z.cross(x), z;
+    object_from_start.translation() = touch.target_m - touch.standoff_m * z;
+    const Eigen::Isometry3d start = base_from_object * object_from_start;
+    const double tilt_rad = std::acos(std::clamp(-start.linear()(2, 2), -1.0, 1.0));
+    if (tilt_rad > limits_.most_tilt_rad + 1e-9)
+      return absl::OutOfRangeError(
+          absl::StrFormat("the approach is tilted %.1f deg from straight down; at most %.1f deg",
+                          tilt_rad / kRadiansPerDegree, limits_.most_tilt_rad / kRadiansPerDegree));
+    const double stroke_m =
+        touch.stroke_m < kNoStrokeLimitM ? touch.stroke_m : touch.standoff_m + limits_.stroke_beyond_target_m;
+
+    PlannedTouch planned;
+    planned.placement = placement;
+    planned.motion.speed_m_s = touch.speed_m_s;
+    planned.motion.end = start * Eigen::Translation3d(0, 0, stroke_m);
+    Joints joints;
+    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
+                                Transfer(from, start, ClearanceHeight(base_from_object, bounds), &joints));
+    int beyond = 0;
+    TOUCHSTONE_RETURN_IF_ERROR(
+        check_.Follow(start, planned.motion.end, touch.speed_m_s, "the approach", &joints, &beyond));
+
+    // Contacts are expected at the target.
+    const Eigen::Isometry3d target = start * Eigen::Translation3d(0, 0, std::min(stroke_m, touch.standoff_m));
+    planned.motion.duration_s = TransferDuration(from.base_from_tip, planned.motion.transfer) +
+                                LineDuration(start, target, touch.speed_m_s, limits_.acceleration_m_s2) +
+                                TransferDuration(target, {start});
+    return planned;
+  }();
+  if (plan.ok()) return plan;
+  return absl::Status(plan.status().code(), absl::StrCat(where, ": ", plan.status().message()));
+}
+
+absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(const ArmState& from,
+                                                       const Eigen::Isometry3d& base_from_camera,
+                                                       const std::string& object, const Bounds& bounds,
+                                                       const std::string& placement,
+                                                       const std::string& where) const {
+  const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
+    if (!calibration_.has_camera)
+      return absl::FailedPreconditionError("the calibration has no flange_from_camera");
+    if (!base_from_camera.matrix().allFinite())
+      return absl::InvalidArgumentError("the camera's pose must be finite numbers");
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
+                                ObjectPose(object, bounds, placement));
+    const Eigen::Isometry3d tip =
+        base_from_camera * calibration_.flange_from_camera.inverse() * calibration_.flange_from_tip;
+    PlannedTouch planned;
+    planned.placement = placement;
+    planned.motion.speed_m_s = limits_.transfer_speed_m_s;
+    planned.motion.end = tip;
+    Joints joints;
+    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
+                                Transfer(from, tip, ClearanceHeight(base_from_object, bounds), &joints));
+    planned.motion.duration_s = TransferDuration(from.base_from_tip, planned.motion.transfer);
+    return planned;
+  }();
+  if (plan.ok()) return plan;
+  return absl::Status(plan.status().code(), absl::StrCat(where, ": ", plan.status().message()));
+}
+
+absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const ArmState& from) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
+  const Eigen::Isometry3d home = check_.TipAt(limits_.home_rad);
+  // Back out along the tool's axis as far as the arm can, then straight up to home's height, then across.
+  absl::Status why;
+  for (const double back_m :
+       {limits_.most_standoff_m, limits_.most_standoff_m / 2, limits_.most_standoff_m / 4, 0.0}) {
+    const std::vector<Eigen::Isometry3d> out = WayOut(from.base_from_tip, back_m, home.translation().z());
+    int beyond = 0;
+    const absl::StatusOr<Joints> above = FollowAll(from.base_from_tip, out, here, &beyond);
+    if (!above.ok()) {
+      why = above.status();
+      continue;
+    }
+    // Across in a straight line where that works; else the joints alone lead home.
+    std::vector<Eigen::Isometry3d> across = out;
+    across.push_back(home);
+    const Eigen::Isometry3d& last = out.empty() ? from.base_from_tip : out.back();
+    if (FollowAll(last, {home}, *above, &beyond).ok()) return across;
+    return out;
+  }
+  return absl::Status(why.code(), absl::StrCat("home: ", why.message(), "; move the arm free by hand"));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MotionPlanner>> MotionPlanner::Create(const std::string& arm_model,
+                                                                     const MotionLimits& limits,
+                                                                     const Calibration& calibration) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics kinematics, UrKinematics::ForModel(arm_model));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckLimits(limits));
+  return std::unique_ptr<MotionPlanner>(
+      std::make_unique<UrMotionPlanner>(arm_model, kinematics, limits, calibration));
+}
+
+}  // namespace touchstone

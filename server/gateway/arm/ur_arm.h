@@ -1,0 +1,43 @@
+// A UR3 or UR3e as an Arm: state over RTDE, programs over the secondary interface, power over the dashboard.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "server/gateway/arm.h"
+#include "server/gateway/arm/ur_script.h"
+
+namespace touchstone {
+
+struct UrArmOptions {
+  std::string model = "ur3e";  // or "ur3"
+  std::string address;
+  int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
+  ScriptOptions script;             // tool, payload, speeds, time scale
+  double frozen_after_s = 0.5;      // host time without a state after which the controller counts as frozen
+  double program_start_s = 1.5;     // host time that a program may take to begin
+  double connect_wait_s = 2;        // host time that ConnectUrArm waits for the first state
+  double assumed_delay_s = 0.0005;  // of a state on its way, host time; the clock is as uncertain
+};
+
+class UrArm : public Arm {
+ public:
+  // The arm's own kinematics, as it was calibrated at the factory, once the controller has told them.
+  virtual std::optional<DhTable> CalibratedKinematics() const = 0;
+};
+
+// Begins to connect, and goes on trying as long as the object lives: State() tells. INVALID_ARGUMENT: the
+// options make no sense. `news` is notified of every state and every change of the link; it must outlive the
+// arm.
+//
+// StartTouch and MoveThrough return when the program is on the wire. If the controller does not begin it,
+// State() becomes UNAVAILABLE with what the controller said, until the next program or stop. Stop() is not
+// queued behind anything: it has a connection of its own, goes a second way behind a program that is just
+// being sent, and falls back on the dashboard; if all fail, beats are withheld so that the watchdog stops the
+// program.
+absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, Signal* news);
+
+}  // namespace touchstone

@@ -1,0 +1,131 @@
+#include "server/gateway/arm/ur_script.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/gateway/registers.h"
+
+namespace touchstone {
+namespace {
+
+std::string Number(double value) {
+  return absl::StrFormat("%.9g", value);
+}
+
+std::string MoveLine(const Eigen::Isometry3d& to, double acceleration_m_s2, double speed_m_s) {
+  return absl::StrCat("movel(", PoseText(to), ", a=", Number(acceleration_m_s2), ", v=", Number(speed_m_s),
+                      ")\n");
+}
+
+std::string Phase(MotionPhase phase) {
+  return absl::StrCat("  write_output_integer_register(", kPhaseRegister, ", ", static_cast<int>(phase),
+                      ")\n");
+}
+
+// What every program begins with. The phase is told before the id, so that nobody sees this id with an old
+// phase.
+std::string Head(uint32_t program_id, const ScriptOptions& options) {
+  std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kBeatRegister, "\", ",
+                                  Number(kWatchdogHz / options.time_scale), ", \"stop\")\n");
+  absl::StrAppend(&text, "  set_tcp(", PoseText(options.flange_from_tip), ")\n  set_payload(",
+                  Number(options.payload_kg), ")\n");
+  if (!options.gravity_m_s2.isApprox(ScriptOptions().gravity_m_s2))
+    absl::StrAppend(&text, "  set_gravity([", Number(options.gravity_m_s2.x()), ",",
+                    Number(options.gravity_m_s2.y()), ",", Number(options.gravity_m_s2.z()), "])\n");
+  absl::StrAppend(&text, Phase(MotionPhase::kTransfer), "  write_output_integer_register(", kProgramRegister,
+                  ", ", program_id, ")\n");
+  return text;
+}
+
+std::string Lines(const std::vector<Eigen::Isometry3d>& poses, Eigen::Isometry3d from,
+                  const ScriptOptions& options) {
+  std::string text;
+  for (const Eigen::Isometry3d& pose : poses) {
+    absl::StrAppend(
+        &text, "  ",
+        MoveLine(pose, options.acceleration_m_s2, LineSpeed(from, pose, options.transfer_speed_m_s)));
+    from = pose;
+  }
+  return text;
+}
+
+double TurnRad(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  return Eigen::AngleAxisd(from.linear().transpose() * to.linear()).angle();
+}
+
+}  // namespace
+
+std::string PoseText(const Eigen::Isometry3d& pose) {
+  const Eigen::AngleAxisd turn(pose.linear());
+  const Eigen::Vector3d p = pose.translation(), r = turn.angle() * turn.axis();
+  return absl::StrCat("p[", Number(p.x()), ",", Number(p.y()), ",", Number(p.z()), ",", Number(r.x()), ",",
+                      Number(r.y()), ",", Number(r.z()), "]");
+}
+
+int32_t CommandWord(uint32_t program_id, int command) {
+  return static_cast<int32_t>(4 * (program_id % (1u << 28))) + command;
+}
+
+double LineSpeed(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s) {
+  const double way_m = (to.translation() - from.translation()).norm(), turn_rad = TurnRad(from, to);
+  if (way_m < 1e-4 || turn_rad <= 0) return speed_m_s;  // the tool turns on the spot
+  return std::min(speed_m_s, way_m * kMostTurnRadS / turn_rad);
+}
+
+double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
+                    double acceleration_m_s2) {
+  const double way_m = (to.translation() - from.translation()).norm(), v = LineSpeed(from, to, speed_m_s);
+  const double ramp_m = v * v / acceleration_m_s2;  // of both ends
+  const double straight_s =
+      way_m < ramp_m ? 2 * std::sqrt(way_m / acceleration_m_s2) : way_m / v + v / acceleration_m_s2;
+  return std::max(straight_s, TurnRad(from, to) / kMostTurnRadS);
+}
+
+std::string TouchProgram(const ArmTouch& touch, const Eigen::Isometry3d& base_from_tip_now,
+                         const ScriptOptions& options) {
+  const Eigen::Isometry3d& start = touch.transfer.back();
+  const std::string command = absl::StrCat("read_input_integer_register(", kCommandRegister, ")");
+  const std::string acceleration = Number(options.acceleration_m_s2);
+  std::string text = absl::StrCat("def touch_", touch.program_id, "():\n", Head(touch.program_id, options));
+  absl::StrAppend(&text, Lines(touch.transfer, base_from_tip_now, options), Phase(MotionPhase::kReady));
+
+  // Waits for the command; the approach runs in a thread, so that the end can be commanded at any moment of
+  // it.
+  absl::StrAppend(&text, "  while ", command, " != ", CommandWord(touch.program_id, kCommandGo),
+                  ":\n    sync()\n  end\n");
+  absl::StrAppend(&text, "  global approaching = True\n  thread approach():\n    ",
+                  MoveLine(touch.end, options.acceleration_m_s2, touch.speed_m_s),
+                  "    approaching = False\n  end\n", Phase(MotionPhase::kApproach),
+                  "  handle = run approach()\n");
+  absl::StrAppend(&text, "  while approaching and ", command,
+                  " != ", CommandWord(touch.program_id, kCommandRetreat),
+                  ":\n    sync()\n  end\n  kill handle\n  stopl(", acceleration, ")\n");
+  absl::StrAppend(&text, Phase(MotionPhase::kRetreat), "  ",
+                  MoveLine(start, options.acceleration_m_s2, options.transfer_speed_m_s),
+                  Phase(MotionPhase::kDone), "end\n");
+  return text;
+}
+
+std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
+                        const std::vector<Joints>& joints, const Eigen::Isometry3d& base_from_tip_now,
+                        const ScriptOptions& options) {
+  std::string text = absl::StrCat("def move_", program_id, "():\n", Head(program_id, options),
+                                  Lines(poses, base_from_tip_now, options));
+  for (const Joints& q : joints) {
+    absl::StrAppend(&text, "  movej([");
+    for (size_t i = 0; i < q.size(); ++i) absl::StrAppend(&text, i == 0 ? "" : ",", Number(q[i]));
+    absl::StrAppend(&text, "], a=", Number(options.joint_acceleration_rad_s2),
+                    ", v=", Number(options.joint_speed_rad_s), ")\n");
+  }
+  return absl::StrCat(text, Phase(MotionPhase::kDone), "end\n");
+}
+
+std::string StopProgram() {
+  return "def stop_motion():\n  stopl(10)\nend\n";
+}
+
+}  // namespace touchstone

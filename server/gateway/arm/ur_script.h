@@ -1,0 +1,45 @@
+// The programs of this gateway, as text for the controller. See ../registers.h for what they read and write.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "server/gateway/arm.h"
+#include "server/gateway/arm/kinematics.h"
+
+namespace touchstone {
+
+struct ScriptOptions {
+  Eigen::Isometry3d flange_from_tip = Eigen::Isometry3d::Identity();
+  double payload_kg = 0.5;
+  double transfer_speed_m_s = 0.25;
+  double acceleration_m_s2 = 1.2;
+  double joint_speed_rad_s = 1.05, joint_acceleration_rad_s2 = 1.4;
+  double time_scale = 1;
+  Eigen::Vector3d gravity_m_s2{0, 0, 9.82};  // as set_gravity takes it; this one (a table) is not sent
+};
+
+// "p[0.3,0,0.1,3.14159,0,0]": position in m, rotation vector in rad.
+std::string PoseText(const Eigen::Isometry3d& pose);
+
+std::string TouchProgram(const ArmTouch& touch, const Eigen::Isometry3d& base_from_tip_now,
+                         const ScriptOptions& options);
+std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
+                        const std::vector<Joints>& joints, const Eigen::Isometry3d& base_from_tip_now,
+                        const ScriptOptions& options);
+std::string StopProgram();
+
+// What stands in the command register to command a program.
+int32_t CommandWord(uint32_t program_id, int command);
+
+// How a straight line of the tip is made: as fast as `speed_m_s`, slower where the tool turns much on a short
+// way.
+double LineSpeed(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s);
+// Rig seconds that it takes, from rest to rest.
+double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
+                    double acceleration_m_s2);
+inline constexpr double kMostTurnRadS = 1.5;  // of the tool on a line
+
+}  // namespace touchstone
