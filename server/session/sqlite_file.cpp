@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -136,9 +135,10 @@ absl::Status SqliteFile::Error(int result) const {
       return absl::ResourceExhaustedError(
           message("cannot grow: its disk is full", "make room and try again"));
     case SQLITE_IOERR:
-      if (error == ENOSPC || error == EDQUOT || error == EFBIG)
+      // A full disk has a code of its own; a quota and the limit of a file's size have not.
+      if (result == SQLITE_IOERR_WRITE)
         return absl::ResourceExhaustedError(
-            message("cannot grow", "make room, or raise the limit of its size"));
+            message("cannot grow", "make room (disk, quota, limit of a file's size), or check its disk"));
       return absl::DataLossError(message("cannot be read or written", "check its disk"));
     case SQLITE_READONLY:
     case SQLITE_PERM:
