@@ -1,0 +1,273 @@
+#include "server/gateway/motion_planner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/base/units.h"
+#include "server/gateway/arm/line_check.h"
+#include "server/gateway/arm/transfer.h"
+#include "server/gateway/arm/ur_script.h"
+
+namespace touchstone {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A cube of 150 mm whose centre stands 100 mm high, 300 mm before the arm, as on the emulated rig.
+const Bounds kCube{Eigen::Vector3d::Constant(-0.075), Eigen::Vector3d::Constant(0.075)};
+
+Calibration Fixture() {
+  Calibration calibration;
+  calibration.flange_from_tip.translation().z() = 0.12;
+  calibration.base_from_object["cube"] = Eigen::Isometry3d(Eigen::Translation3d(0.30, 0, 0.10));
+  return calibration;
+}
+
+struct Rig {
+  explicit Rig(const std::string& model, MotionLimits with = MotionLimits())
+      : limits(with),
+        kinematics(UrKinematics::ForModel(model).value()),
+        planner(MotionPlanner::Create(model, with, Fixture()).value()),
+        check(model, kinematics, with, Fixture().flange_from_tip) {
+    at.joints_rad = with.home_rad;
+    at.base_from_tip = check.TipAt(with.home_rad);
+  }
+  absl::StatusOr<PlannedTouch> Plan(const CommandedTouch& touch, const std::string& placement = "+z") const {
+    return planner->Plan(at, "cube", kCube, placement, touch, "touches[3]");
+  }
+  // As if the arm had made the touch and were back at its start.
+  void Make(const PlannedTouch& plan) {
+    Eigen::Isometry3d from = at.base_from_tip;
+    int beyond = 0;
+    for (const Eigen::Isometry3d& pose : plan.motion.transfer) {
+      ASSERT_TRUE(check.Follow(from, pose, 0.25, "it", &at.joints_rad, &beyond).ok());
+      from = pose;
+    }
+    at.base_from_tip = from;
+  }
+  MotionLimits limits;
+  UrKinematics kinematics;
+  std::unique_ptr<MotionPlanner> planner;
+  LineCheck check;
+  ArmState at;
+};
+
+CommandedTouch FromAbove() {
+  CommandedTouch touch;
+  touch.target_m = Eigen::Vector3d(0, 0, 0.075);
+  return touch;
+}
+
+// A touch from above, tilted and turned as far as is asked for.
+CommandedTouch RandomTouch(std::mt19937_64* random, double most_tilt_rad) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  CommandedTouch touch;
+  touch.target_m = Eigen::Vector3d(0.09 * (unit(*random) - 0.5), 0.09 * (unit(*random) - 0.5), 0.075);
+  const double towards = 2 * kPi * unit(*random), roll = 2 * kPi * unit(*random);
+  const Eigen::AngleAxisd tilt(most_tilt_rad * unit(*random),
+                               Eigen::Vector3d(std::cos(towards), std::sin(towards), 0));
+  touch.approach = tilt * -Eigen::Vector3d::UnitZ();
+  touch.lateral = tilt * Eigen::Vector3d(std::cos(roll), std::sin(roll), 0);
+  return touch;
+}
+
+TEST(MotionPlanner, ReachesTheMiddleSixTenthsOfAFaceFromTwentyDegreesAndAnyRoll) {
+  for (const std::string model : {"ur3", "ur3e"}) {
+    Rig rig(model);
+    std::mt19937_64 random(1);
+    for (int i = 0; i < 200; ++i) {
+      const auto plan = rig.Plan(RandomTouch(&random, 20 * kRadiansPerDegree));
+      ASSERT_TRUE(plan.ok()) << model << " touch " << i << ": " << plan.status().message();
+      rig.Make(*plan);
+    }
+  }
+}
+
+TEST(MotionPlanner, TipFrameHasItsZAlongTheApproachAndItsXAlongTheFingers) {
+  const Rig rig("ur3e");
+  std::mt19937_64 random(2);
+  const CommandedTouch touch = RandomTouch(&random, 0.3);
+  const auto plan = rig.Plan(touch);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  const Eigen::Isometry3d start = plan->motion.transfer.back();
+  EXPECT_LT((start.linear().col(2) - touch.approach).norm(), 1e-9);
+  EXPECT_LT((start.linear().col(0) - touch.lateral).norm(), 1e-9);
+  EXPECT_NEAR(start.linear().determinant(), 1, 1e-9);
+  const Eigen::Vector3d target = Eigen::Vector3d(0.30, 0, 0.10) + touch.target_m;
+  EXPECT_LT((start.translation() + 0.06 * touch.approach - target).norm(), 1e-9);
+  EXPECT_LT((plan->motion.end.translation() - target - 0.03 * touch.approach).norm(), 1e-9)
+      << "without a stroke of its own the approach ends stroke_beyond_target_m behind the target";
+  EXPECT_GT(plan->motion.duration_s, 0.06 / touch.speed_m_s);
+}
+
+TEST(MotionPlanner, StrokeOfATouchIsItsOwn) {
+  CommandedTouch touch = FromAbove();
+  touch.stroke_m = 0.065;
+  const auto plan = Rig("ur3e").Plan(touch);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_NEAR((plan->motion.end.translation() - plan->motion.transfer.back().translation()).norm(), 0.065,
+              1e-9);
+}
+
+// Between two starts no fingertip comes lower than the object's top and the clearance, but on the lines of
+// approach.
+TEST(MotionPlanner, TransfersCrossAboveTheObject) {
+  Rig rig("ur3e");
+  std::mt19937_64 random(3);
+  for (int i = 0; i < 50; ++i) {
+    CommandedTouch touch = RandomTouch(&random, 0.35);
+    touch.standoff_m = 0.02;
+    const auto plan = rig.Plan(touch);
+    ASSERT_TRUE(plan.ok()) << plan.status();
+    std::vector<Eigen::Isometry3d> way = {rig.at.base_from_tip};
+    way.insert(way.end(), plan->motion.transfer.begin(), plan->motion.transfer.end());
+    for (size_t line = 0; line + 1 < way.size(); ++line) {
+      const Eigen::Vector3d along = way[line + 1].translation() - way[line].translation();
+      const bool by_its_axis = along.normalized().cross(way[line + 1].linear().col(2)).norm() < 1e-6 &&
+                               way[line].linear().isApprox(way[line + 1].linear(), 1e-6);
+      if (by_its_axis) continue;
+      for (const double part : {0.0, 0.25, 0.5, 0.75, 1.0})
+        EXPECT_GT((way[line].translation() + part * along).z(), 0.175 + 0.05 - 1e-6) << "touch " << i;
+    }
+    rig.Make(*plan);
+  }
+}
+
+TEST(MotionPlanner, RepeatedTouchNeedsNoTransfer) {
+  Rig rig("ur3");
+  const auto first = rig.Plan(FromAbove());
+  ASSERT_TRUE(first.ok()) << first.status();
+  rig.Make(*first);
+  const auto second = rig.Plan(FromAbove());
+  ASSERT_TRUE(second.ok()) << second.status();
+  EXPECT_EQ(second->motion.transfer.size(), 1u);
+  EXPECT_LT(second->motion.duration_s, first->motion.duration_s);
+}
+
+void ExpectRefused(const absl::StatusOr<PlannedTouch>& plan, absl::StatusCode code,
+                   const std::vector<std::string>& words) {
+  ASSERT_FALSE(plan.ok());
+  EXPECT_EQ(plan.status().code(), code) << plan.status();
+  EXPECT_EQ(std::string(plan.status().message()).rfind("touches[3]: ", 0), 0u) << plan.status();
+  for (const std::string& word : words) EXPECT_THAT(std::string(plan.status().message()), HasSubstr(word));
+}
+
+TEST(MotionPlanner, RefusesWithValueAndLimit) {
+  const Rig rig("ur3e");
+  CommandedTouch touch = FromAbove();
+  touch.speed_m_s = 0.2;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"200 mm/s", "100 mm/s"});
+  touch = FromAbove();
+  touch.standoff_m = 0.2;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"standoff 200 mm", "150 mm"});
+  touch = FromAbove();
+  touch.target_m.x() = std::nan("");
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kInvalidArgument, {"finite"});
+  touch = FromAbove();
+  touch.target_m.x() = 0.3;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"x = ", "500.0 mm"});
+  ExpectRefused(rig.Plan(FromAbove(), "+x"), absl::StatusCode::kFailedPrecondition, {"face +z up", "+x up"});
+  touch = FromAbove();
+  touch.stroke_m = 0.3;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"the approach", "z = ", "0.0"});
+}
+
+TEST(MotionPlanner, RefusesTiltBeyondItsLimit) {
+  MotionLimits limits;
+  limits.most_tilt_rad = 10 * kRadiansPerDegree;
+  CommandedTouch touch = FromAbove();
+  touch.approach = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()) * touch.approach;
+  ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
+                {"tilted 17.2 deg", "10.0 deg"});
+}
+
+TEST(MotionPlanner, RefusesWhatTheArmCannotReach) {
+  MotionLimits limits;
+  limits.box_min_m = Eigen::Vector3d(-2, -2, -1), limits.box_max_m = Eigen::Vector3d(2, 2, 2);
+  CommandedTouch touch = FromAbove();
+  touch.target_m.x() = 0.5;
+  ExpectRefused(Rig("ur3", limits).Plan(touch), absl::StatusCode::kOutOfRange, {"out of reach of the ur3"});
+}
+
+TEST(MotionPlanner, RefusesJointsBeyondTheirLimits) {
+  MotionLimits limits;
+  limits.joint_max_rad[0] = 0.1, limits.joint_min_rad[0] = -0.1;
+  CommandedTouch touch = FromAbove();
+  touch.target_m.y() = 0.07, touch.target_m.x() = -0.07;
+  ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
+                {"base", "its limits are -5.7 and 5.7"});
+}
+
+TEST(MotionPlanner, RefusesUnknownObjectAndNamesTheKnownOnes) {
+  const Rig rig("ur3e");
+  const auto plan = rig.planner->Plan(rig.at, "cub", kCube, "+z", FromAbove(), "touches[3]");
+  ExpectRefused(plan, absl::StatusCode::kFailedPrecondition, {"'cub'", "'cube'"});
+}
+
+TEST(MotionPlanner, LimitsThatMakeNoSenseAreRefused) {
+  MotionLimits limits;
+  limits.payload_kg = 4;
+  EXPECT_THAT(std::string(MotionPlanner::Create("ur3", limits, Fixture()).status().message()),
+              HasSubstr("payload_kg = 4"));
+  limits = MotionLimits();
+  limits.box_min_m.z() = 1;
+  EXPECT_FALSE(MotionPlanner::Create("ur3", limits, Fixture()).ok());
+  EXPECT_FALSE(MotionPlanner::Create("ur10", MotionLimits(), Fixture()).ok());
+}
+
+// Always turned the same way, the wrist would wind its cable up without end.
+TEST(MotionPlanner, UnwindsTheWristBeforeItsLimit) {
+  Rig rig("ur3e");
+  bool unwound = false;
+  for (int i = 0; i < 12; ++i) {
+    CommandedTouch touch = FromAbove();
+    touch.lateral = Eigen::AngleAxisd(-1.9 * i, Eigen::Vector3d::UnitZ()) * touch.lateral;
+    const double before_rad = rig.at.joints_rad[5];
+    const auto plan = rig.Plan(touch);
+    ASSERT_TRUE(plan.ok()) << i << ": " << plan.status();
+    rig.Make(*plan);
+    EXPECT_LE(std::abs(rig.at.joints_rad[5]), 6.2834);
+    unwound = unwound || std::abs(rig.at.joints_rad[5] - before_rad) > kPi;
+  }
+  EXPECT_TRUE(unwound);
+}
+
+TEST(MotionPlanner, HomeLeavesTheObjectAlongTheToolsAxisFirst) {
+  Rig rig("ur3e");
+  std::mt19937_64 random(8);
+  const CommandedTouch touch = RandomTouch(&random, 0.3);
+  const auto plan = rig.Plan(touch);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  rig.Make(*plan);
+  const auto home = rig.planner->PlanHome(rig.at);
+  ASSERT_TRUE(home.ok()) << home.status();
+  ASSERT_FALSE(home->empty());
+  const Eigen::Vector3d out = (home->front().translation() - rig.at.base_from_tip.translation()).normalized();
+  EXPECT_LT((out + touch.approach).norm(), 1e-6);
+  EXPECT_TRUE(home->back().isApprox(rig.check.TipAt(rig.limits.home_rad), 1e-6));
+}
+
+TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
+  Calibration calibration = Fixture();
+  calibration.has_camera = true;
+  calibration.flange_from_camera.translation() = Eigen::Vector3d(0, 0.06, 0.04);
+  const auto planner = MotionPlanner::Create("ur3e", MotionLimits(), calibration);
+  ASSERT_TRUE(planner.ok());
+  const Rig rig("ur3e");
+  Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();
+  base_from_camera.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  base_from_camera.translation() = Eigen::Vector3d(0.30, 0, 0.40);
+  const auto plan = (*planner)->PlanView(rig.at, base_from_camera, "cube", kCube, "+z", "view");
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  const Eigen::Isometry3d camera =
+      plan->motion.transfer.back() * calibration.flange_from_tip.inverse() * calibration.flange_from_camera;
+  EXPECT_TRUE(camera.isApprox(base_from_camera, 1e-9));
+  EXPECT_EQ(rig.planner->PlanView(rig.at, base_from_camera, "cube", kCube, "+z", "view").status().code(),
+            absl::StatusCode::kFailedPrecondition)
+      << "without flange_from_camera";
+}
+
+}  // namespace
+}  // namespace touchstone
