@@ -23,9 +23,9 @@ struct ArmState {
   Eigen::Isometry3d base_from_tip = Eigen::Isometry3d::Identity();  // with the tool's offset
   Eigen::Vector3d tip_velocity_m_s = Eigen::Vector3d::Zero();
   std::array<double, 6> joints_rad{};
-  int robot_mode = -1;   // RIG.md: 7 running
-  int safety_mode = 0;   // 1 normal, 3 protective stop ...
-  int runtime_state = 0; // 1 stopped, 2 playing
+  int robot_mode = -1;    // RIG.md: 7 running
+  int safety_mode = 0;    // 1 normal, 3 protective stop ...
+  int runtime_state = 0;  // 1 stopped, 2 playing
   uint32_t robot_status_bits = 0, safety_status_bits = 0;
   double speed_scaling = 0;
   uint32_t program_id = 0;  // of this gateway's program that runs or ran last
@@ -45,23 +45,24 @@ const char* PhaseName(int phase);  // "transfer"; "unknown" for another number
 
 // A touch as the arm makes it. Poses are base_from_tip.
 struct ArmTouch {
-  uint32_t program_id = 0;                   // above 0; another one for every touch
-  std::vector<Eigen::Isometry3d> transfer;   // straight lines through these; the last is the start
+  uint32_t program_id = 0;                  // above 0; another one for every touch
+  std::vector<Eigen::Isometry3d> transfer;  // straight lines through these; the last is the start
   Eigen::Isometry3d end = Eigen::Isometry3d::Identity();  // where the approach gives up
   double speed_m_s = 0;
-  double duration_s = 0;                     // expected, in all, rig seconds
+  double duration_s = 0;  // expected, in all, rig seconds
 };
 
 class Arm {
  public:
   virtual ~Arm() = default;
 
-  // The newest state; UNAVAILABLE if there is none or the link is down or silent (frozen controller), with why.
+  // The newest state; UNAVAILABLE if there is none or the link is down or silent (frozen controller), with
+  // why.
   virtual absl::StatusOr<ArmState> State() const = 0;
   // The states between two controller times, oldest first, as far back as they are kept (30 rig seconds).
   virtual std::vector<ArmState> History(double from_controller_s, double to_controller_s) const = 0;
-  // Why the arm may not move now, in words for people; OK if it may: connected, powered, brakes released, safety mode
-  // normal, program run possible.
+  // Why the arm may not move now, in words for people; OK if it may: connected, powered, brakes released,
+  // safety mode normal, program run possible.
   virtual absl::Status Ready() const = 0;
 
   // Sends the program of a touch; it goes to the start and waits there (kReady). The caller watches State().
@@ -78,13 +79,13 @@ class Arm {
   // Powers on and releases the brakes if they are not; never unlocks a protective stop.
   virtual absl::Status PowerOn() = 0;
 
-  // The gateway lives: written to the controller's watchdog register until this is no longer called. The watchdog of a
-  // running program stops the arm then.
+  // The gateway lives: written to the controller's watchdog register until this is no longer called. The
+  // watchdog of a running program stops the arm then.
   virtual void Beat() = 0;
 
   virtual ClockEstimate ControllerClock() const = 0;  // controller seconds on host seconds
   virtual double StateRateHz() const = 0;
-  virtual std::string Model() const = 0;    // "ur3e"
+  virtual std::string Model() const = 0;  // "ur3e"
   virtual std::string Address() const = 0;
   virtual std::string Version() const = 0;  // of the controller's software
 };

@@ -20,7 +20,8 @@ struct Frame {
   uint64_t number = 0;
 };
 
-// Pinhole with radial and tangential distortion, as OpenCV writes it (camera_matrix, distortion_coefficients).
+// Pinhole with radial and tangential distortion, as OpenCV writes it (camera_matrix,
+// distortion_coefficients).
 struct Intrinsics {
   int width = 0, height = 0;
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
@@ -30,8 +31,8 @@ struct Intrinsics {
 absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path);
 
 struct CameraOptions {
-  // "": none; "/dev/video0" or "0": UVC; "folder:PATH": the newest picture of a folder, in the order of names;
-  // "video:FILE" or "http://...": a stream.
+  // "": none; "/dev/video0" or "0": UVC; "folder:PATH": the newest picture of a folder, in the order of
+  // names; "video:FILE" or "http://...": a stream.
   std::string source;
   int width = 0, height = 0;  // asked of the camera; 0: as it comes
   std::string intrinsics;     // file; empty: the field of view below, no distortion
@@ -44,16 +45,16 @@ class CameraDevice {
   static absl::StatusOr<std::unique_ptr<CameraDevice>> Open(const CameraOptions& options);
   virtual ~CameraDevice() = default;
 
-  // A picture that was exposed after `after_host_s`: older ones in the driver's queue are thrown away. UNAVAILABLE if
-  // none comes in time, DATA_LOSS if the camera repeats one picture bit by bit (frozen).
+  // A picture that was exposed after `after_host_s`: older ones in the driver's queue are thrown away.
+  // UNAVAILABLE if none comes in time, DATA_LOSS if the camera repeats one picture bit by bit (frozen).
   virtual absl::StatusOr<Frame> Take(double after_host_s) = 0;
   virtual std::string Description() const = 0;
   virtual uint64_t frames() const = 0;
   virtual uint64_t stale_frames() const = 0;
 };
 
-// The picture scaled to width x height pixels of the given vertical field of view without distortion, as a virtual
-// source renders it: rgb or grey.
+// The picture scaled to width x height pixels of the given vertical field of view without distortion, as a
+// virtual source renders it: rgb or grey.
 std::vector<uint8_t> Rectify(const Frame& frame, const Intrinsics& intrinsics, int width, int height,
                              double vertical_fov_rad, bool grey);
 

@@ -19,7 +19,7 @@ namespace touchstone {
 struct EffectorFinger {
   std::string sensor = "optical";  // "optical", "microswitch", "resistor"
   bool active_high = true;
-  double debounce_s = 0.005;  // microswitch
+  double debounce_s = 0.005;             // microswitch
   int threshold = 512, hysteresis = 16;  // resistor, ADC counts
 };
 
@@ -52,22 +52,23 @@ struct EffectorState {
   uint64_t bad_frames = 0, repeated_events = 0, reconnections = 0;
 };
 
-// A thread of its own reads the line, acknowledges, keeps the clock, and opens the port again when it was lost. All
-// functions may be called from any thread.
+// A thread of its own reads the line, acknowledges, keeps the clock, and opens the port again when it was
+// lost. All functions may be called from any thread.
 class Effector {
  public:
   // Opens the port and agrees on version and fingers; goes on trying in the background if nothing answers.
   static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, Signal* news);
   virtual ~Effector() = default;
 
-  // Begins a touch (id above 0) and returns once the device has said so. FAILED_PRECONDITION names the fingers that are
-  // pressed already; UNAVAILABLE: the line is lost.
+  // Begins a touch (id above 0) and returns once the device has said so. FAILED_PRECONDITION names the
+  // fingers that are pressed already; UNAVAILABLE: the line is lost.
   virtual absl::Status Arm(uint32_t touch) = 0;
   virtual absl::Status Disarm() = 0;
-  // What was heard of the armed or last touch; news->Notify() after every change. UNAVAILABLE if the line was lost
-  // since, or the device was reset, in which case its record is gone.
+  // What was heard of the armed or last touch; news->Notify() after every change. UNAVAILABLE if the line was
+  // lost since, or the device was reset, in which case its record is gone.
   virtual absl::StatusOr<EffectorTouch> Touch() const = 0;
-  // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has another one.
+  // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has
+  // another one.
   virtual absl::StatusOr<EffectorTouch> Recall(uint32_t touch) = 0;
 
   virtual EffectorState State() const = 0;

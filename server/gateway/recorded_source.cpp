@@ -4,37 +4,28 @@
 
 #include "server/base/status.h"
 #include "server/image/encode.h"
+#include "server/session/command_bytes.h"
 
 namespace touchstone {
 
 absl::StatusOr<std::unique_ptr<RecordedSource>> RecordedSource::Open(const std::string& path) {
   std::unique_ptr<RecordedSource> source(new RecordedSource);
   TOUCHSTONE_ASSIGN_OR_RETURN(source->journal_, Journal::Open(path, Journal::Mode::kReadOnly));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, RecordedTouches::Read(*source->journal_));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, source->journal_->Sessions());
-  if (sessions.empty()) return absl::InvalidArgumentError(absl::StrCat(path, ": holds no session to serve"));
-  source->fingers_ = sessions[0].fingers;
-  source->spacing_m_ = sessions[0].spacing_m;
-  for (const JournalSession& session : sessions) {
-    if (session.fingers != source->fingers_ || session.spacing_m != source->spacing_m_)
-      return absl::InvalidArgumentError(absl::StrCat(path, ": session '", session.name, "' has ", session.fingers,
-                                                     " fingers, '", sessions[0].name, "' has ", source->fingers_,
-                                                     ": export one of them into a journal of its own"));
+  for (const JournalSession& session : sessions)
     TOUCHSTONE_RETURN_IF_ERROR(source->journal_->ForEachImage(session.name, [&](const JournalImage& image) {
       source->images_[image.id] = image;
       return true;
     }));
-  }
-  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, RecordedTouches::Create(*source->journal_));
   return source;
 }
 
 absl::StatusOr<JournalTouch> RecordedSource::Touch(const TouchOrder& order, const Permit& permit) {
   TOUCHSTONE_RETURN_IF_ERROR(permit());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> same, journal_->Find(order.session, order.id));
-  if (same.has_value() && same->stage == TouchStage::kDone && same->object == order.object &&
-      same->command == order.command)
-    return *same;
-  const JournalTouch* touch = touches_->Find(order.object, order.touch, order.repeat);
+  const JournalTouch* touch = touches_->FindId(order.id);
+  if (touch == nullptr || touch->object != order.object || !SameCommand(touch->command, order.command))
+    touch = touches_->Find(order.object, order.command, order.repeat);
   if (touch == nullptr)
     return absl::NotFoundError(
         absl::StrCat("this is a recorded session, and no such touch of '", order.object, "' was recorded"));
@@ -60,7 +51,7 @@ Intrinsics RecordedSource::IntrinsicsOf(const Frame& frame) const {
 
 PhysicalFacts RecordedSource::Facts() const {
   PhysicalFacts facts;
-  facts.touches = touches_->size();
+  facts.touches = touches_->touches().size();
   facts.images = images_.size();
   return facts;
 }

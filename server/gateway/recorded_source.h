@@ -1,6 +1,7 @@
 // A journal served again: the third source. It gives what was recorded, and says so where nothing was.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -20,10 +21,10 @@ class RecordedSource : public PhysicalSource {
   // nothing like it was recorded.
   absl::StatusOr<JournalTouch> Touch(const TouchOrder& order, const Permit& permit) override;
   absl::StatusOr<Frame> Photograph(const ViewOrder& order, const Permit& permit) override;
-  bool has_camera() const override { return has_images_; }
+  bool has_camera() const override { return !images_.empty(); }
   Intrinsics IntrinsicsOf(const Frame& frame) const override;
-  int fingers() const override { return fingers_; }
-  double spacing_m() const override { return spacing_m_; }
+  int fingers() const override { return touches_->fingers(); }
+  double spacing_m() const override { return touches_->spacing_m(); }
   bool moves() const override { return false; }
   PhysicalFacts Facts() const override;
   std::string State() const override { return "idle"; }
@@ -33,9 +34,6 @@ class RecordedSource : public PhysicalSource {
   std::unique_ptr<Journal> journal_;
   std::unique_ptr<RecordedTouches> touches_;
   std::map<std::string, JournalImage> images_;  // by id
-  bool has_images_ = false;
-  int fingers_ = 3;
-  double spacing_m_ = 0.03;
 };
 
 }  // namespace touchstone

@@ -1,5 +1,5 @@
-// The registers of the controller that this gateway's programs use, and what stands in them. The upper half (24 to 47)
-// is kept for RTDE clients.
+// The registers of the controller that this gateway's programs use, and what stands in them. The upper half
+// (24 to 47) is kept for RTDE clients.
 #pragma once
 
 namespace touchstone {
@@ -12,6 +12,6 @@ inline constexpr int kCommandGo = 1, kCommandRetreat = 2;
 // The program writes (RTDE outputs).
 inline constexpr int kProgramRegister = 24;  // output_int_register_24: the program's id
 inline constexpr int kPhaseRegister = 25;    // output_int_register_25: MotionPhase
-inline constexpr double kWatchdogHz = 4;    // of beats, rig time; a slower gateway means a dead one
+inline constexpr double kWatchdogHz = 4;     // of beats, rig time; a slower gateway means a dead one
 
 }  // namespace touchstone

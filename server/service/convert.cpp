@@ -54,6 +54,20 @@ v1::CommandedTouch ToProto(const CommandedTouch& touch) {
   return message;
 }
 
+absl::Status CheckTouchIds(const v1::TouchRequest& request) {
+  constexpr size_t kMostIdBytes = 128;
+  if (request.touch_ids_size() == 0) return absl::OkStatus();
+  if (request.touch_ids_size() != request.touches_size())
+    return absl::InvalidArgumentError(absl::StrCat("touch_ids has ", request.touch_ids_size(),
+                                                   ": give none, or one for each of the ", request.touches_size(),
+                                                   " touches"));
+  for (int k = 0; k < request.touch_ids_size(); ++k)
+    if (request.touch_ids(k).empty() || request.touch_ids(k).size() > kMostIdBytes)
+      return absl::InvalidArgumentError(
+          absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(), " bytes: 1 to ", kMostIdBytes));
+  return absl::OkStatus();
+}
+
 absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where) {
   switch (view.view_case()) {
     case v1::View::kTouch: {

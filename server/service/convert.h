@@ -20,6 +20,9 @@ grpc::Status ToGrpc(const absl::Status& status);
 absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where);
 v1::CommandedTouch ToProto(const CommandedTouch& touch);
 
+// Touch ids: none, or one a touch, of a sensible length.
+absl::Status CheckTouchIds(const v1::TouchRequest& request);
+
 absl::StatusOr<Camera> FromProto(const v1::View& message, const std::string& where);
 
 absl::StatusOr<Plan> FromProto(const v1::Plan& message);

@@ -14,8 +14,6 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostIdBytes = 128;
-
 absl::StatusOr<std::string> SessionName(const std::string& name) {
   if (name.empty()) return std::string("default");
   TOUCHSTONE_RETURN_IF_ERROR(CheckResourceName(name, "session"));
@@ -25,19 +23,6 @@ absl::StatusOr<std::string> SessionName(const std::string& name) {
 std::string RandomId() {
   static std::atomic<uint64_t> count{0};
   return absl::StrCat("touch-", std::chrono::system_clock::now().time_since_epoch().count(), "-", ++count);
-}
-
-absl::Status CheckIds(const v1::TouchRequest& request) {
-  if (request.touch_ids_size() == 0) return absl::OkStatus();
-  if (request.touch_ids_size() != request.touches_size())
-    return absl::InvalidArgumentError(absl::StrCat("touch_ids has ", request.touch_ids_size(),
-                                                   ": give none, or one for each of the ", request.touches_size(),
-                                                   " touches"));
-  for (int k = 0; k < request.touch_ids_size(); ++k)
-    if (request.touch_ids(k).empty() || request.touch_ids(k).size() > kMostIdBytes)
-      return absl::InvalidArgumentError(
-          absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(), " bytes: 1 to ", kMostIdBytes));
-  return absl::OkStatus();
 }
 
 }  // namespace
@@ -143,7 +128,7 @@ absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const 
   if (request.touches_size() > most)
     return absl::InvalidArgumentError(
         absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckIds(request));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouchIds(request));
 
   // All are checked before the first one moves anything.
   std::vector<TouchOrder> orders;

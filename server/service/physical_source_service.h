@@ -2,7 +2,9 @@
 // plans, checks of a request) is that one's code.
 #pragma once
 
+#include "server/dataset/specification.h"
 #include "server/gateway/physical_source.h"
+#include "server/image/image.h"
 #include "server/service/source_service.h"
 
 namespace touchstone {

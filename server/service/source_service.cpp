@@ -124,6 +124,7 @@ absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::Touc
   if (request.touches_size() > most)
     return absl::InvalidArgumentError(
         absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouchIds(request));
   std::vector<CommandedTouch> touches;
   for (int k = 0; k < request.touches_size(); ++k) {
     TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch,

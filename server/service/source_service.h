@@ -30,6 +30,7 @@ class SourceService : public v1::Source::Service {
                         grpc::ServerWriter<v1::StreamDatasetResponse>* writer);
   absl::Status Ready(uint64_t stops_before) const;
 
+ protected:
   Resources* resources_;
   LeaseBook* leases_;
 };

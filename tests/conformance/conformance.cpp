@@ -25,6 +25,39 @@ Conformance::Conformance() {
   EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
+Conformance::~Conformance() {
+  ending_ = true;
+  if (!keeper_.joinable()) return;
+  keeper_.join();
+  v1::ReleaseLeaseRequest request;
+  request.set_token(lease_.token());
+  v1::ReleaseLeaseResponse response;
+  grpc::ClientContext context;
+  control_->ReleaseLease(&context, request, &response);  // another test may have taken it
+}
+
+std::string Conformance::LeaseToken() {
+  if (!description_.lease_required()) return "";
+  if (!lease_.token().empty()) return lease_.token();
+  v1::AcquireLeaseRequest request;
+  request.set_holder("conformance test");
+  request.set_take(true);
+  grpc::ClientContext context;
+  const grpc::Status status = control_->AcquireLease(&context, request, &lease_);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  keeper_ = std::thread([this] {
+    v1::RenewLeaseRequest renew;
+    renew.set_token(lease_.token());
+    while (!ending_) {
+      v1::Lease renewed;
+      grpc::ClientContext renewing;
+      if (!control_->RenewLease(&renewing, renew, &renewed).ok()) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  });
+  return lease_.token();
+}
+
 v1::Object Conformance::AnObject() const {
   grpc::ClientContext context;
   v1::ListObjectsResponse response;
@@ -56,7 +89,8 @@ v1::DatasetSpec Conformance::SmallDataset(uint64_t samples) const {
   return spec;
 }
 
-Conformance::Streamed Conformance::Stream(const v1::StreamDatasetRequest& request) const {
+Conformance::Streamed Conformance::Stream(v1::StreamDatasetRequest request) {
+  request.set_lease_token(LeaseToken());
   Streamed streamed;
   grpc::ClientContext context;
   const auto reader = source_->StreamDataset(&context, request);

@@ -4,8 +4,10 @@
 // ask Describe what the source offers and skip, saying so, what it does not.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -22,6 +24,7 @@ void SetConformanceTarget(const std::string& address);
 class Conformance : public testing::Test {
  protected:
   Conformance();
+  ~Conformance() override;
 
   // A touch of the middle of the object's top from above, fingers across its x axis.
   v1::CommandedTouch TouchFromAbove(const v1::Object& object) const;
@@ -34,13 +37,20 @@ class Conformance : public testing::Test {
     std::vector<v1::Batch> batches;
     grpc::Status status;
   };
-  Streamed Stream(const v1::StreamDatasetRequest& request) const;
+  Streamed Stream(v1::StreamDatasetRequest request);
   bool IsVirtual() const { return description_.kind() == "virtual"; }
+  // Where the source wants one: a lease, kept alive until the test ends, as every client has it. Else empty.
+  std::string LeaseToken();
 
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::Source::Stub> source_;
   std::unique_ptr<v1::Control::Stub> control_;
   v1::DescribeResponse description_;
+
+ private:
+  v1::Lease lease_;
+  std::thread keeper_;
+  std::atomic<bool> ending_{false};
 };
 
 // The data of one column over all batches, in order.

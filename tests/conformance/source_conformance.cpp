@@ -18,8 +18,9 @@ class SourceConformance : public Conformance {
     grpc::ClientContext context;
     return source_->Touch(&context, request, response);
   }
-  v1::TouchRequest OneTouch() const {
+  v1::TouchRequest OneTouch() {
     v1::TouchRequest request;
+    request.set_lease_token(LeaseToken());
     const v1::Object object = AnObject();
     request.set_object(object.name());
     *request.add_touches() = TouchFromAbove(object);
@@ -124,6 +125,23 @@ TEST_F(SourceConformance, MistakesAreRefusedWithFieldValueAndWhatWouldBeRight) {
   }
 }
 
+TEST_F(SourceConformance, ATouchThatIsAskedForAgainUnderItsIdIsTheSame) {
+  v1::TouchRequest request = OneTouch();
+  *request.add_touches() = request.touches(0);
+  request.set_session("conformance");
+  request.add_touch_ids("first");
+  v1::TouchResponse first, second;
+  const grpc::Status refused = Touch(request, &first);
+  EXPECT_EQ(refused.error_code(), grpc::INVALID_ARGUMENT) << "one id for two touches";
+  EXPECT_THAT(refused.error_message(), HasSubstr("touch_ids"));
+  request.add_touch_ids("second");
+  ASSERT_TRUE(Touch(request, &first).ok());
+  ASSERT_TRUE(Touch(request, &second).ok());
+  for (int touch = 0; touch < 2; ++touch)
+    for (int finger = 0; finger < 3; ++finger)
+      EXPECT_EQ(first.results(touch).descriptor_s(finger), second.results(touch).descriptor_s(finger));
+}
+
 TEST_F(SourceConformance, AlmostPerpendicularVectorsAreMadeExact) {
   v1::TouchRequest request = OneTouch();
   request.mutable_touches(0)->mutable_lateral()->set_z(0.0005);
@@ -151,6 +169,7 @@ TEST_F(SourceConformance, PlansExpandToValidTouches) {
 TEST_F(SourceConformance, PhotographsHaveTheSizeAskedFor) {
   if (description_.most_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
   v1::CaptureRequest request;
+  request.set_lease_token(LeaseToken());
   const v1::Object object = AnObject();
   request.set_object(object.name());
   *request.add_views()->mutable_touch() = TouchFromAbove(object);
@@ -168,6 +187,7 @@ TEST_F(SourceConformance, PhotographsHaveTheSizeAskedFor) {
 TEST_F(SourceConformance, ImageSizesOutOfRangeAreRefused) {
   if (description_.most_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
   v1::CaptureRequest request;
+  request.set_lease_token(LeaseToken());
   const v1::Object object = AnObject();
   request.set_object(object.name());
   *request.add_views()->mutable_touch() = TouchFromAbove(object);

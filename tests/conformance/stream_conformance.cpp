@@ -84,7 +84,9 @@ TEST_F(StreamConformance, StridedStreamsLeaveOutTheOthersBatches) {
 
 TEST_F(StreamConformance, ACancelledStreamEndsSoonAndTheSourceGoesOn) {
   grpc::ClientContext context;
-  const auto reader = source_->StreamDataset(&context, Request(6000, 1));
+  v1::StreamDatasetRequest request = Request(6000, 1);
+  request.set_lease_token(LeaseToken());
+  const auto reader = source_->StreamDataset(&context, request);
   v1::StreamDatasetResponse response;
   ASSERT_TRUE(reader->Read(&response));
   context.TryCancel();

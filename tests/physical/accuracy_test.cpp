@@ -1,0 +1,56 @@
+// Contact times against the emulator's truth.
+#include <cmath>
+
+#include "tests/physical/physical_test.h"
+
+namespace touchstone {
+namespace {
+
+class Accuracy : public PhysicalTest {};
+
+TEST_F(Accuracy, DifferencesOfContactTimesAreRightDespiteDriftAndADelayingLine) {
+  StartRig([](rig::EmulatorOptions* options) {
+    options->speedup = 5;
+    options->drift_ppm = 100;
+    options->faults = {{"line_delay_ms", 5}};
+  });
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  // Clocks come to know each other while touches are made; the first ones only warm up.
+  for (int k = 0; k < 12; ++k) {
+    const Answer answer = Touch(lease.token(), FromAbove(0.02, k % 4), "touch " + std::to_string(k));
+    ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
+    const rig::TouchTruth truth = emulator_->Touches().back();
+    if (k < 6) continue;
+    for (int i = 1; i < 3; ++i) {
+      const double measured_s =
+          answer.response.results(0).contact_time_s(i) - answer.response.results(0).contact_time_s(0);
+      EXPECT_NEAR(measured_s, truth.reported_s[i] - truth.reported_s[0], 50e-6) << "touch " << k << ", finger " << i;
+    }
+    EXPECT_NEAR(answer.response.results(0).measured().speed_m_s(), 0.02, 1e-4);
+  }
+}
+
+TEST_F(Accuracy, PosesAtContactAreWhereTheTipWas) {
+  StartRig([](rig::EmulatorOptions* options) { options->speedup = 2; });
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  for (int k = 0; k < 6; ++k) {
+    const Answer answer = Touch(lease.token(), FromAbove(0.02, k), "touch " + std::to_string(k));
+    ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
+    if (k < 2) continue;
+    const rig::TouchTruth truth = emulator_->Touches().back();
+    const v1::Measured& measured = answer.response.results(0).measured();
+    ASSERT_EQ(measured.base_from_tip_at_contact_size(), 3);
+    // All three are on one straight way down; heights differ as the travels do. The sensor's noise moves the edge, so
+    // compare with the travel at the reported moment.
+    for (int i = 1; i < 3; ++i) {
+      const double lower_m = measured.base_from_tip_at_contact(0).position_m().z() -
+                             measured.base_from_tip_at_contact(i).position_m().z();
+      EXPECT_NEAR(lower_m, 0.02 * (truth.reported_s[i] - truth.reported_s[0]), 2e-5);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace touchstone

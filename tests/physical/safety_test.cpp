@@ -1,0 +1,316 @@
+// The six points of a scripted rig's safety, each provoked. After every one: nothing lost, nothing doubled, nothing
+// attributed to another pose.
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/physical/physical_test.h"
+
+namespace touchstone {
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+class Safety : public PhysicalTest {
+ protected:
+  // Slow enough to be interrupted in mid-approach: 50 mm in about 1 s of the host's.
+  static constexpr double kSlow = 0.0025;
+
+  // The touch that was interrupted can be made under its id; and then is answered without motion.
+  void ExpectTheTouchCanBeMade(const v1::CommandedTouch& touch, const std::string& id) {
+    KeptLease lease(control_.get(), "afterwards", true);
+    ASSERT_TRUE(lease.status().ok()) << lease.status().error_message();
+    Answer made;
+    WaitUntil(
+        [&] {
+          made = Touch(lease.token(), touch, id);
+          return made.status.ok();
+        },
+        "the touch is made");
+    ASSERT_TRUE(made.status.ok()) << made.status.error_message();
+    EXPECT_TRUE(made.response.results(0).complete());
+    const uint64_t programs = emulator_->controller().Count("programs");
+    const Answer again = Touch(lease.token(), touch, id);
+    ASSERT_TRUE(again.status.ok()) << again.status.error_message();
+    EXPECT_EQ(again.response.SerializeAsString(), made.response.SerializeAsString());
+    EXPECT_EQ(emulator_->controller().Count("programs"), programs);
+  }
+};
+
+// --- 1. One writer
+
+TEST_F(Safety, ASecondWriterIsRefusedAndAStaleOneToo) {
+  StartRig();
+  StartGateway();
+  KeptLease first(control_.get(), "first", true);
+  KeptLease second(control_.get(), "second", false);
+  EXPECT_EQ(second.status().error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(second.status().error_message(), HasSubstr("first"));
+  EXPECT_EQ(Touch("", FromAbove(), "without a lease").status.error_code(), grpc::FAILED_PRECONDITION);
+  const uint64_t programs = emulator_->controller().Count("programs");
+  KeptLease third(control_.get(), "third", true);
+  EXPECT_EQ(Touch(first.token(), FromAbove(), "stale").status.error_code(), grpc::ABORTED);
+  EXPECT_EQ(emulator_->controller().Count("programs"), programs) << "a stale writer moved the arm";
+  EXPECT_TRUE(Touch(third.token(), FromAbove(), "fresh").status.ok());
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, TakingTheLeaseStopsTheMotionOfTheOneBefore) {
+  StartRig();
+  StartGateway();
+  KeptLease first(control_.get(), "first", true);
+  auto touch = TouchLater(first.token(), FromAbove(kSlow), "interrupted");
+  WaitUntilApproaching();
+  KeptLease second(control_.get(), "second", true);
+  EXPECT_EQ(touch.get().status.error_code(), grpc::ABORTED);
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "interrupted");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+// --- 2. A dead client, a dead gateway
+
+TEST_F(Safety, ADeadClientsMotionStops) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "dies", true);
+  lease.StopRenewing();
+  const Answer answer = Touch(lease.token(), FromAbove(0.001), "of a dead client");
+  EXPECT_EQ(answer.status.error_code(), grpc::ABORTED) << answer.status.error_message();
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  EXPECT_LT(emulator_->touches(), 1u) << "it went on until contact";
+  ExpectTheTouchCanBeMade(FromAbove(), "of another client");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, AClientThatHangsUpStopsItsMotion) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "hangs up", true);
+  v1::TouchRequest request;
+  request.set_object("lat00");
+  *request.add_touches() = FromAbove(kSlow);
+  request.set_lease_token(lease.token());
+  request.set_session("test");
+  request.add_touch_ids("hung up");
+  grpc::ClientContext context;
+  auto call = std::async(std::launch::async, [&] {
+    v1::TouchResponse response;
+    return source_->Touch(&context, request, &response);
+  });
+  WaitUntilApproaching();
+  context.TryCancel();
+  EXPECT_EQ(call.get().error_code(), grpc::CANCELLED);
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "hung up");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconciled) {
+  StartRig();
+  StartGatewayProcess();
+  {
+    KeptLease lease(control_.get(), "before", true);
+    EXPECT_TRUE(Touch(lease.token(), FromAbove(0.02, 1), "before").status.ok());
+    auto touch = TouchLater(lease.token(), FromAbove(0.001), "killed");
+    WaitUntilApproaching();
+    KillGatewayProcess();
+    EXPECT_FALSE(touch.get().status.ok());
+  }
+  WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > 0; }, "the watchdog stops the arm");
+  EXPECT_FALSE(emulator_->controller().Moving());
+  const auto before = Journalled();
+  ASSERT_EQ(before.size(), 2u);
+  EXPECT_EQ(before[1].stage, TouchStage::kExecuting) << "an interrupted touch is unknown until it is reconciled";
+
+  // A trip is a protective stop: a person looks, and unlocks it at the pendant.
+  StartGatewayProcess();
+  EXPECT_EQ(RigState().interrupted_touches(), 1u);
+  EXPECT_EQ(State(), "protective_stop");
+  UnlockByHand();
+  ExpectTheTouchCanBeMade(FromAbove(0.001), "killed");
+  KillGatewayProcess();
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+// --- A frozen controller, an unplugged line, a protective stop
+
+TEST_F(Safety, AFrozenControllerIsNoticed) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  auto touch = TouchLater(lease.token(), FromAbove(kSlow), "frozen");
+  WaitUntilApproaching();
+  emulator_->faults().Set("freeze", 2);
+  const Answer answer = touch.get();
+  EXPECT_EQ(answer.status.error_code(), grpc::UNAVAILABLE) << answer.status.error_message();
+  WaitUntil([&] { return State() != "disconnected"; }, "the controller is back");
+  if (State() == "protective_stop")  // it thawed with its watchdog overdue
+    UnlockByHand();
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "frozen");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, ALineThatIsUnpluggedInMidTouchStopsTheArm) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  auto touch = TouchLater(lease.token(), FromAbove(kSlow), "unplugged");
+  WaitUntilApproaching();
+  emulator_->faults().Set("unplug", 0.5);
+  const Answer answer = touch.get();
+  EXPECT_FALSE(answer.status.ok());
+  EXPECT_THAT(answer.status.error_code(), AnyOf(grpc::UNAVAILABLE, grpc::DATA_LOSS)) << answer.status.error_message();
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "unplugged");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, AProtectiveStopIsNeverUnlockedByItself) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  auto touch = TouchLater(lease.token(), FromAbove(kSlow), "stopped");
+  WaitUntilApproaching();
+  emulator_->faults().Set("protective_stop", 1);
+  const Answer answer = touch.get();
+  EXPECT_EQ(answer.status.error_code(), grpc::FAILED_PRECONDITION) << answer.status.error_message();
+  EXPECT_THAT(answer.status.error_message(), HasSubstr("protective stop"));
+  EXPECT_EQ(State(), "protective_stop");
+  for (int k = 0; k < 3; ++k) EXPECT_FALSE(Touch(lease.token(), FromAbove(), "more").status.ok());
+  EXPECT_EQ(State(), "protective_stop");
+  UnlockByHand();
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+// --- 3. Every motion is checked before it is sent
+
+TEST_F(Safety, MotionsBeyondTheLimitsAreRefusedWithValueAndLimitAndNothingMoves) {
+  StartRig();
+  StartGateway({"--limits-box-max-mm", "500,500,400"});
+  KeptLease lease(control_.get(), "client", true);
+  ASSERT_TRUE(Touch(lease.token(), FromAbove(), "mounts the object").status.ok());
+  const uint64_t programs = emulator_->controller().Count("programs");
+  v1::CommandedTouch fast = FromAbove(0.5), far = FromAbove(), high = FromAbove(), aside = FromAbove();
+  far.mutable_target_m()->set_x(0.9);
+  high.set_standoff_m(0.14);
+  high.mutable_target_m()->set_z(0.4);
+  aside.mutable_approach()->set_z(0);
+  aside.mutable_approach()->set_x(-1);
+  aside.mutable_lateral()->set_x(0);
+  aside.mutable_lateral()->set_y(1);
+  for (const auto& [touch, words] : {std::pair(fast, "500"), std::pair(far, "touch"), std::pair(high, "box")}) {
+    const Answer answer = Touch(lease.token(), touch, std::string("refused ") + words);
+    EXPECT_THAT(answer.status.error_code(), AnyOf(grpc::OUT_OF_RANGE, grpc::INVALID_ARGUMENT))
+        << answer.status.error_message();
+    EXPECT_THAT(answer.status.error_message(), HasSubstr(words));
+  }
+  EXPECT_EQ(emulator_->controller().Count("programs"), programs);
+  // A dry run says the same.
+  v1::CheckTouchesRequest request;
+  request.set_object("lat00");
+  *request.add_touches() = FromAbove();
+  *request.add_touches() = fast;
+  *request.add_touches() = aside;
+  v1::CheckTouchesResponse response;
+  grpc::ClientContext context;
+  ASSERT_TRUE(rig_->CheckTouches(&context, request, &response).ok());
+  EXPECT_TRUE(response.checks(0).possible());
+  EXPECT_FALSE(response.checks(1).possible());
+  EXPECT_EQ(response.checks(2).placement(), "+x");
+  EXPECT_EQ(emulator_->controller().Count("programs"), programs);
+  StopGateway();
+  EXPECT_EQ(Journalled().size(), 1u) << "what was refused is no touch";
+}
+
+// --- 4. Stop
+
+TEST_F(Safety, StopDuringMotionNeedsNoLeaseAndHolds) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  auto touch = TouchLater(lease.token(), FromAbove(kSlow), "stopped");
+  auto waiting = TouchLater(lease.token(), FromAbove(0.02, 2), "queued");
+  WaitUntilApproaching();
+  v1::StopRequest request;
+  request.set_reason("a test");
+  v1::StopResponse response;
+  grpc::ClientContext context;
+  ASSERT_TRUE(control_->Stop(&context, request, &response).ok());
+  EXPECT_EQ(response.aborted_touches(), 1u);
+  EXPECT_EQ(touch.get().status.error_code(), grpc::ABORTED);
+  EXPECT_EQ(waiting.get().status.error_code(), grpc::ABORTED) << "what waits does not begin after a stop";
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  EXPECT_EQ(State(), "stopped");
+  EXPECT_EQ(Touch(lease.token(), FromAbove(), "after the stop").status.error_code(), grpc::ABORTED);
+  EXPECT_EQ(State(), "stopped");
+  ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
+  ExpectEveryResultIsItsOwnTouch();
+  std::ifstream audit(folder_ / "rig" / "audit.jsonl");
+  const std::string log((std::istreambuf_iterator<char>(audit)), {});
+  EXPECT_THAT(log, testing::AllOf(HasSubstr("\"stop\""), HasSubstr("a test")));
+}
+
+TEST_F(Safety, AProgramThatWasJustSentDoesNotBeginAfterAStop) {
+  StartRig();
+  StartGateway();
+  for (int k = 0; k < 10; ++k) {
+    KeptLease lease(control_.get(), "client", true);
+    auto touch = TouchLater(lease.token(), FromAbove(), "race " + std::to_string(k));
+    std::this_thread::sleep_for(std::chrono::milliseconds(7 * k));
+    v1::StopResponse response;
+    grpc::ClientContext context;
+    ASSERT_TRUE(control_->Stop(&context, {}, &response).ok());
+    touch.get();
+    WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_FALSE(emulator_->controller().Moving()) << "it began after the stop, try " << k;
+  }
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+// --- A finger that does not report, a speed that was scaled
+
+TEST_F(Safety, AFingerThatIsPressedBeforehandIsNamed) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  ASSERT_TRUE(Touch(lease.token(), FromAbove(), "good").status.ok());
+  emulator_->faults().Set("stuck_finger", 1);
+  const Answer answer = Touch(lease.token(), FromAbove(), "stuck");
+  EXPECT_FALSE(answer.status.ok());
+  EXPECT_THAT(answer.status.error_message(), HasSubstr("finger"));
+  emulator_->faults().Set("stuck_finger", -1);
+  ExpectTheTouchCanBeMade(FromAbove(), "stuck");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, AFingerThatStaysSilentEndsTheApproachBeforeTheOthersArePushedTooFar) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  emulator_->faults().Set("missing_finger", 2);
+  const Answer answer = Touch(lease.token(), FromAbove(), "silent");
+  ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
+  EXPECT_FALSE(answer.response.results(0).complete());
+  EXPECT_EQ(State(), "idle") << "the arm is in no protective stop";
+  emulator_->faults().Set("missing_finger", -1);
+  ExpectTheTouchCanBeMade(FromAbove(0.02, 1), "afterwards");
+}
+
+TEST_F(Safety, ATouchWhoseSpeedWasScaledIsNotTakenForOne) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  emulator_->faults().Set("speed_scaling", 0.5);
+  const Answer answer = Touch(lease.token(), FromAbove(), "scaled");
+  EXPECT_EQ(answer.status.error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(answer.status.error_message(), HasSubstr("50 %"));
+  emulator_->faults().Set("speed_scaling", 1);
+  ExpectTheTouchCanBeMade(FromAbove(), "scaled");
+}
+
+}  // namespace
+}  // namespace touchstone
