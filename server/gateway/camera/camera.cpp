@@ -1,0 +1,60 @@
+#include "server/gateway/camera.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "server/base/check.h"
+#include "server/gateway/camera/camera_kinds.h"
+
+namespace touchstone {
+
+void QuietOpenCv() {
+  static const bool quiet = [] {
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // FFmpeg's own; read when it is first used
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
+    return true;
+  }();
+  (void)quiet;
+}
+
+Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number) {
+  Frame frame;
+  frame.width = picture.cols;
+  frame.height = picture.rows;
+  frame.host_time_s = host_time_s;
+  frame.number = number;
+  frame.rgb.resize(static_cast<size_t>(picture.rows) * picture.cols * 3);
+  cv::Mat rgb(picture.rows, picture.cols, CV_8UC3, frame.rgb.data());
+  TOUCHSTONE_CHECK(picture.depth() == CV_8U);
+  cv::cvtColor(picture, rgb, picture.channels() == 1 ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
+  return frame;
+}
+
+absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOptions& options) {
+  QuietOpenCv();
+  if (options.source.empty())
+    return absl::FailedPreconditionError(
+        "no camera: the source is empty; right is /dev/video0, folder:PATH, video:FILE or http://...");
+  if (!(options.timeout_s > 0 && std::isfinite(options.timeout_s)))
+    return absl::InvalidArgumentError(
+        absl::StrCat("camera: timeout_s is ", options.timeout_s, "; right is above 0"));
+  if (options.width < 0 || options.height < 0)
+    return absl::InvalidArgumentError(absl::StrCat("camera: size ", options.width, " x ", options.height,
+                                                   "; right is above 0, or 0 as it comes"));
+  for (const auto& [prefix, open] :
+       {std::pair<const char*, decltype(&OpenFolderCamera)>{"folder:", &OpenFolderCamera},
+        {"video:", &OpenVideoCamera}})
+    if (absl::StartsWith(options.source, prefix))
+      return open(options, options.source.substr(std::string(prefix).size()));
+  return OpenStreamCamera(options);
+}
+
+}  // namespace touchstone

@@ -1,0 +1,37 @@
+// The kinds of cameras behind CameraDevice::Open.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <absl/status/statusor.h>
+
+#include "server/gateway/camera.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace touchstone {
+
+// A camera that goes on whether anyone looks or not: UVC, or pictures over HTTP. Opened again when it was
+// unplugged. Real pictures are never equal bit by bit (but for a covered lens), so equal ones mean that it
+// froze.
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options);
+
+// A folder into which another program puts pictures (whole: written under another name, then renamed). A
+// picture's time is that of its file's last change, and equal pictures are legitimate.
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenFolderCamera(const CameraOptions& options,
+                                                               const std::string& path);
+
+// A recorded video: every Take gives the next picture, taken now, and after the last the first again. Equal
+// pictures are legitimate.
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOptions& options,
+                                                              const std::string& path);
+
+// Of a picture in OpenCV's order (blue first) or grey.
+Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number);
+// OpenCV writes nothing to stderr from now on; its errors come back as exceptions, which are caught here.
+void QuietOpenCv();
+
+}  // namespace touchstone

@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <sys/stat.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "server/gateway/camera/camera_kinds.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kCoarseS = 0.01;  // file systems stamp with the kernel's slow clock
+constexpr double kLookS = 0.02;
+
+bool IsPicture(const std::filesystem::path& path) {
+  if (path.filename().string().front() == '.') return false;
+  const std::string extension = absl::AsciiStrToLower(path.extension().string());
+  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff"})
+    if (extension == known) return true;
+  return false;
+}
+
+// The file's last change on the steady clock; far in the past if it is gone.
+double ChangedAtS(const std::string& path) {
+  struct stat info;
+  if (stat(path.c_str(), &info) != 0) return -1e18;
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return HostNowS() - (wall_s - (static_cast<double>(info.st_mtim.tv_sec) + 1e-9 * info.st_mtim.tv_nsec));
+}
+
+class FolderCamera : public CameraDevice {
+ public:
+  FolderCamera(CameraOptions options, std::string path)
+      : options_(std::move(options)), path_(std::move(path)) {}
+
+  absl::StatusOr<Frame> Take(double after_host_s) override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const double until_s = HostNowS() + options_.timeout_s;
+    while (true) {
+      const std::string name = Newest();
+      std::string why = "it has no picture";
+      if (!name.empty()) {
+        const double changed_s = ChangedAtS(name);
+        if (changed_s + kCoarseS < after_host_s) {
+          why = absl::StrCat("its newest picture, ", std::filesystem::path(name).filename().string(),
+                             ", is older than asked for");
+        } else {
+          cv::Mat picture;
+          try {
+            picture = cv::imread(name, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+          } catch (const cv::Exception&) {
+          }
+          if (!picture.empty()) return FrameOf(picture, changed_s, ++frames_);
+          why = absl::StrCat(std::filesystem::path(name).filename().string(), " cannot be read");
+        }
+      }
+      if (HostNowS() >= until_s)
+        return absl::UnavailableError(
+            absl::StrCat("camera folder ", path_, ": no picture in ", options_.timeout_s, " s: ", why));
+      std::this_thread::sleep_for(std::chrono::duration<double>(kLookS));
+    }
+  }
+  std::string Description() const override { return absl::StrCat("pictures in ", path_); }
+  uint64_t frames() const override { return Locked(frames_); }
+  uint64_t stale_frames() const override { return 0; }
+
+ private:
+  uint64_t Locked(const uint64_t& value) const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return value;
+  }
+  std::string Newest() const {
+    std::string newest;
+    std::error_code error;
+    for (std::filesystem::directory_iterator i(path_, error), end; !error && i != end; i.increment(error))
+      if (IsPicture(i->path())) newest = std::max(newest, i->path().string());
+    return newest;
+  }
+
+  const CameraOptions options_;
+  const std::string path_;
+  mutable std::mutex mutex_;
+  uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenFolderCamera(const CameraOptions& options,
+                                                               const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(path, error))
+    return absl::NotFoundError(absl::StrCat("camera: ", path, " is no folder"));
+  return std::make_unique<FolderCamera>(options, path);
+}
+
+}  // namespace touchstone

@@ -1,0 +1,188 @@
+// A thread takes every picture off the driver's queue as it comes, so that the queue never holds old ones;
+// only those that somebody waits for are decoded where the driver leaves a choice.
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <thread>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "server/gateway/camera/camera_kinds.h"
+
+namespace touchstone {
+namespace {
+
+// A picture for which nobody had to wait so long stood in a queue; a queue is empty after kDrainS.
+constexpr double kWaitS = 0.004, kDrainS = 0.5;
+constexpr double kReopenS = 0.2;
+
+bool IsNumber(const std::string& text) {
+  return !text.empty() && text.size() < 6 &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+class StreamCamera : public CameraDevice {
+ public:
+  explicit StreamCamera(CameraOptions options) : options_(std::move(options)) {}
+  ~StreamCamera() override {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  absl::Status Start() {
+    if (!OpenStream())
+      return absl::UnavailableError(
+          absl::StrCat("camera: ", options_.source,
+                       " cannot be opened; is it there, is it a camera, and does nobody else use it?"));
+    thread_ = std::thread([this] { Run(); });
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<Frame> Take(double after_host_s) override {
+    std::lock_guard<std::mutex> one(take_mutex_);
+    std::unique_lock<std::mutex> lock(mutex_);
+    wanted_ = true;
+    wanted_after_s_ = after_host_s;
+    repeated_ = false;
+    has_result_ = false;
+    // Of what is asked for ahead of time, the time until then does not count.
+    const double patience_s = options_.timeout_s + std::clamp(after_host_s - HostNowS(), 0.0, 60.0);
+    changed_.wait_for(lock, std::chrono::duration<double>(patience_s), [this] { return has_result_; });
+    wanted_ = false;
+    if (has_result_) return std::move(result_);
+    if (repeated_)
+      return absl::DataLossError(absl::StrCat(
+          "camera ", options_.source, " repeats one picture bit by bit: it is frozen; plug it in anew"));
+    return absl::UnavailableError(absl::StrCat("camera ", options_.source, ": no picture in ",
+                                               options_.timeout_s, " s", why_.empty() ? "" : ": ", why_));
+  }
+
+  std::string Description() const override { return absl::StrCat("camera ", options_.source); }
+  uint64_t frames() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return frames_;
+  }
+  uint64_t stale_frames() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return stale_frames_;
+  }
+
+ private:
+  bool OpenStream() {
+    try {
+      stream_.release();
+      const std::string& source = options_.source;
+      if (absl::StrContains(source, "://")) {
+        const int timeout_ms = static_cast<int>(options_.timeout_s * 1000);
+        if (!stream_.open(
+                source, cv::CAP_FFMPEG,
+                {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, timeout_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC, timeout_ms}))
+          return false;
+      } else if (!(IsNumber(source) ? stream_.open(std::stoi(source), cv::CAP_V4L2)
+                                    : stream_.open(source, cv::CAP_V4L2))) {
+        return false;
+      }
+      if (options_.width > 0) stream_.set(cv::CAP_PROP_FRAME_WIDTH, options_.width);
+      if (options_.height > 0) stream_.set(cv::CAP_PROP_FRAME_HEIGHT, options_.height);
+      return true;
+    } catch (const cv::Exception&) {
+      return false;
+    }
+  }
+
+  void Run() {
+    bool open = true;
+    while (true) {
+      {
+        std::unique_lock<std::mutex> lock(mutex_);
+        if (stopping_) return;
+        if (!open) {
+          changed_.wait_for(lock, std::chrono::duration<double>(kReopenS), [this] { return stopping_; });
+          if (stopping_) return;
+        }
+      }
+      if (!open) open = OpenStream();
+      if (open) open = Next();
+      if (!open) {
+        std::lock_guard<std::mutex> lock(mutex_);
+        why_ = "it is gone";
+      }
+    }
+  }
+
+  // The next picture off the queue; false if the stream broke.
+  bool Next() {
+    try {
+      const double began_s = HostNowS();
+      if (!stream_.grab()) return false;
+      const double came_s = HostNowS();
+      bool decode;
+      {
+        std::lock_guard<std::mutex> lock(mutex_);
+        ++frames_;
+        why_.clear();
+        // One that we began to wait for after that moment was exposed after it.
+        const bool fresh = began_s >= wanted_after_s_ &&
+                           (came_s - began_s >= kWaitS || began_s >= wanted_after_s_ + kDrainS);
+        decode = last_.empty() || (wanted_ && fresh);
+        if (wanted_ && !fresh) ++stale_frames_;
+      }
+      cv::Mat picture;
+      if (!decode) return true;
+      if (!stream_.retrieve(picture) || picture.empty()) return false;
+      const bool first = last_.empty();
+      const bool same = !first && picture.size() == last_.size() && picture.type() == last_.type() &&
+                        picture.isContinuous() &&
+                        std::memcmp(picture.data, last_.data, picture.total() * picture.elemSize()) == 0;
+      picture.copyTo(last_);
+      std::unique_lock<std::mutex> lock(mutex_);
+      if (same) {
+        ++stale_frames_;
+        repeated_ = true;
+      } else if (!first && wanted_ && !has_result_ && began_s >= wanted_after_s_) {
+        result_ = FrameOf(picture, came_s, frames_);
+        has_result_ = true;
+        lock.unlock();
+        changed_.notify_all();
+      }
+      return true;
+    } catch (const cv::Exception&) {
+      return false;
+    }
+  }
+
+  const CameraOptions options_;
+  std::thread thread_;
+  cv::VideoCapture stream_;  // of the thread, once it runs
+  cv::Mat last_;             // what was decoded last
+
+  std::mutex take_mutex_;     // one Take at a time
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable changed_;
+  bool stopping_ = false;
+  bool wanted_ = false, has_result_ = false, repeated_ = false;
+  double wanted_after_s_ = 0;
+  Frame result_;
+  std::string why_;
+  uint64_t frames_ = 0, stale_frames_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options) {
+  auto camera = std::make_unique<StreamCamera>(options);
+  if (absl::Status status = camera->Start(); !status.ok()) return status;
+  return camera;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,65 @@
+#include <filesystem>
+#include <mutex>
+
+#include <absl/strings/str_cat.h>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "server/gateway/camera/camera_kinds.h"
+
+namespace touchstone {
+namespace {
+
+class VideoCamera : public CameraDevice {
+ public:
+  explicit VideoCamera(std::string path) : path_(std::move(path)) {}
+
+  absl::Status Start() {
+    try {
+      if (video_.open(path_)) return absl::OkStatus();
+    } catch (const cv::Exception&) {
+    }
+    return absl::InvalidArgumentError(absl::StrCat("camera: ", path_, " is no video that OpenCV can read"));
+  }
+  absl::StatusOr<Frame> Take(double /*after_host_s*/) override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    try {
+      cv::Mat picture;
+      if (!video_.read(picture)) {
+        // Opened again rather than wound back, which not every container can.
+        video_.release();
+        if (!video_.open(path_) || !video_.read(picture))
+          return absl::UnavailableError(absl::StrCat("camera: video ", path_, " cannot be read any more"));
+      }
+      return FrameOf(picture, HostNowS(), ++frames_);
+    } catch (const cv::Exception& problem) {
+      return absl::UnavailableError(absl::StrCat("camera: video ", path_, ": ", problem.err));
+    }
+  }
+  std::string Description() const override { return absl::StrCat("video ", path_); }
+  uint64_t frames() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return frames_;
+  }
+  uint64_t stale_frames() const override { return 0; }
+
+ private:
+  const std::string path_;
+  mutable std::mutex mutex_;
+  cv::VideoCapture video_;
+  uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOptions& /*options*/,
+                                                              const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    return absl::NotFoundError(absl::StrCat("camera: there is no video ", path));
+  auto camera = std::make_unique<VideoCamera>(path);
+  if (absl::Status status = camera->Start(); !status.ok()) return status;
+  return camera;
+}
+
+}  // namespace touchstone
