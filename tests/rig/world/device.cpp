@@ -94,7 +94,7 @@ void Device::Boot() {
       },
       [](void* self) {
         auto* device = static_cast<Device*>(self);
-        return device->counter_->ReadingAt(device->clock_->NowS());
+        return device->counter_->ReadingAt(device->frozen_s_.value_or(device->clock_->NowS()));
       },
       this);
   pins_->Repeat(clock_->NowS());
@@ -128,8 +128,11 @@ void Device::Run() {
     const double now_s = clock_->NowS();
     counter_->SetDriftPpm(options_.drift_ppm + faults_->Get("clock_drift_ppm"), now_s);
     pins_->Run(now_s, static_cast<int>(faults_->Get("stuck_finger")));
-    for (const uint8_t byte : line_->Exchange(clock_->NowS())) core_->OnByte(byte);
+    // For debouncing it is as late as the edges are that it has been told, however long this thread was away.
+    frozen_s_ = now_s;
     core_->OnTime();
+    frozen_s_.reset();
+    for (const uint8_t byte : line_->Exchange(clock_->NowS())) core_->OnByte(byte);
     // What the core has just written leaves at once.
     for (const uint8_t byte : line_->Exchange(clock_->NowS())) core_->OnByte(byte);
     Wait();

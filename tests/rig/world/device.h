@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
@@ -69,7 +70,8 @@ class Device {
   std::unique_ptr<Pins> pins_;
   std::unique_ptr<SerialLine> line_;
   std::unique_ptr<firmware::Effector> core_;
-  int wake_ = -1;  // eventfd
+  std::optional<double> frozen_s_;  // what the core takes for now
+  int wake_ = -1;                   // eventfd
   std::thread thread_;
 };
 

@@ -120,7 +120,7 @@ void Pins::RunSamples(int i, double now_s, bool stuck) {
 void Pins::Repeat(double now_s) {
   for (size_t i = 0; i < fingers_.size(); ++i) {
     fingers_[i].last_value = -1;
-    if (!analogue_ && fingers_[i].shown) sink_.edge(i, true, now_s);
+    if (!analogue_) sink_.edge(i, fingers_[i].shown, now_s);
   }
 }
 

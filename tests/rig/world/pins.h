@@ -28,7 +28,7 @@ class Pins {
   void Run(double now_s, int stuck);
   // When an edge is due next; infinite if none is.
   double NextDueS() const;
-  // After a reset: tells every pressed finger again, as hardware that is read at the start.
+  // After a reset: tells how every pin stands, as hardware that is read at the start.
   void Repeat(double now_s);
 
  private:
