@@ -1,6 +1,7 @@
 // touchstone capture: photographs as PNG or JPEG files.
 #include <filesystem>
 
+#include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/source/batch.h"
 #include "client/source/lab_units.h"
@@ -17,6 +18,7 @@ namespace fs = std::filesystem;
 struct Options {
   TouchFlags touch;
   ImageFlags image;
+  MotionFlags motion;
   std::string object;
   std::string plan;
   std::string eye_mm, at_mm, up = "0,0,1";
@@ -76,6 +78,8 @@ absl::Status RunCapture(const Cli& cli, const Options& options) {
                               MakeImageSpec(cli, options.image, extension == ".png" ? "png" : "jpeg"));
   TOUCHSTONE_RETURN_IF_ERROR(AddViews(options, &request));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), options.motion));
+  const StopOnInterrupt stop_on_interrupt(source.get());
 
   if (request.views_size() > 1 && output.has_parent_path()) {
     std::error_code error;
@@ -90,9 +94,7 @@ absl::Status RunCapture(const Cli& cli, const Options& options) {
   for (int i = 0; i < views.size(); ++i) {
     request.clear_views();
     *request.add_views() = views[i];
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const v1::CaptureResponse response,
-        client::Connection::Call(&v1::Source::Stub::Capture, connection->source(), request));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CaptureResponse response, source->Capture(request));
     const fs::path file = FileOfView(output, i, views.size());
     const auto beside = [&](const char* ending) {
       return (file.parent_path() / file.stem()).string() + ending;
@@ -154,6 +156,7 @@ void AddCapture(Cli* cli) {
       ->group("Camera");
   AddTouchOptions(command, &options->touch);
   AddImageOptions(command, &options->image);
+  AddMotionOptions(command, &options->motion, false);
   cli->AddSourceOptions(command);
 }
 

@@ -55,6 +55,18 @@ TEST_F(CommandLineTest, HelpBeginsWithExamples) {
                                                   {"mesh"},
                                                   {"mesh", "import"},
                                                   {"mesh", "supershape"},
+                                                  {"session"},
+                                                  {"session", "import"},
+                                                  {"session", "export"},
+                                                  {"rig"},
+                                                  {"rig", "status"},
+                                                  {"rig", "stop"},
+                                                  {"rig", "home"},
+                                                  {"rig", "mount"},
+                                                  {"rig", "dry-run"},
+                                                  {"rig", "run"},
+                                                  {"rig", "photos"},
+                                                  {"rig", "calibrate"},
                                                   {"doctor"}}) {
     std::vector<std::string> arguments = command;
     arguments.push_back("--help");
@@ -112,6 +124,16 @@ TEST_F(CommandLineTest, BadInputIsExitCode2AndNamesFieldAndValue) {
       {{"objects", "--server", "nowhere"}, "'nowhere' is not HOST:PORT"},
       {{"objects", "--server", "127.0.0.1:1", "--mesh", "a=b.off"}, "--mesh: works only without --server"},
       {{"objects", "extra"}, "'extra' is one argument too many"},
+      {{"touch", "lat20", "--approach", "0,0,-1", "--session", "a b"},
+       "--session: 'a b' is no session's name"},
+      {{"rig", "status"}, "--server is missing"},
+      {{"rig", "stop"}, "--server is missing"},
+      {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "PLACEMENT: '+w'"},
+      {{"rig", "run", "none.csv", "-o", "set.txt"}, "-o: 'set.txt' does not say the format"},
+      {{"session", "list", "set.csv"}, "'set.csv' is no journal"},
+      {{"session", "list", "none.db"}, "none.db"},
+      {{"session", "export", "monday", "tuesday"}, "'tuesday' is one argument too many"},
+      {{"session", "import", "bad.csv", "-o", "set.csv"}, "'set.csv' is no journal"},
   };
   for (const auto& [arguments, words] : cases) {
     const Outcome outcome = Run(arguments);
@@ -138,6 +160,76 @@ TEST_F(CommandLineTest, DataGoesToStdoutAsMeasurementFiles) {
   const auto parsed = nlohmann::json::parse(json.out, nullptr, false);
   ASSERT_FALSE(parsed.is_discarded()) << json.out;
   EXPECT_EQ(parsed["touches"][0]["descriptor_us"].size(), 3u);
+}
+
+TEST_F(CommandLineTest, AVirtualSourceHasNoRigAndSaysWhatDoesTheSame) {
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  auto server = Server::Start(options);
+  ASSERT_TRUE(server.ok()) << server.status();
+  const std::string address = "127.0.0.1:" + std::to_string((*server)->port());
+  ASSERT_EQ(Run({"plan", "lat20", "--count", "2", "-o", "plan.csv"}).exit_code, 0);
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"rig", "status"},
+                                                  {"rig", "home"},
+                                                  {"rig", "dry-run", "plan.csv"},
+                                                  {"rig", "run", "plan.csv", "-o", "session.db"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--server", address});
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 4) << outcome.err;
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("virtual source"), HasSubstr("touchstone touch --plan")));
+  }
+  EXPECT_FALSE(fs::exists(Path("session.db")));
+  // What touches a rig touches here, with the same options.
+  EXPECT_EQ(
+      Run({"touch", "--plan", "plan.csv", "--session", "monday", "--take-lease", "--server", address}).out,
+      Run({"touch", "--plan", "plan.csv"}).out);
+  EXPECT_EQ(Run({"rig", "stop", "--server", address}).exit_code, 0) << "stopping is never refused";
+}
+
+TEST_F(CommandLineTest, JournalsAreListedExportedAndReadLikeMeasurementFiles) {
+  ASSERT_EQ(
+      Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "3", "--rounds", "2", "-o", "plan.csv"})
+          .exit_code,
+      0);
+  ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "set.csv"}).exit_code, 0);
+  const Outcome import = Run({"session", "import", "set.csv", "-o", "session.db"});
+  ASSERT_EQ(import.exit_code, 0) << import.err;
+  EXPECT_THAT(import.err, HasSubstr("36 touches"));
+  const Outcome list = Run({"session", "list", "session.db", "--json"});
+  ASSERT_EQ(list.exit_code, 0) << list.err;
+  const auto sessions = nlohmann::json::parse(list.out)["sessions"];
+  ASSERT_EQ(sessions.size(), 1u);
+  EXPECT_EQ(sessions[0]["name"], "set");
+  EXPECT_EQ(sessions[0]["done"], 36);
+  const Outcome shown = Run({"session", "show", "session.db"});
+  EXPECT_THAT(shown.out, HasSubstr("36 done"));
+
+  ASSERT_EQ(Run({"session", "export", "session.db", "-o", "again.csv"}).exit_code, 0);
+  const auto before = client::ParseMeasurements(Read("set.csv"), "set.csv");
+  const auto after = client::ParseMeasurements(Read("again.csv"), "again.csv");
+  ASSERT_TRUE(before.ok() && after.ok()) << after.status();
+  ASSERT_EQ(after->size(), before->size());
+  for (size_t row = 0; row < before->size(); ++row) {
+    EXPECT_EQ((*after)[row].touch, (*before)[row].touch);
+    EXPECT_EQ((*after)[row].commanded.approach().DebugString(),
+              (*before)[row].commanded.approach().DebugString());
+    for (int finger = 0; finger < 3; ++finger)
+      EXPECT_DOUBLE_EQ((*after)[row].time_s[finger], (*before)[row].time_s[finger]);
+  }
+  const Outcome compare = Run({"compare", "session.db"});
+  EXPECT_EQ(compare.exit_code, 0) << compare.err;
+
+  // Two sessions: the user says which.
+  EXPECT_EQ(Run({"session", "import", "set.csv", "-o", "session.db"}).exit_code, 2)
+      << "a session never changes";
+  ASSERT_EQ(Run({"session", "import", "set.csv", "-o", "session.db", "--session", "monday"}).exit_code, 0);
+  const Outcome which = Run({"compare", "session.db"});
+  EXPECT_EQ(which.exit_code, 2);
+  EXPECT_THAT(which.err, AllOf(HasSubstr("set, monday"), HasSubstr("session export session.db NAME")));
+  EXPECT_EQ(Run({"session", "delete", "session.db"}).exit_code, 2);
+  EXPECT_EQ(Run({"session", "delete", "session.db", "monday"}).exit_code, 0);
+  EXPECT_EQ(Run({"compare", "session.db"}).exit_code, 0);
 }
 
 TEST_F(CommandLineTest, ModelFilesAreNeverChanged) {

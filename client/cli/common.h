@@ -138,6 +138,7 @@ void AddCompare(Cli* cli);
 void AddDiagnose(Cli* cli);
 void AddPropose(Cli* cli);
 void AddSession(Cli* cli);
+void AddRig(Cli* cli);
 void AddDoctor(Cli* cli);
 
 }  // namespace touchstone::cli

@@ -14,6 +14,7 @@
 #include <random>
 #include <set>
 
+#include "client/cli/journal_session.h"
 #include "client/report/report.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -42,6 +43,11 @@ absl::StatusOr<SetText> ReadSet(const Cli& cli, const std::string& text) {
   SetText set;
   if (text == "-") {
     set.csv.assign(std::istreambuf_iterator<char>(std::cin), {});
+    return set;
+  }
+  // A rig's journal with one session is as good as its measurement file.
+  if (IsJournalPath(text)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(text, ""));
     return set;
   }
   std::error_code error;
@@ -124,8 +130,10 @@ int TerminalWidth() {
 
 void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html) {
   command
-      ->add_option("SET", options->set,
-                   "The measurement file (CSV); -: stdin; with --server also a stored session's name")
+      ->add_option(
+          "SET", options->set,
+          "The measurement file (CSV), or the journal (.db) of a rig's session; -: stdin; with --server "
+          "also a stored session's name")
       ->type_name("")
       ->required();
   command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")

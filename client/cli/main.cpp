@@ -21,6 +21,7 @@ void AddCommands(Cli* cli) {
   AddDiagnose(cli);
   AddPropose(cli);
   AddSession(cli);
+  AddRig(cli);
   AddDoctor(cli);
 }
 

@@ -1,12 +1,16 @@
-// touchstone session create|list|show|export|delete: measured sets that a server keeps.
+// touchstone session create|list|show|export|import|delete: measured sets that a server keeps, or that a
+// journal holds.
 #include <absl/strings/str_join.h>
 
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/journal_session.h"
+#include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 
@@ -17,6 +21,7 @@ constexpr size_t kPiece = 1 << 20;
 
 struct Options {
   std::string name, file, output;
+  std::string in_journal;  // the session's name where NAME is a journal
   bool check = false;
 };
 
@@ -24,7 +29,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServer(const Cli& c
   if (cli.source().servers.empty())
     return absl::InvalidArgumentError(
         "--server is missing: sessions are kept by a touchstone-server, for instance --server "
-        "127.0.0.1:50051");
+        "127.0.0.1:50051, or by a journal, for instance session.db");
   return cli.Connect();
 }
 
@@ -43,6 +48,97 @@ std::string InWords(const v1::Session& session) {
                       Counted(session.fingers(), "finger", "fingers"), ", ",
                       session.has_poses() ? "" : "no poses, ", "hash ", session.hash().substr(0, 12));
 }
+
+// --- Sessions of a journal file
+
+Json JournalSessionJson(const JournalSession& session) {
+  return {{"name", session.name},
+          {"source", session.source},
+          {"created_unix_s", session.created_unix_s},
+          {"fingers", session.fingers},
+          {"spacing_mm", session.spacing_m * 1e3},
+          {"touches", session.touches},
+          {"done", session.done},
+          {"failed", session.failed},
+          {"images", session.images},
+          {"objects", session.objects}};
+}
+
+std::string UtcText(double unix_s) {
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm parts{};
+  char text[32] = "";
+  if (::gmtime_r(&seconds, &parts) != nullptr)
+    std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+absl::Status ListJournal(const Cli& cli, const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, journal->Sessions());
+  if (cli.output().json) {
+    Json list = Json::array();
+    for (const JournalSession& session : sessions) list.push_back(JournalSessionJson(session));
+    PrintJson({{"sessions", list}});
+    return absl::OkStatus();
+  }
+  Table table({"SESSION", "TOUCHES", "DONE", "PICTURES", "CREATED", "OBJECTS"});
+  for (const JournalSession& session : sessions)
+    table.Add({session.name, std::to_string(session.touches), std::to_string(session.done),
+               std::to_string(session.images), UtcText(session.created_unix_s),
+               absl::StrJoin(session.objects, ", ")});
+  return WriteOutput("", table.Text());
+}
+
+absl::Status ShowJournal(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session,
+                              FindSession(*journal, options.name, options.in_journal));
+  if (cli.output().json) {
+    PrintJson(JournalSessionJson(session));
+    return absl::OkStatus();
+  }
+  return WriteOutput(
+      "", absl::StrCat(session.name, ": ", Counted(session.touches, "touch", "touches"), ", ", session.done,
+                       " done, ", session.failed, " failed, ", Counted(session.images, "picture", "pictures"),
+                       ", ", Counted(session.fingers, "finger", "fingers"), "\n  Objects   ",
+                       absl::StrJoin(session.objects, ", "), "\n  Source    ", session.source,
+                       "\n  Created   ", UtcText(session.created_unix_s), "\n"));
+}
+
+absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {
+  if (options.in_journal.empty())
+    return absl::InvalidArgumentError(
+        absl::StrCat(options.name, ": which session? touchstone session delete ", options.name,
+                     " SESSION (touchstone session list ", options.name, " lists them)"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, Journal::Open(options.name, Journal::Mode::kReadWrite));
+  TOUCHSTONE_RETURN_IF_ERROR(FindSession(*journal, options.name, options.in_journal).status());
+  TOUCHSTONE_RETURN_IF_ERROR(journal->DeleteSession(options.in_journal));
+  cli.Log(absl::StrCat("deleted ", options.in_journal, " from ", options.name));
+  return absl::OkStatus();
+}
+
+// A word after the name is a session of a journal, and of nothing else.
+absl::Status CheckInJournal(const Options& options) {
+  if (options.in_journal.empty() || IsJournalPath(options.name)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("'", options.in_journal, "' is one argument too many: '",
+                                                 options.name,
+                                                 "' is no journal (.db), but a server's session"));
+}
+
+absl::Status RunImport(const Cli& cli, const Options& options) {
+  if (!IsJournalPath(options.output))
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: '", options.output, "' is no journal; its name ends in .db"));
+  const std::string name = options.name.empty() ? client::SessionNameOf(options.file) : options.name;
+  TOUCHSTONE_RETURN_IF_ERROR(client::CheckSessionName(name, "--session"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const size_t touches, ImportIntoJournal(options.file, options.output, name));
+  if (cli.output().json) PrintJson({{"session", name}, {"journal", options.output}, {"touches", touches}});
+  cli.Log(absl::StrCat(options.output, ": session '", name, "', ", Counted(touches, "touch", "touches")));
+  return absl::OkStatus();
+}
+
+// --- Sessions of a server
 
 absl::Status RunCreate(const Cli& cli, const Options& options) {
   std::ifstream file(options.file, std::ios::binary);
@@ -75,7 +171,12 @@ absl::Status RunCreate(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunList(const Cli& cli) {
+absl::Status RunList(const Cli& cli, const Options& options) {
+  if (!options.file.empty()) {
+    if (IsJournalPath(options.file)) return ListJournal(cli, options.file);
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", options.file, "' is no journal; its name ends in .db"));
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListSessionsResponse response,
                               client::Connection::Call(&v1::Sessions::Stub::ListSessions,
@@ -99,6 +200,8 @@ absl::Status RunList(const Cli& cli) {
 }
 
 absl::Status RunShow(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
+  if (IsJournalPath(options.name)) return ShowJournal(cli, options);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   v1::GetSessionRequest request;
   request.set_name(options.name);
@@ -115,6 +218,8 @@ absl::Status RunShow(const Cli& cli, const Options& options) {
 }
 
 absl::Status RunExport(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
+  if (IsJournalPath(options.name)) return ExportFromJournal(options.name, options.in_journal, options.output);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
@@ -129,6 +234,8 @@ absl::Status RunExport(const Cli& cli, const Options& options) {
 }
 
 absl::Status RunDelete(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
+  if (IsJournalPath(options.name)) return DeleteFromJournal(cli, options);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   v1::DeleteSessionRequest request;
   request.set_name(options.name);
@@ -143,15 +250,28 @@ absl::Status RunDelete(const Cli& cli, const Options& options) {
 void AddSession(Cli* cli) {
   auto options = std::make_shared<Options>();
   CLI::App* group = cli->AddGroup(
-      "session", "Stores measured sets at a server, where its replicas and other people find them.",
+      "session",
+      "Measured sets: at a server, where its replicas and other people find them, or in a rig's journal.",
       "touchstone session create monday set.csv --server 127.0.0.1:50051\n"
       "touchstone session list --server 127.0.0.1:50051\n"
       "touchstone diagnose monday --model nominal.yaml --server 127.0.0.1:50051\n"
-      "touchstone session export monday -o set.csv --server 127.0.0.1:50051");
+      "touchstone session export monday -o set.csv --server 127.0.0.1:50051\n"
+      "touchstone session list session.db                                        a journal of touchstone rig "
+      "run\n"
+      "touchstone session export session.db -o set.csv");
   const auto add_name = [&](CLI::App* command) {
     command->add_option("NAME", options->name, "The session's name: letters, digits, '_', '-' and '.'")
         ->type_name("")
         ->required();
+  };
+  const auto add_place = [&](CLI::App* command) {
+    command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
+        ->type_name("")
+        ->required();
+    command
+        ->add_option("SESSION", options->in_journal,
+                     "The session's name in that journal. Default: its only one")
+        ->type_name("");
   };
   const std::string server = " --server 127.0.0.1:50051";
 
@@ -165,27 +285,49 @@ void AddSession(Cli* cli) {
   create->add_flag("--check", options->check, "Only check it");
   cli->AddSourceOptions(create);
 
-  CLI::App* list = cli->AddCommand(group, "list", "Lists the stored sessions.",
-                                   "touchstone session list" + server, [cli] { return RunList(*cli); });
+  CLI::App* list =
+      cli->AddCommand(group, "list", "Lists the stored sessions.",
+                      "touchstone session list" + server + "\ntouchstone session list session.db",
+                      [cli, options] { return RunList(*cli, *options); });
+  list->add_option("JOURNAL", options->file, "A journal (.db). Default: those of --server")->type_name("");
   cli->AddSourceOptions(list);
 
-  CLI::App* show =
-      cli->AddCommand(group, "show", "Describes a session.", "touchstone session show monday" + server,
-                      [cli, options] { return RunShow(*cli, *options); });
-  add_name(show);
+  CLI::App* show = cli->AddCommand(
+      group, "show", "Describes a session.",
+      "touchstone session show monday" + server + "\ntouchstone session show session.db monday",
+      [cli, options] { return RunShow(*cli, *options); });
+  add_place(show);
   cli->AddSourceOptions(show);
 
   CLI::App* out = cli->AddCommand(group, "export", "Writes a session's measurement file, as it was stored.",
-                                  "touchstone session export monday -o set.csv" + server,
+                                  "touchstone session export monday -o set.csv" + server + "\n" +
+                                      "touchstone session export session.db -o set.csv\n"
+                                      "touchstone session export session.db monday -o set.h5",
                                   [cli, options] { return RunExport(*cli, *options); });
-  add_name(out);
-  out->add_option("-o,--output", options->output, "The file to write. Default: stdout")->type_name("FILE");
+  add_place(out);
+  out->add_option("-o,--output", options->output,
+                  "The file to write; from a journal also .h5, with poses and pictures. Default: stdout")
+      ->type_name("FILE");
   cli->AddSourceOptions(out);
 
-  CLI::App* remove =
-      cli->AddCommand(group, "delete", "Deletes a session.", "touchstone session delete monday" + server,
-                      [cli, options] { return RunDelete(*cli, *options); });
-  add_name(remove);
+  CLI::App* in = cli->AddCommand(group, "import", "Puts a measurement file into a journal.",
+                                 "touchstone session import set.csv -o session.db\n"
+                                 "touchstone session import set.csv -o session.db --session monday",
+                                 [cli, options] { return RunImport(*cli, *options); });
+  in->add_option("FILE", options->file, "The measurement file (.csv), or what session export wrote (.h5)")
+      ->type_name("")
+      ->required();
+  in->add_option("-o,--output", options->output, "The journal (.db); made if it is not there")
+      ->type_name("FILE")
+      ->required();
+  in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
+      ->type_name("NAME");
+
+  CLI::App* remove = cli->AddCommand(
+      group, "delete", "Deletes a session.",
+      "touchstone session delete monday" + server + "\ntouchstone session delete session.db monday",
+      [cli, options] { return RunDelete(*cli, *options); });
+  add_place(remove);
   cli->AddSourceOptions(remove);
 }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "client/cli/interrupt.h"
+#include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/source/dataset_writer.h"
@@ -18,6 +19,7 @@ namespace {
 struct Options {
   PlanOptions plan;
   ImageFlags image;
+  MotionFlags motion;
   std::vector<std::string> objects;
   std::vector<std::string> columns;
   std::string model;
@@ -164,8 +166,13 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
     TOUCHSTONE_ASSIGN_OR_RETURN(job.spec, MakeSpec(cli, o, job.format, connection.get()));
   }
 
-  client::DatasetWriter writer(connection.get(), job);
   ProgressBar bar(!cli.output().quiet);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), o.motion));
+  job.lease = source->lease();
+  job.session = o.motion.session;
+  // Where a touch takes seconds, each is heard of when it is done.
+  if (source->physical() && job.batch_size == 0) job.batch_size = 1;
+  client::DatasetWriter writer(connection.get(), job);
   writer.on_log = [&](const std::string& line) {
     bar.Clear();
     cli.Log(line);
@@ -176,7 +183,10 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
   const auto start = std::chrono::steady_clock::now();
   absl::Status status;
   {
-    const Interrupt::Handler on_interrupt([&writer] { writer.Cancel(); });
+    const Interrupt::Handler on_interrupt([&writer, &source] {
+      source->Interrupt("interrupted at the command line of " + client::LeaseHolder());
+      writer.Cancel();
+    });
     status = writer.Run();
   }
   bar.Clear();
@@ -260,6 +270,7 @@ void AddStream(Cli* cli) {
   for (CLI::Option* option : specification)
     if (option->get_group() == what) like->excludes(option);
   like->excludes(const_cast<CLI::Option*>(to));
+  AddMotionOptions(command, &options->motion, true);
   cli->AddSourceOptions(command);
 }
 

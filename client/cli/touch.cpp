@@ -1,9 +1,12 @@
 // touchstone touch: explicit touches and their contact times.
 #include <cmath>
 
+#include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
+#include "client/cli/progress_bar.h"
 #include "client/source/lab_units.h"
 #include "client/source/measurement_csv.h"
+#include "client/source/touch_ids.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {
@@ -11,6 +14,7 @@ namespace {
 
 struct Options {
   TouchFlags touch;
+  MotionFlags motion;
   std::string object;
   std::string plan;
   std::string model;
@@ -22,6 +26,7 @@ struct Options {
 // What a touch gave, beside the row of the measurement file.
 struct TouchRow {
   client::MeasuredTouch measured;
+  uint64_t planned = 0;  // its number in the plan, for its id
   v1::TouchResult result;
 };
 
@@ -46,42 +51,61 @@ absl::StatusOr<std::vector<TouchRow>> CommandedRows(const Options& options) {
   std::vector<TouchRow> rows;
   for (uint32_t repeat = 0; repeat < options.repeats; ++repeat)
     for (const client::MeasuredTouch& touch : touches) {
-      rows.push_back({touch, {}});
+      rows.push_back({touch, options.repeats == 1 ? touch.touch : rows.size(), {}});
       rows.back().measured.touch = rows.size() - 1;
     }
   return rows;
 }
 
-// Rows of one object that follow each other are one session; the noise hangs on the row's number alone.
+// Rows of one object that follow each other are one session; the noise hangs on the row's number alone. A
+// physical source gets one at a time, with ids: those of a plan's touches are always the same, so that a
+// repeated command goes on where it stopped.
 absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchRow>* rows,
                       std::string* model_hash) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::DescribeResponse source,
-      client::Connection::Call(&v1::Source::Stub::Describe, connection->source(), v1::DescribeRequest()));
-  const size_t most = std::max<uint32_t>(1, source.most_touches_per_request());
+  ProgressBar bar(!cli.output().quiet);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source,
+                              OpenLeased(cli, connection.get(), options.motion, [&](const std::string& line) {
+                                bar.Clear();
+                                cli.Log(line);
+                              }));
+  const StopOnInterrupt stop_on_interrupt(source.get());
+  const std::string session = options.motion.session.empty() ? "default" : options.motion.session;
+  const size_t most = source->touches_a_request();
   for (size_t first = 0; first < rows->size();) {
     v1::TouchRequest request;
     request.set_object((*rows)[first].measured.object);
     *request.mutable_model() = model;
     request.set_seed(options.seed);
     request.set_first_index(first);
+    if (source->physical()) request.set_session(session);
     size_t stop = first;
-    while (stop < rows->size() && stop - first < most && (*rows)[stop].measured.object == request.object())
-      *request.add_touches() = (*rows)[stop++].measured.commanded;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        v1::TouchResponse response,
-        client::Connection::Call(&v1::Source::Stub::Touch, connection->source(), request));
-    if (static_cast<size_t>(response.results_size()) != stop - first)
-      return absl::InternalError(absl::StrCat("the source gave ", response.results_size(), " results for ",
-                                              stop - first, " touches"));
+    while (stop < rows->size() && stop - first < most && (*rows)[stop].measured.object == request.object()) {
+      const TouchRow& row = (*rows)[stop++];
+      *request.add_touches() = row.measured.commanded;
+      if (source->physical())
+        request.add_touch_ids(options.plan.empty()
+                                  ? client::NewTouchId(row.measured.touch)
+                                  : client::TouchId(session, row.measured.object, row.planned));
+    }
+    if (source->physical())
+      bar.ShowStage(absl::StrCat("touch ", first + 1, " of ", rows->size(), ": ", request.object()),
+                    static_cast<double>(first) / rows->size());
+    absl::StatusOr<v1::TouchResponse> response = source->Touch(std::move(request));
+    if (!response.ok()) {
+      bar.Clear();
+      if (source->physical() && first > 0 && !options.plan.empty())
+        cli.Log(absl::StrCat(first, " of ", rows->size(), " touches stand in session '", session,
+                             "' of the source; the same command goes on after them"));
+      return response.status();
+    }
     for (size_t row = first; row < stop; ++row) {
-      v1::TouchResult& result = *response.mutable_results(static_cast<int>(row - first));
+      v1::TouchResult& result = *response->mutable_results(static_cast<int>(row - first));
       (*rows)[row].measured.time_s.assign(result.contact_time_s().begin(), result.contact_time_s().end());
       (*rows)[row].result = std::move(result);
     }
-    *model_hash = response.model_hash();
+    *model_hash = response->model_hash();
     first = stop;
   }
   return absl::OkStatus();
@@ -151,6 +175,7 @@ void AddTouch(Cli* cli) {
   command->add_option("-o,--output", options->output, "The file to write. Default: stdout")
       ->type_name("FILE");
   AddTouchOptions(command, &options->touch);
+  AddMotionOptions(command, &options->motion, true);
   cli->AddSourceOptions(command);
 }
 

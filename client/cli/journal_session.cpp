@@ -1,0 +1,82 @@
+#include "client/cli/journal_session.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include "client/cli/common.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/session/session_files.h"
+
+namespace touchstone::cli {
+
+bool IsJournalPath(const std::string& text) {
+  return absl::EndsWith(text, ".db");
+}
+
+absl::StatusOr<std::unique_ptr<Journal>> OpenJournal(const std::string& path) {
+  return Journal::Open(path, Journal::Mode::kReadOnly);
+}
+
+absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::string& path,
+                                           const std::string& name) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, journal.Sessions());
+  std::vector<std::string> names;
+  for (const JournalSession& session : sessions) {
+    if (session.name == name || (name.empty() && sessions.size() == 1)) return session;
+    names.push_back(session.name);
+  }
+  if (names.empty()) return absl::NotFoundError(absl::StrCat(path, ": the journal has no session"));
+  if (!name.empty())
+    return absl::NotFoundError(
+        absl::StrCat(path, ": there is no session '", name, "'", DidYouMean(name, names)));
+  std::string list;
+  for (const std::string& known : names) absl::StrAppend(&list, list.empty() ? "" : ", ", known);
+  return absl::InvalidArgumentError(absl::StrCat(path, ": the journal has ", names.size(), " sessions (",
+                                                 list,
+                                                 "); say which: touchstone session "
+                                                 "export ",
+                                                 path, " NAME -o set.csv writes one as a measurement file"));
+}
+
+absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& journal,
+                                                             const std::string& session) {
+  return SessionMeasurements(journal, session);
+}
+
+absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> touches,
+                              TouchesOf(*journal, found.name));
+  if (touches.empty())
+    return absl::FailedPreconditionError(
+        absl::StrCat(path, ": session '", found.name, "' has no touch that is done"));
+  return client::FormatMeasurements(touches);
+}
+
+absl::Status ExportFromJournal(const std::string& path, const std::string& session,
+                               const std::string& output) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));
+  if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
+    return ExportSessionHdf5(*journal, found.name, output);
+  if (!output.empty() && output != "-") return ExportSessionCsv(*journal, found.name, output);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, JournalCsv(path, found.name));
+  return WriteOutput(output, csv);
+}
+
+absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,
+                                         const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal,
+                              Journal::Open(journal_path, Journal::Mode::kCreateOrReadWrite));
+  ImportOptions options;
+  options.session = session;
+  const bool hdf5 = absl::EndsWith(file_path, ".h5") || absl::EndsWith(file_path, ".hdf5");
+  TOUCHSTONE_RETURN_IF_ERROR(hdf5 ? ImportSessionHdf5(file_path, options, journal.get())
+                                  : ImportSessionCsv(file_path, options, journal.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession made, journal->Session(session));
+  return made.touches;
+}
+
+}  // namespace touchstone::cli

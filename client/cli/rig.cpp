@@ -1,0 +1,109 @@
+// touchstone rig: the group, and what its commands share.
+#include "client/cli/rig.h"
+
+#include <algorithm>
+
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr size_t kChecksARequest = 100;
+
+}  // namespace
+
+absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
+  if (cli.source().servers.empty())
+    return absl::InvalidArgumentError(
+        "--server is missing: a rig is reached through its touchstone-gateway, for instance --server "
+        "127.0.0.1:50052");
+  RigConnection rig;
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig.connection, cli.Connect());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      rig.source,
+      client::Connection::Call(&v1::Source::Stub::Describe, rig.connection->source(), v1::DescribeRequest()));
+  if (rig.source.kind() != "physical")
+    return absl::FailedPreconditionError(
+        absl::StrCat(rig.connection->address(), " is a ", rig.source.kind(),
+                     " source, which has no rig; touchstone touch --plan makes a plan's touches there"));
+  return rig;
+}
+
+absl::StatusOr<v1::RigState> GetRig(client::Connection* connection) {
+  return client::Connection::Call(&v1::Rig::Stub::GetRig, connection->rig(), v1::GetRigRequest());
+}
+
+absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
+                             const std::string& object, const std::string& placement) {
+  if (state.object() == object && state.placement() == placement) return absl::OkStatus();
+  if (!state.mounts_itself())
+    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(PlacementRequest(object, placement, state.object())));
+  else
+    cli.Log(absl::StrCat("the rig puts ", object, " on the fixture with its face ", placement, " up"));
+  return source->Mount(object, placement).status();
+}
+
+absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>& wanted,
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks) {
+  for (size_t first = 0; first < wanted.size();) {
+    v1::CheckTouchesRequest request;
+    request.set_object((*rows)[wanted[first]].touch.object);
+    request.set_path(checks != nullptr);
+    size_t stop = first;
+    while (stop < wanted.size() && stop - first < kChecksARequest &&
+           (*rows)[wanted[stop]].touch.object == request.object())
+      *request.add_touches() = (*rows)[wanted[stop++]].touch.commanded;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        v1::CheckTouchesResponse response,
+        client::Connection::Call(&v1::Rig::Stub::CheckTouches, connection->rig(), request));
+    if (static_cast<size_t>(response.checks_size()) != stop - first)
+      return absl::InternalError(
+          absl::StrCat("the source checked ", response.checks_size(), " of ", stop - first, " touches"));
+    for (size_t k = first; k < stop; ++k) {
+      v1::TouchCheck& check = *response.mutable_checks(static_cast<int>(k - first));
+      PlannedRow& row = (*rows)[wanted[k]];
+      row.possible = check.possible();
+      row.reason = check.reason();
+      row.placement = check.placement();
+      row.duration_s = check.duration_s();
+      if (checks != nullptr) checks->push_back(std::move(check));
+    }
+    first = stop;
+    if (Interrupt::Raised()) return absl::CancelledError("interrupted");
+  }
+  return absl::OkStatus();
+}
+
+std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t most_lines) {
+  Table table({"TOUCH", "OBJECT", "FACE UP", "WHY NOT"});
+  size_t lines = 0, more = 0;
+  for (const PlannedRow& row : rows) {
+    if (row.possible) continue;
+    if (lines == most_lines) {
+      ++more;
+      continue;
+    }
+    ++lines;
+    table.Add({std::to_string(row.touch.touch), row.touch.object, row.placement, row.reason});
+  }
+  if (lines == 0) return "";
+  return table.Text() + (more > 0 ? absl::StrCat("and ", more, " more\n") : "");
+}
+
+void AddRig(Cli* cli) {
+  CLI::App* group = cli->AddGroup(
+      "rig",
+      "Works a rig through its touchstone-gateway: state, motions, calibration, whole sessions of touches.",
+      "touchstone rig status --server 127.0.0.1:50052\n"
+      "touchstone rig stop --server 127.0.0.1:50052\n"
+      "touchstone rig dry-run plan.csv -o way.svg --server 127.0.0.1:50052\n"
+      "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052");
+  AddRigStatus(cli, group);
+  AddRigMotions(cli, group);
+  AddRigDryRun(cli, group);
+  AddRigRun(cli, group);
+  AddRigPhotos(cli, group);
+  AddRigCalibrate(cli, group);
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,44 @@
+// What the commands of `touchstone rig` share; one file a command.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/cli/common.h"
+#include "client/cli/motion_options.h"
+#include "client/cli/rig_plan.h"
+
+namespace touchstone::cli {
+
+// A connection to --server, which must be given and must be a physical source: its description goes along.
+struct RigConnection {
+  std::unique_ptr<client::Connection> connection;
+  v1::DescribeResponse source;
+};
+absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli);
+
+absl::StatusOr<v1::RigState> GetRig(client::Connection* connection);
+
+// Says that the object lies on the fixture as it must. Where the rig changes it by itself it does; else a
+// person is asked, unless it lies there already.
+absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
+                             const std::string& object, const std::string& placement);
+
+// Checks the rows that `wanted` names (indices), in parts, and fills in what the source says. `path` of each
+// row's check goes to `paths` (may be null).
+absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>& wanted,
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks);
+
+// "2 of 192 touches are impossible: ...", with a line for each of the first few.
+std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t most_lines);
+
+// One file a command.
+void AddRigStatus(Cli* cli, CLI::App* group);
+void AddRigMotions(Cli* cli, CLI::App* group);  // home, mount, stop
+void AddRigDryRun(Cli* cli, CLI::App* group);
+void AddRigRun(Cli* cli, CLI::App* group);
+void AddRigPhotos(Cli* cli, CLI::App* group);
+void AddRigCalibrate(Cli* cli, CLI::App* group);
+
+}  // namespace touchstone::cli

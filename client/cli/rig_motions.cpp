@@ -1,0 +1,112 @@
+// touchstone rig stop|home|mount.
+#include "client/cli/rig.h"
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr std::chrono::seconds kStopAnswer{5};
+
+struct Options {
+  MotionFlags motion;
+  std::string reason, object, placement = "+z";
+};
+
+const std::vector<std::string>& PlacementNames() {
+  static const std::vector<std::string> names = {"+x", "-x", "+y", "-y", "+z", "-z"};
+  return names;
+}
+
+// As fast as it goes: no question before the call.
+absl::Status RunStop(const Cli& cli, const Options& options) {
+  if (cli.source().servers.empty())
+    return absl::InvalidArgumentError(
+        "--server is missing: which rig is to stop? For instance --server 127.0.0.1:50052");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
+  v1::StopRequest request;
+  request.set_reason(options.reason.empty() ? "touchstone rig stop by " + client::LeaseHolder()
+                                            : options.reason);
+  v1::StopResponse response;
+  const absl::Status status = client::FromGrpc(connection->control().Stop(&context, request, &response));
+  if (!status.ok())
+    return absl::Status(status.code(), absl::StrCat("THE STOP WAS NOT CONFIRMED: ", status.message(),
+                                                    "; use the emergency stop if anything moves"));
+  if (cli.output().json) PrintJson({{"aborted_touches", response.aborted_touches()}});
+  cli.Log(absl::StrCat(
+      "stopped; ", Counted(response.aborted_touches(), "touch was", "touches were"),
+      " under way. This is a software stop and not safety-rated. Whoever acquires the lease next "
+      "(any command that moves) ends it"));
+  return absl::OkStatus();
+}
+
+void Report(const Cli& cli, const std::string& what, const v1::RigState& state) {
+  if (cli.output().json) PrintJson({{"object", state.object()}, {"placement", state.placement()}});
+  cli.Log(what);
+}
+
+absl::Status RunHome(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
+  const StopOnInterrupt stop_on_interrupt(source.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, source->Home());
+  Report(cli, "the arm is at home", state);
+  return absl::OkStatus();
+}
+
+absl::Status RunMount(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("PLACEMENT", options.placement, PlacementNames()).status());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
+  const StopOnInterrupt stop_on_interrupt(source.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, source->Mount(options.object, options.placement));
+  Report(cli,
+         absl::StrCat(state.mounts_itself() ? "the rig has put " : "noted: ", state.object(),
+                      state.mounts_itself() ? " on the fixture" : " lies on the fixture", " with its face ",
+                      state.placement(), " up"),
+         state);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddRigMotions(Cli* cli, CLI::App* group) {
+  auto options = std::make_shared<Options>();
+  const std::string server = " --server 127.0.0.1:50052";
+
+  CLI::App* stop = cli->AddCommand(
+      group, "stop", "Stops every motion now. Needs no lease and waits for nothing; not safety-rated.",
+      "touchstone rig stop" + server + "\ntouchstone rig stop --reason 'cable caught'" + server,
+      [cli, options] { return RunStop(*cli, *options); });
+  stop->add_option("--reason", options->reason, "For the log")->type_name("TEXT");
+  cli->AddSourceOptions(stop);
+
+  CLI::App* home =
+      cli->AddCommand(group, "home", "Backs the tool out along its own axis and goes to the home joints.",
+                      "touchstone rig home" + server, [cli, options] { return RunHome(*cli, *options); });
+  AddMotionOptions(home, &options->motion, false);
+  cli->AddSourceOptions(home);
+
+  CLI::App* mount = cli->AddCommand(
+      group, "mount",
+      "Tells which object lies on the fixture, and how. Where the rig changes it by itself, it does.",
+      "touchstone rig mount lat20" + server + "\ntouchstone rig mount lat20 -x" + server +
+          "     its face -x points up",
+      [cli, options] { return RunMount(*cli, *options); });
+  mount->add_option("OBJECT", options->object, "What lies on the fixture (touchstone objects)")
+      ->type_name("")
+      ->required();
+  mount
+      ->add_option(
+          "PLACEMENT", options->placement,
+          "The face of its box that points up: +x, -x, +y, -y, +z (as in the mesh file) or -z. Default: +z")
+      ->type_name("");
+  // "-x" reads like an option; here it is a face.
+  for (const char* face : {"-x", "-y", "-z"})
+    mount->add_flag_callback(face, [options, face] { options->placement = face; })->group("");
+  AddMotionOptions(mount, &options->motion, false);
+  cli->AddSourceOptions(mount);
+}
+
+}  // namespace touchstone::cli

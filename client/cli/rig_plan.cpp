@@ -1,0 +1,106 @@
+#include "client/cli/rig_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "client/source/touch_ids.h"
+#include "server/session/command_bytes.h"
+
+namespace touchstone::cli {
+
+std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::function<bool(size_t)>& take,
+                                const std::string& mounted_object, const std::string& mounted_placement) {
+  std::vector<std::string> objects;
+  std::vector<RigGroup> groups;
+  for (size_t row = 0; row < rows.size(); ++row) {
+    if (!take(row)) continue;
+    const std::string& object = rows[row].touch.object;
+    if (std::find(objects.begin(), objects.end(), object) == objects.end()) objects.push_back(object);
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const RigGroup& g) {
+      return g.object == object && g.placement == rows[row].placement;
+    });
+    if (group == groups.end()) {
+      groups.push_back({object, rows[row].placement, {}, 0});
+      group = groups.end() - 1;
+    }
+    group->rows.push_back(row);
+    group->duration_s += rows[row].duration_s;
+  }
+  // An object stays on the fixture until all of its placements are done.
+  const auto rank = [&](const RigGroup& group) {
+    const bool on_fixture = group.object == mounted_object;
+    const bool lies_so = on_fixture && group.placement == mounted_placement;
+    return std::make_tuple(
+        !on_fixture, std::find(objects.begin(), objects.end(), group.object) - objects.begin(), !lies_so);
+  };
+  std::stable_sort(groups.begin(), groups.end(),
+                   [&](const RigGroup& a, const RigGroup& b) { return rank(a) < rank(b); });
+  return groups;
+}
+
+absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::MeasuredTouch>& plan,
+                                               const std::string& session, const std::string& origin) {
+  std::vector<PlannedRow> rows;
+  std::set<std::string> ids;
+  for (const client::MeasuredTouch& touch : plan) {
+    PlannedRow row;
+    row.touch = touch;
+    row.touch.time_s.clear();
+    row.id = client::TouchId(session, touch.object, touch.touch);
+    if (!ids.insert(row.id).second)
+      return absl::InvalidArgumentError(absl::StrCat(origin, ": touch ", touch.touch, " of ", touch.object,
+                                                     " stands twice; every touch needs a number of its own"));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string PlacementRequest(const std::string& object, const std::string& placement,
+                             const std::string& mounted_object) {
+  if (object == mounted_object)
+    return absl::StrCat("Turn ", object, " so that its face ", placement, " points up");
+  return absl::StrCat("Put ", object, " on the fixture with its face ", placement, " up");
+}
+
+double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {
+  struct Repeats {
+    std::vector<double> sum, sum_of_squares;
+    size_t count = 0;
+  };
+  std::map<std::pair<std::string, std::string>, Repeats> poses;
+  size_t fingers = 0;
+  for (const client::MeasuredTouch& touch : touches) {
+    double mean = 0;
+    for (const double time_s : touch.time_s) mean += time_s / touch.time_s.size();
+    fingers = std::max(fingers, touch.time_s.size());
+    if (!std::isfinite(mean) || touch.time_s.size() < 2) continue;
+    // The same pose at another time is a repeat.
+    v1::CommandedTouch command = touch.commanded;
+    command.clear_session_time_s();
+    command.clear_covariates();
+    Repeats& repeats = poses[{touch.object, CommandBytes(command)}];
+    repeats.sum.resize(touch.time_s.size());
+    repeats.sum_of_squares.resize(touch.time_s.size());
+    ++repeats.count;
+    for (size_t i = 0; i < touch.time_s.size(); ++i) {
+      // The start of the approach is no part of the descriptor.
+      const double time_s = touch.time_s[i] - mean;
+      repeats.sum[i] += time_s;
+      repeats.sum_of_squares[i] += time_s * time_s;
+    }
+  }
+  double squares = 0;
+  size_t degrees = 0;
+  for (const auto& [pose, repeats] : poses) {
+    if (repeats.count < 2) continue;
+    for (size_t i = 0; i < repeats.sum.size(); ++i)
+      squares += std::max(0.0, repeats.sum_of_squares[i] - repeats.sum[i] * repeats.sum[i] / repeats.count);
+    degrees += (repeats.count - 1) * (repeats.sum.size() - 1);
+  }
+  return degrees > 0 ? std::sqrt(squares / degrees) : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,51 @@
+// The order in which a rig makes the touches of a plan, and what people are told about it. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "client/cli/common.h"
+#include "client/source/measurement_csv.h"
+
+namespace touchstone::cli {
+
+// A row of the plan with what its check said.
+struct PlannedRow {
+  client::MeasuredTouch touch;
+  std::string id;
+  bool possible = true;
+  std::string reason;     // why not
+  std::string placement;  // of the object, that it needs
+  double duration_s = 0;
+};
+
+// Rows (by index) that need the same object lying the same way.
+struct RigGroup {
+  std::string object, placement;
+  std::vector<size_t> rows;  // in the order of the plan
+  double duration_s = 0;
+};
+
+// Rows that `take` wants, by object and then by placement, each in the order of its first row; what lies on
+// the fixture already (may be empty) comes first.
+std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::function<bool(size_t)>& take,
+                                const std::string& mounted_object, const std::string& mounted_placement);
+
+// The rows of a plan with their ids; INVALID_ARGUMENT if two have one number for the same object.
+absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::MeasuredTouch>& plan,
+                                               const std::string& session, const std::string& origin);
+
+// "Put lat20 on the fixture with its face -x up", or where it lies there already, "Turn lat20 so that its
+// face -x points up".
+std::string PlacementRequest(const std::string& object, const std::string& placement,
+                             const std::string& mounted_object);
+
+// The standard deviation of one finger's contact time among repeats of the same touch, seconds: what no pose
+// explains. Only whole touches count. NaN without repeats.
+double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches);
+
+}  // namespace touchstone::cli

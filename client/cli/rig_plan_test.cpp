@@ -1,0 +1,189 @@
+// The order of a rig's touches, their noise, and the local record that makes a run resumable.
+#include "client/cli/rig_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "client/cli/journal_session.h"
+#include "client/cli/rig_record.h"
+#include "server/base/random.h"
+
+namespace touchstone::cli {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+client::MeasuredTouch Touch(uint64_t number, const std::string& object, double x_m = 0) {
+  client::MeasuredTouch touch;
+  touch.touch = number;
+  touch.object = object;
+  touch.commanded.mutable_target_m()->set_x(x_m);
+  touch.commanded.mutable_approach()->set_z(-1);
+  touch.commanded.mutable_lateral()->set_x(1);
+  touch.commanded.set_standoff_m(0.06);
+  touch.commanded.set_speed_m_s(0.02);
+  return touch;
+}
+
+PlannedRow Row(uint64_t number, const std::string& object, const std::string& placement) {
+  PlannedRow row;
+  row.touch = Touch(number, object);
+  row.placement = placement;
+  row.duration_s = 2;
+  return row;
+}
+
+bool All(size_t) {
+  return true;
+}
+
+// Two rounds over two objects, each with two faces, one after the other as plans have them.
+std::vector<PlannedRow> TwoRounds() {
+  std::vector<PlannedRow> rows;
+  for (int round = 0; round < 2; ++round)
+    for (const char* object : {"a", "b"})
+      for (const char* face : {"+x", "+z"}) rows.push_back(Row(rows.size(), object, face));
+  return rows;
+}
+
+TEST(RigPlan, PutsEveryObjectDownOnceForEachOfItsFaces) {
+  const std::vector<RigGroup> groups = GroupRows(TwoRounds(), All, "", "");
+  ASSERT_EQ(groups.size(), 4u);
+  EXPECT_EQ(groups[0].object + groups[0].placement, "a+x");
+  EXPECT_EQ(groups[1].object + groups[1].placement, "a+z");
+  EXPECT_EQ(groups[2].object + groups[2].placement, "b+x");
+  EXPECT_EQ(groups[3].object + groups[3].placement, "b+z");
+  EXPECT_THAT(groups[0].rows, ElementsAre(0, 4)) << "rounds keep the plan's order";
+  EXPECT_THAT(groups[3].rows, ElementsAre(3, 7));
+  EXPECT_DOUBLE_EQ(groups[0].duration_s, 4);
+}
+
+TEST(RigPlan, BeginsWithWhatLiesOnTheFixture) {
+  const std::vector<RigGroup> groups = GroupRows(TwoRounds(), All, "b", "+z");
+  ASSERT_EQ(groups.size(), 4u);
+  EXPECT_EQ(groups[0].object + groups[0].placement, "b+z");
+  EXPECT_EQ(groups[1].object + groups[1].placement, "b+x") << "it is turned before it is taken away";
+  EXPECT_EQ(groups[2].object + groups[2].placement, "a+x");
+}
+
+TEST(RigPlan, LeavesOutWhatIsDone) {
+  const std::vector<RigGroup> groups = GroupRows(
+      TwoRounds(), [](size_t row) { return row >= 5; }, "", "");
+  ASSERT_EQ(groups.size(), 3u);
+  EXPECT_THAT(groups[0].rows, ElementsAre(5));
+}
+
+TEST(RigPlan, NumbersAreUniqueForAnObject) {
+  EXPECT_TRUE(RowsOf({Touch(0, "a"), Touch(0, "b"), Touch(1, "a")}, "monday", "plan.csv").ok());
+  const auto twice = RowsOf({Touch(0, "a"), Touch(0, "a")}, "monday", "plan.csv");
+  EXPECT_EQ(twice.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(twice.status().message()), HasSubstr("plan.csv: touch 0 of a stands twice"));
+}
+
+TEST(RigPlan, TellsAPersonWhatToDo) {
+  EXPECT_EQ(PlacementRequest("lat20", "-x", ""), "Put lat20 on the fixture with its face -x up");
+  EXPECT_EQ(PlacementRequest("lat20", "-x", "lat00"), "Put lat20 on the fixture with its face -x up");
+  EXPECT_EQ(PlacementRequest("lat20", "-x", "lat20"), "Turn lat20 so that its face -x points up");
+}
+
+TEST(NoiseOfRepeats, IsThatOfOneFinger) {
+  constexpr double kSigmaS = 50e-6;
+  RandomStream random(7, RandomDomain::kTest);
+  std::vector<client::MeasuredTouch> touches;
+  for (int repeat = 0; repeat < 400; ++repeat)
+    for (int pose = 0; pose < 3; ++pose) {
+      client::MeasuredTouch touch = Touch(touches.size(), "a", 0.01 * pose);
+      touch.commanded.set_session_time_s(touches.size());
+      // The whole touch comes earlier or later, which is no noise of a finger.
+      const double start_s = 1 + 0.01 * random.Normal();
+      for (int finger = 0; finger < 3; ++finger)
+        touch.time_s.push_back(start_s + 1e-3 * finger * pose + kSigmaS * random.Normal());
+      touches.push_back(touch);
+    }
+  // 2400 degrees of freedom: 1.4 % standard error.
+  EXPECT_NEAR(NoiseOfRepeats(touches), kSigmaS, 0.05 * kSigmaS);
+}
+
+TEST(NoiseOfRepeats, IsUnknownWithoutRepeatsAndIgnoresMisses) {
+  client::MeasuredTouch a = Touch(0, "a"), b = Touch(1, "a", 0.01);
+  a.time_s = {1, 2, 3};
+  b.time_s = {1, 2, 4};
+  EXPECT_TRUE(std::isnan(NoiseOfRepeats({a, b})));
+  b = a;
+  b.time_s[1] = NAN;
+  EXPECT_TRUE(std::isnan(NoiseOfRepeats({a, b})));
+}
+
+class RigRecordTest : public ::testing::Test {
+ protected:
+  RigRecordTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "touchstone_record_XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~RigRecordTest() override { std::filesystem::remove_all(folder_); }
+
+  std::unique_ptr<RigRecord> Open() {
+    auto record = RigRecord::Open(folder_ + "/session.db", "monday", v1::RigState(), 3);
+    EXPECT_TRUE(record.ok()) << record.status();
+    return *std::move(record);
+  }
+  static v1::TouchResult Result() {
+    v1::TouchResult result;
+    for (const double time_s : {1.0, 1.25, static_cast<double>(NAN)}) result.add_contact_time_s(time_s);
+    result.mutable_measured()->set_session_time_s(12.5);
+    return result;
+  }
+
+  std::string folder_;
+};
+
+TEST_F(RigRecordTest, WhatIsDoneIsNotAskedForAgain) {
+  const client::MeasuredTouch done = Touch(0, "a"), begun = Touch(1, "a", 0.01), failed = Touch(2, "a", 0.02);
+  {
+    const auto record = Open();
+    EXPECT_FALSE(*record->Has("0", done));
+    ASSERT_TRUE(record->Begin("0", done, "+z").ok());
+    ASSERT_TRUE(record->Done("0", Result()).ok());
+    ASSERT_TRUE(record->Begin("1", begun, "+z").ok());
+    ASSERT_TRUE(record->Begin("2", failed, "+z").ok());
+    ASSERT_TRUE(record->Failed("2", absl::AbortedError("stopped")).ok());
+  }
+  // As after a kill: one is done, one under way, one failed.
+  const auto record = Open();
+  EXPECT_TRUE(*record->Has("0", done));
+  EXPECT_FALSE(*record->Has("1", begun));
+  EXPECT_FALSE(*record->Has("2", failed));
+  for (const auto& [id, touch] : {std::pair("1", begun), std::pair("2", failed)}) {
+    ASSERT_TRUE(record->Begin(id, touch, "+z").ok());
+    ASSERT_TRUE(record->Done(id, Result()).ok());
+  }
+  const auto touches = record->Touches();
+  ASSERT_TRUE(touches.ok()) << touches.status();
+  ASSERT_EQ(touches->size(), 3u);
+  EXPECT_DOUBLE_EQ((*touches)[0].time_s[1], 1.25);
+  EXPECT_TRUE(std::isnan((*touches)[0].time_s[2]));
+  EXPECT_DOUBLE_EQ((*touches)[0].commanded.session_time_s(), 12.5);
+}
+
+TEST_F(RigRecordTest, AChangedPlanIsRefused) {
+  const auto record = Open();
+  ASSERT_TRUE(record->Begin("0", Touch(0, "a"), "+z").ok());
+  ASSERT_TRUE(record->Done("0", Result()).ok());
+  const auto other = record->Has("0", Touch(0, "a", 0.01));
+  EXPECT_EQ(other.status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_THAT(std::string(other.status().message()), HasSubstr("the plan was changed"));
+}
+
+TEST(RigRecord, JournalsStandBesideMeasurementFiles) {
+  EXPECT_EQ(*JournalPathOf("out/session.db"), "out/session.db");
+  EXPECT_EQ(*JournalPathOf("out/set.csv"), "out/set.db");
+  EXPECT_EQ(JournalPathOf("out/set.txt").status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace touchstone::cli

@@ -1,0 +1,113 @@
+#include "client/cli/rig_record.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <limits>
+
+#include "client/cli/journal_session.h"
+#include "server/base/status.h"
+#include "server/session/command_bytes.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+std::string SourceInWords(const v1::RigState& rig) {
+  std::string text = absl::StrCat(rig.arm().model(), " at ", rig.arm().address(), ", ",
+                                  rig.effector().firmware(), " at ", rig.effector().port());
+  if (rig.time_scale() != 0 && rig.time_scale() != 1) text += " (emulated)";
+  return text;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> JournalPathOf(const std::string& output) {
+  if (absl::EndsWith(output, ".db")) return output;
+  if (absl::EndsWith(output, ".csv")) return std::filesystem::path(output).replace_extension(".db").string();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "-o: '", output,
+      "' does not say the format; its name ends in .db (a journal, resumable) or .csv (a measurement "
+      "file, with the journal beside it)"));
+}
+
+JournalResult ResultOfMessage(const v1::TouchResult& message) {
+  JournalResult result;
+  const v1::Measured& measured = message.measured();
+  for (int i = 0; i < message.contact_time_s_size(); ++i) {
+    JournalFinger finger;
+    finger.contact_time_s = message.contact_time_s(i);
+    finger.base_from_tip.fill(kUnknown);
+    if (i < measured.base_from_tip_at_contact_size() &&
+        measured.base_from_tip_at_contact(i).has_position_m()) {
+      const v1::Vector3& p = measured.base_from_tip_at_contact(i).position_m();
+      const v1::Vector3& r = measured.base_from_tip_at_contact(i).rotation_rad();
+      finger.base_from_tip = {p.x(), p.y(), p.z(), r.x(), r.y(), r.z()};
+    }
+    result.fingers.push_back(finger);
+  }
+  result.speed_m_s = measured.speed_m_s();
+  result.session_time_s = measured.session_time_s();
+  result.start_unix_s = measured.start_unix_s();
+  result.time_uncertainty_s = measured.time_uncertainty_s();
+  result.synchronisation_uncertainty_s = measured.synchronisation_uncertainty_s();
+  result.effector_drift = measured.effector_drift();
+  result.recovered = measured.recovered();
+  return result;
+}
+
+absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& path,
+                                                           const std::string& session,
+                                                           const v1::RigState& rig, int fingers) {
+  std::unique_ptr<RigRecord> record(new RigRecord);
+  record->session_ = session;
+  TOUCHSTONE_ASSIGN_OR_RETURN(record->journal_, Journal::Open(path, Journal::Mode::kCreateOrReadWrite));
+  JournalSession head;
+  head.name = session;
+  head.created_unix_s =
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  head.source = SourceInWords(rig);
+  if (fingers > 0) head.fingers = fingers;
+  TOUCHSTONE_RETURN_IF_ERROR(record->journal_->EnsureSession(head));
+  return record;
+}
+
+absl::StatusOr<bool> RigRecord::Has(const std::string& id, const client::MeasuredTouch& touch) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> found, journal_->Find(session_, id));
+  if (!found.has_value()) return false;
+  if (found->object != touch.object || !SameCommand(found->command, CommandBytes(touch.commanded)))
+    return absl::AlreadyExistsError(
+        absl::StrCat("session '", session_, "' has another touch ", touch.touch, " of ", touch.object,
+                     " than the plan: the plan was changed; choose another --session or output"));
+  return found->stage == TouchStage::kDone;
+}
+
+absl::Status RigRecord::Begin(const std::string& id, const client::MeasuredTouch& touch,
+                              const std::string& placement) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> found, journal_->Find(session_, id));
+  // This process was killed while it waited for the result; the source knows what became of it and answers
+  // under the id.
+  if (found.has_value() && (found->stage == TouchStage::kIntent || found->stage == TouchStage::kExecuting))
+    TOUCHSTONE_RETURN_IF_ERROR(
+        journal_->Failed(session_, id, "the command was interrupted; the source is asked again"));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      journal_->Begin(session_, id, touch.object, placement, CommandBytes(touch.commanded)).status());
+  return journal_->Executing(session_, id, 0, 0);
+}
+
+absl::Status RigRecord::Done(const std::string& id, const v1::TouchResult& result) {
+  return journal_->Done(session_, id, ResultOfMessage(result));
+}
+
+absl::Status RigRecord::Failed(const std::string& id, const absl::Status& why) {
+  return journal_->Failed(session_, id, std::string(why.message()));
+}
+
+absl::StatusOr<std::vector<client::MeasuredTouch>> RigRecord::Touches() const {
+  return TouchesOf(*journal_, session_);
+}
+
+}  // namespace touchstone::cli

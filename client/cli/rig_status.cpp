@@ -1,0 +1,165 @@
+// touchstone rig status: how every part is.
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include <google/protobuf/util/json_util.h>
+
+#include "client/cli/rig.h"
+#include "client/source/lab_units.h"
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr double kMicro = 1e6;
+constexpr double kMilli = 1e3;
+constexpr double kPartsPerMillion = 1e6;
+
+struct Options {
+  bool watch = false;
+  double every_s = 1;
+};
+
+std::string Line(const std::string& name, const std::string& text) {
+  std::string line = "  " + name;
+  line.append(line.size() < 16 ? 16 - line.size() : 1, ' ');
+  return line + text + "\n";
+}
+
+std::string Pose(const v1::BasePose& pose) {
+  constexpr double kDegrees = 180 / M_PI;
+  const auto three = [](const v1::Vector3& v, double factor) {
+    return absl::StrCat(Rounded(std::round(v.x() * factor * 10) / 10), ", ",
+                        Rounded(std::round(v.y() * factor * 10) / 10), ", ",
+                        Rounded(std::round(v.z() * factor * 10) / 10));
+  };
+  return absl::StrCat(three(pose.position_m(), kMilli), " mm; rotation ",
+                      three(pose.rotation_rad(), kDegrees), " deg");
+}
+
+std::string ArmText(const v1::ArmStatus& arm) {
+  std::string text = absl::StrCat("Arm           ", arm.model(), " at ", arm.address(),
+                                  arm.connected() ? "" : ": NOT CONNECTED", "\n");
+  if (!arm.connected()) return text;
+  text += Line("Software", arm.version());
+  text += Line("Mode", absl::StrCat(arm.robot_mode(), ", safety ", arm.safety_mode(), ", speed ",
+                                    Rounded(100 * arm.speed_scaling()), " %"));
+  text += Line("Program",
+               arm.program_id() == 0 ? "none yet" : absl::StrCat(arm.program_id(), ", phase ", arm.phase()));
+  text += Line("States", absl::StrCat(Rounded(arm.rate_hz()), " Hz, the newest is ",
+                                      Rounded(kMilli * arm.state_age_s()), " ms old"));
+  text += Line("Tip", Pose(arm.base_from_tip()));
+  text += Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * arm.clock_drift()),
+                                     " ppm, known to ", Rounded(kMicro * arm.clock_uncertainty_s()), " us"));
+  return text;
+}
+
+std::string EffectorText(const v1::EffectorStatus& effector) {
+  std::string text =
+      absl::StrCat("End effector  ", effector.port(), effector.connected() ? "" : ": NOT CONNECTED", "\n");
+  if (!effector.connected()) return text;
+  std::string pressed;
+  for (int i = 0; i < effector.pressed_size(); ++i)
+    if (effector.pressed(i)) absl::StrAppend(&pressed, pressed.empty() ? "" : ", ", i);
+  text += Line("Firmware", effector.firmware());
+  text += Line("Fingers", absl::StrCat(effector.fingers(),
+                                       pressed.empty() ? ", none pressed" : ", PRESSED: " + pressed));
+  text +=
+      Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * effector.clock_drift()), " +- ",
+                                 Rounded(kPartsPerMillion * effector.clock_drift_uncertainty()),
+                                 " ppm, known to ", Rounded(kMicro * effector.clock_uncertainty_s()), " us; ",
+                                 Counted(effector.round_trips(), "round trip", "round trips"), ", shortest ",
+                                 Rounded(kMilli * effector.shortest_round_trip_s()), " ms"));
+  text += Line("Line", absl::StrCat(Counted(effector.bad_frames(), "bad frame", "bad frames"), ", ",
+                                    Counted(effector.repeated_events(), "repeated event", "repeated events"),
+                                    ", ", Counted(effector.reconnections(), "reconnection", "reconnections"),
+                                    "; all were noticed and mended"));
+  return text;
+}
+
+std::string StateText(const v1::RigState& rig, const v1::State& state) {
+  std::string text = absl::StrCat(
+      "State         ", state.state(), ", ",
+      state.lease_holder().empty() ? "nobody holds the lease" : state.lease_holder() + " holds the lease",
+      "; ", Counted(state.touches(), "touch", "touches"), ", ",
+      Counted(state.images(), "picture", "pictures"), " in ", DurationInWords(state.uptime_s()), "\n");
+  if (state.state() == "stopped") text += Line("", "stopped; whoever acquires the lease next ends that");
+  text += absl::StrCat("Object        ",
+                       rig.object().empty()
+                           ? "nobody has told what lies on the fixture (touchstone rig mount)"
+                           : absl::StrCat(rig.object(), " with its face ", rig.placement(), " up"),
+                       rig.mounts_itself() ? "; the rig changes it by itself" : "", "\n");
+  text += ArmText(rig.arm()) + EffectorText(rig.effector());
+  const v1::CameraStatus& camera = rig.camera();
+  text += absl::StrCat("Camera        ",
+                       camera.connected()
+                           ? absl::StrCat(camera.description(), ", ", camera.width(), "x", camera.height(),
+                                          ", ", Counted(camera.frames(), "picture", "pictures"), ", ",
+                                          camera.stale_frames(), " stale")
+                       : camera.description().empty() ? "none"
+                                                      : camera.description() + ": NOT CONNECTED",
+                       "\n");
+  if (rig.recovered_touches() + rig.interrupted_touches() > 0)
+    text += absl::StrCat("After an interruption: ", rig.recovered_touches(), " touches recovered, ",
+                         rig.interrupted_touches(), " not\n");
+  if (!rig.last_error().empty()) text += "Last error    " + Wrap(rig.last_error(), 110, 14) + "\n";
+  if (rig.time_scale() != 0 && rig.time_scale() != 1)
+    text += absl::StrCat("Time          ", Rounded(rig.time_scale()),
+                         " rig seconds in one second: an emulator; nothing here is measured\n");
+  if (!rig.safety_notice().empty()) text += "\n" + Wrap(rig.safety_notice(), 110, 0) + "\n";
+  return text;
+}
+
+absl::Status PrintState(const Cli& cli, client::Connection* connection) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState rig, GetRig(connection));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::State state,
+      client::Connection::Call(&v1::Control::Stub::GetState, connection->control(), v1::GetStateRequest()));
+  if (!cli.output().json) return WriteOutput("", StateText(rig, state));
+  google::protobuf::util::JsonPrintOptions print;
+  print.always_print_primitive_fields = true;
+  print.preserve_proto_field_names = true;
+  Json json;
+  for (const auto& [name, message] :
+       {std::pair<const char*, const google::protobuf::Message*>{"state", &state}, {"rig", &rig}}) {
+    std::string text;
+    if (!google::protobuf::util::MessageToJsonString(*message, &text, print).ok())
+      return absl::InternalError("the rig's state cannot be written as JSON");
+    json[name] = Json::parse(text);
+  }
+  PrintJson(json);
+  return absl::OkStatus();
+}
+
+absl::Status RunStatus(const Cli& cli, const Options& options) {
+  if (!(options.every_s > 0) || options.every_s > 3600)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--every-s: ", Rounded(options.every_s), " is out of range; above 0, at most 3600"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  while (true) {
+    TOUCHSTONE_RETURN_IF_ERROR(PrintState(cli, rig.connection.get()));
+    if (!options.watch) return absl::OkStatus();
+    std::printf("\n");
+    std::fflush(stdout);
+    // Ctrl-C ends the process: nothing is under way here.
+    std::this_thread::sleep_for(std::chrono::duration<double>(options.every_s));
+  }
+}
+
+}  // namespace
+
+void AddRigStatus(Cli* cli, CLI::App* group) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      cli->AddCommand(group, "status", "Tells how every part of the rig is. Needs no lease.",
+                      "touchstone rig status --server 127.0.0.1:50052\n"
+                      "touchstone rig status --watch --server 127.0.0.1:50052\n"
+                      "touchstone rig status --json --server 127.0.0.1:50052     SI units, as on the wire",
+                      [cli, options] { return RunStatus(*cli, *options); });
+  command->add_flag("--watch", options->watch, "Again and again, until Ctrl-C");
+  command->add_option("--every-s", options->every_s, "With --watch: how often. Default: 1")->type_name("S");
+  cli->AddSourceOptions(command);
+}
+
+}  // namespace touchstone::cli
