@@ -1,4 +1,4 @@
-#include "client/source/measurement_csv.h"
+#include "server/session/measurement_csv.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone::client {
+namespace touchstone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -46,6 +46,40 @@ TEST(MeasurementCsv, WhatIsWrittenIsReadBackExactly) {
   EXPECT_TRUE(std::isnan((*read)[0].time_s[1]));
 }
 
+TEST(MeasurementCsv, NamesThatASpreadsheetWouldTakeApartStandInQuotes) {
+  MeasuredTouch touch;
+  touch.object = "cup, \"blue\"";
+  touch.commanded.set_speed_m_s(0.02);
+  touch.commanded.mutable_approach()->set_z(-1);
+  touch.commanded.mutable_lateral()->set_x(1);
+  touch.round = 3;
+  touch.face = 2;
+  touch.time_s = {0.1};
+  const std::string text = FormatMeasurements({touch});
+  EXPECT_THAT(text, HasSubstr(",t_0_us,round,face\n"));
+  const auto read = ParseMeasurements(text, "set.csv");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ((*read)[0].object, touch.object);
+  EXPECT_EQ((*read)[0].round, 3);
+  EXPECT_EQ((*read)[0].face, 2);
+}
+
+TEST(MeasurementCsv, TimesOfManyDigitsComeBackBitForBit) {
+  MeasuredTouch touch;
+  touch.object = "cup";
+  touch.commanded.set_speed_m_s(0.019999999999999997);
+  touch.commanded.mutable_target_m()->set_x(0.1 / 3);
+  touch.commanded.mutable_approach()->set_z(-1);
+  touch.commanded.mutable_lateral()->set_x(1);
+  for (int i = 0; i < 3; ++i) touch.time_s.push_back((20'000'003.0 + i) / 16e6);  // ticks of 62.5 ns
+  const std::string text = FormatMeasurements({touch});
+  const auto read = ParseMeasurements(text, "set.csv");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ((*read)[0].time_s, touch.time_s);
+  EXPECT_EQ((*read)[0].commanded.target_m().x(), 0.1 / 3);
+  EXPECT_EQ(FormatMeasurements(*read), text);
+}
+
 TEST(MeasurementCsv, FingersHaveLettersOnlyWhereThereAreThree) {
   EXPECT_EQ(TimeColumnName(0, 3), "t_l_us");
   EXPECT_EQ(TimeColumnName(2, 3), "t_r_us");
@@ -80,4 +114,4 @@ TEST(MeasurementCsv, ErrorsNameFileLineAndColumn) {
 }
 
 }  // namespace
-}  // namespace touchstone::client
+}  // namespace touchstone

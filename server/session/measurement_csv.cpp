@@ -1,20 +1,28 @@
-#include "client/source/measurement_csv.h"
+#include "server/session/measurement_csv.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include <cmath>
 #include <set>
 
-#include "client/source/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/model/parameter_values.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone::client {
+namespace touchstone {
 namespace {
 
 std::string Millimetres(double metres) {
-  return ShortestNumber(LabNumber(Unit::kMillimetre, metres));
+  return FileNumber(Unit::kMillimetre, metres);
+}
+
+// In quotes where a reader would take it apart.
+std::string Name(const std::string& name) {
+  if (name.find_first_of(",\"") == std::string::npos) return name;
+  return absl::StrCat("\"", absl::StrReplaceAll(name, {{"\"", "\"\""}}), "\"");
 }
 
 void AppendVector(const v1::Vector3& v, std::string* row) {
@@ -43,29 +51,31 @@ std::string TimeColumnName(int finger, int fingers) {
   return absl::StrCat("t_", FingerName(finger, fingers), "_us");
 }
 
-std::string MeasurementHeader(int fingers, bool session_time, const std::vector<std::string>& covariates) {
+std::string MeasurementHeader(int fingers, const MeasurementColumns& columns) {
   std::string line;
   for (const std::string& name : RequiredColumns()) absl::StrAppend(&line, line.empty() ? "" : ",", name);
   for (int i = 0; i < fingers; ++i) absl::StrAppend(&line, ",", TimeColumnName(i, fingers));
-  if (session_time) absl::StrAppend(&line, ",session_time_s");
-  for (const std::string& name : covariates) absl::StrAppend(&line, ",", name);
+  if (columns.session_time) absl::StrAppend(&line, ",session_time_s");
+  if (columns.round) absl::StrAppend(&line, ",round");
+  if (columns.face) absl::StrAppend(&line, ",face");
+  for (const std::string& name : columns.covariates) absl::StrAppend(&line, ",", name);
   return line + "\n";
 }
 
-std::string MeasurementRow(const MeasuredTouch& touch, bool session_time,
-                           const std::vector<std::string>& covariates) {
+std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns& columns) {
   const v1::CommandedTouch& c = touch.commanded;
-  std::string row = absl::StrCat(touch.touch, ",", touch.object, ",",
-                                 ShortestNumber(LabNumber(Unit::kMillimetrePerSecond, c.speed_m_s())), ",",
+  std::string row = absl::StrCat(touch.touch, ",", Name(touch.object), ",",
+                                 FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
                                  Millimetres(c.standoff_m()), ",", Millimetres(c.target_m().x()), ",",
                                  Millimetres(c.target_m().y()), ",", Millimetres(c.target_m().z()));
   AppendVector(c.approach(), &row);
   AppendVector(c.lateral(), &row);
   for (const double time_s : touch.time_s)
-    absl::StrAppend(&row, ",",
-                    std::isnan(time_s) ? "" : ShortestNumber(LabNumber(Unit::kMicrosecond, time_s)));
-  if (session_time) absl::StrAppend(&row, ",", ShortestNumber(c.session_time_s()));
-  for (const std::string& name : covariates) {
+    absl::StrAppend(&row, ",", std::isnan(time_s) ? "" : FileNumber(Unit::kMicrosecond, time_s));
+  if (columns.session_time) absl::StrAppend(&row, ",", ShortestNumber(c.session_time_s()));
+  if (columns.round) absl::StrAppend(&row, ",", touch.round.value_or(0));
+  if (columns.face) absl::StrAppend(&row, ",", touch.face.value_or(0));
+  for (const std::string& name : columns.covariates) {
     const auto found = c.covariates().find(name);
     absl::StrAppend(&row, ",", found == c.covariates().end() ? "" : ShortestNumber(found->second));
   }
@@ -73,16 +83,19 @@ std::string MeasurementRow(const MeasuredTouch& touch, bool session_time,
 }
 
 std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches) {
-  bool session_time = false;
+  MeasurementColumns columns;
+  columns.round = columns.face = !touches.empty();
   std::set<std::string> names;
   for (const MeasuredTouch& touch : touches) {
-    session_time = session_time || touch.commanded.has_session_time_s();
+    columns.session_time = columns.session_time || touch.commanded.has_session_time_s();
+    columns.round = columns.round && touch.round;
+    columns.face = columns.face && touch.face;
     for (const auto& [name, value] : touch.commanded.covariates()) names.insert(name);
   }
-  const std::vector<std::string> covariates(names.begin(), names.end());
+  columns.covariates.assign(names.begin(), names.end());
   const int fingers = touches.empty() ? 0 : static_cast<int>(touches[0].time_s.size());
-  std::string text = MeasurementHeader(fingers, session_time, covariates);
-  for (const MeasuredTouch& touch : touches) text += MeasurementRow(touch, session_time, covariates);
+  std::string text = MeasurementHeader(fingers, columns);
+  for (const MeasuredTouch& touch : touches) text += MeasurementRow(touch, columns);
   return text;
 }
 
@@ -106,9 +119,11 @@ absl::StatusOr<std::vector<MeasuredTouch>> ParseMeasurements(const std::string& 
     if (set.has_session_time) c.set_session_time_s(set.session_time_s[row]);
     for (const auto& [name, values] : set.covariates)
       if (!std::isnan(values[row])) (*c.mutable_covariates())[name] = values[row];
+    if (!set.round.empty()) touch.round = set.round[row];
+    if (!set.face.empty()) touch.face = set.face[row];
     for (int finger = 0; finger < set.fingers; ++finger) touch.time_s.push_back(set.TimeS(row, finger));
   }
   return touches;
 }
 
-}  // namespace touchstone::client
+}  // namespace touchstone

@@ -1,0 +1,44 @@
+// A session of a journal as files that other programs read, and such files as sessions that can be kept and
+// served again.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "server/session/journal.h"
+#include "server/session/measurement_csv.h"
+
+namespace touchstone {
+
+// The touches that are done, in the order of their approaches, times since each approach began. `touch` is
+// the client's id where every id is a number of its own, else the number in the session; session_time_s is
+// the measured one where it is known. DATA_LOSS names a touch whose command cannot be read.
+absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
+                                                               const std::string& session);
+
+// The measurement file of DESIGN 7; whole or absent. FAILED_PRECONDITION if no touch is done.
+absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path);
+
+// HDF5 in SI: a dataset a column with the attribute "unit", one row a touch that is done (contact_time_s is
+// touches x fingers, base_from_tip_position_m touches x fingers x 3, NaN where unknown); pictures under
+// /images (PNG files end to end, png_offset says where each begins); what is known of the session under
+// /session. Whole or absent.
+absl::Status ExportSessionHdf5(const Journal& journal, const std::string& session, const std::string& path);
+
+struct ImportOptions {
+  std::string session;      // its name; must be new
+  double spacing_m = 0.03;  // of the fingers; a measurement file does not say
+  std::string source;       // where the touches were made; default: "imported from FILE"
+  double created_unix_s = 0;
+};
+
+// A measurement file with poses as a session: all of it or nothing. The ids are the file's touch numbers.
+absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& options, Journal* journal);
+// What ExportSessionHdf5 wrote, as the session that it was; under another name if options.session is not
+// empty.
+absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& options, Journal* journal);
+
+}  // namespace touchstone

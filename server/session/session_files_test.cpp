@@ -1,0 +1,213 @@
+#include "server/session/session_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "server/base/text.h"
+#include "server/session/command_bytes.h"
+
+namespace touchstone {
+namespace {
+
+using ::testing::HasSubstr;
+
+const char kCsv[] =
+    "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_"
+    "z,"
+    "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us,session_time_s,round,face,cov_temperature\n"
+    "7,lat20,20.1,60,-12.3,0.1,7,0,0,-1,1,0,0,1250000.0625,,1250002.5,3.5,0,1,21.25\n"
+    "3,cup,10,60,0,0,0,0,0,-1,1,0,0,3000000,3000100,3000200.125,9.25,1,0,\n"
+    "12,lat20,20.1,60,-12.3,0.1,7,0,0,-1,1,0,0,1250001,1250002,1250003,15,1,1,21.5\n";
+
+class SessionFiles : public ::testing::Test {
+ protected:
+  SessionFiles() {
+    std::string folder = ::testing::TempDir() + "session_files_XXXXXX";
+    folder_ = mkdtemp(folder.data());
+    journal_ = *Journal::Open(folder_ + "/session.db", Journal::Mode::kCreateOrReadWrite);
+    csv_ = folder_ + "/set.csv";
+    options_.session = "s";
+  }
+  ~SessionFiles() override {
+    journal_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  void Import(const std::string& text) {
+    ASSERT_TRUE(WriteFileAtomically(csv_, text).ok());
+    const absl::Status imported = ImportSessionCsv(csv_, options_, journal_.get());
+    ASSERT_TRUE(imported.ok()) << imported;
+  }
+
+  std::string folder_, csv_;
+  std::unique_ptr<Journal> journal_;
+  ImportOptions options_;
+};
+
+TEST_F(SessionFiles, AMeasurementFileComesBackAsItWas) {
+  Import(kCsv);
+  const std::string out = folder_ + "/out.csv";
+  ASSERT_TRUE(ExportSessionCsv(*journal_, "s", out).ok());
+  EXPECT_EQ(*ReadFile(out), kCsv);
+  const auto session = journal_->Session("s");
+  EXPECT_EQ(session->done, 3u);
+  EXPECT_EQ(session->fingers, 3);
+  EXPECT_THAT(session->source, HasSubstr("imported from " + csv_));
+}
+
+TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {
+  JournalSession session;
+  session.name = "rig";
+  session.fingers = 1;
+  ASSERT_TRUE(journal_->EnsureSession(session).ok());
+  v1::CommandedTouch command;
+  command.mutable_target_m();
+  command.mutable_approach()->set_z(-1);
+  command.mutable_lateral()->set_x(1);
+  command.set_speed_m_s(0.02);
+  const auto begin = [&](const char* id) {
+    ASSERT_TRUE(journal_->Begin("rig", id, "cup", "+z", CommandBytes(command)).ok());
+    ASSERT_TRUE(journal_->Executing("rig", id, 1, 1).ok());
+  };
+  JournalResult result;
+  result.fingers.resize(1);
+  begin("first");
+  ASSERT_TRUE(journal_->Failed("rig", "first", "why").ok());
+  begin("second");
+  result.fingers[0].contact_time_s = 2;
+  result.session_time_s = 20;
+  ASSERT_TRUE(journal_->Done("rig", "second", result).ok());
+  begin("first");
+  result.fingers[0].contact_time_s = 3;
+  result.session_time_s = 30;
+  ASSERT_TRUE(journal_->Done("rig", "first", result).ok());
+  begin("never");
+  const auto touches = SessionMeasurements(*journal_, "rig");
+  ASSERT_TRUE(touches.ok()) << touches.status();
+  ASSERT_EQ(touches->size(), 2u);
+  EXPECT_EQ((*touches)[0].time_s[0], 2);
+  EXPECT_EQ((*touches)[1].time_s[0], 3);
+  EXPECT_EQ((*touches)[1].commanded.session_time_s(), 30);
+  // The ids are no numbers: the session's are taken.
+  EXPECT_EQ((*touches)[0].touch, 1u);
+  EXPECT_EQ((*touches)[1].touch, 2u);
+}
+
+TEST_F(SessionFiles, ImportsAreWholeOrAbsent) {
+  Import(kCsv);
+  EXPECT_TRUE(absl::IsAlreadyExists(ImportSessionCsv(csv_, options_, journal_.get())));
+  options_.session = "t";
+  const std::string plan = folder_ + "/plan.csv";
+  const std::string text = kCsv;
+  ASSERT_TRUE(WriteFileAtomically(plan,
+                                  "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,"
+                                  "approach_x,approach_y,approach_z,lateral_x,lateral_y,lateral_z\n"
+                                  "0,cup,20,60,0,0,0,0,0,-1,1,0,0\n")
+                  .ok());
+  const absl::Status status = ImportSessionCsv(plan, options_, journal_.get());
+  EXPECT_TRUE(absl::IsInvalidArgument(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("it is a plan"));
+  EXPECT_FALSE(ImportSessionCsv(folder_ + "/no.csv", options_, journal_.get()).ok());
+  EXPECT_TRUE(absl::IsNotFound(journal_->Session("t").status()));
+}
+
+TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
+  Import(kCsv);
+  std::vector<JournalTouch> more(1);
+  more[0].id = "with poses";
+  more[0].object = "cup";
+  more[0].placement = "-x";
+  more[0].command = std::string("bytes that are \0 no command", 27);
+  more[0].stage = TouchStage::kDone;
+  more[0].attempt = 3;
+  JournalResult& result = more[0].result;
+  result.recovered = true;
+  result.speed_m_s = 0.1 / 3;
+  result.start_unix_s = 1.7e9 + 1.0 / 3;
+  result.effector_drift = 1e-4 / 3;
+  for (int i = 0; i < 3; ++i)
+    result.fingers.push_back({1.0 / 3 + i, {0.1, 0.2, 0.3, 1, 2, i / 7.0}, (uint64_t{1} << 63) + i});
+  ASSERT_TRUE(journal_->AddFinished("s", more).ok());
+  JournalImage image;
+  image.id = "front";
+  image.object = "cup";
+  image.width = 64;
+  image.height = 48;
+  image.base_from_camera = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  image.unix_s = 1.7e9;
+  image.png = std::string("\x89PNG\0\0", 6);
+  ASSERT_TRUE(journal_->AddImage("s", image).ok());
+
+  const std::string path = folder_ + "/session.h5";
+  const absl::Status exported = ExportSessionHdf5(*journal_, "s", path);
+  ASSERT_TRUE(exported.ok()) << exported;
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+  options_.session = "again";
+  const absl::Status imported = ImportSessionHdf5(path, options_, journal_.get());
+  ASSERT_TRUE(imported.ok()) << imported;
+  const auto touches = [&](const std::string& session) {
+    std::vector<JournalTouch> all;
+    EXPECT_TRUE(journal_
+                    ->ForEachTouch(session,
+                                   [&](const JournalTouch& touch) {
+                                     all.push_back(touch);
+                                     return true;
+                                   })
+                    .ok());
+    return all;
+  };
+  const auto before = touches("s"), after = touches("again");
+  ASSERT_EQ(before.size(), 4u);
+  ASSERT_EQ(after.size(), 4u);
+  const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  for (size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(after[k].id, before[k].id);
+    EXPECT_EQ(after[k].object, before[k].object);
+    EXPECT_EQ(after[k].placement, before[k].placement);
+    EXPECT_EQ(after[k].command, before[k].command);
+    EXPECT_EQ(after[k].attempt, before[k].attempt);
+    EXPECT_EQ(after[k].round, before[k].round);
+    EXPECT_EQ(after[k].face, before[k].face);
+    EXPECT_EQ(after[k].result.recovered, before[k].result.recovered);
+    EXPECT_TRUE(same(after[k].result.speed_m_s, before[k].result.speed_m_s));
+    EXPECT_TRUE(same(after[k].result.session_time_s, before[k].result.session_time_s));
+    EXPECT_TRUE(same(after[k].result.start_unix_s, before[k].result.start_unix_s));
+    EXPECT_TRUE(same(after[k].result.effector_drift, before[k].result.effector_drift));
+    ASSERT_EQ(after[k].result.fingers.size(), 3u);
+    for (int i = 0; i < 3; ++i) {
+      const JournalFinger &a = after[k].result.fingers[i], &b = before[k].result.fingers[i];
+      EXPECT_TRUE(same(a.contact_time_s, b.contact_time_s));
+      EXPECT_EQ(a.ticks, b.ticks);
+      for (int axis = 0; axis < 6; ++axis) EXPECT_TRUE(same(a.base_from_tip[axis], b.base_from_tip[axis]));
+    }
+  }
+  EXPECT_EQ(journal_->Session("again")->source, journal_->Session("s")->source);
+  ASSERT_TRUE(journal_
+                  ->ForEachImage("again",
+                                 [&](const JournalImage& kept) {
+                                   EXPECT_EQ(kept.id, "front");
+                                   EXPECT_EQ(kept.png, image.png);
+                                   EXPECT_EQ(kept.width, 64);
+                                   EXPECT_EQ(kept.base_from_camera, image.base_from_camera);
+                                   return true;
+                                 })
+                  .ok());
+  EXPECT_TRUE(absl::IsAlreadyExists(ImportSessionHdf5(path, options_, journal_.get())));
+  EXPECT_TRUE(absl::IsInvalidArgument(ImportSessionHdf5(csv_, options_, journal_.get())));
+  EXPECT_FALSE(ExportSessionHdf5(*journal_, "s", folder_ + "/no/session.h5").ok());
+}
+
+TEST_F(SessionFiles, ASessionWithoutAResultIsNotExported) {
+  JournalSession session;
+  session.name = "empty";
+  ASSERT_TRUE(journal_->EnsureSession(session).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(ExportSessionCsv(*journal_, "empty", folder_ + "/out.csv")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ + "/out.csv"));
+}
+
+}  // namespace
+}  // namespace touchstone

@@ -1,0 +1,250 @@
+// A session as HDF5, in SI so that every number comes back bit for bit.
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <limits>
+
+#include "server/base/status.h"
+#include "server/session/command_bytes.h"
+#include "server/session/hdf5_file.h"
+#include "server/session/session_files.h"
+
+namespace touchstone {
+namespace {
+
+constexpr char kFormat[] = "touchstone: session/1";
+constexpr uint64_t kNoNumber = std::numeric_limits<uint64_t>::max();  // of a round or face that is unknown
+
+void Append(const v1::Vector3& v, std::vector<double>* values) {
+  values->insert(values->end(), {v.x(), v.y(), v.z()});
+}
+
+void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf5Columns* columns) {
+  const hsize_t rows = touches.size();
+  std::vector<std::string> ids, objects, placements, commands;
+  std::vector<uint64_t> attempt, round, face, recovered, ticks;
+  std::vector<double> target, approach, lateral, standoff, commanded_speed, speed, session_time, start,
+      time_uncertainty, synchronisation, drift, time, position, rotation;
+  for (const JournalTouch& touch : touches) {
+    ids.push_back(touch.id);
+    objects.push_back(touch.object);
+    placements.push_back(touch.placement);
+    commands.push_back(touch.command);
+    attempt.push_back(static_cast<uint64_t>(touch.attempt));
+    round.push_back(touch.round ? static_cast<uint64_t>(*touch.round) : kNoNumber);
+    face.push_back(touch.face ? static_cast<uint64_t>(*touch.face) : kNoNumber);
+    const v1::CommandedTouch command = ParseCommandBytes(touch.command).value_or(v1::CommandedTouch());
+    Append(command.target_m(), &target);
+    Append(command.approach(), &approach);
+    Append(command.lateral(), &lateral);
+    standoff.push_back(command.standoff_m());
+    commanded_speed.push_back(command.speed_m_s());
+    const JournalResult& result = touch.result;
+    speed.push_back(result.speed_m_s);
+    session_time.push_back(result.session_time_s);
+    start.push_back(result.start_unix_s);
+    time_uncertainty.push_back(result.time_uncertainty_s);
+    synchronisation.push_back(result.synchronisation_uncertainty_s);
+    drift.push_back(result.effector_drift);
+    recovered.push_back(result.recovered);
+    for (const JournalFinger& finger : result.fingers) {
+      time.push_back(finger.contact_time_s);
+      position.insert(position.end(), finger.base_from_tip.begin(), finger.base_from_tip.begin() + 3);
+      rotation.insert(rotation.end(), finger.base_from_tip.begin() + 3, finger.base_from_tip.end());
+      ticks.push_back(finger.ticks);
+    }
+  }
+  columns->Texts("id", ids);
+  columns->Texts("object", objects);
+  columns->Texts("placement", placements);
+  columns->Numbers("target_m", "m", target, {rows, 3});
+  columns->Numbers("approach", "", approach, {rows, 3});
+  columns->Numbers("lateral", "", lateral, {rows, 3});
+  columns->Numbers("standoff_m", "m", standoff, {rows});
+  columns->Numbers("commanded_speed_m_s", "m/s", commanded_speed, {rows});
+  columns->Numbers("contact_time_s", "s", time, {rows, fingers});
+  columns->Numbers("base_from_tip_position_m", "m", position, {rows, fingers, 3});
+  columns->Numbers("base_from_tip_rotation_rad", "rad", rotation, {rows, fingers, 3});
+  columns->Whole("ticks", ticks, {rows, fingers});
+  columns->Numbers("measured_speed_m_s", "m/s", speed, {rows});
+  columns->Numbers("session_time_s", "s", session_time, {rows});
+  columns->Numbers("start_unix_s", "s", start, {rows});
+  columns->Numbers("time_uncertainty_s", "s", time_uncertainty, {rows});
+  columns->Numbers("synchronisation_uncertainty_s", "s", synchronisation, {rows});
+  columns->Numbers("effector_drift", "", drift, {rows});
+  columns->Whole("recovered", recovered, {rows});
+  columns->Whole("attempt", attempt, {rows});
+  columns->Whole("round", round, {rows});
+  columns->Whole("face", face, {rows});
+  columns->Bytes("command", commands);
+}
+
+absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t fingers,
+                         std::vector<JournalTouch>* touches) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("id", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("object", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto placements, file.Texts("placement", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto commands, file.Bytes("command", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto attempt, file.Whole("attempt", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto round, file.Whole("round", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto face, file.Whole("face", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto recovered, file.Whole("recovered", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto speed, file.Numbers("measured_speed_m_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto session_time, file.Numbers("session_time_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto start, file.Numbers("start_unix_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto uncertainty, file.Numbers("time_uncertainty_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto synchronisation,
+                              file.Numbers("synchronisation_uncertainty_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto drift, file.Numbers("effector_drift", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto time, file.Numbers("contact_time_s", rows * fingers));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto position,
+                              file.Numbers("base_from_tip_position_m", rows * fingers * 3));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto rotation,
+                              file.Numbers("base_from_tip_rotation_rad", rows * fingers * 3));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto ticks, file.Whole("ticks", rows * fingers));
+  touches->resize(rows);
+  for (uint64_t k = 0; k < rows; ++k) {
+    JournalTouch& touch = (*touches)[k];
+    touch.id = ids[k];
+    touch.object = objects[k];
+    touch.placement = placements[k];
+    touch.command = commands[k];
+    touch.stage = TouchStage::kDone;
+    touch.attempt = static_cast<int>(attempt[k]);
+    if (round[k] != kNoNumber) touch.round = static_cast<int>(round[k]);
+    if (face[k] != kNoNumber) touch.face = static_cast<int>(face[k]);
+    touch.result.recovered = recovered[k] != 0;
+    touch.result.speed_m_s = speed[k];
+    touch.result.session_time_s = session_time[k];
+    touch.result.start_unix_s = start[k];
+    touch.result.time_uncertainty_s = uncertainty[k];
+    touch.result.synchronisation_uncertainty_s = synchronisation[k];
+    touch.result.effector_drift = drift[k];
+    for (uint64_t i = k * fingers; i < (k + 1) * fingers; ++i) {
+      JournalFinger& finger = touch.result.fingers.emplace_back();
+      finger.contact_time_s = time[i];
+      for (int axis = 0; axis < 3; ++axis) {
+        finger.base_from_tip[axis] = position[3 * i + axis];
+        finger.base_from_tip[3 + axis] = rotation[3 * i + axis];
+      }
+      finger.ticks = ticks[i];
+    }
+  }
+  return absl::OkStatus();
+}
+
+void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) {
+  const hsize_t rows = images.size();
+  std::vector<std::string> ids, objects, placements, pngs;
+  std::vector<uint64_t> sizes;
+  std::vector<double> poses, unix_s;
+  for (const JournalImage& image : images) {
+    ids.push_back(image.id);
+    objects.push_back(image.object);
+    placements.push_back(image.placement);
+    pngs.push_back(image.png);
+    sizes.insert(sizes.end(), {static_cast<uint64_t>(image.width), static_cast<uint64_t>(image.height)});
+    poses.insert(poses.end(), image.base_from_camera.begin(), image.base_from_camera.end());
+    unix_s.push_back(image.unix_s);
+  }
+  columns->Texts("images/id", ids);
+  columns->Texts("images/object", objects);
+  columns->Texts("images/placement", placements);
+  columns->Whole("images/width_height_px", sizes, {rows, 2});
+  columns->Numbers("images/base_from_camera_m_rad", "m, rad", poses, {rows, 6});
+  columns->Numbers("images/unix_s", "s", unix_s, {rows});
+  columns->Bytes("images/png", pngs);
+}
+
+absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vector<JournalImage>* images) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("images/id", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("images/object", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto placements, file.Texts("images/placement", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto sizes, file.Whole("images/width_height_px", 2 * rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto poses, file.Numbers("images/base_from_camera_m_rad", 6 * rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto unix_s, file.Numbers("images/unix_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto pngs, file.Bytes("images/png", rows));
+  images->resize(rows);
+  for (uint64_t k = 0; k < rows; ++k) {
+    JournalImage& image = (*images)[k];
+    image.id = ids[k];
+    image.object = objects[k];
+    image.placement = placements[k];
+    image.width = static_cast<int>(sizes[2 * k]);
+    image.height = static_cast<int>(sizes[2 * k + 1]);
+    for (int i = 0; i < 6; ++i) image.base_from_camera[i] = poses[6 * k + i];
+    image.unix_s = unix_s[k];
+    image.png = pngs[k];
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session, journal.Session(name));
+  std::vector<JournalTouch> touches;
+  TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(name, [&](const JournalTouch& touch) {
+    if (touch.stage == TouchStage::kDone) touches.push_back(touch);
+    return true;
+  }));
+  std::vector<JournalImage> images;
+  TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachImage(name, [&](const JournalImage& image) {
+    images.push_back(image);
+    return true;
+  }));
+  if (touches.empty() && images.empty())
+    return absl::FailedPreconditionError(
+        absl::StrCat("session '", name,
+                     "' has no touch that is done and no picture; there is nothing to write to ", path));
+  const auto fingers = static_cast<hsize_t>(session.fingers);
+  Hdf5Columns columns(path);
+  columns.Texts("session/format", {kFormat});
+  columns.Texts("session/name", {session.name});
+  columns.Texts("session/source", {session.source});
+  columns.Texts("session/calibration", {session.calibration});
+  columns.Numbers("session/created_unix_s", "s", {session.created_unix_s}, {1});
+  columns.Numbers("session/spacing_m", "m", {session.spacing_m}, {1});
+  columns.Whole("session/fingers_touches_images", {fingers, touches.size(), images.size()}, {3});
+  WriteTouches(touches, fingers, &columns);
+  WriteImages(images, &columns);
+  return columns.Finish();
+}
+
+absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& options, Journal* journal) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Hdf5ColumnsReader file, Hdf5ColumnsReader::Open(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto format, file.Texts("session/format", 1));
+  if (format[0] != kFormat)
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": is of format '", format[0], "'; this program reads '", kFormat, "'"));
+  JournalSession session;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto name, file.Texts("session/name", 1));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, file.Texts("session/source", 1));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto calibration, file.Texts("session/calibration", 1));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto created_unix_s, file.Numbers("session/created_unix_s", 1));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto spacing_m, file.Numbers("session/spacing_m", 1));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto counts, file.Whole("session/fingers_touches_images", 3));
+  session.name = options.session.empty() ? name[0] : options.session;
+  session.source = options.source.empty() ? source[0] : options.source;
+  session.calibration = calibration[0];
+  session.created_unix_s = created_unix_s[0];
+  session.spacing_m = spacing_m[0];
+  for (const uint64_t count : counts)
+    if (count > 1u << 28)
+      return absl::InvalidArgumentError(absl::StrCat(path, ": ", count, " rows cannot be read"));
+  session.fingers = static_cast<int>(counts[0]);
+  std::vector<JournalTouch> touches;
+  std::vector<JournalImage> images;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadTouches(file, counts[1], counts[0], &touches));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadImages(file, counts[2], &images));
+  if (journal->Session(session.name).ok())
+    return absl::AlreadyExistsError(absl::StrCat("there is a session '", session.name, "' already; import ",
+                                                 path, " under another name"));
+  TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
+  absl::Status added = journal->AddFinished(session.name, touches);
+  for (size_t k = 0; k < images.size() && added.ok(); ++k) added = journal->AddImage(session.name, images[k]);
+  if (!added.ok()) (void)journal->DeleteSession(session.name);
+  return added;
+}
+
+}  // namespace touchstone
