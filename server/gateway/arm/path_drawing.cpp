@@ -28,6 +28,8 @@ constexpr char kStyle[] = R"(
   .limits { fill: none; stroke: #64748b; stroke-width: 1.4; stroke-dasharray: 7 5; }
   .transfer { fill: none; stroke: #94a3b8; stroke-width: 1; stroke-opacity: .55; }
   .approach { stroke: #0f766e; stroke-width: 1.7; stroke-opacity: .8; } .start { fill: #0f766e; }
+  .beyond { stroke: #0f766e; stroke-width: 1; stroke-opacity: .35; stroke-dasharray: 2 2; }
+  .many .approach { stroke-width: 1; stroke-opacity: .5; } .many .beyond { stroke-opacity: .15; }
   .number { font-size: 10px; fill: #0f766e; paint-order: stroke; stroke: #ffffff; stroke-width: 3px; }
   .bad { stroke: #dc2626; stroke-width: 2; fill: none; }
   .badnumber { font-size: 12px; font-weight: 700; fill: #dc2626; paint-order: stroke; stroke: #ffffff; stroke-width: 3px; }
@@ -68,15 +70,16 @@ class Panel {
   }
 
   std::string Draw(const PathDrawing& drawing) const {
+    const bool numbered = drawing.touches.size() <= kMostNumbers;
     std::string svg = absl::StrFormat(
         "<clipPath id=\"%s\"><rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/></clipPath>\n", id_,
         left_, kHead, kPanelWidth, height_);
     absl::StrAppend(&svg, Rectangle("panel", left_, kHead, kPanelWidth, height_),
-                    absl::StrFormat("<g clip-path=\"url(#%s)\">\n", id_), Grid());
+                    absl::StrFormat("<g clip-path=\"url(#%s)\"%s>\n", id_, numbered ? "" : " class=\"many\""),
+                    Grid());
     if (drawing.object.has_value()) absl::StrAppend(&svg, Box("object", *drawing.object));
     if (drawing.limits.has_value()) absl::StrAppend(&svg, Box("limits", *drawing.limits));
     // What is wrong is drawn last, over everything.
-    const bool numbered = drawing.touches.size() <= kMostNumbers;
     for (const DrawnTouch& touch : drawing.touches) absl::StrAppend(&svg, Transfer(touch));
     for (const DrawnTouch& touch : drawing.touches)
       if (touch.possible) absl::StrAppend(&svg, Approach(touch, numbered));
@@ -113,7 +116,7 @@ class Panel {
   void ForEachLine(double centre_m, double half_m, Each each) const {
     const double step_m = GridM();
     for (double i = std::ceil((centre_m - half_m) / step_m); i * step_m <= centre_m + half_m; ++i)
-      each(i * step_m);
+      each(i * step_m + 0.0);  // no -0
   }
   std::string Grid() const {
     std::string svg;
@@ -157,12 +160,14 @@ class Panel {
   }
   std::string Approach(const DrawnTouch& touch, bool numbered) const {
     if (touch.transfer_poses < 1 || touch.path.size() <= touch.transfer_poses) return "";
+    // To the target, where a contact is expected; beyond it the arm only goes if there is none.
     const Eigen::Vector3d &start = touch.path[touch.transfer_poses - 1], &end = touch.path.back();
+    const Eigen::Vector3d target = touch.target_m.value_or(end);
     std::string svg = absl::StrFormat(
-        "<path class=\"approach\" marker-end=\"url(#arrow)\" d=\"M%s L%s\"/><circle class=\"start\" "
-        "cx=\"%.1f\" "
-        "cy=\"%.1f\" r=\"2.4\"/>\n",
-        Point(start), Point(end), X(start.x()), Y(start[up_]));
+        "<path class=\"beyond\" d=\"M%s L%s\"/><path class=\"approach\" marker-end=\"url(#arrow)\" d=\"M%s "
+        "L%s\"/><circle class=\"start\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>\n",
+        Point(target), Point(end), Point(start), Point(target), X(start.x()), Y(start[up_]),
+        numbered ? 2.4 : 1.5);
     if (numbered)
       absl::StrAppendFormat(&svg, "<text class=\"number\" x=\"%.1f\" y=\"%.1f\">%d</text>\n",
                             X(start.x()) + 5, Y(start[up_]) - 4, touch.number);
@@ -207,7 +212,7 @@ std::string Reasons(const PathDrawing& drawing, double top, size_t impossible) {
 
 // Samples of what the colours mean, in the upper right corner.
 std::string Legend() {
-  const double y = 40, x = kWidth - kMargin - 520;
+  const double y = 40, x = kWidth - kMargin - 560;
   std::string svg;
   absl::StrAppendFormat(&svg, "<path class=\"approach\" marker-end=\"url(#arrow)\" d=\"M%.1f %.1fh26\"/>", x,
                         y);
@@ -222,7 +227,8 @@ std::string Legend() {
   absl::StrAppendFormat(&svg, "<path class=\"limits\" d=\"M%.1f %.1fh26\"/>", x + 366, y);
   absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">limits</text>", x + 400, y + 5);
   absl::StrAppendFormat(&svg, "<path class=\"bad\" d=\"M%.1f %.1fl10 10m0 -10l-10 10\"/>", x + 458, y - 5);
-  absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">no</text>\n", x + 476, y + 5);
+  absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">impossible</text>\n", x + 476,
+                        y + 5);
   return svg;
 }
 

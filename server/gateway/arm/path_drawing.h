@@ -17,7 +17,7 @@ struct DrawnTouch {
   std::string reason;                 // what forbids it
   std::vector<Eigen::Vector3d> path;  // of the tip: transfer, start, end of the stroke; empty: unknown
   size_t transfer_poses = 0;          // how many of the path are the transfer; the last of them is the start
-  std::optional<Eigen::Vector3d> target_m;
+  std::optional<Eigen::Vector3d> target_m;  // where a contact is expected
 };
 
 struct PathDrawing {
