@@ -44,8 +44,9 @@ Eigen::Isometry3d FlangeFromCamera() {
 
 Eigen::Isometry3d FixtureOf(const Eigen::Vector3d& box_min_m, const Eigen::Vector3d& box_max_m) {
   const Eigen::Vector3d centre = 0.5 * (box_min_m + box_max_m);
-  return Eigen::Isometry3d(
-      Eigen::Translation3d(kFixtureXM - centre.x(), kFixtureYM - centre.y(), kPlateZM - box_min_m.z()));
+  const Eigen::Vector3d place(kFixtureXM - centre.x(), kFixtureYM - centre.y(), kPlateZM - box_min_m.z());
+  // Whole micrometres, so that the calibration file tells the truth to the last digit.
+  return Eigen::Isometry3d(Eigen::Translation3d((place * 1e6).array().round().matrix() * 1e-6));
 }
 
 void WriteCalibration(const EmulatorOptions& options,
