@@ -128,7 +128,7 @@ class RigRecordTest : public ::testing::Test {
   ~RigRecordTest() override { std::filesystem::remove_all(folder_); }
 
   std::unique_ptr<RigRecord> Open() {
-    auto record = RigRecord::Open(folder_ + "/session.db", "monday", v1::RigState(), 3);
+    auto record = RigRecord::Open(folder_ + "/session.db", "monday", v1::RigState());
     EXPECT_TRUE(record.ok()) << record.status();
     return *std::move(record);
   }

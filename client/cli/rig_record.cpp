@@ -16,13 +16,6 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-std::string SourceInWords(const v1::RigState& rig) {
-  std::string text = absl::StrCat(rig.arm().model(), " at ", rig.arm().address(), ", ",
-                                  rig.effector().firmware(), " at ", rig.effector().port());
-  if (rig.time_scale() != 0 && rig.time_scale() != 1) text += " (emulated)";
-  return text;
-}
-
 }  // namespace
 
 absl::StatusOr<std::string> JournalPathOf(const std::string& output) {
@@ -61,7 +54,7 @@ JournalResult ResultOfMessage(const v1::TouchResult& message) {
 
 absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& path,
                                                            const std::string& session,
-                                                           const v1::RigState& rig, int fingers) {
+                                                           const v1::RigState& rig) {
   std::unique_ptr<RigRecord> record(new RigRecord);
   record->session_ = session;
   TOUCHSTONE_ASSIGN_OR_RETURN(record->journal_, Journal::Open(path, Journal::Mode::kCreateOrReadWrite));
@@ -69,8 +62,10 @@ absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& pa
   head.name = session;
   head.created_unix_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  head.source = SourceInWords(rig);
-  if (fingers > 0) head.fingers = fingers;
+  head.source = rig.source();
+  head.calibration = rig.calibration();
+  if (rig.fingers() > 0) head.fingers = static_cast<int>(rig.fingers());
+  if (rig.spacing_m() > 0) head.spacing_m = rig.spacing_m();
   TOUCHSTONE_RETURN_IF_ERROR(record->journal_->EnsureSession(head));
   return record;
 }

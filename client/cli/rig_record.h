@@ -20,7 +20,7 @@ class RigRecord {
  public:
   // Opens or makes the journal and its session.
   static absl::StatusOr<std::unique_ptr<RigRecord>> Open(const std::string& path, const std::string& session,
-                                                         const v1::RigState& rig, int fingers);
+                                                         const v1::RigState& rig);
 
   // Whether the touch is recorded already; ALREADY_EXISTS if its id stands for another one there.
   absl::StatusOr<bool> Has(const std::string& id, const client::MeasuredTouch& touch) const;

@@ -36,8 +36,7 @@ class Run {
     TOUCHSTONE_ASSIGN_OR_RETURN(rows_, RowsOf(plan, session_, options_.plan));
     TOUCHSTONE_ASSIGN_OR_RETURN(rig_, ConnectToRig(cli_));
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig_.connection.get()));
-    const int fingers = static_cast<int>(state.effector().fingers());
-    TOUCHSTONE_ASSIGN_OR_RETURN(record_, RigRecord::Open(journal_path_, session_, state, fingers));
+    TOUCHSTONE_ASSIGN_OR_RETURN(record_, RigRecord::Open(journal_path_, session_, state));
     std::vector<size_t> wanted;
     for (size_t row = 0; row < rows_.size(); ++row) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const bool has, record_->Has(rows_[row].id, rows_[row].touch));

@@ -88,6 +88,7 @@ PhysicalFacts Rig::Facts() const {
 }
 
 absl::Status Rig::EnsureSession(const std::string& name) {
+  std::lock_guard<std::mutex> lock(sessions_mutex_);
   if (sessions_.count(name) > 0) return absl::OkStatus();
   JournalSession session;
   session.name = name;
@@ -120,6 +121,7 @@ absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchOrder& orde
 }
 
 absl::StatusOr<JournalTouch> Rig::Touch(const TouchOrder& order, const Permit& permit) {
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(order));
   if (known.has_value()) return *std::move(known);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
@@ -137,7 +139,6 @@ absl::StatusOr<JournalTouch> Rig::Touch(const TouchOrder& order, const Permit& p
                               parts_.planner->Plan(from, order.object, order.bounds, placement, order.touch,
                                                    "touch '" + order.id + "'"));
 
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
   const double began_s = HostNowS(), began_unix_s = UnixNowS();
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const JournalTouch intent,

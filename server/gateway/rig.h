@@ -140,7 +140,8 @@ class Rig : public PhysicalSource {
   std::atomic<double> last_beat_s_{0};
   mutable std::mutex facts_mutex_;
   PhysicalFacts facts_;
-  std::set<std::string> sessions_;  // known to be in the journal; guarded by moving_
+  std::mutex sessions_mutex_;
+  std::set<std::string> sessions_;  // known to be in the journal
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
 };
 

@@ -111,12 +111,9 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
         return false;
       }));
 
-  // What was heard; where a finger is missing, the device itself has the last word.
+  // Only a device that was disarmed and asked has the last word on a finger that made no contact.
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->Disarm());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
-  if (record.contacts.Contacts() < options_.fingers) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Recall(program_id));
-  }
-  parts_.effector->Disarm().IgnoreError();  // the next Arm does it anyway
   record.contacts.contact_ticks.resize(options_.fingers);
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();

@@ -3,11 +3,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
-#if __has_include("server/session/session_files.h")
 #include "server/session/session_files.h"
-#else
-namespace touchstone { inline absl::StatusOr<std::string> ExportCsv(const Journal&, const std::string&) { return std::string(); } }
-#endif
 
 namespace touchstone {
 namespace {
@@ -26,6 +22,11 @@ v1::Session ToProto(const JournalSession& session, const std::string& csv) {
   return message;
 }
 
+absl::StatusOr<std::string> Csv(const Journal& journal, const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches, SessionMeasurements(journal, session));
+  return FormatMeasurements(touches);
+}
+
 }  // namespace
 
 grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
@@ -40,7 +41,7 @@ grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1
   const auto sessions = journal_->Sessions();
   if (!sessions.ok()) return ToGrpc(sessions.status());
   for (const JournalSession& session : *sessions) {
-    const auto csv = ExportCsv(*journal_, session.name);
+    const auto csv = Csv(*journal_, session.name);
     if (!csv.ok()) return ToGrpc(csv.status());
     *response->add_sessions() = ToProto(session, *csv);
   }
@@ -51,7 +52,7 @@ grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::
                                                 v1::Session* response) {
   const auto session = journal_->Session(request->name());
   if (!session.ok()) return ToGrpc(session.status());
-  const auto csv = ExportCsv(*journal_, session->name);
+  const auto csv = Csv(*journal_, session->name);
   if (!csv.ok()) return ToGrpc(csv.status());
   *response = ToProto(*session, *csv);
   return grpc::Status::OK;
@@ -59,7 +60,7 @@ grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::
 
 grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*, const v1::ExportSessionRequest* request,
                                                    grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
-  const auto csv = ExportCsv(*journal_, request->name());
+  const auto csv = Csv(*journal_, request->name());
   if (!csv.ok()) return ToGrpc(csv.status());
   v1::ExportSessionResponse response;
   for (size_t begin = 0; begin < csv->size(); begin += kPiece) {

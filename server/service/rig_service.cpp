@@ -133,6 +133,10 @@ void RigService::Describe(v1::RigState* state) const {
                         : !effector.connected ? effector.why
                                               : facts.last_error);
   state->set_time_scale(scale);
+  state->set_fingers(rig_->fingers());
+  state->set_spacing_m(rig_->spacing_m());
+  state->set_source(rig_->SourceInWords());
+  state->set_calibration(FormatCalibration(rig_->planner().calibration()));
   state->set_safety_notice(
       "Stop is a software stop: it is not safety-rated. Keep the emergency stop within reach.");
 }

@@ -65,9 +65,10 @@ TEST_F(SourceConformance, AFingerThatMeetsNothingIsReportedAndTheOthersStand) {
   const v1::Object object = AnObject();
   target->set_x(object.bounds_max_m().x() - 0.02);  // the last finger, 30 mm further out, passes the object
   target->set_z(object.bounds_max_m().z());
-  request.mutable_touches(0)->set_stroke_m(0.2);
+  request.mutable_touches(0)->set_stroke_m(0.1);
   v1::TouchResponse response;
-  ASSERT_TRUE(Touch(request, &response).ok());
+  const grpc::Status status = Touch(request, &response);
+  ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_FALSE(response.results(0).complete());
   EXPECT_FALSE(std::isnan(response.results(0).descriptor_s(0)));
   EXPECT_TRUE(std::isnan(response.results(0).descriptor_s(2)));

@@ -176,7 +176,7 @@ TEST_F(Safety, AProtectiveStopIsNeverUnlockedByItself) {
   emulator_->faults().Set("protective_stop", 1);
   const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::FAILED_PRECONDITION) << answer.status.error_message();
-  EXPECT_THAT(answer.status.error_message(), HasSubstr("protective stop"));
+  EXPECT_THAT(answer.status.error_message(), HasSubstr("PROTECTIVE_STOP"));
   EXPECT_EQ(State(), "protective_stop");
   for (int k = 0; k < 3; ++k) EXPECT_FALSE(Touch(lease.token(), FromAbove(), "more").status.ok());
   EXPECT_EQ(State(), "protective_stop");
