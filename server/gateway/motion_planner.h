@@ -18,7 +18,7 @@ namespace touchstone {
 // What a rig permits; each is a key of the gateway's configuration.
 struct MotionLimits {
   double most_speed_m_s = 0.1;  // of an approach
-  double transfer_speed_m_s = 0.25;
+  double transfer_speed_m_s = 0.15;
   double acceleration_m_s2 = 1.2;  // of approaches and transfers
   double most_standoff_m = 0.15;
   double stroke_beyond_target_m =
@@ -32,12 +32,14 @@ struct MotionLimits {
   double payload_kg = 0.5, most_payload_kg = 3.0;
   double outermost_finger_m =
       0.03;  // tip of the outermost finger from the middle one's, along x of the tip frame
-  std::array<double, 6> home_rad{{0, -1.5708, -1.5708, -1.5708, 1.5708, 0}};
+  // The tool looks down, high above what lies on the fixture: the arm crosses to it at its tip's height.
+  std::array<double, 6> home_rad{{0, -1.5708, -0.9599, -2.1817, 1.5708, 0}};
 };
 
 struct PlannedTouch {
   ArmTouch motion;        // program_id is still 0
   std::string placement;  // that it was planned for
+  std::array<double, 6> start_joints_rad{};  // at the start, where the touch ends too
 };
 
 // Thread-safe after construction.

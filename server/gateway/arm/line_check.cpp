@@ -8,6 +8,7 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/gateway/arm/line_pace.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone {
@@ -17,7 +18,7 @@ constexpr double kStepM = 0.005, kStepRad = 0.035;
 constexpr double kJumpRad = 0.35;  // of a joint from sample to sample: another branch, or a wrist that flips
 constexpr double kBoxToleranceM = 1e-6, kJointToleranceRad = 1e-4;
 constexpr const char* kJointNames[] = {"base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"};
-constexpr double kJointSpeedRadS[] = {kPi, kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
+constexpr double kMostSlowing = 10;
 
 double Degrees(double angle_rad) {
   return angle_rad / kRadiansPerDegree;
@@ -55,9 +56,22 @@ absl::Status LineCheck::CheckTips(const Eigen::Isometry3d& base_from_tip, const 
   return absl::OkStatus();
 }
 
+absl::Status LineCheck::OutOfReach(const Eigen::Isometry3d& base_from_tip, const std::string& what) const {
+  return absl::OutOfRangeError(
+      absl::StrFormat("%s is out of reach of the %s at %s m in the base frame: its flange would be %.0f mm "
+                      "from the base; the arm "
+                      "reaches 500 mm from its shoulder",
+                      what, arm_model_, PointText(base_from_tip.translation()),
+                      (base_from_tip * tip_from_flange_).translation().norm() / kMetresPerMillimetre));
+}
+
 absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
-                               const std::string& what, Joints* joints, int* wrist_3_beyond) const {
+                               bool may_slow, const std::string& what, Joints* joints,
+                               int* wrist_3_beyond) const {
   *wrist_3_beyond = 0;
+  // An end that cannot be reached is told as that, not as the stretched elbow on the way to it.
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTips(to, what));
+  if (Joints unused; !JointsAt(to, *joints, &unused)) return OutOfReach(to, what);
   const Eigen::Vector3d way_m = to.translation() - from.translation();
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
   const int steps =
@@ -73,24 +87,19 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
     TOUCHSTONE_RETURN_IF_ERROR(CheckTips(pose, what));
 
     Joints next;
-    if (!JointsAt(pose, *joints, &next))
-      return absl::OutOfRangeError(absl::StrFormat(
-          "%s is out of reach of the %s at %s m in the base frame: the flange would be %.0f mm from "
-          "the base, the arm reaches 500 mm from its shoulder",
-          what, arm_model_, PointText(pose.translation()),
-          (pose * tip_from_flange_).translation().norm() / kMetresPerMillimetre));
+    if (!JointsAt(pose, *joints, &next)) return OutOfReach(pose, what);
     for (size_t i = 0; i < 6; ++i) {
       const double change_rad = std::abs(next[i] - (*joints)[i]);
       if (change_rad > kJumpRad)
         return absl::OutOfRangeError(absl::StrFormat(
             "%s passes a singularity at %s m in the base frame: %s would jump by %.0f deg, at most %.0f",
             what, PointText(pose.translation()), kJointNames[i], Degrees(change_rad), Degrees(kJumpRad)));
-      if (step > 0 && change_rad > kJointSpeedRadS[i] * step_s)
+      if (step > 0 && change_rad > MostJointSpeeds()[i] * step_s * (may_slow ? kMostSlowing : 1))
         return absl::OutOfRangeError(absl::StrFormat(
             "%s at %.1f mm/s would turn %s at %.0f deg/s near %s m in the base frame; %.0f deg/s is its "
             "limit",
             what, speed_m_s / kMetresPerMillimetre, kJointNames[i], Degrees(change_rad / step_s),
-            PointText(pose.translation()), Degrees(kJointSpeedRadS[i])));
+            PointText(pose.translation()), Degrees(MostJointSpeeds()[i])));
       const bool above = next[i] > limits_.joint_max_rad[i] + kJointToleranceRad;
       if (!above && next[i] >= limits_.joint_min_rad[i] - kJointToleranceRad) continue;
       if (i == 5) *wrist_3_beyond = above ? 1 : -1;

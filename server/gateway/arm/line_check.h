@@ -26,12 +26,14 @@ class LineCheck {
   Eigen::Isometry3d TipAt(const Joints& joints) const;
 
   // Follows the line at `speed_m_s`, beginning with *joints, which become those of the end. `what` names the
-  // line in messages ("the approach"). OUT_OF_RANGE with value and limit. *wrist_3_beyond tells +1 or -1 if
-  // only wrist 3 would turn beyond its upper or lower limit; else 0.
+  // line in messages ("the approach"). OUT_OF_RANGE with value and limit. Where `may_slow`, the arm goes
+  // slower where its joints demand it (PacedSpeed), down to a tenth. *wrist_3_beyond tells +1 or -1 if only
+  // wrist 3 would turn beyond its upper or lower limit; else 0.
   absl::Status Follow(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
-                      const std::string& what, Joints* joints, int* wrist_3_beyond) const;
+                      bool may_slow, const std::string& what, Joints* joints, int* wrist_3_beyond) const;
 
  private:
+  absl::Status OutOfReach(const Eigen::Isometry3d& base_from_tip, const std::string& what) const;
   absl::Status CheckTips(const Eigen::Isometry3d& base_from_tip, const std::string& what) const;
 
   std::string arm_model_;

@@ -171,7 +171,7 @@ absl::StatusOr<Joints> UrMotionPlanner::FollowAll(Eigen::Isometry3d from,
   for (size_t i = 0; i < poses.size(); ++i) {
     const std::string what = i + 1 == poses.size() ? "the way to the start" : "the transfer";
     TOUCHSTONE_RETURN_IF_ERROR(
-        check_.Follow(from, poses[i], limits_.transfer_speed_m_s, what, &joints, wrist_3_beyond));
+        check_.Follow(from, poses[i], limits_.transfer_speed_m_s, true, what, &joints, wrist_3_beyond));
     from = poses[i];
   }
   return joints;
@@ -240,9 +240,10 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
     Joints joints;
     TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
                                 Transfer(from, start, ClearanceHeight(base_from_object, bounds), &joints));
+    planned.start_joints_rad = joints;
     int beyond = 0;
     TOUCHSTONE_RETURN_IF_ERROR(
-        check_.Follow(start, planned.motion.end, touch.speed_m_s, "the approach", &joints, &beyond));
+        check_.Follow(start, planned.motion.end, touch.speed_m_s, false, "the approach", &joints, &beyond));
 
     // Contacts are expected at the target.
     const Eigen::Isometry3d target = start * Eigen::Translation3d(0, 0, std::min(stroke_m, touch.standoff_m));
@@ -276,6 +277,7 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(const ArmState& from,
     Joints joints;
     TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
                                 Transfer(from, tip, ClearanceHeight(base_from_object, bounds), &joints));
+    planned.start_joints_rad = joints;
     planned.motion.duration_s = TransferDuration(from.base_from_tip, planned.motion.transfer);
     return planned;
   }();

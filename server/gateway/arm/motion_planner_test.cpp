@@ -42,7 +42,7 @@ struct Rig {
     Eigen::Isometry3d from = at.base_from_tip;
     int beyond = 0;
     for (const Eigen::Isometry3d& pose : plan.motion.transfer) {
-      ASSERT_TRUE(check.Follow(from, pose, 0.25, "it", &at.joints_rad, &beyond).ok());
+      ASSERT_TRUE(check.Follow(from, pose, 0.25, true, "it", &at.joints_rad, &beyond).ok());
       from = pose;
     }
     at.base_from_tip = from;
@@ -166,8 +166,8 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
   touch.target_m.x() = std::nan("");
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kInvalidArgument, {"finite"});
   touch = FromAbove();
-  touch.target_m.x() = 0.3;
-  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"x = ", "500.0 mm"});
+  touch.target_m.x() = 0.2;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"x = 530.0 mm", "500.0 mm"});
   ExpectRefused(rig.Plan(FromAbove(), "+x"), absl::StatusCode::kFailedPrecondition, {"face +z up", "+x up"});
   touch = FromAbove();
   touch.stroke_m = 0.3;

@@ -10,6 +10,7 @@
 
 #include "server/base/status.h"
 #include "server/gateway/arm/dashboard_client.h"
+#include "server/gateway/arm/line_pace.h"
 #include "server/gateway/arm/rtde_client.h"
 #include "server/gateway/arm/script_port.h"
 #include "server/gateway/arm/state_history.h"
@@ -38,9 +39,11 @@ Eigen::Isometry3d PoseOf(const std::array<double, 6>& vector) {
 
 class UrArmOnTcp final : public UrArm {
  public:
-  UrArmOnTcp(const UrArmOptions& options, Signal* news)
+  UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, Signal* news)
       : options_(options),
         news_(news),
+        nominal_(nominal),
+        tip_from_flange_(options.script.flange_from_tip.inverse()),
         history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * RateOf(options.model))),
         clock_(options.script.time_scale),
         dashboard_(options.address, options.dashboard_port),
@@ -97,11 +100,15 @@ class UrArmOnTcp final : public UrArm {
   absl::Status Begin(uint32_t program_id, const std::string& program);
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
+  // How fast each line of a way is gone.
+  std::vector<double> Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& way) const;
   // Why the program that was sent last has not begun, if it should have by now. With mutex_ held.
   absl::Status StartFailure() const;
 
   const UrArmOptions options_;
   Signal* const news_;
+  const UrKinematics nominal_;
+  const Eigen::Isometry3d tip_from_flange_;
 
   mutable std::mutex mutex_;  // of what follows
   StateHistory history_;
@@ -236,19 +243,34 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program) 
   return sent;
 }
 
+std::vector<double> UrArmOnTcp::Speeds(const ArmState& from,
+                                       const std::vector<Eigen::Isometry3d>& way) const {
+  std::vector<double> speeds_m_s;
+  Joints joints = from.joints_rad;
+  Eigen::Isometry3d at = from.base_from_tip;
+  for (const Eigen::Isometry3d& pose : way) {
+    speeds_m_s.push_back(
+        PacedSpeed(nominal_, tip_from_flange_, at, pose, options_.script.transfer_speed_m_s, &joints));
+    at = pose;
+  }
+  return speeds_m_s;
+}
+
 absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
   if (touch.transfer.empty()) return absl::InvalidArgumentError("a touch needs a start");
   if (!(touch.speed_m_s > 0)) return absl::InvalidArgumentError("a touch needs a speed above 0");
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
-  return Begin(touch.program_id, TouchProgram(touch, now.base_from_tip, options_.script));
+  std::vector<Eigen::Isometry3d> way = touch.transfer;
+  way.push_back(touch.end);  // as fast as it could be gone down, it can be gone up
+  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, way), options_.script));
 }
 
 absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                                      const std::vector<std::array<double, 6>>& joints) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
-  return Begin(program_id, MoveProgram(program_id, poses, joints, now.base_from_tip, options_.script));
+  return Begin(program_id, MoveProgram(program_id, poses, Speeds(now, poses), joints, options_.script));
 }
 
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
@@ -320,7 +342,7 @@ absl::Status UrArmOnTcp::PowerOn() {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, Signal* news) {
-  TOUCHSTONE_RETURN_IF_ERROR(UrKinematics::ForModel(options.model).status());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics nominal, UrKinematics::ForModel(options.model));
   if (options.address.empty()) return absl::InvalidArgumentError("arm: the controller's address is missing");
   for (const int port :
        {options.dashboard_port, options.primary_port, options.secondary_port, options.rtde_port}) {
@@ -329,7 +351,7 @@ absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options,
   }
   if (!(options.script.time_scale > 0) || !(options.frozen_after_s > 0))
     return absl::InvalidArgumentError("arm: time_scale and frozen_after_s must be above 0");
-  auto arm = std::make_unique<UrArmOnTcp>(options, news);
+  auto arm = std::make_unique<UrArmOnTcp>(options, nominal, news);
   const double until_s = HostNowS() + options.connect_wait_s;
   while ((!arm->State().ok() || !arm->ProgramPortsConnected()) && HostNowS() < until_s) {
     const uint64_t seen = news->count();

@@ -30,7 +30,7 @@ std::string Phase(MotionPhase phase) {
 // phase.
 std::string Head(uint32_t program_id, const ScriptOptions& options) {
   std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kBeatRegister, "\", ",
-                                  Number(kWatchdogHz / options.time_scale), ", \"stop\")\n");
+                                  Number(options.watchdog_hz / options.time_scale), ", \"stop\")\n");
   absl::StrAppend(&text, "  set_tcp(", PoseText(options.flange_from_tip), ")\n  set_payload(",
                   Number(options.payload_kg), ")\n");
   if (!options.gravity_m_s2.isApprox(ScriptOptions().gravity_m_s2))
@@ -41,15 +41,11 @@ std::string Head(uint32_t program_id, const ScriptOptions& options) {
   return text;
 }
 
-std::string Lines(const std::vector<Eigen::Isometry3d>& poses, Eigen::Isometry3d from,
+std::string Lines(const std::vector<Eigen::Isometry3d>& poses, const std::vector<double>& speeds_m_s,
                   const ScriptOptions& options) {
   std::string text;
-  for (const Eigen::Isometry3d& pose : poses) {
-    absl::StrAppend(
-        &text, "  ",
-        MoveLine(pose, options.acceleration_m_s2, LineSpeed(from, pose, options.transfer_speed_m_s)));
-    from = pose;
-  }
+  for (size_t i = 0; i < poses.size(); ++i)
+    absl::StrAppend(&text, "  ", MoveLine(poses[i], options.acceleration_m_s2, speeds_m_s[i]));
   return text;
 }
 
@@ -85,13 +81,13 @@ double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, 
   return std::max(straight_s, TurnRad(from, to) / kMostTurnRadS);
 }
 
-std::string TouchProgram(const ArmTouch& touch, const Eigen::Isometry3d& base_from_tip_now,
+std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options) {
   const Eigen::Isometry3d& start = touch.transfer.back();
   const std::string command = absl::StrCat("read_input_integer_register(", kCommandRegister, ")");
   const std::string acceleration = Number(options.acceleration_m_s2);
   std::string text = absl::StrCat("def touch_", touch.program_id, "():\n", Head(touch.program_id, options));
-  absl::StrAppend(&text, Lines(touch.transfer, base_from_tip_now, options), Phase(MotionPhase::kReady));
+  absl::StrAppend(&text, Lines(touch.transfer, speeds_m_s, options), Phase(MotionPhase::kReady));
 
   // Waits for the command; the approach runs in a thread, so that the end can be commanded at any moment of
   // it.
@@ -105,16 +101,16 @@ std::string TouchProgram(const ArmTouch& touch, const Eigen::Isometry3d& base_fr
                   " != ", CommandWord(touch.program_id, kCommandRetreat),
                   ":\n    sync()\n  end\n  kill handle\n  stopl(", acceleration, ")\n");
   absl::StrAppend(&text, Phase(MotionPhase::kRetreat), "  ",
-                  MoveLine(start, options.acceleration_m_s2, options.transfer_speed_m_s),
-                  Phase(MotionPhase::kDone), "end\n");
+                  MoveLine(start, options.acceleration_m_s2, speeds_m_s.back()), Phase(MotionPhase::kDone),
+                  "end\n");
   return text;
 }
 
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                        const std::vector<Joints>& joints, const Eigen::Isometry3d& base_from_tip_now,
+                        const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
                         const ScriptOptions& options) {
   std::string text = absl::StrCat("def move_", program_id, "():\n", Head(program_id, options),
-                                  Lines(poses, base_from_tip_now, options));
+                                  Lines(poses, speeds_m_s, options));
   for (const Joints& q : joints) {
     absl::StrAppend(&text, "  movej([");
     for (size_t i = 0; i < q.size(); ++i) absl::StrAppend(&text, i == 0 ? "" : ",", Number(q[i]));

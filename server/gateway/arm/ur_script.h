@@ -8,6 +8,7 @@
 
 #include "server/gateway/arm.h"
 #include "server/gateway/arm/kinematics.h"
+#include "server/gateway/registers.h"
 
 namespace touchstone {
 
@@ -17,17 +18,20 @@ struct ScriptOptions {
   double transfer_speed_m_s = 0.25;
   double acceleration_m_s2 = 1.2;
   double joint_speed_rad_s = 1.05, joint_acceleration_rad_s2 = 1.4;
-  double time_scale = 1;
+  double time_scale = 1;                     // rig seconds in one host second
+  double watchdog_hz = kWatchdogHz;          // of beats, host time
   Eigen::Vector3d gravity_m_s2{0, 0, 9.82};  // as set_gravity takes it; this one (a table) is not sent
 };
 
 // "p[0.3,0,0.1,3.14159,0,0]": position in m, rotation vector in rad.
 std::string PoseText(const Eigen::Isometry3d& pose);
 
-std::string TouchProgram(const ArmTouch& touch, const Eigen::Isometry3d& base_from_tip_now,
+// `speeds_m_s` has one speed for every line of the transfer, and one for the retreat.
+std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options);
+// One speed for every pose.
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                        const std::vector<Joints>& joints, const Eigen::Isometry3d& base_from_tip_now,
+                        const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
                         const ScriptOptions& options);
 std::string StopProgram();
 

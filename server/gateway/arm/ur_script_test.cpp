@@ -38,7 +38,7 @@ TEST(TouchProgram, ReadsAsItDoes) {
       "  write_output_integer_register(25, 1)\n"
       "  write_output_integer_register(24, 17)\n"
       "  movel(p[0.3,0,0.3,3.14159265,0,0], a=1.2, v=0.25)\n"
-      "  movel(p[0.3,0,0.2,3.14159265,0,0], a=1.2, v=0.25)\n"
+      "  movel(p[0.3,0,0.2,3.14159265,0,0], a=1.2, v=0.2)\n"
       "  write_output_integer_register(25, 2)\n"
       "  while read_input_integer_register(25) != 69:\n"
       "    sync()\n"
@@ -56,16 +56,16 @@ TEST(TouchProgram, ReadsAsItDoes) {
       "  kill handle\n"
       "  stopl(1.2)\n"
       "  write_output_integer_register(25, 4)\n"
-      "  movel(p[0.3,0,0.2,3.14159265,0,0], a=1.2, v=0.25)\n"
+      "  movel(p[0.3,0,0.2,3.14159265,0,0], a=1.2, v=0.15)\n"
       "  write_output_integer_register(25, 5)\n"
       "end\n";
-  EXPECT_EQ(TouchProgram(SomeTouch(), Down(0.2, 0.3), options), expected);
+  EXPECT_EQ(TouchProgram(SomeTouch(), {0.25, 0.2, 0.15}, options), expected);
 }
 
 TEST(TouchProgram, NameFitsTheControllersThirtyOneCharacters) {
   ArmTouch touch = SomeTouch();
   touch.program_id = (1u << 28) - 1;
-  const std::string text = TouchProgram(touch, Down(0.2, 0.3), ScriptOptions());
+  const std::string text = TouchProgram(touch, {0.25, 0.25, 0.25}, ScriptOptions());
   EXPECT_LE(text.find('(') - 4, 31u);
   EXPECT_THAT(text, HasSubstr(std::to_string(4 * ((1 << 28) - 1) + 1)));
 }
@@ -73,13 +73,13 @@ TEST(TouchProgram, NameFitsTheControllersThirtyOneCharacters) {
 TEST(TouchProgram, WatchdogIsSlowerOnAnAcceleratedClock) {
   ScriptOptions options;
   options.time_scale = 8;
-  EXPECT_THAT(TouchProgram(SomeTouch(), Down(0.2, 0.3), options),
+  EXPECT_THAT(TouchProgram(SomeTouch(), {0.25, 0.2, 0.15}, options),
               HasSubstr("\"input_int_register_24\", 0.5, "));
 }
 
 TEST(MoveProgram, EndsWithTheJoints) {
   const std::string text =
-      MoveProgram(5, {Down(0.3, 0.3)}, {{{0, -1.5, 0.25, 0, 1, 0}}}, Down(0.3, 0.2), ScriptOptions());
+      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, ScriptOptions());
   EXPECT_THAT(text, HasSubstr("def move_5():\n"));
   EXPECT_THAT(
       text,
