@@ -24,7 +24,7 @@ struct Raw {
   double debounce_ms = 5;
   int threshold = 512, hysteresis = 16;
   double vertical_fov_deg = 45;
-  double most_speed_mm_s = 100, transfer_speed_mm_s = 250, acceleration_mm_s2 = 1200;
+  double most_speed_mm_s = 100, transfer_speed_mm_s = 150, acceleration_mm_s2 = 1200;
   double most_standoff_mm = 150, stroke_beyond_target_mm = 30, most_tilt_deg = 60, clearance_mm = 50;
   std::vector<double> box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
 };

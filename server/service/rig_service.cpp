@@ -173,6 +173,7 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     check->set_duration_s(plan->motion.duration_s);
     // The next one begins where this one ends: at its start.
     from.base_from_tip = plan->motion.transfer.back();
+    from.joints_rad = plan->start_joints_rad;
     if (!request.path()) continue;
     for (const Eigen::Isometry3d& pose : plan->motion.transfer) *check->add_path() = PoseToProto(pose);
     *check->add_path() = PoseToProto(plan->motion.end);

@@ -33,7 +33,7 @@ TEST_F(StreamConformance, TheHeaderComesFirstAndTellsTheColumns) {
 
 TEST_F(StreamConformance, BatchesAreInOrderWithoutGapOrRepeat) {
   const Streamed streamed = Stream(Request(7, 3));
-  ASSERT_TRUE(streamed.status.ok());
+  ASSERT_TRUE(streamed.status.ok()) << streamed.status.error_message();
   uint64_t expected = 0;
   for (const v1::Batch& batch : streamed.batches) {
     EXPECT_EQ(batch.start_index(), expected);
@@ -54,7 +54,7 @@ TEST_F(StreamConformance, APartIsThatPartOfTheWhole) {
   request.set_start_index(3);
   request.set_stop_index(8);
   const Streamed part = Stream(request);
-  ASSERT_TRUE(part.status.ok());
+  ASSERT_TRUE(part.status.ok()) << part.status.error_message();
   const std::string poses = ColumnBytes(whole.batches, "approach");
   EXPECT_EQ(ColumnBytes(part.batches, "approach"), poses.substr(3 * 12, 5 * 12));
   if (IsVirtual()) {
