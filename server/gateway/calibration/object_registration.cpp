@@ -32,6 +32,8 @@ constexpr double kUndetermined = 0.02;  // singular value below which a directio
 constexpr double kWorstRmsM = 0.002;    // above, the contacts are of something else
 constexpr double kMostLeftOut = 0.25;
 constexpr int kMostSteps = 100;
+constexpr double kStartShiftM = 0.004,
+                 kStartTurnRad = 2.5 * kRadiansPerDegree;  // between the starts that are tried
 constexpr double kMostShiftM = 0.02, kMostTurnRad = 15 * kRadiansPerDegree;  // from the start
 
 // Contacts against the surface at one pose.
@@ -64,7 +66,25 @@ class Registration {
     length_m_ = std::max(1e-3, std::sqrt(squares / static_cast<double>(points_m_.size())));
   }
 
+  // Near an edge a bad start meets the wrong face and may settle there: of several starts about the given
+  // one, the pose that fits the most contacts, and those best, is taken.
   absl::StatusOr<ObjectRegistration> Solve(const Isometry3d& start) {
+    absl::StatusOr<ObjectRegistration> best = Finish(start, Descend(start));
+    for (int axis = 0; axis < 6; ++axis)
+      for (const double sign : {-1.0, 1.0}) {
+        Vector6d change = Vector6d::Zero();
+        change[axis] = sign * (axis < 3 ? kStartShiftM : kStartTurnRad * length_m_);
+        const absl::StatusOr<ObjectRegistration> other = Finish(start, Descend(Moved(start, change)));
+        if (!other.ok()) continue;
+        if (!best.ok() || other->left_out < best->left_out ||
+            (other->left_out == best->left_out && other->rms_m < best->rms_m))
+          best = other;
+      }
+    return best;
+  }
+
+ private:
+  Isometry3d Descend(const Isometry3d& start) const {
     Isometry3d pose = start;
     // The scale of the losses only falls, so that costs can be compared: wide at a bad start, then as the
     // data have it.
@@ -98,10 +118,9 @@ class Registration {
         }
       }
     }
-    return Finish(start, pose);
+    return pose;
   }
 
- private:
   Fit Evaluate(const Isometry3d& base_from_object, double scale_m) const {
     const size_t count = points_m_.size();
     const Isometry3d object_from_base = base_from_object.inverse();

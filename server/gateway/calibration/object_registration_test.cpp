@@ -19,7 +19,8 @@ using ::testing::HasSubstr;
 std::shared_ptr<const Surface> Box() {
   TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner)
-    mesh.vertices_m.emplace_back(corner & 1 ? 0.05f : -0.05f, corner & 2 ? 0.03f : -0.03f, corner & 4 ? 0.04f : 0.0f);
+    mesh.vertices_m.emplace_back(corner & 1 ? 0.05f : -0.05f, corner & 2 ? 0.03f : -0.03f,
+                                 corner & 4 ? 0.04f : 0.0f);
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return *Surface::Create("box", std::move(mesh));
@@ -36,29 +37,35 @@ Isometry3d Off(const Isometry3d& pose, const Vector3d& shift_m, const Vector3d& 
   Isometry3d off = pose;
   off.translation() += shift_m;
   if (turn_rad.norm() > 0)
-    off.linear() = Eigen::AngleAxisd(turn_rad.norm(), turn_rad.normalized()).toRotationMatrix() * off.linear();
+    off.linear() =
+        Eigen::AngleAxisd(turn_rad.norm(), turn_rad.normalized()).toRotationMatrix() * off.linear();
   return off;
 }
 
 // Contacts on the top and two sides (or the top alone), with noise along the approach.
-std::vector<RegistrationContact> Touch(const Surface& surface, size_t count, double noise_m, RandomStream* random,
-                                       bool top_only = false) {
+std::vector<RegistrationContact> Touch(const Surface& surface, size_t count, double noise_m,
+                                       RandomStream* random, bool top_only = false) {
   const Isometry3d truth = Truth();
   std::vector<RegistrationContact> contacts;
   while (contacts.size() < count) {
     const size_t face = top_only ? 0 : contacts.size() % 3;
-    const Vector3d normal = face == 0 ? Vector3d::UnitZ() : face == 1 ? Vector3d::UnitX() : -Vector3d::UnitY();
+    Vector3d normal = Vector3d::UnitZ();
+    if (face == 1) normal = Vector3d::UnitX();
+    if (face == 2) normal = -Vector3d::UnitY();
     // Slightly oblique, as a planned touch is.
     const Vector3d approach =
-        (-normal + 0.2 * Vector3d(random->Uniform(-1, 1), random->Uniform(-1, 1), random->Uniform(-1, 1))).normalized();
-    const Vector3d near_m(random->Uniform(-0.04, 0.04), random->Uniform(-0.02, 0.02), random->Uniform(0.01, 0.03));
+        (-normal + 0.2 * Vector3d(random->Uniform(-1, 1), random->Uniform(-1, 1), random->Uniform(-1, 1)))
+            .normalized();
+    const Vector3d near_m(random->Uniform(-0.04, 0.04), random->Uniform(-0.02, 0.02),
+                          random->Uniform(0.01, 0.03));
     Contacts hit;
     const Vector3d origin_m = near_m - 0.2 * approach;
     surface.CastLines({&origin_m, 1}, {&approach, 1}, 1, &hit);
     if (std::isnan(hit.travel_m[0])) continue;
     RegistrationContact contact;
     contact.finger_x_m = 0.03 * (static_cast<double>(contacts.size() % 3) - 1);
-    const Vector3d point_m = truth * hit.point_m[0] + noise_m * random->Normal() * (truth.linear() * approach);
+    const Vector3d point_m =
+        truth * hit.point_m[0] + noise_m * random->Normal() * (truth.linear() * approach);
     contact.base_from_tip.linear() =
         Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), truth.linear() * approach).toRotationMatrix();
     contact.base_from_tip.translation() =
@@ -75,8 +82,9 @@ TEST(ObjectRegistration, FindsThePoseFromAStartFiveMillimetresAndThreeDegreesOff
     const auto contacts = Touch(*surface, 36, 0, &random);
     const Vector3d shift(random.Normal(), random.Normal(), random.Normal());
     const Vector3d turn(random.Normal(), random.Normal(), random.Normal());
-    const auto found = RegisterObject(
-        *surface, contacts, Off(Truth(), 0.005 * shift.normalized(), 3 * kRadiansPerDegree * turn.normalized()));
+    const auto found =
+        RegisterObject(*surface, contacts,
+                       Off(Truth(), 0.005 * shift.normalized(), 3 * kRadiansPerDegree * turn.normalized()));
     ASSERT_TRUE(found.ok()) << "round " << round << ": " << found.status();
     // The mesh is in single precision.
     EXPECT_NEAR((found->base_from_object.matrix() - Truth().matrix()).norm(), 0, 1e-6) << "round " << round;
@@ -92,7 +100,8 @@ TEST(ObjectRegistration, StandardErrorsAreThoseOfTheNoise) {
   for (int round = 0; round < kRounds; ++round) {
     RandomStream random(2, RandomDomain::kTest, round);
     const auto contacts = Touch(*surface, 45, kNoiseM, &random);
-    const auto found = RegisterObject(*surface, contacts, Off(Truth(), Vector3d(0.001, 0, 0.001), Vector3d::Zero()));
+    const auto found =
+        RegisterObject(*surface, contacts, Off(Truth(), Vector3d(0.001, 0, 0.001), Vector3d::Zero()));
     ASSERT_TRUE(found.ok()) << found.status();
     const Eigen::AngleAxisd turn(found->base_from_object.linear() * Truth().linear().transpose());
     for (int k = 0; k < 3; ++k) {
@@ -111,9 +120,10 @@ TEST(ObjectRegistration, AFewFalseContactsDoNotPullIt) {
   const auto surface = Box();
   RandomStream random(3, RandomDomain::kTest);
   auto contacts = Touch(*surface, 40, 20e-6, &random);
-  contacts[4].base_from_tip.translation().z() += 0.004;
-  contacts[11].base_from_tip.translation().x() -= 0.006;
-  const auto found = RegisterObject(*surface, contacts, Off(Truth(), Vector3d(0.002, -0.002, 0.002), Vector3d::Zero()));
+  contacts[4].base_from_tip.translate(Vector3d(0, 0, 0.004));
+  contacts[11].base_from_tip.translate(Vector3d(0, 0, -0.006));
+  const auto found =
+      RegisterObject(*surface, contacts, Off(Truth(), Vector3d(0.002, -0.002, 0.002), Vector3d::Zero()));
   ASSERT_TRUE(found.ok()) << found.status();
   EXPECT_NEAR((found->base_from_object.translation() - Truth().translation()).norm(), 0, 1e-4);
   EXPECT_GE(found->left_out, 2u);
@@ -135,13 +145,15 @@ TEST(ObjectRegistration, RefusesTooFewContactsAndAnotherObject) {
   const auto surface = Box();
   RandomStream random(5, RandomDomain::kTest);
   auto contacts = Touch(*surface, 6, 0, &random);
-  EXPECT_THAT(std::string(RegisterObject(*surface, contacts, Truth()).status().message()), HasSubstr("has 6 contacts"));
+  EXPECT_THAT(std::string(RegisterObject(*surface, contacts, Truth()).status().message()),
+              HasSubstr("has 6 contacts"));
   contacts = Touch(*surface, 30, 0, &random);
   for (RegistrationContact& contact : contacts)
     contact.base_from_tip.translation() += 0.01 * Vector3d(random.Normal(), random.Normal(), random.Normal());
   EXPECT_TRUE(absl::IsFailedPrecondition(RegisterObject(*surface, contacts, Truth()).status()));
   contacts[2].base_from_tip.translation().x() = NAN;
-  EXPECT_THAT(std::string(RegisterObject(*surface, contacts, Truth()).status().message()), HasSubstr("contact 2"));
+  EXPECT_THAT(std::string(RegisterObject(*surface, contacts, Truth()).status().message()),
+              HasSubstr("contact 2"));
 }
 
 }  // namespace
