@@ -1,0 +1,309 @@
+// The gateway's arm against the emulated controller, over real sockets, and what it does when the controller
+// fails.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "server/gateway/arm/ur_arm.h"
+#include "server/gateway/motion_planner.h"
+#include "tests/rig/controller.h"
+
+namespace touchstone {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kPatienceS = 60;  // host time; the machine may be busy
+
+// A beat as the gateway gives it while something moves.
+class Heart {
+ public:
+  explicit Heart(Arm* arm)
+      : thread_([this, arm] {
+          while (beating_) {
+            arm->Beat();
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+          }
+        }) {}
+  ~Heart() { Stop(); }
+  void Stop() {
+    beating_ = false;
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  std::atomic<bool> beating_{true};
+  std::thread thread_;
+};
+
+// An arm that is powered, at home, 120 mm of tool on its flange.
+class EmulatedArm : public testing::Test {
+ protected:
+  explicit EmulatedArm(double speedup = 4, const std::string& model = "ur3e") : clock_(speedup) {
+    options_.model = model;
+    options_.powered = true;
+    controller_ = rig::Controller::Start(options_, &clock_, &faults_, nullptr);
+    UrArmOptions arm;
+    arm.model = model;
+    arm.address = "127.0.0.1";
+    arm.dashboard_port = controller_->ports().dashboard;
+    arm.primary_port = controller_->ports().primary;
+    arm.secondary_port = controller_->ports().secondary;
+    arm.rtde_port = controller_->ports().rtde;
+    arm.script.flange_from_tip.translation().z() = 0.12;
+    arm.script.time_scale = speedup;
+    // A busy machine's pauses are no dead gateway and no frozen controller.
+    arm.script.watchdog_hz = 0.2;
+    arm.frozen_after_s = 3;
+    arm.program_start_s = 10;
+    arm.connect_wait_s = kPatienceS;
+    arm_options_ = arm;
+    arm_ = ConnectUrArm(arm, &news_).value();
+  }
+
+  template <typename Done>
+  bool Wait(Done done) {
+    const double until_s = HostNowS() + kPatienceS;
+    while (!done()) {
+      if (HostNowS() > until_s) return false;
+      news_.WaitForNews(news_.count(), 0.01);
+    }
+    return true;
+  }
+  bool WaitForProgram(uint32_t program_id) {
+    return Wait([&] {
+      const auto state = arm_->State();
+      return state.ok() && state->program_id == program_id;
+    });
+  }
+  bool WaitForPhase(uint32_t program_id, MotionPhase phase) {
+    return Wait([&] {
+      const auto state = arm_->State();
+      return state.ok() && state->program_id == program_id && state->phase == static_cast<int>(phase);
+    });
+  }
+  // A few steps straight down from above where the arm is.
+  ArmTouch SomeTouch(uint32_t program_id, double speed_m_s = 0.02) {
+    Wait([&] { return arm_->State().ok(); });
+    ArmTouch touch;
+    touch.program_id = program_id;
+    Eigen::Isometry3d pose = arm_->State()->base_from_tip;
+    pose.translation().z() += 0.03;
+    touch.transfer.push_back(pose);
+    pose.translation().y() += 0.02;
+    touch.transfer.push_back(pose);
+    touch.end = pose;
+    touch.end.translation().z() -= 0.08;
+    touch.speed_m_s = speed_m_s;
+    return touch;
+  }
+  void ExpectAtRestSoon() {
+    EXPECT_TRUE(Wait([&] { return !controller_->Moving(); }));
+    const Eigen::Vector3d here = controller_->BaseFromTip().translation();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    EXPECT_LT((controller_->BaseFromTip().translation() - here).norm(), 1e-6);
+  }
+
+  rig::SimClock clock_;
+  rig::Faults faults_;
+  rig::ControllerOptions options_;
+  UrArmOptions arm_options_;
+  std::unique_ptr<rig::Controller> controller_;
+  Signal news_;
+  std::unique_ptr<UrArm> arm_;
+};
+
+TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
+  const auto state = arm_->State();
+  ASSERT_TRUE(state.ok()) << state.status();
+  const Eigen::Isometry3d truth = controller_->BaseFromFlange() * arm_options_.script.flange_from_tip;
+  EXPECT_LT((state->base_from_tip.translation() - truth.translation()).norm(), 2e-4);
+  EXPECT_EQ(state->robot_mode, 7);
+  EXPECT_TRUE(arm_->Ready().ok()) << arm_->Ready();
+  EXPECT_FALSE(arm_->Version().empty());
+}
+
+TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
+  Heart heart(arm_.get());
+  const ArmTouch touch = SomeTouch(7);
+  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(WaitForPhase(7, MotionPhase::kReady));
+  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transfer.back().translation()).norm(), 1e-4);
+  ASSERT_TRUE(arm_->BeginApproach(7).ok());
+  ASSERT_TRUE(WaitForPhase(7, MotionPhase::kDone));
+  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transfer.back().translation()).norm(), 1e-4);
+
+  // The history shows the approach: at its speed, down to its end.
+  const double now_s = arm_->State()->controller_time_s;
+  double lowest_m = 1, fastest_m_s = 0;
+  for (const ArmState& state : arm_->History(now_s - 30, now_s)) {
+    if (state.phase != static_cast<int>(MotionPhase::kApproach)) continue;
+    lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
+    fastest_m_s = std::max(fastest_m_s, state.tip_velocity_m_s.norm());
+  }
+  EXPECT_NEAR(lowest_m, touch.end.translation().z(), 1e-3);
+  EXPECT_NEAR(fastest_m_s, 0.02, 0.004);
+}
+
+TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
+  Heart heart(arm_.get());
+  const ArmTouch touch = SomeTouch(8, 0.002);
+  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kReady));
+  ASSERT_TRUE(arm_->BeginApproach(8).ok());
+  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kApproach));
+  ASSERT_TRUE(arm_->EndApproach(8).ok());
+  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kDone));
+  const double now_s = arm_->State()->controller_time_s;
+  double lowest_m = 1;
+  for (const ArmState& state : arm_->History(now_s - 30, now_s))
+    if (state.phase == static_cast<int>(MotionPhase::kApproach))
+      lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
+  EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01) << "it would have taken 40 s to the end";
+}
+
+TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
+  Heart heart(arm_.get());
+  const ArmTouch touch = SomeTouch(9);
+  Joints joints = options_.joints_rad;
+  joints[0] += 0.2;
+  ASSERT_TRUE(arm_->MoveThrough(9, touch.transfer, {joints}).ok());
+  ASSERT_TRUE(WaitForPhase(9, MotionPhase::kDone));
+  EXPECT_LT(Farthest(arm_->State()->joints_rad, joints), 1e-3);
+}
+
+TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
+  Heart heart(arm_.get());
+  const ArmTouch touch = SomeTouch(10, 0.002);
+  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(WaitForPhase(10, MotionPhase::kReady));
+  ASSERT_TRUE(arm_->BeginApproach(10).ok());
+  ASSERT_TRUE(WaitForPhase(10, MotionPhase::kApproach));
+  ASSERT_TRUE(arm_->Stop().ok());
+  ExpectAtRestSoon();
+  EXPECT_EQ(arm_->State()->phase, static_cast<int>(MotionPhase::kApproach)) << "it tells how far it came";
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(11)).ok());
+  EXPECT_TRUE(WaitForPhase(11, MotionPhase::kReady));
+}
+
+TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
+  Heart heart(arm_.get());
+  for (uint32_t id = 20; id < 30; ++id) {
+    const ArmTouch touch = SomeTouch(id);
+    ASSERT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
+    std::thread starter([&] { arm_->StartTouch(touch).IgnoreError(); });
+    if (id % 2 == 0)
+      std::this_thread::sleep_for(std::chrono::microseconds(100 * (id - 20)));
+    else
+      starter.join();
+    ASSERT_TRUE(arm_->Stop().ok());
+    if (starter.joinable()) starter.join();
+    // Started after the stop it may run; stopped again it must not.
+    ASSERT_TRUE(arm_->Stop().ok());
+    ExpectAtRestSoon();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_FALSE(controller_->Moving()) << id;
+  }
+}
+
+TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
+  Heart heart(arm_.get());
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(12)).ok());
+  ASSERT_TRUE(WaitForProgram(12));
+  faults_.Set("disconnect", 1);
+  // Whatever is up again first carries it.
+  EXPECT_TRUE(Wait([&] { return arm_->Stop().ok(); }));
+  ExpectAtRestSoon();
+}
+
+TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {
+  Heart heart(arm_.get());
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(13, 0.001)).ok());
+  ASSERT_TRUE(WaitForPhase(13, MotionPhase::kReady));
+  ASSERT_TRUE(arm_->BeginApproach(13).ok());
+  ASSERT_TRUE(WaitForPhase(13, MotionPhase::kApproach));
+  heart.Stop();
+  EXPECT_TRUE(Wait([&] { return controller_->Count("watchdog_stops") > 0; }));
+  ExpectAtRestSoon();
+}
+
+TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
+  Heart heart(arm_.get());
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(14)).ok());
+  faults_.Set("protective_stop", 1);
+  ASSERT_TRUE(Wait([&] { return arm_->State().ok() && arm_->State()->safety_mode == 3; }));
+  EXPECT_EQ(arm_->Ready().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(arm_->Ready().message()), HasSubstr("PROTECTIVE_STOP"));
+  EXPECT_EQ(arm_->StartTouch(SomeTouch(15)).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(arm_->PowerOn().code(), absl::StatusCode::kFailedPrecondition);
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(arm_->State()->safety_mode, 3);
+}
+
+TEST_F(EmulatedArm, FrozenControllerIsToldAsSuchAndComesBack) {
+  faults_.Set("freeze", 8);
+  ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
+  EXPECT_EQ(arm_->State().status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(arm_->State().status().message()), HasSubstr("silent"));
+  EXPECT_FALSE(arm_->Ready().ok());
+  EXPECT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
+}
+
+TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
+  const double before_s = arm_->State()->controller_time_s;
+  faults_.Set("disconnect", 1);
+  ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
+  ASSERT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
+  EXPECT_GT(arm_->State()->controller_time_s, before_s);
+  Heart heart(arm_.get());
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(16)).ok());
+  EXPECT_TRUE(WaitForPhase(16, MotionPhase::kReady));
+}
+
+TEST_F(EmulatedArm, ClockOfTheControllerIsToldInHostTime) {
+  ASSERT_TRUE(Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 50; }));
+  const ArmState state = *arm_->State();
+  const double told_s = arm_->ControllerClock().RemoteOf(state.host_time_s);
+  EXPECT_NEAR(told_s, state.controller_time_s, 1.0) << "not later than a busy machine delivers it";
+}
+
+TEST(UrArm, PowersOnAndReleasesTheBrakes) {
+  rig::SimClock clock(20);
+  rig::Faults faults;
+  rig::ControllerOptions options;
+  options.model = "ur3";
+  const auto controller = rig::Controller::Start(options, &clock, &faults, nullptr);
+  UrArmOptions arm_options;
+  arm_options.model = "ur3";
+  arm_options.address = "127.0.0.1";
+  arm_options.dashboard_port = controller->ports().dashboard;
+  arm_options.primary_port = controller->ports().primary;
+  arm_options.secondary_port = controller->ports().secondary;
+  arm_options.rtde_port = controller->ports().rtde;
+  arm_options.script.time_scale = 20;
+  arm_options.connect_wait_s = kPatienceS;
+  Signal news;
+  const auto arm = ConnectUrArm(arm_options, &news).value();
+  EXPECT_EQ(arm->Ready().code(), absl::StatusCode::kFailedPrecondition) << arm->Ready();
+  EXPECT_THAT(std::string(arm->Ready().message()), HasSubstr("POWER_OFF"));
+  const absl::Status powered = arm->PowerOn();
+  EXPECT_TRUE(powered.ok()) << powered;
+  EXPECT_TRUE(arm->Ready().ok()) << arm->Ready();
+}
+
+// Without a program that compiles nothing starts, and the error says what the controller said.
+TEST_F(EmulatedArm, ProgramThatDoesNotCompileIsToldAsSuch) {
+  ArmTouch touch = SomeTouch(17);
+  touch.end.translation().x() = std::numeric_limits<double>::quiet_NaN();  // "nan" is no number of URScript
+  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
+  EXPECT_THAT(std::string(arm_->State().status().message()), HasSubstr("did not begin program 17"));
+  ASSERT_TRUE(arm_->Stop().ok());
+  EXPECT_TRUE(arm_->State().ok()) << "a stop clears it";
+}
+
+}  // namespace
+}  // namespace touchstone
