@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kStepM = 0.005, kStepRad = 0.035;
 constexpr double kJumpRad = 0.35;  // of a joint from sample to sample: another branch, or a wrist that flips
+constexpr double kPostureRad = 1;
 constexpr double kBoxToleranceM = 1e-6, kJointToleranceRad = 1e-4;
 constexpr const char* kJointNames[] = {"base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"};
 constexpr double kMostSlowing = 10;
@@ -90,6 +91,8 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
     if (!JointsAt(pose, *joints, &next)) return OutOfReach(pose, what);
     for (size_t i = 0; i < 6; ++i) {
       const double change_rad = std::abs(next[i] - (*joints)[i]);
+      // Only in another posture, to which no straight line leads.
+      if (change_rad > kPostureRad) return OutOfReach(pose, what);
       if (change_rad > kJumpRad)
         return absl::OutOfRangeError(absl::StrFormat(
             "%s passes a singularity at %s m in the base frame: %s would jump by %.0f deg, at most %.0f",

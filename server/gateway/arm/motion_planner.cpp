@@ -18,7 +18,8 @@
 namespace touchstone {
 namespace {
 
-constexpr double kSettleS = 0.05;  // of the arm at the end of a line, and of the program's start
+constexpr double kSettleS = 0.05;         // of the arm at the end of a line, and of the program's start
+constexpr double kWristReserveRad = 0.2;  // that a transfer leaves of wrist 3's range, where it can
 constexpr double kLeastStandoffM = 1e-3;
 constexpr double kMostTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
 
@@ -186,7 +187,10 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transfer(const A
   std::vector<Eigen::Isometry3d> poses = way.Poses(0);
   int beyond = 0;
   absl::StatusOr<Joints> end = FollowAll(from.base_from_tip, poses, here, &beyond);
-  if (!end.ok() && beyond != 0) {
+  // Near its limit it would be stuck: the approach and the next way out turn it a little, too.
+  if (end.ok() && (*end)[5] > limits_.joint_max_rad[5] - kWristReserveRad) beyond = 1;
+  if (end.ok() && (*end)[5] < limits_.joint_min_rad[5] + kWristReserveRad) beyond = -1;
+  if (beyond != 0) {
     // Wrist 3 would wind the cable up: the tool turns the other way round.
     const std::vector<Eigen::Isometry3d> unwinding = way.Poses(-beyond);
     if (absl::StatusOr<Joints> other = FollowAll(from.base_from_tip, unwinding, here, &beyond); other.ok())
