@@ -106,6 +106,11 @@ class Client:
         with self._leased() as lease:
             yield lease.token
 
+    @property
+    def held_token(self) -> str:
+        """The token of the lease that is held now, or ""."""
+        return self._leases[-1].token if self._leases else ""
+
     def session(self, name: str = "default", *, take_lease: bool = False) -> Session:
         """Touches of one session, under ids that make it possible to go on with it. See Session."""
         return Session(self, name, take_lease)

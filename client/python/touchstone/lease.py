@@ -63,6 +63,10 @@ class Lease:
                 f"{error} Wait until they are done, or take it from them with client.lease(take=True).",
                 error.code, error.target,
             ) from None
+        self._hold(lease)
+
+    def _hold(self, lease: control_pb2.Lease) -> None:
+        """Renews it from now on."""
         self.token, self.holder, self.epoch, self._window_s = lease.token, lease.holder, lease.epoch, lease.window_s
         self._thread = threading.Thread(target=self._run, name="touchstone lease", daemon=True)
         self._thread.start()
@@ -109,19 +113,25 @@ class Lease:
 
     def release(self) -> None:
         """Gives it back; the second time it does nothing."""
+        if self._end_renewing():
+            if self._lost is None:
+                try:
+                    self._stub().ReleaseLease(
+                        control_pb2.ReleaseLeaseRequest(token=self.token),
+                        timeout=max(self._window_s, _SHORTEST_ANSWER_S),
+                    )
+                except grpc.RpcError:
+                    pass  # it runs out by itself
+            self._own.close()
+
+    def _end_renewing(self) -> bool:
+        """False if it was not renewed any more."""
         if self._thread is None:
-            return
+            return False
         self._ending.set()
         self._thread.join()
         self._thread = None
-        if self._lost is None:
-            try:
-                self._stub().ReleaseLease(
-                    control_pb2.ReleaseLeaseRequest(token=self.token), timeout=max(self._window_s, _SHORTEST_ANSWER_S)
-                )
-            except grpc.RpcError:
-                pass  # it runs out by itself
-        self._own.close()
+        return True
 
     def __enter__(self) -> Lease:
         return self

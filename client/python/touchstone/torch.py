@@ -22,6 +22,7 @@ like "spawn" needs the script's main part under `if __name__ == "__main__":`.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -41,8 +42,9 @@ from .errors import InvalidRequest, Refused, SourceChanged
 from .images import ImageOptions
 from .models import ModelLike
 from .plans import PlanLike
+from .shared_lease import LeaseSlot, SharedLease
 from .specification import resolve_batch_size, specification
-from .v1 import source_pb2
+from .v1 import source_pb2, source_pb2_grpc
 
 __all__ = ["TouchstoneDataset", "TouchstoneLoader", "epoch_seed"]
 
@@ -118,6 +120,7 @@ class TouchstoneDataset(IterableDataset):
         self._begin = torch.tensor([0, self.start, 0], dtype=torch.int64).share_memory_()
         # What the sources serve, as digests: row 0 what a loaded state expects, then a row a worker.
         self._fingerprints = torch.zeros((1 + _FINGERPRINTS, 32), dtype=torch.uint8).share_memory_()
+        self._lease_slot = LeaseSlot(target.held_token if isinstance(target, Client) else "")
         # Progress of the iteration in this process: batches that this rank was given, samples of the next one.
         self._delivered = 0
         self._skipped = 0
@@ -236,7 +239,8 @@ class TouchstoneDataset(IterableDataset):
             spec.seed = epoch_seed(self._seed, epoch)
         connection = Connection(self._targets, self._retry_for_s, begin_with=self.rank * workers + worker)
         dataset = Dataset(
-            connection, spec, batch_size=self.batch_size, start=start, stop=stop, stride=self.ranks * workers
+            connection, spec, batch_size=self.batch_size, start=start, stop=stop, stride=self.ranks * workers,
+            hold_lease=lambda: self._lease(connection, worker),
         )
         try:
             for k, batch in enumerate(dataset):
@@ -245,6 +249,13 @@ class TouchstoneDataset(IterableDataset):
                 yield _tensors(batch, skip if k == 0 else 0)
         finally:
             connection.close()
+
+    @contextlib.contextmanager
+    def _lease(self, connection: Connection, worker: int) -> Iterator[str]:
+        """The token of what the source wants to be held while it makes samples; "" where it wants nothing."""
+        source = connection.call(source_pb2_grpc.SourceStub, "Describe", source_pb2.DescribeRequest())
+        with SharedLease(connection, source.lease_required, self._lease_slot, worker) as lease:
+            yield lease.token
 
     def _compare(self, worker: int, served: bytes, target: str) -> None:
         """All workers, and the one who saved a state, must have been served the same dataset."""
