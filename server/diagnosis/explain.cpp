@@ -201,10 +201,14 @@ absl::StatusOr<Explained> Explain(Study* study) {
         study->thinned ? Residuals(o, details) : ResidualsWithoutSurface(*study, explained.fit);
     std::vector<double> tangents(residuals.size());
     std::vector<char> expected(residuals.size());
+    // A finger that would have had farther to go than any that reported is beyond the rig's stroke.
+    double farthest_m = 0;
+    for (size_t e = 0; e < residuals.size(); ++e)
+      if (!std::isnan(o.time_s[e]) && details.travel_m[e] > farthest_m) farthest_m = details.travel_m[e];
     for (size_t e = 0; e < residuals.size(); ++e) {
       const double cosine = std::clamp(details.cos_incidence[e], 0.05, 1.0);
       tangents[e] = std::sqrt(1 / (cosine * cosine) - 1);
-      expected[e] = !std::isnan(details.time_s[e]);
+      expected[e] = !std::isnan(details.time_s[e]) && details.travel_m[e] <= farthest_m;
     }
     explained.noise =
         FindNoise(o, residuals, tangents, expected,

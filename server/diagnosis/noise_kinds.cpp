@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <functional>
 
 #include "server/diagnosis/noise_likelihood.h"
@@ -132,15 +133,37 @@ NoiseEstimate FindPolling(const Observations& o) {
   return none;
 }
 
+// Contacts of one finger at one pose: how many were expected, how many silent.
+struct Repeats {
+  double all = 0, silent = 0;
+  bool AlwaysSilent() const { return all > 1 && silent == all; }
+};
+
+// A finger that is silent in every repeat of a pose is out of reach there (the stroke ended, a sensor cannot see it);
+// that is no chance, unless chance alone would bring about as many such fingers.
 NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expected) {
-  double silent = 0, all = 0;
+  std::map<std::pair<int, int>, Repeats> groups;  // by pose and finger
   for (int k = 0; k < o.size(); ++k)
     for (int i = 0; i < o.fingers; ++i) {
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
       if (!expected[e]) continue;
-      all += 1;
-      silent += std::isnan(o.time_s[e]);
+      Repeats& group = groups[{o.pose[k], i}];
+      group.all += 1;
+      group.silent += std::isnan(o.time_s[e]);
     }
+  double silent = 0, all = 0, always = 0;
+  for (const auto& [key, group] : groups) {
+    always += group.AlwaysSilent();
+    if (!group.AlwaysSilent()) silent += group.silent, all += group.all;
+  }
+  const double sometimes = all > 0 ? silent / all : 0;
+  double by_chance = 0;
+  for (const auto& [key, group] : groups)
+    if (group.all > 1) by_chance += std::pow(sometimes, group.all);
+  if (always <= by_chance + 3 * std::sqrt(by_chance) + 0.5)
+    for (const auto& [key, group] : groups)
+      if (group.AlwaysSilent()) silent += group.silent, all += group.all;
+
   NoiseEstimate found;
   if (silent < 3 || silent < 0.002 * all) return found;
   found.value = silent / all;

@@ -75,12 +75,24 @@ TEST(FindNoise, FindsTheTicksOfAPollingLoop) {
 
 TEST(FindNoise, CountsContactsThatAreMissed) {
   MadeUpSet set(3, 20, 2, kSigma, 6);
-  for (size_t e = 0; e < set.observations.time_s.size(); e += 10) set.observations.time_s[e] = NAN;
+  for (size_t e = 0; e < set.observations.time_s.size(); e += 11) set.observations.time_s[e] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
   const NoiseFindings found =
       FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
-  EXPECT_NEAR(found.missed_probability.value, 0.1, 0.01);
+  EXPECT_NEAR(found.missed_probability.value, 1.0 / 11, 0.01);
+}
+
+TEST(FindNoise, AFingerThatIsSilentInEveryRepeatIsOutOfReachAndNoChance) {
+  MadeUpSet set(3, 20, 4, kSigma, 6);
+  const Observations& o = set.observations;
+  for (int k = 0; k < o.size(); ++k)
+    if (o.pose[k] % 10 == 0) set.observations.time_s[static_cast<size_t>(k) * o.fingers + 2] = NAN;
+  set.Finish();
+  const std::vector<double> tangents(set.residuals.size(), 0.1);
+  const NoiseFindings found =
+      FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
+  EXPECT_EQ(found.missed_probability.gain_nats, 0) << found.missed_probability.value;
 }
 
 }  // namespace

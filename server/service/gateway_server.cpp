@@ -21,7 +21,9 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   RigParts parts;
   parts.news = std::make_unique<Signal>();
   TOUCHSTONE_ASSIGN_OR_RETURN(const Calibration calibration, ReadCalibration(options.calibration));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner, MotionPlanner::Create(options.arm.model, options.limits, calibration));
+  MotionLimits limits = options.limits;
+  limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner, MotionPlanner::Create(options.arm.model, limits, calibration));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.journal, Journal::Open(options.journal, Journal::Mode::kCreateOrReadWrite));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, AuditLog::Open(options.audit_log));
 
