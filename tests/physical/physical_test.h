@@ -52,6 +52,7 @@ class PhysicalTest : public testing::Test {
   void StopGateway();
   void StartGatewayProcess();
   void KillGatewayProcess();
+  pid_t gateway_process() const { return process_; }  // 0: none
 
   // A touch of lat00 from above, 10 mm to the side for every unit of `which`.
   v1::CommandedTouch FromAbove(double speed_m_s = 0.02, double which = 0) const;

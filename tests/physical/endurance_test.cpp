@@ -1,0 +1,20 @@
+// A few hundred touches while things break at random. RESULTS.md tells of many more.
+#include "tests/physical/endurance/endurance.h"
+
+namespace touchstone {
+namespace {
+
+TEST(EnduranceTest, NothingIsLostDoubledOrAttributedToAnotherTouchWhateverBreaks) {
+  EnduranceOptions options;
+  options.touches = 300;
+  options.fault_share = 0.15;
+  Endurance endurance(options);
+  const EnduranceReport report = endurance.Run();
+  EXPECT_TRUE(report.Sound()) << report.Text();
+  EXPECT_EQ(report.done, options.touches);
+  EXPECT_GT(report.failed, 0u) << "nothing broke: " << report.Text();
+  EXPECT_GT(report.repeats, 0u);
+}
+
+}  // namespace
+}  // namespace touchstone
