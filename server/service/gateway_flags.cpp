@@ -52,6 +52,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"arm.secondary_port", "", &o.arm.secondary_port},
       {"arm.rtde_port", "", &o.arm.rtde_port},
       {"arm.silence_s", "Seconds without a state after which the controller counts as frozen", &o.arm.silence_s},
+      {"arm.watchdog_hz", "The controller stops the arm when this gateway beats more slowly", &o.arm.watchdog_hz},
       {"effector.port", "Serial port of the end effector, /dev/ttyACM0", &o.effector.port},
       {"effector.baud", "", &o.effector.baud},
       {"effector.fingers", "1 to 8", &raw->fingers},
@@ -123,6 +124,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.most_press_mm, 0.1, 1000, "effector.most_press_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.time_scale, 1e-3, 1e5, "time_scale"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.silence_s, 0.05, 60, "arm.silence_s"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.watchdog_hz, 0.1, 50, "arm.watchdog_hz"));
   if (raw.sensor.size() > 1 && static_cast<int>(raw.sensor.size()) != raw.fingers)
     return absl::InvalidArgumentError(absl::StrCat("effector.sensor has ", raw.sensor.size(),
                                                    " names: one, or one for each of ", raw.fingers, " fingers"));

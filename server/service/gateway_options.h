@@ -19,6 +19,7 @@ struct ArmOptions {
   std::string address;         // "192.168.0.10"
   int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
   double silence_s = 0.5;      // host time without a state: the controller counts as frozen
+  double watchdog_hz = 4;      // the controller stops the arm if this gateway beats more slowly
 };
 
 struct GatewayOptions {

@@ -40,6 +40,7 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   arm.script.transfer_speed_m_s = options.limits.transfer_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
+  arm.script.watchdog_hz = options.arm.watchdog_hz;
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.news.get()));
   if (const absl::Status powered = parts.arm->PowerOn(); !powered.ok())
     spdlog::warn("the arm was not powered on: {}", std::string(powered.message()));

@@ -19,6 +19,17 @@ extern char** environ;
 
 namespace touchstone {
 
+namespace {
+
+// Limits of host time that a busy machine, or one under sanitizers, keeps too. A rig has shorter ones.
+const std::vector<std::string>& Patience() {
+  static const std::vector<std::string> flags = {"--lease-window-s", "2",   "--arm-watchdog-hz",    "1",
+                                                 "--arm-silence-s",  "1.5", "--effector-silence-s", "3"};
+  return flags;
+}
+
+}  // namespace
+
 KeptLease::KeptLease(v1::Control::Stub* control, const std::string& holder, bool take) : control_(control) {
   v1::AcquireLeaseRequest request;
   request.set_holder(holder);
@@ -78,7 +89,8 @@ void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& ch
 
 void PhysicalTest::StartGateway(std::vector<std::string> flags) {
   flags.insert(flags.begin(), {"touchstone-gateway", "--config", emulator_->config_path(), "--listen", "127.0.0.1:0",
-                               "--supershape-triangles", "2000", "--lease-window-s", "1"});
+                               "--supershape-triangles", "2000"});
+  flags.insert(flags.begin() + 1, Patience().begin(), Patience().end());
   std::vector<const char*> argv;
   for (const std::string& flag : flags) argv.push_back(flag.c_str());
   auto parsed = ParseGatewayFlags(static_cast<int>(argv.size()), argv.data());
@@ -101,7 +113,8 @@ void PhysicalTest::StartGatewayProcess() {
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   std::vector<std::string> words = {program, "--config", emulator_->config_path(), "--listen", "127.0.0.1:0",
-                                    "--supershape-triangles", "2000", "--lease-window-s", "1"};
+                                    "--supershape-triangles", "2000"};
+  words.insert(words.begin() + 1, Patience().begin(), Patience().end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);

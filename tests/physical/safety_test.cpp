@@ -76,7 +76,7 @@ TEST_F(Safety, ADeadClientsMotionStops) {
   StartGateway();
   KeptLease lease(control_.get(), "dies", true);
   lease.StopRenewing();
-  const Answer answer = Touch(lease.token(), FromAbove(0.001), "of a dead client");
+  const Answer answer = Touch(lease.token(), FromAbove(0.0005), "of a dead client");
   EXPECT_EQ(answer.status.error_code(), grpc::ABORTED) << answer.status.error_message();
   WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
   EXPECT_LT(emulator_->touches(), 1u) << "it went on until contact";
@@ -113,7 +113,7 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   {
     KeptLease lease(control_.get(), "before", true);
     EXPECT_TRUE(Touch(lease.token(), FromAbove(0.02, 1), "before").status.ok());
-    auto touch = TouchLater(lease.token(), FromAbove(0.001), "killed");
+    auto touch = TouchLater(lease.token(), FromAbove(0.0005), "killed");
     WaitUntilApproaching();
     KillGatewayProcess();
     EXPECT_FALSE(touch.get().status.ok());
@@ -129,7 +129,7 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   EXPECT_EQ(RigState().interrupted_touches(), 1u);
   EXPECT_EQ(State(), "protective_stop");
   UnlockByHand();
-  ExpectTheTouchCanBeMade(FromAbove(0.001), "killed");
+  ExpectTheTouchCanBeMade(FromAbove(0.0005), "killed");
   KillGatewayProcess();
   ExpectEveryResultIsItsOwnTouch();
 }
@@ -142,7 +142,7 @@ TEST_F(Safety, AFrozenControllerIsNoticed) {
   KeptLease lease(control_.get(), "client", true);
   auto touch = TouchLater(lease.token(), FromAbove(kSlow), "frozen");
   WaitUntilApproaching();
-  emulator_->faults().Set("freeze", 2);
+  emulator_->faults().Set("freeze", 4);
   const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::UNAVAILABLE) << answer.status.error_message();
   WaitUntil([&] { return State() != "disconnected"; }, "the controller is back");
