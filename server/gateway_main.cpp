@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
   }
   AnnounceListening(flags->options.common.listen, (*gateway)->port());
   const int signal = WaitForSignal();
-  spdlog::info("signal {}: what moves is stopped; draining for up to {} s", signal, flags->options.common.drain_s);
+  spdlog::info("signal {}: what moves is stopped; draining for up to {} s", signal,
+               flags->options.common.drain_s);
   (*gateway)->Drain();
   spdlog::info("stopped");
   return 0;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <functional>
+#include <map>
 
 #include "server/diagnosis/noise_likelihood.h"
 
@@ -139,8 +139,8 @@ struct Repeats {
   bool AlwaysSilent() const { return all > 1 && silent == all; }
 };
 
-// A finger that is silent in every repeat of a pose is out of reach there (the stroke ended, a sensor cannot see it);
-// that is no chance, unless chance alone would bring about as many such fingers.
+// A finger that is silent in every repeat of a pose is out of reach there (the stroke ended, a sensor cannot
+// see it); that is no chance, unless chance alone would bring about as many such fingers.
 NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expected) {
   std::map<std::pair<int, int>, Repeats> groups;  // by pose and finger
   for (int k = 0; k < o.size(); ++k)

@@ -37,8 +37,8 @@ struct MotionLimits {
 };
 
 struct PlannedTouch {
-  ArmTouch motion;        // program_id is still 0
-  std::string placement;  // that it was planned for
+  ArmTouch motion;                           // program_id is still 0
+  std::string placement;                     // that it was planned for
   std::array<double, 6> start_joints_rad{};  // at the start, where the touch ends too
 };
 

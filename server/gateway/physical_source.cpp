@@ -10,7 +10,8 @@ std::string ViewId(const ViewOrder& order) {
   std::string id = "view " + order.object;
   const Eigen::Matrix<double, 3, 4> pose = order.object_from_camera.matrix().topRows<3>();
   // Adding 0 makes one zero of the two.
-  for (int i = 0; i < pose.size(); ++i) absl::StrAppendFormat(&id, " %.6f", std::round(pose(i) * 1e6) / 1e6 + 0.0);
+  for (int i = 0; i < pose.size(); ++i)
+    absl::StrAppendFormat(&id, " %.6f", std::round(pose(i) * 1e6) / 1e6 + 0.0);
   return id;
 }
 

@@ -1,4 +1,5 @@
-// What the services need of a physical source: a rig (rig.h), or what a rig once recorded (recorded_source.h).
+// What the services need of a physical source: a rig (rig.h), or what a rig once recorded
+// (recorded_source.h).
 #pragma once
 
 #include <functional>
@@ -15,14 +16,14 @@
 
 namespace touchstone {
 
-// Asked over and over while something moves; an error ends the motion and is what the caller gets. It tells, for
-// instance, that the lease is lost or the client gone.
+// Asked over and over while something moves; an error ends the motion and is what the caller gets. It tells,
+// for instance, that the lease is lost or the client gone.
 using Permit = std::function<absl::Status()>;
 
 struct TouchOrder {
   std::string session, id;
   std::string object;
-  Bounds bounds;        // of the object, object frame
+  Bounds bounds;  // of the object, object frame
   CommandedTouch touch;
   std::string command;  // serialised v1::CommandedTouch
   uint64_t repeat = 0;  // which repeat of the same command this is, where the order knows

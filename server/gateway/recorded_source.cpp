@@ -36,8 +36,8 @@ absl::StatusOr<Frame> RecordedSource::Photograph(const ViewOrder& order, const P
   TOUCHSTONE_RETURN_IF_ERROR(permit());
   const auto found = images_.find(ViewId(order));
   if (found == images_.end())
-    return absl::NotFoundError(
-        absl::StrCat("this is a recorded session, and no picture of '", order.object, "' was taken from there"));
+    return absl::NotFoundError(absl::StrCat("this is a recorded session, and no picture of '", order.object,
+                                            "' was taken from there"));
   TOUCHSTONE_ASSIGN_OR_RETURN(Image image, DecodePng(found->second.png));
   Frame frame;
   frame.width = image.width, frame.height = image.height;

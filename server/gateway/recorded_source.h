@@ -17,8 +17,8 @@ class RecordedSource : public PhysicalSource {
   // All sessions of the journal; they must have the same fingers.
   static absl::StatusOr<std::unique_ptr<RecordedSource>> Open(const std::string& path);
 
-  // By its id; else by its command, the repeats of it in the order in which they were made and round again. NOT_FOUND:
-  // nothing like it was recorded.
+  // By its id; else by its command, the repeats of it in the order in which they were made and round again.
+  // NOT_FOUND: nothing like it was recorded.
   absl::StatusOr<JournalTouch> Touch(const TouchOrder& order, const Permit& permit) override;
   absl::StatusOr<Frame> Photograph(const ViewOrder& order, const Permit& permit) override;
   bool has_camera() const override { return !images_.empty(); }

@@ -102,7 +102,6 @@ class Rig : public PhysicalSource {
   AuditLog& audit() const { return *parts_.audit; }
   std::string SourceInWords() const;  // for a session's head
 
-
  private:
   Rig(RigOptions options, RigParts parts) : options_(std::move(options)), parts_(std::move(parts)) {}
   absl::Status Reconcile();

@@ -18,7 +18,8 @@ TEST(RunCommand, TellsTheExitCodeAndTheCommand) {
 }
 
 TEST(RunCommand, NamesAProgramThatIsNotThere) {
-  EXPECT_THAT(std::string(RunCommand({"no-such-program"}, 60, nullptr).message()), HasSubstr("no-such-program"));
+  EXPECT_THAT(std::string(RunCommand({"no-such-program"}, 60, nullptr).message()),
+              HasSubstr("no-such-program"));
 }
 
 TEST(RunCommand, ArgumentsAreNotAShells) {

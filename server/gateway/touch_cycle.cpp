@@ -41,7 +41,8 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (const absl::Status allowed = Allowed(permit, stops); !allowed.ok()) return give_up(allowed);
     const absl::StatusOr<ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
-    if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok()) return give_up(safety);
+    if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok())
+      return give_up(safety);
     seen = seen || state->program_id == program_id;
     if (seen) {
       const absl::StatusOr<bool> over = done(*state);

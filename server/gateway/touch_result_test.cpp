@@ -18,8 +18,9 @@ double Distance(double t) {
   return t < ramp_s ? 0.5 * kAcceleration * t * t : kSpeed * (t - 0.5 * ramp_s);
 }
 
-// An approach along -z that began at controller time 100.0013 s, told 500 times a second by a controller whose clock is
-// 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is 120 ppm slow.
+// An approach along -z that began at controller time 100.0013 s, told 500 times a second by a controller
+// whose clock is 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is 120
+// ppm slow.
 struct Made {
   TouchRecord record;
   double began_controller_s = 100.0013;

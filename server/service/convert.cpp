@@ -59,12 +59,12 @@ absl::Status CheckTouchIds(const v1::TouchRequest& request) {
   if (request.touch_ids_size() == 0) return absl::OkStatus();
   if (request.touch_ids_size() != request.touches_size())
     return absl::InvalidArgumentError(absl::StrCat("touch_ids has ", request.touch_ids_size(),
-                                                   ": give none, or one for each of the ", request.touches_size(),
-                                                   " touches"));
+                                                   ": give none, or one for each of the ",
+                                                   request.touches_size(), " touches"));
   for (int k = 0; k < request.touch_ids_size(); ++k)
     if (request.touch_ids(k).empty() || request.touch_ids(k).size() > kMostIdBytes)
-      return absl::InvalidArgumentError(
-          absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(), " bytes: 1 to ", kMostIdBytes));
+      return absl::InvalidArgumentError(absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(),
+                                                     " bytes: 1 to ", kMostIdBytes));
   return absl::OkStatus();
 }
 

@@ -39,20 +39,25 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"calibration", "Where tool, objects and camera stand (YAML)", &o.calibration},
       {"source_note", "Kept with every session; an emulator says here that it is one", &o.source_note},
       {"time_scale", "Rig seconds in one second: 1, but with an emulator on a faster clock", &o.time_scale},
-      {"mount_command", "Program and arguments that put {object} down with its face {placement} up; none: a person does",
+      {"mount_command",
+       "Program and arguments that put {object} down with its face {placement} up; none: a person does",
        &o.mount_command},
       {"mount_timeout_s", "Seconds that it may take", &o.mount_timeout_s},
-      {"mesh", "An object that can be touched, NAME=FILE[,unit=..][,up=..][,scale=..]; may be repeated", &raw->mesh},
+      {"mesh", "An object that can be touched, NAME=FILE[,unit=..][,up=..][,scale=..]; may be repeated",
+       &raw->mesh},
       {"mesh_dir", "Every mesh file of a folder; may be repeated", &raw->mesh_dir},
-      {"supershape_triangles", "About how many triangles each built-in supershape has", &o.common.supershape_triangles},
+      {"supershape_triangles", "About how many triangles each built-in supershape has",
+       &o.common.supershape_triangles},
       {"arm.model", "ur3 (CB3) or ur3e", &o.arm.model},
       {"arm.address", "Host name or address of the controller", &o.arm.address},
       {"arm.dashboard_port", "", &o.arm.dashboard_port},
       {"arm.primary_port", "", &o.arm.primary_port},
       {"arm.secondary_port", "", &o.arm.secondary_port},
       {"arm.rtde_port", "", &o.arm.rtde_port},
-      {"arm.silence_s", "Seconds without a state after which the controller counts as frozen", &o.arm.silence_s},
-      {"arm.watchdog_hz", "The controller stops the arm when this gateway beats more slowly", &o.arm.watchdog_hz},
+      {"arm.silence_s", "Seconds without a state after which the controller counts as frozen",
+       &o.arm.silence_s},
+      {"arm.watchdog_hz", "The controller stops the arm when this gateway beats more slowly",
+       &o.arm.watchdog_hz},
       {"effector.port", "Serial port of the end effector, /dev/ttyACM0", &o.effector.port},
       {"effector.baud", "", &o.effector.baud},
       {"effector.fingers", "1 to 8", &raw->fingers},
@@ -70,14 +75,16 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"camera.source", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.source},
       {"camera.width", "Asked of the camera; 0: as it comes", &o.camera.width},
       {"camera.height", "", &o.camera.height},
-      {"camera.intrinsics", "OpenCV's calibration file; empty: the field of view below", &o.camera.intrinsics},
+      {"camera.intrinsics", "OpenCV's calibration file; empty: the field of view below",
+       &o.camera.intrinsics},
       {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
       {"camera.timeout_s", "", &o.camera.timeout_s},
       {"limits.most_speed_mm_s", "Limit of an approach's speed", &raw->most_speed_mm_s},
       {"limits.transfer_speed_mm_s", "Speed between touches", &raw->transfer_speed_mm_s},
       {"limits.acceleration_mm_s2", "", &raw->acceleration_mm_s2},
       {"limits.most_standoff_mm", "", &raw->most_standoff_mm},
-      {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target", &raw->stroke_beyond_target_mm},
+      {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target",
+       &raw->stroke_beyond_target_mm},
       {"limits.most_tilt_deg", "Of an approach, from straight down", &raw->most_tilt_deg},
       {"limits.clearance_mm", "Transfers cross so far above the object", &raw->clearance_mm},
       {"limits.box_min_mm", "Corner of the box that the tip must stay in, base frame", &raw->box_min_mm},
@@ -127,7 +134,8 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.watchdog_hz, 0.1, 50, "arm.watchdog_hz"));
   if (raw.sensor.size() > 1 && static_cast<int>(raw.sensor.size()) != raw.fingers)
     return absl::InvalidArgumentError(absl::StrCat("effector.sensor has ", raw.sensor.size(),
-                                                   " names: one, or one for each of ", raw.fingers, " fingers"));
+                                                   " names: one, or one for each of ", raw.fingers,
+                                                   " fingers"));
   EffectorFinger finger;
   finger.active_high = raw.active_high;
   finger.debounce_s = raw.debounce_ms / 1000;
@@ -161,7 +169,8 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
         absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
   if (o.replay.empty() && (o.arm.address.empty() || o.effector.port.empty()))
     return absl::InvalidArgumentError(
-        "arm.address and effector.port say where the rig is: give --config FILE, or both; --replay FILE serves a "
+        "arm.address and effector.port say where the rig is: give --config FILE, or both; --replay FILE "
+        "serves a "
         "recorded session instead");
   return absl::OkStatus();
 }
@@ -178,7 +187,8 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
       "  touchstone-gateway --arm-address 192.168.0.10 --arm-model ur3e --effector-port /dev/ttyACM0\n"
       "  touchstone-gateway --replay session.db\n"
       "\nThe physical source: drives a UR3 arm, the end effector and a camera behind the same services as\n"
-      "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software stop and\n"
+      "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software stop "
+      "and\n"
       "not safety-rated: keep the emergency stop within reach.",
       "touchstone-gateway");
   std::string config;
@@ -207,11 +217,10 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(config, 1 << 20));
     TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, given));
     const std::filesystem::path folder = std::filesystem::path(config).parent_path();
-    for (const auto& [key, path] : {std::pair("journal", &flags.options.journal),
-                                    std::pair("audit_log", &flags.options.audit_log),
-                                    std::pair("calibration", &flags.options.calibration),
-                                    std::pair("replay", &flags.options.replay),
-                                    std::pair("camera.intrinsics", &flags.options.camera.intrinsics)})
+    for (const auto& [key, path] :
+         {std::pair("journal", &flags.options.journal), std::pair("audit_log", &flags.options.audit_log),
+          std::pair("calibration", &flags.options.calibration), std::pair("replay", &flags.options.replay),
+          std::pair("camera.intrinsics", &flags.options.camera.intrinsics)})
       if (given.count(key) == 0 && !path->empty()) *path = (folder / *path).string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));

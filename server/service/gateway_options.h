@@ -1,5 +1,5 @@
-// Everything that can be set about a physical source. Each field is a key of the gateway's TOML file, in the table that
-// its group is named after, and a flag of touchstone-gateway.
+// Everything that can be set about a physical source. Each field is a key of the gateway's TOML file, in the
+// table that its group is named after, and a flag of touchstone-gateway.
 #pragma once
 
 #include <string>
@@ -18,13 +18,13 @@ struct ArmOptions {
   std::string model = "ur3e";  // or "ur3"
   std::string address;         // "192.168.0.10"
   int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
-  double silence_s = 0.5;      // host time without a state: the controller counts as frozen
-  double watchdog_hz = 4;      // the controller stops the arm if this gateway beats more slowly
+  double silence_s = 0.5;  // host time without a state: the controller counts as frozen
+  double watchdog_hz = 4;  // the controller stops the arm if this gateway beats more slowly
 };
 
 struct GatewayOptions {
-  ServerOptions common;           // listen, meshes, limits, lease window, drain
-  std::string replay;             // a journal to serve instead of a rig
+  ServerOptions common;  // listen, meshes, limits, lease window, drain
+  std::string replay;    // a journal to serve instead of a rig
   std::string journal = "rig.db";
   std::string audit_log = "rig.audit.jsonl";
   std::string calibration = "calibration.yaml";
@@ -49,7 +49,8 @@ struct GatewayFlags {
   bool done = false;  // help or version was printed
 };
 
-// Command line and TOML file; flags win. Paths in the file are relative to its folder. Errors name file, line and key.
+// Command line and TOML file; flags win. Paths in the file are relative to its folder. Errors name file, line
+// and key.
 absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv);
 
 }  // namespace touchstone

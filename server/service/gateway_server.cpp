@@ -24,7 +24,8 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   MotionLimits limits = options.limits;
   limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner, MotionPlanner::Create(options.arm.model, limits, calibration));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.journal, Journal::Open(options.journal, Journal::Mode::kCreateOrReadWrite));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.journal,
+                              Journal::Open(options.journal, Journal::Mode::kCreateOrReadWrite));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, AuditLog::Open(options.audit_log));
 
   UrArmOptions arm;
@@ -107,14 +108,16 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     journal = &rig->journal();
     parts.source = std::move(rig);
   } else {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedSource> recorded, RecordedSource::Open(options.replay));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedSource> recorded,
+                                RecordedSource::Open(options.replay));
     journal = &recorded->journal();
     parts.source = std::move(recorded);
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model, ModelOfFingers(*parts.source));
 
   parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, parts.source->moves());
-  parts.source_service = std::make_unique<PhysicalSourceService>(&resources, parts.leases.get(), parts.source.get());
+  parts.source_service =
+      std::make_unique<PhysicalSourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.sessions = std::make_unique<JournalSessionsService>(journal, parts.source->moves());
   std::vector<ServedService> services = {{"touchstone.v1.Source", parts.source_service.get()},
                                          {"touchstone.v1.Sessions", parts.sessions.get()}};

@@ -23,17 +23,20 @@ v1::Session ToProto(const JournalSession& session, const std::string& csv) {
 }
 
 absl::StatusOr<std::string> Csv(const Journal& journal, const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches, SessionMeasurements(journal, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches,
+                              SessionMeasurements(journal, session));
   return FormatMeasurements(touches);
 }
 
 }  // namespace
 
 grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
-                                                   grpc::ServerReader<v1::CreateSessionRequest>*, v1::Session*) {
-  return grpc::Status(grpc::UNIMPLEMENTED,
-                      "a gateway's sessions come from touching; touchstone session import FILE -o SESSION.db makes one "
-                      "from a file, which touchstone-gateway --replay serves");
+                                                   grpc::ServerReader<v1::CreateSessionRequest>*,
+                                                   v1::Session*) {
+  return grpc::Status(
+      grpc::UNIMPLEMENTED,
+      "a gateway's sessions come from touching; touchstone session import FILE -o SESSION.db makes one "
+      "from a file, which touchstone-gateway --replay serves");
 }
 
 grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
@@ -58,7 +61,8 @@ grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::
   return grpc::Status::OK;
 }
 
-grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*, const v1::ExportSessionRequest* request,
+grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*,
+                                                   const v1::ExportSessionRequest* request,
                                                    grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
   const auto csv = Csv(*journal_, request->name());
   if (!csv.ok()) return ToGrpc(csv.status());
@@ -70,7 +74,8 @@ grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*, const v
   return grpc::Status::OK;
 }
 
-grpc::Status JournalSessionsService::DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest* request,
+grpc::Status JournalSessionsService::DeleteSession(grpc::ServerContext*,
+                                                   const v1::DeleteSessionRequest* request,
                                                    v1::DeleteSessionResponse*) {
   if (!writable_) return grpc::Status(grpc::FAILED_PRECONDITION, "a recorded session is served read-only");
   return ToGrpc(journal_->DeleteSession(request->name()));

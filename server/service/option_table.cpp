@@ -54,10 +54,11 @@ absl::Status Assign(const toml::node& node, const std::string& where, const Opti
       list = {*node.value<std::string>()};
       return absl::OkStatus();
     }
-    return AssignList(node, where, "a text, or a list of texts", &list, [](const toml::node& entry, auto* texts) {
-      if (entry.is_string()) texts->push_back(*entry.value<std::string>());
-      return entry.is_string();
-    });
+    return AssignList(node, where, "a text, or a list of texts", &list,
+                      [](const toml::node& entry, auto* texts) {
+                        if (entry.is_string()) texts->push_back(*entry.value<std::string>());
+                        return entry.is_string();
+                      });
   }
   return absl::OkStatus();
 }

@@ -16,7 +16,8 @@ namespace touchstone {
 
 // One option. A key "arm.address" stands in the file's table [arm]; its flag is --arm-address.
 struct Option {
-  using Target = std::variant<std::string*, int*, double*, bool*, std::vector<std::string>*, std::vector<double>*>;
+  using Target =
+      std::variant<std::string*, int*, double*, bool*, std::vector<std::string>*, std::vector<double>*>;
   std::string key;
   std::string meaning;
   Target target;
@@ -25,8 +26,8 @@ struct Option {
 // "--arm-address".
 std::string FlagOf(const Option& option);
 
-// Reads the keys of a TOML text into the targets, but those in `set` (which flags gave: those win). Errors name
-// `origin`, the line, the key, and what would be right; an unknown key is one.
+// Reads the keys of a TOML text into the targets, but those in `set` (which flags gave: those win). Errors
+// name `origin`, the line, the key, and what would be right; an unknown key is one.
 absl::Status ReadToml(const std::string& text, const std::string& origin, const std::vector<Option>& options,
                       const std::set<std::string>& set);
 

@@ -50,10 +50,9 @@ std::string CommandBytes(const CommandedTouch& touch) {
   return CommandBytes(command);
 }
 
-absl::StatusOr<PhysicalDataset> PhysicalDataset::Create(std::shared_ptr<const DatasetSpecification> specification,
-                                                        std::vector<std::string> names, const DatasetPart& part,
-                                                        std::string session, std::string key,
-                                                        PhysicalSource* source) {
+absl::StatusOr<PhysicalDataset> PhysicalDataset::Create(
+    std::shared_ptr<const DatasetSpecification> specification, std::vector<std::string> names,
+    const DatasetPart& part, std::string session, std::string key, PhysicalSource* source) {
   PhysicalDataset dataset;
   dataset.part_ = part;
   if (part.stop_index > specification->samples)
@@ -67,7 +66,8 @@ absl::StatusOr<PhysicalDataset> PhysicalDataset::Create(std::shared_ptr<const Da
   if (dataset.part_.batch_stride == 0) dataset.part_.batch_stride = 1;
   dataset.columns_ = ColumnsOf(*specification);
   for (const auto& object : specification->objects)
-    dataset.generators_.push_back(MakePoseGenerator(specification->plan, object->bounds(), specification->seed));
+    dataset.generators_.push_back(
+        MakePoseGenerator(specification->plan, object->bounds(), specification->seed));
   dataset.specification_ = std::move(specification);
   dataset.names_ = std::move(names);
   dataset.session_ = std::move(session);
@@ -94,7 +94,7 @@ absl::StatusOr<std::optional<DatasetBatch>> PhysicalDataset::Next(const Permit& 
 }
 
 absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(uint64_t index,
-                                                                              const Permit& permit) const {
+                                                                               const Permit& permit) const {
   const size_t which = index % names_.size();
   const PoseGenerator& generator = *generators_[which];
   const uint64_t number = generator.Count() == 0 ? index : index / names_.size();
@@ -109,12 +109,14 @@ absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(u
     order.touch = TouchOfPlan(specification_->plan, generator, number, attempt);
     order.command = CommandBytes(order.touch);
     TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, source_->Touch(order, permit));
-    const bool complete = std::none_of(touch.result.fingers.begin(), touch.result.fingers.end(),
-                                       [](const JournalFinger& finger) { return std::isnan(finger.contact_time_s); });
+    const bool complete =
+        std::none_of(touch.result.fingers.begin(), touch.result.fingers.end(),
+                     [](const JournalFinger& finger) { return std::isnan(finger.contact_time_s); });
     if (complete || !generator.CanRedraw()) return std::pair(order, std::move(touch));
   }
-  return absl::FailedPreconditionError(absl::StrCat("sample ", index, ": no touch of ", specification_->most_draws,
-                                                    " draws had all fingers hit; raise most_draws or change the plan"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("sample ", index, ": no touch of ", specification_->most_draws,
+                   " draws had all fingers hit; raise most_draws or change the plan"));
 }
 
 absl::Status PhysicalDataset::AppendSample(uint64_t index, const Permit& permit, DatasetBatch* batch) const {
@@ -123,29 +125,41 @@ absl::Status PhysicalDataset::AppendSample(uint64_t index, const Permit& permit,
   const v1::TouchResult result = ToProto(touch, session_);
   std::optional<Image> picture;
   if (specification_->columns.image) {
-    const Camera camera =
-        CameraOfTouch(order.touch.target_m, order.touch.approach, order.touch.lateral, order.touch.standoff_m);
+    const Camera camera = CameraOfTouch(order.touch.target_m, order.touch.approach, order.touch.lateral,
+                                        order.touch.standoff_m);
     const ViewOrder view{session_, order.object, order.bounds, ObjectFromCamera(camera)};
     TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, source_->Photograph(view, permit));
-    TOUCHSTONE_ASSIGN_OR_RETURN(picture, PictureOf(frame, source_->IntrinsicsOf(frame), specification_->image));
+    TOUCHSTONE_ASSIGN_OR_RETURN(picture,
+                                PictureOf(frame, source_->IntrinsicsOf(frame), specification_->image));
   }
   const float unknown = std::numeric_limits<float>::quiet_NaN();
   for (size_t column = 0; column < columns_.size(); ++column) {
     const std::string& name = columns_[column].name;
     std::string* data = &batch->data[column];
-    if (name == "index") Append(index, data);
-    else if (name == "object") Append(static_cast<int32_t>(index % names_.size()), data);
-    else if (name == "descriptor_s") for (const double s : result.descriptor_s()) Append(static_cast<float>(s), data);
-    else if (name == "contact_time_s") for (const double s : result.contact_time_s()) Append(static_cast<float>(s), data);
-    else if (name == "target_m") AppendVector(order.touch.target_m, data);
-    else if (name == "approach") AppendVector(order.touch.approach, data);
-    else if (name == "lateral") AppendVector(order.touch.lateral, data);
-    else if (name == "standoff_m") Append(static_cast<float>(order.touch.standoff_m), data);
-    else if (name == "speed_m_s") Append(static_cast<float>(order.touch.speed_m_s), data);
+    if (name == "index")
+      Append(index, data);
+    else if (name == "object")
+      Append(static_cast<int32_t>(index % names_.size()), data);
+    else if (name == "descriptor_s")
+      for (const double s : result.descriptor_s()) Append(static_cast<float>(s), data);
+    else if (name == "contact_time_s")
+      for (const double s : result.contact_time_s()) Append(static_cast<float>(s), data);
+    else if (name == "target_m")
+      AppendVector(order.touch.target_m, data);
+    else if (name == "approach")
+      AppendVector(order.touch.approach, data);
+    else if (name == "lateral")
+      AppendVector(order.touch.lateral, data);
+    else if (name == "standoff_m")
+      Append(static_cast<float>(order.touch.standoff_m), data);
+    else if (name == "speed_m_s")
+      Append(static_cast<float>(order.touch.speed_m_s), data);
     else if (picture.has_value() && name == "image")
-      TOUCHSTONE_RETURN_IF_ERROR(AppendPicture(*picture, specification_->image, name, data, &batch->offsets[column]));
+      TOUCHSTONE_RETURN_IF_ERROR(
+          AppendPicture(*picture, specification_->image, name, data, &batch->offsets[column]));
     else
-      for (size_t k = 0; k < columns_[column].BytesPerSample() / sizeof(float); ++k) Append(unknown, data);  // not measured
+      for (size_t k = 0; k < columns_[column].BytesPerSample() / sizeof(float); ++k)
+        Append(unknown, data);  // not measured
   }
   return absl::OkStatus();
 }

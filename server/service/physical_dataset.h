@@ -1,5 +1,6 @@
-// A dataset that a physical source makes touch by touch. Sample i is journalled under the dataset's key and i, so that it
-// is made once and given again whenever the dataset, or a part of it, is asked for in the same session.
+// A dataset that a physical source makes touch by touch. Sample i is journalled under the dataset's key and
+// i, so that it is made once and given again whenever the dataset, or a part of it, is asked for in the same
+// session.
 #pragma once
 
 #include <memory>
@@ -15,10 +16,12 @@
 
 namespace touchstone {
 
-// What decides the touches of a dataset (objects, plan, seed), as 16 hexadecimal digits; columns and images do not.
+// What decides the touches of a dataset (objects, plan, seed), as 16 hexadecimal digits; columns and images
+// do not.
 std::string DatasetKey(const v1::DatasetSpec& spec);
 
-// The bytes that say whether two commands are the same: made from the exact command, whatever a client left unset.
+// The bytes that say whether two commands are the same: made from the exact command, whatever a client left
+// unset.
 std::string CommandBytes(const CommandedTouch& touch);
 
 class PhysicalDataset {

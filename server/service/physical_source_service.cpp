@@ -33,8 +33,10 @@ v1::TouchResult ToProto(const JournalTouch& touch, const std::string& session) {
   double first_s = std::numeric_limits<double>::infinity();
   bool complete = true;
   for (const JournalFinger& finger : result.fingers) {
-    if (std::isnan(finger.contact_time_s)) complete = false;
-    else first_s = std::min(first_s, finger.contact_time_s);
+    if (std::isnan(finger.contact_time_s))
+      complete = false;
+    else
+      first_s = std::min(first_s, finger.contact_time_s);
   }
   v1::Measured* measured = message.mutable_measured();
   for (const JournalFinger& finger : result.fingers) {
@@ -59,12 +61,15 @@ v1::TouchResult ToProto(const JournalTouch& touch, const std::string& session) {
   return message;
 }
 
-absl::StatusOr<Image> PictureOf(const Frame& frame, const Intrinsics& intrinsics, const DatasetImage& wanted) {
+absl::StatusOr<Image> PictureOf(const Frame& frame, const Intrinsics& intrinsics,
+                                const DatasetImage& wanted) {
   const ImageOptions& options = wanted.options;
   if (options.depth || options.mask)
-    return absl::InvalidArgumentError("image.depth, image.mask: this source's camera sees colours only; ask for none");
+    return absl::InvalidArgumentError(
+        "image.depth, image.mask: this source's camera sees colours only; ask for none");
   if (options.look != Look::kShaded)
-    return absl::InvalidArgumentError("image.look: this source's camera shows what it sees; leave it unspecified");
+    return absl::InvalidArgumentError(
+        "image.look: this source's camera shows what it sees; leave it unspecified");
   Image picture;
   picture.width = options.width;
   picture.height = options.height;
@@ -98,14 +103,16 @@ grpc::Status PhysicalSourceService::Describe(grpc::ServerContext*, const v1::Des
   response->set_most_batch_size(options.most_batch_size);
   response->set_most_fingers(source_->fingers());
   response->set_lease_required(source_->moves());
-  response->set_touch_duration_s(source_->moves() && facts.touch_duration_s == 0 ? 8 : facts.touch_duration_s);
+  response->set_touch_duration_s(source_->moves() && facts.touch_duration_s == 0 ? 8
+                                                                                 : facts.touch_duration_s);
   response->set_clock_uncertainty_s(facts.clock_uncertainty_s);
   return grpc::Status::OK;
 }
 
 Permit PhysicalSourceService::PermitOf(grpc::ServerContext* context, const std::string& lease_token) const {
   return [this, context, lease_token]() -> absl::Status {
-    if (context->IsCancelled()) return absl::CancelledError("the client is gone, or the call's deadline has passed");
+    if (context->IsCancelled())
+      return absl::CancelledError("the client is gone, or the call's deadline has passed");
     if (resources_->draining) return absl::UnavailableError("the gateway is being shut down");
     return leases_->Check(lease_token);
   };
@@ -121,10 +128,12 @@ absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const 
   const RunningGuard running(&resources_->running_requests);
   const Permit permit = PermitOf(context, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+                              resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string session, SessionName(request.session()));
   const int most = resources_->options.most_touches_per_request;
-  if (request.touches_size() == 0) return absl::InvalidArgumentError("touches is empty: give at least one touch");
+  if (request.touches_size() == 0)
+    return absl::InvalidArgumentError("touches is empty: give at least one touch");
   if (request.touches_size() > most)
     return absl::InvalidArgumentError(
         absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
@@ -162,7 +171,8 @@ absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, cons
   const RunningGuard running(&resources_->running_requests);
   const Permit permit = PermitOf(context, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+                              resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetImage image, FromProto(request.image(), resources_));
   const int most = resources_->options.most_images_per_request;
   if (request.views_size() == 0) return absl::InvalidArgumentError("views is empty: give at least one view");
@@ -182,7 +192,8 @@ absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, cons
   const bool raw = image.encoding == ImageEncoding::kRaw;
   column->set_type(raw ? v1::DATA_TYPE_UINT8 : v1::DATA_TYPE_BYTES);
   if (raw)
-    for (const int side : {image.options.height, image.options.width, image.options.format == PixelFormat::kRgb ? 3 : 1})
+    for (const int side :
+         {image.options.height, image.options.width, image.options.format == PixelFormat::kRgb ? 3 : 1})
       column->add_shape(side);
   std::vector<uint64_t> offsets;
   for (const Camera& camera : cameras) {
@@ -203,20 +214,23 @@ grpc::Status PhysicalSourceService::StreamDataset(grpc::ServerContext* context,
   return ToGrpc(DoStream(context, *request, writer));
 }
 
-absl::Status PhysicalSourceService::DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& request,
+absl::Status PhysicalSourceService::DoStream(grpc::ServerContext* context,
+                                             const v1::StreamDatasetRequest& request,
                                              grpc::ServerWriter<v1::StreamDatasetResponse>* writer) {
   const RunningGuard running(&resources_->running_streams);
   const ServerOptions& options = resources_->options;
   if (resources_->running_streams > static_cast<uint32_t>(options.most_streams))
-    return absl::ResourceExhaustedError(absl::StrCat("this source runs ", options.most_streams,
-                                                     " dataset streams already (most_streams): try again later"));
+    return absl::ResourceExhaustedError(
+        absl::StrCat("this source runs ", options.most_streams,
+                     " dataset streams already (most_streams): try again later"));
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   if (request.batch_size() > static_cast<uint32_t>(options.most_batch_size))
     return absl::InvalidArgumentError(
         absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.most_batch_size));
   if (request.spec().plan().has_sphere())
     return absl::InvalidArgumentError(
-        "plan.sphere makes no sense at this source: an arm cannot come from everywhere; faces and list would be right");
+        "plan.sphere makes no sense at this source: an arm cannot come from everywhere; faces and list would "
+        "be right");
   v1::DatasetSpec spec = request.spec();
   spec.clear_model();  // a rig simulates nothing
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const DatasetSpecification> specification,

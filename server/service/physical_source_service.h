@@ -1,5 +1,5 @@
-// touchstone.v1.Source of a physical source: a rig, or the record of one. What it shares with the virtual one (objects,
-// plans, checks of a request) is that one's code.
+// touchstone.v1.Source of a physical source: a rig, or the record of one. What it shares with the virtual one
+// (objects, plans, checks of a request) is that one's code.
 #pragma once
 
 #include "server/dataset/specification.h"
@@ -21,7 +21,8 @@ class PhysicalSourceService final : public SourceService {
                              grpc::ServerWriter<v1::StreamDatasetResponse>*) override;
 
  private:
-  absl::Status DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request, v1::TouchResponse* response);
+  absl::Status DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request,
+                       v1::TouchResponse* response);
   absl::Status DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request,
                          v1::CaptureResponse* response);
   absl::Status DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& request,
@@ -35,7 +36,8 @@ class PhysicalSourceService final : public SourceService {
 // A journalled touch as the protocol tells it. Times of fingers that reported nothing are NaN.
 v1::TouchResult ToProto(const JournalTouch& touch, const std::string& session);
 
-// A picture as an image specification asks for it. INVALID_ARGUMENT for what a camera has not: depth, mask, another look.
+// A picture as an image specification asks for it. INVALID_ARGUMENT for what a camera has not: depth, mask,
+// another look.
 absl::StatusOr<Image> PictureOf(const Frame& frame, const Intrinsics& intrinsics, const DatasetImage& wanted);
 
 // Camera of the protocol (eye, at, up) as object_from_camera: z looks ahead, y down.

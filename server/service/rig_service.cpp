@@ -24,8 +24,8 @@ v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
 
 }  // namespace
 
-grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context, const v1::AcquireLeaseRequest* request,
-                                             v1::Lease* response) {
+grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
+                                             const v1::AcquireLeaseRequest* request, v1::Lease* response) {
   const grpc::Status status = ControlService::AcquireLease(context, request, response);
   if (status.ok()) {
     rig_->Resume();
@@ -39,7 +39,8 @@ grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context, const
   return status;
 }
 
-grpc::Status RigControlService::ReleaseLease(grpc::ServerContext* context, const v1::ReleaseLeaseRequest* request,
+grpc::Status RigControlService::ReleaseLease(grpc::ServerContext* context,
+                                             const v1::ReleaseLeaseRequest* request,
                                              v1::ReleaseLeaseResponse* response) {
   const std::string holder = leases_->Holder();
   const grpc::Status status = ControlService::ReleaseLease(context, request, response);
@@ -65,7 +66,8 @@ grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1:
 
 Permit RigService::PermitOf(grpc::ServerContext* context, const std::string& lease_token) const {
   return [this, context, lease_token]() -> absl::Status {
-    if (context->IsCancelled()) return absl::CancelledError("the client is gone, or the call's deadline has passed");
+    if (context->IsCancelled())
+      return absl::CancelledError("the client is gone, or the call's deadline has passed");
     if (resources_->draining) return absl::UnavailableError("the gateway is being shut down");
     return leases_->Check(lease_token);
   };
@@ -129,7 +131,7 @@ void RigService::Describe(v1::RigState* state) const {
   state->set_mounts_itself(!rig_->options().mount_command.empty());
   state->set_recovered_touches(facts.recovered_touches);
   state->set_interrupted_touches(facts.interrupted_touches);
-  state->set_last_error(!now.ok()              ? std::string(now.status().message())
+  state->set_last_error(!now.ok()             ? std::string(now.status().message())
                         : !effector.connected ? effector.why
                                               : facts.last_error);
   state->set_time_scale(scale);
@@ -152,7 +154,8 @@ grpc::Status RigService::CheckTouches(grpc::ServerContext*, const v1::CheckTouch
 }
 
 absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, resources_->objects.Find(request.object(), "object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+                              resources_->objects.Find(request.object(), "object"));
   const int most = resources_->options.most_touches_per_request;
   if (request.touches_size() > most)
     return absl::InvalidArgumentError(
@@ -195,12 +198,13 @@ absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountOb
   const std::string placement = request.placement().empty() ? "+z" : request.placement();
   const std::vector<std::string>& known = Placements();
   if (std::find(known.begin(), known.end(), placement) == known.end())
-    return absl::InvalidArgumentError(absl::StrCat("placement = '", placement, "': the face that points up, one of ",
-                                                   absl::StrJoin(known, ", ")));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "placement = '", placement, "': the face that points up, one of ", absl::StrJoin(known, ", ")));
   return rig_->Mount(request.object(), placement, PermitOf(context, request.lease_token()));
 }
 
-grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request, v1::RigState* response) {
+grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request,
+                              v1::RigState* response) {
   absl::Status status = leases_->Check(request->lease_token());
   if (status.ok()) status = rig_->Home(PermitOf(context, request->lease_token()));
   if (status.ok()) Describe(response);

@@ -15,7 +15,8 @@ class RigControlService final : public ControlService {
 
   // Also ends a stop.
   grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest*, v1::Lease*) override;
-  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*, v1::ReleaseLeaseResponse*) override;
+  grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*,
+                            v1::ReleaseLeaseResponse*) override;
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest*, v1::StopResponse*) override;
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
 

@@ -73,11 +73,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   parts.sessions = std::make_unique<SessionsService>(&resources);
   parts.diagnosis = std::make_unique<DiagnosisService>(&resources);
 
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options, {{"touchstone.v1.Source", parts.source.get()},
-                                                                      {"touchstone.v1.Control", parts.control.get()},
-                                                                      {"touchstone.v1.Models", parts.models.get()},
-                                                                      {"touchstone.v1.Sessions", parts.sessions.get()},
-                                                                      {"touchstone.v1.Diagnosis", parts.diagnosis.get()}}));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
+                              StartServing(options, {{"touchstone.v1.Source", parts.source.get()},
+                                                     {"touchstone.v1.Control", parts.control.get()},
+                                                     {"touchstone.v1.Models", parts.models.get()},
+                                                     {"touchstone.v1.Sessions", parts.sessions.get()},
+                                                     {"touchstone.v1.Diagnosis", parts.diagnosis.get()}}));
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return server;

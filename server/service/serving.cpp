@@ -39,7 +39,8 @@ absl::Status CheckServing(const ServerOptions& options) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services) {
+absl::StatusOr<Serving> StartServing(const ServerOptions& options,
+                                     const std::vector<ServedService>& services) {
   EnablePlugins();
   Serving serving;
   grpc::ServerBuilder builder;

@@ -24,7 +24,8 @@ struct Serving {
 
 // Errors name the option.
 absl::Status CheckServing(const ServerOptions& options);
-absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services);
+absl::StatusOr<Serving> StartServing(const ServerOptions& options,
+                                     const std::vector<ServedService>& services);
 // NOT_SERVING, no more calls, up to drain_s for running ones.
 void StopServing(const ServerOptions& options, grpc::Server* server);
 

@@ -210,8 +210,7 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
 
   std::vector<Camera> cameras;
   for (int k = 0; k < request.views_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera,
-                                FromProto(request.views(k), absl::StrCat("views[", k, "]")));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera, FromProto(request.views(k), absl::StrCat("views[", k, "]")));
     camera.vertical_fov_rad = image.vertical_fov_rad;
     if (const absl::Status status = ValidateImageRequest(camera, image.options); !status.ok())
       return absl::Status(status.code(), absl::StrCat("views[", k, "]: ", status.message()));

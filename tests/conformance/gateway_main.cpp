@@ -1,5 +1,6 @@
-// The conformance tests against a physical source: a gateway that drives the emulated rig (--record DIR keeps its
-// journal there), or one that serves that journal again (--replay DIR). The emulator's data stand for no measurement.
+// The conformance tests against a physical source: a gateway that drives the emulated rig (--record DIR keeps
+// its journal there), or one that serves that journal again (--replay DIR). The emulator's data stand for no
+// measurement.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -15,7 +16,8 @@
 namespace {
 
 std::unique_ptr<touchstone::GatewayServer> StartGateway(std::vector<const char*> flags) {
-  flags.insert(flags.begin(), {"touchstone-gateway", "--listen", "127.0.0.1:0", "--supershape-triangles", "2000"});
+  flags.insert(flags.begin(),
+               {"touchstone-gateway", "--listen", "127.0.0.1:0", "--supershape-triangles", "2000"});
   auto parsed = touchstone::ParseGatewayFlags(static_cast<int>(flags.size()), flags.data());
   if (parsed.ok()) {
     auto gateway = touchstone::GatewayServer::Start(parsed->options);
@@ -48,8 +50,8 @@ int main(int argc, char** argv) {
     options.speedup = 40;
     options.supershape_triangles = 2000;
     emulator = touchstone::rig::Emulator::Start(options);
-    gateway = StartGateway({"--config", emulator->config_path().c_str(), "--arm-watchdog-hz", "0.5", "--arm-silence-s", "5",
-                            "--effector-silence-s", "5"});
+    gateway = StartGateway({"--config", emulator->config_path().c_str(), "--arm-watchdog-hz", "0.5",
+                            "--arm-silence-s", "5", "--effector-silence-s", "5"});
   } else {
     gateway = StartGateway({"--replay", (folder / "rig.db").c_str()});
   }

@@ -25,7 +25,8 @@ TEST_F(Accuracy, DifferencesOfContactTimesAreRightDespiteDriftAndADelayingLine) 
     for (int i = 1; i < 3; ++i) {
       const double measured_s =
           answer.response.results(0).contact_time_s(i) - answer.response.results(0).contact_time_s(0);
-      EXPECT_NEAR(measured_s, truth.reported_s[i] - truth.reported_s[0], 50e-6) << "touch " << k << ", finger " << i;
+      EXPECT_NEAR(measured_s, truth.reported_s[i] - truth.reported_s[0], 50e-6)
+          << "touch " << k << ", finger " << i;
     }
     EXPECT_NEAR(answer.response.results(0).measured().speed_m_s(), 0.02, 1e-4);
   }
@@ -42,8 +43,8 @@ TEST_F(Accuracy, PosesAtContactAreWhereTheTipWas) {
     const rig::TouchTruth truth = emulator_->Touches().back();
     const v1::Measured& measured = answer.response.results(0).measured();
     ASSERT_EQ(measured.base_from_tip_at_contact_size(), 3);
-    // All three are on one straight way down; heights differ as the travels do. The sensor's noise moves the edge, so
-    // compare with the travel at the reported moment.
+    // All three are on one straight way down; heights differ as the travels do. The sensor's noise moves the
+    // edge, so compare with the travel at the reported moment.
     for (int i = 1; i < 3; ++i) {
       const double lower_m = measured.base_from_tip_at_contact(0).position_m().z() -
                              measured.base_from_tip_at_contact(i).position_m().z();

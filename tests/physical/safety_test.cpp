@@ -1,5 +1,5 @@
-// The six points of a scripted rig's safety, each provoked. After every one: nothing lost, nothing doubled, nothing
-// attributed to another pose.
+// The six points of a scripted rig's safety, each provoked. After every one: nothing lost, nothing doubled,
+// nothing attributed to another pose.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -118,11 +118,13 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
     KillGatewayProcess();
     EXPECT_FALSE(touch.get().status.ok());
   }
-  WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > 0; }, "the watchdog stops the arm");
+  WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > 0; },
+            "the watchdog stops the arm");
   EXPECT_FALSE(emulator_->controller().Moving());
   const auto before = Journalled();
   ASSERT_EQ(before.size(), 2u);
-  EXPECT_EQ(before[1].stage, TouchStage::kExecuting) << "an interrupted touch is unknown until it is reconciled";
+  EXPECT_EQ(before[1].stage, TouchStage::kExecuting)
+      << "an interrupted touch is unknown until it is reconciled";
 
   // A trip is a protective stop: a person looks, and unlocks it at the pendant.
   StartGatewayProcess();
@@ -161,7 +163,8 @@ TEST_F(Safety, ALineThatIsUnpluggedInMidTouchStopsTheArm) {
   emulator_->faults().Set("unplug", 0.5);
   const Answer answer = touch.get();
   EXPECT_FALSE(answer.status.ok());
-  EXPECT_THAT(answer.status.error_code(), AnyOf(grpc::UNAVAILABLE, grpc::DATA_LOSS)) << answer.status.error_message();
+  EXPECT_THAT(answer.status.error_code(), AnyOf(grpc::UNAVAILABLE, grpc::DATA_LOSS))
+      << answer.status.error_message();
   WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "unplugged");
   ExpectEveryResultIsItsOwnTouch();
@@ -201,7 +204,8 @@ TEST_F(Safety, MotionsBeyondTheLimitsAreRefusedWithValueAndLimitAndNothingMoves)
   aside.mutable_approach()->set_x(-1);
   aside.mutable_lateral()->set_x(0);
   aside.mutable_lateral()->set_y(1);
-  for (const auto& [touch, words] : {std::pair(fast, "500"), std::pair(far, "touch"), std::pair(high, "box")}) {
+  for (const auto& [touch, words] :
+       {std::pair(fast, "500"), std::pair(far, "touch"), std::pair(high, "box")}) {
     const Answer answer = Touch(lease.token(), touch, std::string("refused ") + words);
     EXPECT_THAT(answer.status.error_code(), AnyOf(grpc::OUT_OF_RANGE, grpc::INVALID_ARGUMENT))
         << answer.status.error_message();

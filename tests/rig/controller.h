@@ -1,5 +1,6 @@
-// An emulated UR controller on TCP: dashboard (29999), primary and secondary (30001, 30002), RTDE (30004), a part of
-// URScript, straight and joint motion with trapezoidal speed, safety modes and watchdogs. See ../../server/gateway.
+// An emulated UR controller on TCP: dashboard (29999), primary and secondary (30001, 30002), RTDE (30004), a
+// part of URScript, straight and joint motion with trapezoidal speed, safety modes and watchdogs. See
+// ../../server/gateway.
 #pragma once
 
 #include <array>
@@ -11,13 +12,13 @@
 namespace touchstone::rig {
 
 struct ControllerOptions {
-  std::string model = "ur3e";        // or "ur3" (CB3): kinematics, rate, dashboard texts
-  std::string address = "127.0.0.1"; // listens here
+  std::string model = "ur3e";         // or "ur3" (CB3): kinematics, rate, dashboard texts
+  std::string address = "127.0.0.1";  // listens here
   // 0: any free port, told by ports()
   int dashboard_port = 0, primary_port = 0, secondary_port = 0, rtde_port = 0;
   std::array<double, 6> joints_rad{{0, -1.5708, -1.5708, -1.5708, 1.5708, 0}};
-  bool powered = false;              // begins with power off, as a controller that was just switched on
-  double finger_give_m = 0.050;      // pushed further than this beyond a contact: protective stop (C153)
+  bool powered = false;          // begins with power off, as a controller that was just switched on
+  double finger_give_m = 0.050;  // pushed further than this beyond a contact: protective stop (C153)
   double position_noise_m = 5e-6, joint_noise_rad = 2e-5;  // of what it reports
   uint64_t seed = 1;
 };
@@ -28,8 +29,8 @@ class Controller {
     int dashboard = 0, primary = 0, secondary = 0, rtde = 0;
   };
   // Listens and runs threads until it is destroyed. Throws std::runtime_error if a port is taken.
-  static std::unique_ptr<Controller> Start(const ControllerOptions& options, const SimClock* clock, Faults* faults,
-                                           TipListener* tip);
+  static std::unique_ptr<Controller> Start(const ControllerOptions& options, const SimClock* clock,
+                                           Faults* faults, TipListener* tip);
   virtual ~Controller() = default;
   virtual Ports ports() const = 0;
   // For the truth of tests, not for clients: base_from_tip without noise, now.

@@ -32,8 +32,8 @@ class Rig {
   std::vector<Finger> Touch(const Command& command, double speed_mm_s, double session_time_s,
                             double temperature);
 
-  // Corrects what the fingers remember of the last touch, where it was not the whole approach that Touch supposed: how
-  // far each was pressed, mm.
+  // Corrects what the fingers remember of the last touch, where it was not the whole approach that Touch
+  // supposed: how far each was pressed, mm.
   void Remember(std::vector<double> pressed_mm) { pressed_mm_ = std::move(pressed_mm); }
 
   double clock_factor() const { return 1 + Value("clock_skew"); }
