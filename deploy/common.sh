@@ -52,45 +52,64 @@ install_python_package() {
   printf '%s' "$sources" > "$stamp"
 }
 
-server_pid=
-server_address=
+# What runs in the background, "PID NAME" each; stop_programs ends it.
+programs=()
 
-# start_server LOG [flag ...]: starts touchstone-server on a free port, waits until its health check says SERVING,
-# and sets server_address. It is stopped by stop_server, at the latest when the script ends.
-start_server() {
-  local log=$1
-  shift
-  trap stop_server EXIT
+# start_program NAME LOG READY [argument ...]: starts a program of the build with its output in LOG, waits until a line
+# says READY, and sets `told` to the word that follows. It is stopped by stop_programs, at the latest when the script
+# ends.
+start_program() {
+  local name=$1 log=$2 ready=$3 pid tries=0
+  shift 3
+  trap stop_programs EXIT
   trap 'exit 130' INT
   trap 'exit 143' TERM
-  "$bin/touchstone-server" --listen 127.0.0.1:0 "$@" > "$log" 2>&1 < /dev/null &
-  server_pid=$!
-  # Port 0 is any free one; the line 'listening on HOST:PORT' tells which.
-  local tries=0
-  until server_address=$(sed -nE '/listening on /{s/.*listening on ([^ ]+).*/\1/p;q}' "$log") && [[ -n $server_address ]]; do
-    if ! kill -0 "$server_pid" 2> /dev/null || ((++tries > 300)); then
-      echo "touchstone-server did not start; its log, $log:" >&2
+  "$bin/$name" "$@" > "$log" 2>&1 < /dev/null &
+  pid=$!
+  programs+=("$pid $name")
+  until told=$(sed -nE "/$ready /{s/.*$ready ([^ ]+).*/\\1/p;q}" "$log") && [[ -n $told ]]; do
+    if ! kill -0 "$pid" 2> /dev/null || ((++tries > 600)); then
+      echo "$name did not start; its log, $log:" >&2
       tail -n 20 "$log" >&2
       return 1
     fi
     sleep 0.1
   done
+}
+
+# Asks what was started to drain and end, the last first; an exit status other than 0 is an error.
+stop_programs() {
+  local failed=0
+  while [[ ${#programs[@]} -gt 0 ]]; do
+    local pid name status=0
+    read -r pid name <<< "${programs[-1]}"
+    unset 'programs[-1]'
+    kill -TERM "$pid" 2> /dev/null || true
+    # What does not end in 20 s is killed, and then its status tells it.
+    (sleep 20 && kill -KILL "$pid") > /dev/null 2>&1 &
+    local watchdog=$!
+    wait "$pid" || status=$?
+    kill "$watchdog" 2> /dev/null || true
+    ((status == 0)) || { echo "$name ended with exit status $status" >&2 && failed=1; }
+  done
+  return "$failed"
+}
+
+# start_server LOG [flag ...]: touchstone-server on a free port; sets server_address when its health check says SERVING.
+start_server() {
+  start_program touchstone-server "$1" 'listening on' --listen 127.0.0.1:0 "${@:2}" || return
+  server_address=$told
   "$python" deploy/wait-until-serving "$server_address" 30
 }
 
-# Asks it to drain and end; an exit status other than 0 is an error.
-stop_server() {
-  [[ -n $server_pid ]] || return 0
-  local pid=$server_pid
-  server_pid=
-  kill -TERM "$pid" 2> /dev/null || true
-  # A server that does not end in 20 s is killed, and then its status tells it.
-  (sleep 20 && kill -KILL "$pid") > /dev/null 2>&1 &
-  local watchdog=$! status=0
-  wait "$pid" || status=$?
-  kill "$watchdog" 2> /dev/null || true
-  if ((status != 0)); then
-    echo "touchstone-server ended with exit status $status" >&2
-    return 1
-  fi
+# start_emulated_rig FOLDER SPEEDUP [flag of the emulator ...]: an emulated rig and the gateway before it, on free ports;
+# sets gateway_address. A test tool: nothing that it reports was measured on anything.
+start_emulated_rig() {
+  local folder=$1 speedup=$2
+  mkdir -p "$folder" || return
+  start_program touchstone-rig-emulator "$folder/emulator.out" 'ready' --dir "$folder" --speedup "$speedup" \
+    "${@:3}" || return
+  start_program touchstone-gateway "$folder/gateway.log" 'listening on' --config "$told" --listen 127.0.0.1:0 || return
+  gateway_address=$told
+  "$python" deploy/wait-until-serving "$gateway_address" 60
 }

@@ -1,0 +1,235 @@
+"""The whole circle: an emulated rig hides an effect, the gateway makes a session of touches on it, the diagnosis names
+the effect and tells its size, and with it the model's error is the noise.
+
+Over real sockets and a real pseudo-terminal, 192 touches an object. Half of the sessions are made by `touchstone rig
+run`, half by the Python package. Nothing that the emulated rig reports was measured on anything.
+"""
+import concurrent.futures
+import contextlib
+import csv
+import dataclasses
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tarfile
+import time
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", ROOT / "build/release/bin/touchstone-server")).parent
+EXAMPLE = ROOT / "client/python/examples/rig_run.py"
+
+# Simulated seconds in one second. A touch takes 15 simulated seconds: what is left is our own programs' time.
+SPEEDUP = 400
+SIGMA_US = 5000
+# Rigs that run at once: one spends half of its time waiting for the other side of a socket.
+RIGS_AT_ONCE = 2
+GENEROUS_S = 900
+
+
+@dataclasses.dataclass(frozen=True)
+class Circle:
+    name: str
+    by: str  # "command line" or "python"
+    # effect -> what is hidden, as `touchstone-rig-emulator --hide` takes it: (parameter, values)
+    hidden: dict = dataclasses.field(default_factory=dict)
+    unlisted: str = ""
+    objects: str = "lat10,lat20"
+    seed: int = 1
+    # The largest distance from the truth, whatever the standard error: a lab could use the number.
+    near: dict = dataclasses.field(default_factory=dict)
+
+    @property
+    def verdict(self):
+        return "UNEXPLAINED" if self.unlisted else "MISSING_EFFECTS" if self.hidden else "ADEQUATE"
+
+
+CIRCLES = [
+    Circle("nothing", "command line", seed=11),
+    # Pose.
+    Circle("tool_yaw", "python", {"tool_yaw": ("angle_deg", [3])}, seed=12, near={"tool_yaw": 0.5}),
+    Circle("finger_length", "command line", {"finger_length": ("offset_mm", [0.25, -0.3, 0.05])}, seed=13,
+           near={"finger_length": 0.05}),
+    # Contact.
+    Circle("tip_radius", "command line", {"tip_radius": ("radius_mm", [2])}, seed=14, near={"tip_radius": 0.2}),
+    # Motion.
+    Circle("object_push", "python", {"object_push": ("shift_mm", [0.4])}, seed=15, near={"object_push": 0.05}),
+    Circle("acceleration_ramp", "command line", {"acceleration_ramp": ("acceleration_mm_s2", [3.5])}, seed=16,
+           near={"acceleration_ramp": 0.4}),
+    # Sensor.
+    Circle("oblique_slip", "python", {"oblique_slip": ("travel_mm", [0.5])}, seed=17, near={"oblique_slip": 0.1}),
+    Circle("thermal_drift", "command line", {"thermal_drift": ("rate_mm_per_h", [0.8, -0.2, -0.6])}, seed=18,
+           near={"thermal_drift": 0.15}),
+    Circle("return_hysteresis", "python", {"return_hysteresis": ("fraction", [0.08])}, seed=19,
+           near={"return_hysteresis": 0.01}),
+    Circle("pair", "command line", {"tip_radius": ("radius_mm", [1.5]), "object_push": ("shift_mm", [0.5])}, seed=20,
+           near={"tip_radius": 0.25, "object_push": 0.06}),
+    # Of no catalogue: a lead screw with a pitch of 5 mm that is not true.
+    Circle("lead_screw", "python", unlisted="lead_screw=0.15,5", seed=21),
+]
+
+
+def run(*command, cwd):
+    """One of our programs, to its end; what it printed is shown if it fails."""
+    result = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True,
+                            timeout=GENEROUS_S, check=False)
+    if result.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, command))}\nended with {result.returncode}:\n"
+                             f"{result.stdout[-2000:]}{result.stderr[-4000:]}")
+    return result.stdout
+
+
+@contextlib.contextmanager
+def started(ready, log, *command):
+    """A program that runs until the block ends; yields what follows `ready` in the line that begins so."""
+    with open(log, "w", encoding="utf-8") as errors:
+        process = subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, stderr=errors, text=True)
+    with process:
+        try:
+            for line in process.stdout:
+                if line.startswith(ready):
+                    break
+            else:
+                raise AssertionError(f"{command[0]} ended: {log.read_text()}")
+            yield line[len(ready):].strip()
+        finally:
+            process.terminate()
+            try:
+                status = process.wait(timeout=60)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
+    assert status == 0, f"{command[0]} ended with {status}: {log.read_text()[-2000:]}"
+
+
+@contextlib.contextmanager
+def emulated_rig(folder, circle):
+    """An emulator and its gateway; yields the gateway's address."""
+    hide = [f"--hide={effect}.{parameter}={','.join(map(str, values))}"
+            for effect, (parameter, values) in circle.hidden.items()]
+    unlisted = [f"--unlisted={circle.unlisted}"] if circle.unlisted else []
+    with started("ready ", folder / "emulator.stderr", BIN / "touchstone-rig-emulator", "--dir", folder / "rig",
+                 "--speedup", SPEEDUP, "--sigma-us", SIGMA_US, "--seed", circle.seed, *hide, *unlisted) as config:
+        with started("listening on ", folder / "gateway.log", BIN / "touchstone-gateway", "--config", config,
+                     "--listen", "127.0.0.1:0") as address:
+            yield address
+
+
+def go_round(folder, circle):
+    """The circle's report, and what went into it."""
+    cli = BIN / "touchstone"
+    run(cli, "plan", circle.objects, "--plan", "faces", "-o", "plan.csv", cwd=folder)
+    measured = "session.db" if circle.by == "command line" else "set.csv"
+    began = time.monotonic()
+    with emulated_rig(folder, circle) as address:
+        if circle.by == "command line":
+            run(cli, "rig", "run", "plan.csv", "--server", address, "-o", measured, cwd=folder)
+        else:
+            run(sys.executable, EXAMPLE, address, "plan.csv", circle.name, measured, cwd=folder)
+    session_s = time.monotonic() - began
+    run(cli, "model", "new", "-o", "bare.yaml", cwd=folder)
+    run(cli, "model", "add", "bare.yaml", "gaussian_noise", f"sigma_us={SIGMA_US}", "-o", "nominal.yaml", cwd=folder)
+    run(cli, "diagnose", measured, "--model", "nominal.yaml", "--json", "report.json", "--save-model", "better.yaml",
+        cwd=folder)
+    report = json.loads((folder / "report.json").read_text())
+    print(f"{circle.name}: {report['summary']} [session {session_s:.0f} s, diagnosis {report['duration_s']:.1f} s]")
+    return report
+
+
+@pytest.fixture(scope="module")
+def circles(request, tmp_path_factory):
+    """Name -> (folder, its report in the future). Only circles that a collected test asks for are run."""
+    wanted = {item.callspec.params["circle"].name for item in request.session.items
+              if item.path == request.path and hasattr(item, "callspec")}
+    with concurrent.futures.ThreadPoolExecutor(RIGS_AT_ONCE) as pool:
+        running = {}
+        for circle in CIRCLES:
+            if circle.name in wanted:
+                folder = tmp_path_factory.mktemp(circle.name)
+                running[circle.name] = folder, pool.submit(go_round, folder, circle)
+        yield running
+        for _, future in running.values():
+            future.cancel()
+
+
+def parameter(circle, *names):
+    return pytest.mark.parametrize("circle", [c for c in circle if not names or c.name in names],
+                                   ids=lambda c: c.name)
+
+
+def named(step):
+    return [step["effect"], *step["equivalent"]]
+
+
+def step_for(report, effect):
+    found = [step for step in report["steps"] if effect in named(step)]
+    assert len(found) == 1, f"{effect}: {[named(step) for step in report['steps']]}"
+    return found[0]
+
+
+@parameter(CIRCLES)
+def test_the_verdict_is_right_and_nothing_is_named_that_is_not_there(circles, circle):
+    report = circles[circle.name][1].result()
+    assert report["verdict"] == circle.verdict, report["summary"]
+    assert report["touches"] > 0.98 * 192 * len(circle.objects.split(","))
+    # What no catalogue lists may look like something that a catalogue lists, as long as the rest is owned up to.
+    if not circle.unlisted:
+        assert len(report["steps"]) == len(circle.hidden), report["summary"]
+
+
+@parameter([c for c in CIRCLES if c.hidden])
+def test_the_hidden_effects_are_named_and_their_values_are_right(circles, circle):
+    report = circles[circle.name][1].result()
+    for effect, (name, values) in circle.hidden.items():
+        step = step_for(report, effect)
+        if step["effect"] != effect:
+            continue  # an exact tie: its value has another unit
+        found = [p for p in step["parameters"] if p["name"] == name]
+        assert len(found) == len(values)
+        for value, truth in zip(found, values):
+            error = abs(value["value"] - truth)
+            assert error < 4 * value["std_error"], (effect, value, truth)
+            assert error < circle.near[effect], (effect, value, truth)
+
+
+@parameter([c for c in CIRCLES if not c.unlisted])
+def test_the_error_comes_down_to_the_noise(circles, circle):
+    report = circles[circle.name][1].result()
+    # 768 differences to a mean: one standard error is 2.6 %.
+    assert report["final"]["rmse_us"] == pytest.approx(SIGMA_US, rel=0.08)
+    assert report["noise_floor_us"] == pytest.approx(SIGMA_US, rel=0.08)
+    if circle.hidden:
+        assert report["initial"]["rmse_us"] > 1.15 * SIGMA_US
+
+
+@parameter([c for c in CIRCLES if c.unlisted])
+def test_what_no_catalogue_lists_is_owned_up_to_with_what_it_hangs_on(circles, circle):
+    report = circles[circle.name][1].result()
+    assert report["final"]["rmse_us"] > 1.1 * report["noise_floor_us"], report["summary"]
+    assert "travel_mm" in json.dumps(report["unexplained"]), report["unexplained"]
+
+
+@parameter(CIRCLES, "tip_radius")
+def test_the_better_model_is_adequate_and_makes_a_dataset(circles, circle):
+    folder, future = circles[circle.name]
+    future.result()
+    cli = BIN / "touchstone"
+    run(cli, "diagnose", "session.db", "--model", "better.yaml", "--json", "again.json", cwd=folder)
+    assert json.loads((folder / "again.json").read_text())["verdict"] == "ADEQUATE"
+    run(cli, "stream", "--objects", "lat10,lat20", "--samples", 40, "--model", "better.yaml", "--image", "32x32",
+        "--out", "pairs", cwd=folder)
+    with tarfile.open(next((folder / "pairs").glob("*.tar"))) as shard:
+        assert len(shard.getnames()) >= 80
+
+
+@parameter(CIRCLES, "tip_radius")
+def test_the_journal_tells_that_its_data_are_emulated_and_repeats_nothing(circles, circle):
+    folder, future = circles[circle.name]
+    future.result()
+    run(BIN / "touchstone", "session", "export", "session.db", "plan", "-o", "exported.csv", cwd=folder)
+    with open(folder / "exported.csv", encoding="utf-8") as file:
+        assert len(list(csv.DictReader(file))) == 384
+    assert b"emulated" in (folder / "session.db").read_bytes()
