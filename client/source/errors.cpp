@@ -4,6 +4,11 @@ namespace touchstone::client {
 
 absl::Status FromGrpc(const grpc::Status& status) {
   if (status.ok()) return absl::OkStatus();
+  // What gRPC itself answers where a service is not there comes without a word.
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_message().empty())
+    return absl::UnimplementedError(
+        "this source does not offer that; only a rig has an arm: a recorded session or a touchstone-server "
+        "has none");
   return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
 }
 

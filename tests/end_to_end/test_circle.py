@@ -57,12 +57,13 @@ CIRCLES = [
     Circle("tip_radius", "command line", {"tip_radius": ("radius_mm", [2])}, seed=14, near={"tip_radius": 0.2}),
     # Motion.
     Circle("object_push", "python", {"object_push": ("shift_mm", [0.4])}, seed=15, near={"object_push": 0.05}),
-    Circle("acceleration_ramp", "command line", {"acceleration_ramp": ("acceleration_mm_s2", [3.5])}, seed=16,
-           near={"acceleration_ramp": 0.4}),
+    Circle("contact_slowdown", "command line", {"contact_slowdown": ("fraction", [0.06])}, seed=16,
+           near={"contact_slowdown": 0.01}),
     # Sensor.
     Circle("oblique_slip", "python", {"oblique_slip": ("travel_mm", [0.5])}, seed=17, near={"oblique_slip": 0.1}),
-    Circle("thermal_drift", "command line", {"thermal_drift": ("rate_mm_per_h", [0.8, -0.2, -0.6])}, seed=18,
-           near={"thermal_drift": 0.15}),
+    # The simulated clock goes on while our programs take their time: the session is two simulated hours or more.
+    Circle("thermal_drift", "command line", {"thermal_drift": ("rate_mm_per_h", [0.2, -0.05, -0.15])}, seed=18,
+           near={"thermal_drift": 0.04}),
     Circle("return_hysteresis", "python", {"return_hysteresis": ("fraction", [0.08])}, seed=19,
            near={"return_hysteresis": 0.01}),
     Circle("pair", "command line", {"tip_radius": ("radius_mm", [1.5]), "object_push": ("shift_mm", [0.5])}, seed=20,

@@ -59,10 +59,15 @@ _CLASSES = {
 }
 
 
+# What gRPC itself answers where a service is not there comes without a word.
+_NOT_OFFERED = ("this source does not offer that; only a rig has an arm: a recorded session or a touchstone-server has "
+                "none")
+
+
 def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
     """The exception for a failed call; raise it `from None`."""
     code = error.code().name
-    details = error.details() or "no message"
+    details = error.details() or (_NOT_OFFERED if code == "UNIMPLEMENTED" else "no message")
     kind = _CLASSES.get(code, SourceFailed)
     if kind is SourceUnreachable:
         details = f"{target}: {details}"
