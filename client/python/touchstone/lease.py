@@ -19,6 +19,9 @@ _CONTROL = control_pb2_grpc.ControlStub
 _RENEWALS_A_WINDOW = 5
 _ACQUIRE_S = 10.0
 _SHORTEST_ANSWER_S = 0.5
+# A lease that nobody renews, because its holder was killed, is over by then.
+_HOLDER_MAY_BE_GONE_S = 2.5
+_ASK_AGAIN_S = 0.1
 
 
 def holder() -> str:
@@ -53,16 +56,21 @@ class Lease:
 
     def _acquire(self, take: bool) -> None:
         request = control_pb2.AcquireLeaseRequest(holder=self.holder, take=take)
-        try:
-            # Not repeated: an answer that was lost would leave a lease behind that refuses us.
-            lease = self._own.call(_CONTROL, "AcquireLease", request, timeout_s=_ACQUIRE_S, repeat=False)
-        except errors.Refused as error:
-            if error.code != "FAILED_PRECONDITION":
-                raise
-            raise errors.Refused(
-                f"{error} Wait until they are done, or take it from them with client.lease(take=True).",
-                error.code, error.target,
-            ) from None
+        until = time.monotonic() + _HOLDER_MAY_BE_GONE_S
+        while True:
+            try:
+                # Not repeated: an answer that was lost would leave a lease behind that refuses us.
+                lease = self._own.call(_CONTROL, "AcquireLease", request, timeout_s=_ACQUIRE_S, repeat=False)
+                break
+            except errors.Refused as error:
+                if error.code != "FAILED_PRECONDITION":
+                    raise
+                if time.monotonic() > until:
+                    raise errors.Refused(
+                        f"{error} Wait until they are done, or take it from them with client.lease(take=True).",
+                        error.code, error.target,
+                    ) from None
+            time.sleep(_ASK_AGAIN_S)
         self._hold(lease)
 
     def _hold(self, lease: control_pb2.Lease) -> None:
