@@ -7,7 +7,8 @@ namespace {
 TEST(EnduranceTest, NothingIsLostDoubledOrAttributedToAnotherTouchWhateverBreaks) {
   EnduranceOptions options;
   options.touches = 300;
-  options.fault_share = 0.15;
+  options.speedup = 400;
+  options.fault_share = 0.08;
   Endurance endurance(options);
   const EnduranceReport report = endurance.Run();
   EXPECT_TRUE(report.Sound()) << report.Text();

@@ -85,7 +85,12 @@ int Bench::Stop(int repeats) {
   std::vector<double> arrived_s, answered_s;
   for (int k = 0; k < repeats; ++k) {
     KeptLease lease(control_.get(), "bench", true);
+    const uint64_t begun = emulator_->controller().Count("programs");
     auto touch = TouchLater(lease.token(), FromAbove(0.01), "stopped " + std::to_string(k));
+    // The registers tell the phase of the touch before until this one's program has begun.
+    WaitUntil([&] { return emulator_->controller().Count("programs") > begun; },
+              "the touch's program begins");
+    SleepS(0.05);
     WaitUntilApproaching();
     std::atomic<double> seen_s{0};
     std::atomic<bool> ending{false};

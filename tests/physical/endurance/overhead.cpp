@@ -138,7 +138,7 @@ int Overhead::Measure(int touches, double speedup) {
   }
   if (all_s.empty()) return 1;
   std::printf("%zu touches, emulated rig %g times as fast, %.0f states a second; ms\n\n", all_s.size(),
-              speedup, made_rig_->arm().StateRateHz());
+              speedup, speedup * made_rig_->arm().StateRateHz());
   std::printf("| %-62s | %7s | %7s | %7s |\n| --- | --- | --- | --- |\n", "", "median", "99 %", "most");
   PrintRow("asked until the program is on the wire (checks, planning)", before_s);
   PrintRow("at the start until go is on the wire", go_s);
