@@ -27,8 +27,13 @@ constexpr int kMostTouches = 10000;
 
 using Options = CalibrateOptions;
 
+struct FlatTouches {
+  std::vector<FlatTouch> touches;
+  double spacing_m = 0;
+};
+
 // Repeated touches straight onto the middle of the upper face.
-absl::StatusOr<std::vector<FlatTouch>> TouchFlat(const Cli& cli, const Options& options) {
+absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const Options& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Object object, FindObject(rig.connection.get(), options.object));
   const v1::Vector3 &low = object.bounds_min_m(), &high = object.bounds_max_m();
@@ -50,7 +55,8 @@ absl::StatusOr<std::vector<FlatTouch>> TouchFlat(const Cli& cli, const Options& 
   const StopOnInterrupt stop_on_interrupt(source.get());
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
   TOUCHSTONE_RETURN_IF_ERROR(MountForTouches(cli, source.get(), state, options.object, "+z"));
-  std::vector<FlatTouch> touches;
+  FlatTouches flat;
+  flat.spacing_m = state.spacing_m();
   for (int k = 0; k < options.touches; ++k) {
     bar.ShowStage(absl::StrCat("touch ", k + 1, " of ", options.touches),
                   static_cast<double>(k) / options.touches);
@@ -62,44 +68,48 @@ absl::StatusOr<std::vector<FlatTouch>> TouchFlat(const Cli& cli, const Options& 
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchResponse response, source->Touch(std::move(request)));
     const v1::TouchResult& result = response.results(0);
     const double measured_m_s = result.measured().speed_m_s();
-    touches.push_back({measured_m_s > 0 ? measured_m_s : touch.speed_m_s(),
-                       {result.contact_time_s().begin(), result.contact_time_s().end()}});
+    flat.touches.push_back({measured_m_s > 0 ? measured_m_s : touch.speed_m_s(),
+                            {result.contact_time_s().begin(), result.contact_time_s().end()}});
   }
-  return touches;
+  bar.Clear();
+  return flat;
 }
 
 // Those of a recorded session that came straight onto a face.
-absl::StatusOr<std::vector<FlatTouch>> RecordedFlat(const Options& options) {
+absl::StatusOr<FlatTouches> RecordedFlat(const Options& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.from));
   TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session,
                               FindSession(*journal, options.from, options.motion.session));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> recorded,
                               TouchesOf(*journal, session.name));
-  std::vector<FlatTouch> touches;
+  FlatTouches flat;
+  flat.spacing_m = session.spacing_m;
   for (const client::MeasuredTouch& touch : recorded) {
     const v1::Vector3& a = touch.commanded.approach();
     if (!options.object.empty() && touch.object != options.object) continue;
     if (std::max({std::abs(a.x()), std::abs(a.y()), std::abs(a.z())}) < kStraight) continue;
-    touches.push_back({touch.commanded.speed_m_s(), touch.time_s});
+    flat.touches.push_back({touch.commanded.speed_m_s(), touch.time_s});
   }
-  if (touches.empty())
+  if (flat.touches.empty())
     return absl::FailedPreconditionError(absl::StrCat(options.from, ": session '", session.name,
                                                       "' has no touch straight onto a face",
                                                       options.object.empty() ? "" : " of " + options.object));
-  return touches;
+  return flat;
 }
 
 absl::Status RunFlat(const Cli& cli, const Options& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckNewFile(options.output));
-  std::vector<FlatTouch> touches;
+  FlatTouches flat;
   if (options.from.empty()) {
     if (options.object.empty())
       return absl::InvalidArgumentError("OBJECT is missing: whose upper face is flat?");
-    TOUCHSTONE_ASSIGN_OR_RETURN(touches, TouchFlat(cli, options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(flat, TouchFlat(cli, options));
   } else {
-    TOUCHSTONE_ASSIGN_OR_RETURN(touches, RecordedFlat(options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(flat, RecordedFlat(options));
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const FlatCalibration fit, CalibrateFlat(touches, options.spacing_mm / kMilli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const FlatCalibration fit,
+      CalibrateFlat(flat.touches, options.spacing_mm > 0 ? options.spacing_mm / kMilli : flat.spacing_m));
   Model base = NominalModel(fit.fingers, fit.spacing_m);
   base.name = client::SessionNameOf(options.output);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string model, CalibratedModelFile(base, fit, Catalogue()));
@@ -176,8 +186,10 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
 }
 
 absl::Status RunCalibrate(const Cli& cli, const Options& options) {
-  if (!(options.speed_mm_s > 0) || !(options.spacing_mm > 0))
-    return absl::InvalidArgumentError("--speed-mm-s, --spacing-mm: above 0 is right");
+  if (!(options.speed_mm_s > 0))
+    return absl::InvalidArgumentError(absl::StrCat("--speed-mm-s: ", options.speed_mm_s, " is not above 0"));
+  if (!(options.spacing_mm >= 0))
+    return absl::InvalidArgumentError(absl::StrCat("--spacing-mm: ", options.spacing_mm, " is below 0"));
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("KIND", options.kind, {"flat", "object", "tip"}).status());
   if (options.touches < 2 || options.touches > kMostTouches)
     return absl::InvalidArgumentError(
@@ -255,7 +267,7 @@ void AddRigCalibrate(Cli* cli, CLI::App* group) {
       ->type_name("V");
   command
       ->add_option("--spacing-mm", options->spacing_mm,
-                   "flat, object: between neighbouring fingers. Default: 30")
+                   "flat, object: between neighbouring fingers. Default: as the rig tells, or the session")
       ->type_name("MM");
   command
       ->add_option("--from", options->from,

@@ -13,7 +13,8 @@ struct CalibrateOptions {
   MotionFlags motion;
   std::string kind = "flat", object, output, from, calibration, surface;
   int touches = 20, poses = 6;
-  double speed_mm_s = 20, spacing_mm = 30;
+  double speed_mm_s = 20;
+  double spacing_mm = 0;  // 0: as the rig or the recorded session tells
 };
 
 // Files that others made are never written over.

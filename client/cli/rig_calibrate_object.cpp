@@ -1,5 +1,7 @@
 // touchstone rig calibrate object: where an object lies, from touches of its upper half.
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "client/cli/progress_bar.h"
 #include "client/cli/rig_calibrate.h"
@@ -22,7 +24,9 @@ constexpr double kTiltsRad[] = {15 * kDegree, 30 * kDegree,
                                 40 * kDegree};  // from straight down; all come from above
 constexpr double kSpread = 0.5;                 // targets lie within this share of the box's half sides
 constexpr double kHeight = 0.4;                 // and this share of its half height above its middle
-constexpr double kBeyondBoxM = 0.03;            // starts lie so far outside the sphere round the box
+constexpr double kBeyondBoxM = 0.03;            // every finger starts so far outside the box
+constexpr size_t kMostLines = 5;
+constexpr size_t kFewestTouches = 6;
 constexpr uint64_t kTriangles = 20000;
 
 absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const CalibrateOptions& options) {
@@ -39,22 +43,39 @@ absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const CalibrateOption
   return Surface::Create(options.object, std::move(mesh));
 }
 
+// How far one goes from a point within the box, along the direction, until outside.
+double WayOut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, const Eigen::Vector3d& low,
+              const Eigen::Vector3d& high) {
+  double way_m = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0) continue;
+    const double side_m = direction[axis] > 0 ? high[axis] : low[axis];
+    way_m = std::min(way_m, (side_m - point[axis]) / direction[axis]);
+  }
+  return std::max(way_m, 0.0);
+}
+
 // From all sides and above, the hand turned along and across, so that every direction of the object shows.
-v1::CommandedTouch TouchOf(int k, const Eigen::Vector3d& low, const Eigen::Vector3d& high, double speed_m_s) {
+v1::CommandedTouch TouchOf(int k, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                           double outer_finger_m, double speed_m_s) {
   const double tilt_rad = kTiltsRad[k % 3], azimuth_rad = k * kGoldenAngleRad;
   const Eigen::Vector3d half = (high - low) / 2;
   const Eigen::Vector3d round(std::cos(azimuth_rad), std::sin(azimuth_rad), 0);
   const Eigen::Vector3d approach =
       -(std::cos(tilt_rad) * Eigen::Vector3d::UnitZ() + std::sin(tilt_rad) * round);
   const Eigen::Vector3d across(-round.y(), round.x(), 0);
+  const Eigen::Vector3d lateral = k % 2 == 0 ? across : across.cross(approach);
   const Eigen::Vector3d target =
       (low + high) / 2 +
       Eigen::Vector3d(kSpread * half.x() * round.x(), kSpread * half.y() * round.y(), kHeight * half.z());
   v1::CommandedTouch touch;
   *touch.mutable_target_m() = ToProto(target);
   *touch.mutable_approach() = ToProto(approach);
-  *touch.mutable_lateral() = ToProto(Eigen::Vector3d(k % 2 == 0 ? across : across.cross(approach)));
-  touch.set_standoff_m(half.norm() + kBeyondBoxM);
+  *touch.mutable_lateral() = ToProto(lateral);
+  double way_out_m = 0;
+  for (const double reach_m : {-outer_finger_m, 0.0, outer_finger_m})
+    way_out_m = std::max(way_out_m, WayOut(target + reach_m * lateral, -approach, low, high));
+  touch.set_standoff_m(way_out_m + kBeyondBoxM);
   touch.set_speed_m_s(speed_m_s);
   return touch;
 }
@@ -82,6 +103,8 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
         "names its "
         "file");
 
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
+  const double spacing_m = options.spacing_mm > 0 ? options.spacing_mm / kMilli : state.spacing_m();
   // What the rig cannot reach is left out before anything moves.
   std::vector<PlannedRow> rows;
   std::vector<size_t> all;
@@ -90,12 +113,19 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
     row.touch.object = options.object;
     row.touch.touch = k;
     row.touch.commanded = TouchOf(k, FromProto(object.bounds_min_m()), FromProto(object.bounds_max_m()),
-                                  options.speed_mm_s / kMilli);
+                                  (state.fingers() - 1) / 2.0 * spacing_m, options.speed_mm_s / kMilli);
     row.id = client::NewTouchId(k);
     all.push_back(rows.size());
     rows.push_back(std::move(row));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig.connection.get(), all, &rows, nullptr));
+  const std::string impossible = ImpossibleTable(rows, kMostLines);
+  if (!impossible.empty()) cli.Log(impossible + "these are left out");
+  const auto makes = [](const PlannedRow& row) { return row.possible && row.placement == "+z"; };
+  if (std::count_if(rows.begin(), rows.end(), makes) < static_cast<int>(kFewestTouches))
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the rig can make only ", std::count_if(rows.begin(), rows.end(), makes), " of ", rows.size(),
+        " touches of ", options.object, ", ", kFewestTouches, " are needed, so nothing was moved"));
 
   ProgressBar bar(!cli.output().quiet);
   TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -104,12 +134,11 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
         cli.Log(line);
       }));
   const StopOnInterrupt stop_on_interrupt(source.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
   TOUCHSTONE_RETURN_IF_ERROR(MountForTouches(cli, source.get(), state, options.object, "+z"));
   std::vector<RegistrationContact> contacts;
   int made = 0;
   for (const PlannedRow& row : rows) {
-    if (!row.possible || row.placement != "+z") continue;
+    if (!makes(row)) continue;
     bar.ShowStage(absl::StrCat("touch ", row.touch.touch + 1, " of ", rows.size()),
                   static_cast<double>(row.touch.touch) / rows.size());
     v1::TouchRequest request;
@@ -123,8 +152,8 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
     const int fingers = measured.base_from_tip_at_contact_size();
     for (int finger = 0; finger < fingers; ++finger) {
       if (!measured.base_from_tip_at_contact(finger).has_position_m()) continue;
-      contacts.push_back({PoseOf(measured.base_from_tip_at_contact(finger)),
-                          (finger - (fingers - 1) / 2.0) * options.spacing_mm / kMilli});
+      contacts.push_back(
+          {PoseOf(measured.base_from_tip_at_contact(finger)), (finger - (fingers - 1) / 2.0) * spacing_m});
     }
   }
   bar.Clear();

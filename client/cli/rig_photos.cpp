@@ -93,7 +93,7 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
   const StopOnInterrupt stop_on_interrupt(source.get());
   ProgressBar bar(!cli.output().quiet);
   Json files = Json::array();
-  size_t kept = 0;
+  size_t kept = 0, left_out = 0;
   size_t views_a_turn = 0;
   for (const Ring& ring : RingsOf(options.sequence)) views_a_turn += ring.views;
   for (int turn = 0; turn < options.turns; ++turn) {
@@ -122,7 +122,17 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
         request.clear_views();
         *request.add_views() =
             ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kDegree, 2 * M_PI * k / ring.views);
-        TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CaptureResponse response, source->Capture(request));
+        const absl::StatusOr<v1::CaptureResponse> captured = source->Capture(request);
+        // Where the arm cannot take the camera there is no picture; the others stand for themselves.
+        if (absl::IsOutOfRange(captured.status()) || absl::IsInvalidArgument(captured.status())) {
+          bar.Clear();
+          cli.Log(absl::StrCat("no ", path, ": ", captured.status().message()));
+          files.erase(files.size() - 1);
+          ++left_out;
+          continue;
+        }
+        TOUCHSTONE_RETURN_IF_ERROR(captured.status());
+        const v1::CaptureResponse& response = *captured;
         if (response.columns_size() != 1 || response.columns(0).type() != v1::DATA_TYPE_BYTES)
           return absl::InternalError("the source did not send one encoded picture");
         TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(response.columns(0), response.rows()));
@@ -131,9 +141,12 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
     }
   }
   bar.Clear();
-  if (cli.output().json) PrintJson({{"files", files}, {"kept", kept}});
-  cli.Log(absl::StrCat(options.folder, ": ", Counted(files.size(), "picture", "pictures"),
-                       kept > 0 ? absl::StrCat(", ", kept, " of them stood already") : ""));
+  if (cli.output().json) PrintJson({{"files", files}, {"kept", kept}, {"left_out", left_out}});
+  cli.Log(absl::StrCat(
+      options.folder, ": ", Counted(files.size(), "picture", "pictures"),
+      kept > 0 ? absl::StrCat(", ", kept, " of them stood already") : "",
+      left_out > 0 ? absl::StrCat("; ", left_out, " that the rig cannot take are left out") : ""));
+  if (files.empty()) return absl::FailedPreconditionError("the rig can take none of these pictures");
   return absl::OkStatus();
 }
 

@@ -49,7 +49,8 @@ class Run {
     const absl::Status status = wanted.empty() ? absl::OkStatus() : TouchAll(wanted, state);
     bar_.Clear();
     if (!status.ok()) {
-      cli_.Log(absl::StrCat(made_, " touches were made now; run the same command again to go on"));
+      cli_.Log(absl::StrCat(Counted(made_, "touch was", "touches were"),
+                            " made now; run the same command again to go on"));
       return status;
     }
     return Finish();

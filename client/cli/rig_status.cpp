@@ -74,7 +74,9 @@ std::string EffectorText(const v1::EffectorStatus& effector) {
   text += Line("Line", absl::StrCat(Counted(effector.bad_frames(), "bad frame", "bad frames"), ", ",
                                     Counted(effector.repeated_events(), "repeated event", "repeated events"),
                                     ", ", Counted(effector.reconnections(), "reconnection", "reconnections"),
-                                    "; all were noticed and mended"));
+                                    effector.bad_frames() + effector.repeated_events() > 0
+                                        ? "; all were noticed and mended"
+                                        : ""));
   return text;
 }
 
@@ -92,17 +94,19 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
                        rig.mounts_itself() ? "; the rig changes it by itself" : "", "\n");
   text += ArmText(rig.arm()) + EffectorText(rig.effector());
   const v1::CameraStatus& camera = rig.camera();
-  text += absl::StrCat("Camera        ",
-                       camera.connected()
-                           ? absl::StrCat(camera.description(), ", ", camera.width(), "x", camera.height(),
-                                          ", ", Counted(camera.frames(), "picture", "pictures"), ", ",
-                                          camera.stale_frames(), " stale")
-                       : camera.description().empty() ? "none"
-                                                      : camera.description() + ": NOT CONNECTED",
-                       "\n");
+  text += absl::StrCat(
+      "Camera        ",
+      camera.connected()
+          ? absl::StrCat(camera.description(),
+                         camera.width() > 0 ? absl::StrCat(", ", camera.width(), "x", camera.height()) : "",
+                         ", ", Counted(camera.frames(), "picture", "pictures"), ", ", camera.stale_frames(),
+                         " stale")
+      : camera.description().empty() ? "none"
+                                     : camera.description() + ": NOT CONNECTED",
+      "\n");
   if (rig.recovered_touches() + rig.interrupted_touches() > 0)
-    text += absl::StrCat("After an interruption: ", rig.recovered_touches(), " touches recovered, ",
-                         rig.interrupted_touches(), " not\n");
+    text += absl::StrCat("After an interruption: ", Counted(rig.recovered_touches(), "touch", "touches"),
+                         " recovered, ", rig.interrupted_touches(), " not\n");
   if (!rig.last_error().empty()) text += "Last error    " + Wrap(rig.last_error(), 110, 14) + "\n";
   if (rig.time_scale() != 0 && rig.time_scale() != 1)
     text += absl::StrCat("Time          ", Rounded(rig.time_scale()),

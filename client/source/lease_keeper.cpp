@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <thread>
 
 #include "server/base/status.h"
 
@@ -16,6 +17,9 @@ using Clock = std::chrono::steady_clock;
 constexpr double kRenewalsAWindow = 5;
 constexpr double kShortestAnswerS = 0.5;  // what a call to a busy source gets at the least
 constexpr double kAcquireS = 10;
+// A lease that nobody renews, because its holder was killed, is over by then.
+constexpr std::chrono::milliseconds kHolderMayBeGone{2500};
+constexpr std::chrono::milliseconds kAskAgain{100};
 
 Clock::duration Seconds(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
@@ -53,7 +57,13 @@ absl::StatusOr<std::unique_ptr<LeaseKeeper>> LeaseKeeper::Acquire(Connection* co
   std::unique_ptr<LeaseKeeper> keeper(new LeaseKeeper(std::move(options), source.lease_required()));
   if (!keeper->required_) return keeper;
   keeper->control_ = v1::Control::NewStub(connection->channel());
-  TOUCHSTONE_RETURN_IF_ERROR(keeper->AcquireNow(keeper->control_.get(), keeper->options_.take));
+  const Clock::time_point until = Clock::now() + kHolderMayBeGone;
+  absl::Status status = keeper->AcquireNow(keeper->control_.get(), keeper->options_.take);
+  while (absl::IsFailedPrecondition(status) && Clock::now() < until) {
+    std::this_thread::sleep_for(kAskAgain);
+    status = keeper->AcquireNow(keeper->control_.get(), false);
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(status);
   keeper->thread_ = std::thread(&LeaseKeeper::Run, keeper.get());
   return keeper;
 }

@@ -16,6 +16,7 @@ BIN = pathlib.Path(os.environ.get("TOUCHSTONE_BIN", ROOT / "build/release/bin"))
 PYTHON_CLIENT = ROOT / "client/python"
 HIDDEN_OFFSETS_MM = (0.2, 0.0, -0.2)
 HIDDEN_SIGMA_US = 2000
+SPEEDUP = 50
 DONE = 3  # stage of a touch in a journal
 PATIENCE_S = 120
 
@@ -37,7 +38,7 @@ def rig(tmp_path_factory):
     """The address of a gateway in front of the emulated rig."""
     folder = tmp_path_factory.mktemp("rig")
     emulator = subprocess.Popen(
-        [BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", "200", "--seed", "7", "--sigma-us",
+        [BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(SPEEDUP), "--seed", "7", "--sigma-us",
          str(HIDDEN_SIGMA_US), "--hide", "finger_length.offset_mm=" + ",".join(map(str, HIDDEN_OFFSETS_MM))],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     gateway = None
@@ -83,7 +84,8 @@ def plan(tmp_path_factory):
 
 def journal_of_gateway(rig):
     """Ids of the touches of every session that the source itself has, through its own list."""
-    return {entry["name"]: entry for entry in json.loads(touchstone("session", "list", "--json", server=rig))["sessions"]}
+    sessions = json.loads(touchstone("session", "list", "--json", server=rig))["sessions"]
+    return {entry["name"]: entry for entry in sessions}
 
 
 def test_status_tells_every_part_and_that_it_is_emulated(rig):
@@ -91,7 +93,7 @@ def test_status_tells_every_part_and_that_it_is_emulated(rig):
     assert "emulator" in text and "not safety-rated" in text and "RUNNING" in text
     state = json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]
     assert state["arm"]["connected"] and state["effector"]["connected"] and state["camera"]["connected"]
-    assert state["fingers"] == 3 and state["time_scale"] == 200
+    assert state["fingers"] == 3 and state["time_scale"] == SPEEDUP
 
 
 def test_commands_without_a_gateway_say_what_is_missing():
@@ -161,7 +163,7 @@ def test_a_changed_plan_is_no_resumption(rig, plan, session, tmp_path):
     words = lines[1].split(",")
     words[speed] = "10"
     changed.write_text("\n".join([lines[0], ",".join(words), *lines[2:]]) + "\n")
-    message = touchstone("rig", "run", changed, "-o", session, "--session", "monday", server=rig, code=4)
+    message = touchstone("rig", "run", changed, "-o", session, "--session", "monday", server=rig, code=2)
     assert "the plan was changed" in message
 
 

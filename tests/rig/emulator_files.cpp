@@ -96,6 +96,8 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
       "\n[camera]\nsource = %s\nvertical_fov_deg = %.9g\n",
       Quoted("http://" + options.address + ":" + std::to_string(addresses.camera_port) + "/video.mjpg"),
       kVerticalFovDeg);
+  // The plate lies below the arm's base, and an approach may be told to end just above it.
+  text += absl::StrFormat("\n[limits]\nbox_min_mm = [-500, -500, %.9g]\n", kPlateZM * 1e3);
   Write(dir + "/gateway.toml", text);
 }
 
