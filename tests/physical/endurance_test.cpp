@@ -6,9 +6,8 @@ namespace {
 
 TEST(EnduranceTest, NothingIsLostDoubledOrAttributedToAnotherTouchWhateverBreaks) {
   EnduranceOptions options;
-  options.touches = 300;
-  options.speedup = 400;
-  options.fault_share = 0.08;
+  options.touches = 200;
+  options.fault_share = 0.1;
   Endurance endurance(options);
   const EnduranceReport report = endurance.Run();
   EXPECT_TRUE(report.Sound()) << report.Text();

@@ -213,19 +213,26 @@ void Endurance::CompareWithTruth() {
   std::set<uint64_t> taken;
   for (const Expected& expected : pending_) {
     const rig::TouchTruth* own = nullptr;
+    std::string others;  // which fingers reported in touches at its pose
     double nearest_s = INFINITY;
     for (const rig::TouchTruth& truth : truths) {
       if (truth.number <= compared_ || taken.count(truth.number) > 0) continue;
       if (std::abs(truth.speed_m_s - expected.command.speed_m_s()) > 1e-7) continue;
       if ((StartOf(expected.command) - truth.start_in_object_m).norm() > 1e-4) continue;
+      others += " (";
+      for (const double each : truth.reported_s) others += std::isnan(each) ? "-" : "x";
+      others += ")";
       const double furthest_s = FurthestS(expected.contact_time_s, truth.reported_s);
       if (furthest_s < nearest_s) nearest_s = furthest_s, own = &truth;
     }
     if (own == nullptr || nearest_s > kLikenessS) {
       ++report_.wrong;
-      Remark(expected.id + (own == nullptr
-                                ? ": no emulated touch was made at its pose"
-                                : ": its times are " + std::to_string(nearest_s * 1e6) + " us off"));
+      std::string fingers;
+      for (const double each : expected.contact_time_s) fingers += std::isnan(each) ? "-" : "x";
+      Remark(expected.id + ", fingers " + fingers + ": " +
+             (own != nullptr   ? "its times are " + std::to_string(nearest_s * 1e6) + " us off"
+              : others.empty() ? "no emulated touch was made at its pose"
+                               : "in the emulated touches at its pose other fingers reported:" + others));
       continue;
     }
     taken.insert(own->number);

@@ -16,6 +16,8 @@ namespace touchstone {
 struct EnduranceOptions {
   uint64_t touches = 300;
   uint64_t seed = 1;
+  // At most 130: the gateway allows for a second of the host's between an event and its news, and the
+  // device's 32-bit counter comes round in 268 s of the rig's.
   double speedup = 100;
   double fault_share = 0.1;      // of the attempts that something breaks in
   bool own_process = true;       // the gateway is a process, that may be killed; else it is in this one
