@@ -131,6 +131,13 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record) {
     }
     result.fingers.push_back(finger);
   }
+  // No contact comes before its approach. Where it seems so, the two clocks were apart by more than the way
+  // took (on a clock that is accelerated, when the host is busy): the fingers share that error, so it goes,
+  // and their differences stay.
+  double early_s = 0;
+  for (const JournalFinger& finger : result.fingers)
+    if (finger.contact_time_s < early_s) early_s = finger.contact_time_s;
+  for (JournalFinger& finger : result.fingers) finger.contact_time_s -= early_s;
 
   const double scale = record.time_scale;
   const double span_s = last_s > first_s ? (last_s - first_s) / device_rate * scale : 0;

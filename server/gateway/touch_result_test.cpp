@@ -73,6 +73,15 @@ TEST(TouchResult, DifferencesAreInHostTimeWhateverTheEffectorsClockDoes) {
   EXPECT_NEAR(result->effector_drift, -120e-6, 1e-9);
 }
 
+TEST(TouchResult, AnErrorOfTheClocksNeverPutsAContactBeforeItsApproach) {
+  Made made({{0.5}, {2.5}, {1.0}});
+  made.record.controller_clock.remote_at_s -= 3;
+  const auto result = ResultOf(made.record);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->fingers[0].contact_time_s, 0);
+  EXPECT_NEAR(result->fingers[1].contact_time_s, 2.0, 2e-6);
+}
+
 TEST(TouchResult, ThePoseAtContactIsInterpolatedAtItsMoment) {
   const auto result = ResultOf(Made({{1.2005}, {1.0}, {1.1}}).record);
   ASSERT_TRUE(result.ok()) << result.status();

@@ -23,7 +23,7 @@ BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", ROOT / "build/release/bin
 EXAMPLE = ROOT / "client/python/examples/rig_run.py"
 
 # Simulated seconds in one second. A touch takes five of them; what is left is our own programs' time.
-SPEEDUP = 400
+SPEEDUP = 200
 SIGMA_US = 5000
 # Rigs that run at once: one spends half of its time waiting for the other side of a socket.
 RIGS_AT_ONCE = 2
