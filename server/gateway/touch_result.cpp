@@ -21,7 +21,6 @@ struct Line {
 Line FitLine(const std::vector<std::pair<double, double>>& points) {
   Line line;
   line.points = static_cast<int>(points.size());
-  if (points.size() < 2) return line;
   for (const auto& [t, d] : points) line.time_s += t / points.size(), line.distance_m += d / points.size();
   double tt = 0, td = 0;
   for (const auto& [t, d] : points) {
@@ -98,10 +97,13 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record) {
   const Line line = FitLine(full_speed);
   JournalResult result;
   double began_controller_s = origin_s;
-  if (line.points >= 3 && line.speed_m_s > 0) {
-    began_controller_s = origin_s + line.time_s - line.distance_m / line.speed_m_s -
+  if (line.points > 0) {
+    // Few states, as on an accelerated clock, do not tell the speed: then it is the commanded one.
+    const bool told = line.points >= 3 && line.speed_m_s > 0;
+    if (told) result.speed_m_s = line.speed_m_s;
+    began_controller_s = origin_s + line.time_s -
+                         line.distance_m / (told ? line.speed_m_s : motion.speed_m_s) -
                          motion.speed_m_s / (2 * record.acceleration_m_s2);
-    result.speed_m_s = line.speed_m_s;
   }
 
   const bool placed = !states.empty() && record.controller_clock.valid && record.effector_clock.valid;
@@ -141,6 +143,12 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record) {
 
   const double scale = record.time_scale;
   const double span_s = last_s > first_s ? (last_s - first_s) / device_rate * scale : 0;
+  // No damage to the line or the device's counter may pass for a contact.
+  if (motion.duration_s > 0 && span_s > 2 * motion.duration_s + 10)
+    return absl::DataLossError(
+        absl::StrCat("the end effector tells contacts ", ShortestNumber(std::round(span_s)),
+                     " s apart in a touch of about ", ShortestNumber(std::round(motion.duration_s)),
+                     " s: its counter cannot be believed"));
   const double tick_s = 1.0 / record.tick_hz / device_rate * scale;
   const double rate_share =
       record.effector_clock.valid ? record.effector_clock.rate_uncertainty / device_rate : 2e-4;

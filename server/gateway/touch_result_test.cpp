@@ -73,6 +73,26 @@ TEST(TouchResult, DifferencesAreInHostTimeWhateverTheEffectorsClockDoes) {
   EXPECT_NEAR(result->effector_drift, -120e-6, 1e-9);
 }
 
+TEST(TouchResult, OneStateAtFullSpeedTellsWhenTheApproachBegan) {
+  Made made({{1.2}, {1.0}, {2.5}});
+  std::vector<ArmState> few;
+  for (const ArmState& state : made.record.states)
+    if (std::abs(state.controller_time_s - 101.0) < 1e-6 || state.controller_time_s < 100)
+      few.push_back(state);
+  made.record.states = few;
+  const auto result = ResultOf(made.record);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_NEAR(result->fingers[0].contact_time_s, 1.2, 1e-4);
+  EXPECT_EQ(result->speed_m_s, 0) << "one state tells no speed";
+}
+
+TEST(TouchResult, ContactsFartherApartThanTheTouchTookAreNotBelieved) {
+  Made made({{1.2}, {1.0}, {1.1 + 268.4}});
+  made.record.motion.duration_s = 8;
+  const auto result = ResultOf(made.record);
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kDataLoss) << result.status();
+}
+
 TEST(TouchResult, AnErrorOfTheClocksNeverPutsAContactBeforeItsApproach) {
   Made made({{0.5}, {2.5}, {1.0}});
   made.record.controller_clock.remote_at_s -= 3;

@@ -257,7 +257,10 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
   faults_.Set("disconnect", 1);
   ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
   ASSERT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
-  EXPECT_GT(arm_->State()->controller_time_s, before_s);
+  EXPECT_TRUE(Wait([&] {
+    const auto state = arm_->State();
+    return state.ok() && state->controller_time_s > before_s;
+  }));
   Heart heart(arm_.get());
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(16)).ok());
   EXPECT_TRUE(WaitForPhase(16, MotionPhase::kReady));

@@ -45,7 +45,7 @@ bool Negotiate(FakeServer::Connection& connection, const Script& script) {
             "\1DOUBLE,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,INT32,INT32,UINT32,UINT32,UINT32,DOUBLE,INT32,"
             "INT32";
         if (absl::StrContains((*message)->payload, "tcp_offset"))
-          reply += script.knows_tcp_offset ? ",VECTOR6D" : ",NOT_FOUND";
+          reply += script.knows_tcp_offset ? ",VECTOR6D,INT32" : ",NOT_FOUND,NOT_FOUND";
       }
       connection.Send(EncodeRtde(type, reply));
       if (type == RtdeType::kStart) return true;
@@ -59,6 +59,7 @@ std::string Data(double timestamp_s, bool with_tcp_offset = true) {
   for (int i = 0; i < 24; ++i) writer.F64(0);
   writer.I32(7).I32(1).U32(1).U32(1).U32(1).F64(1).I32(0).I32(0);
   for (int i = 0; with_tcp_offset && i < 6; ++i) writer.F64(0);
+  if (with_tcp_offset) writer.I32(0);
   return EncodeRtde(RtdeType::kData, writer.bytes());
 }
 

@@ -32,7 +32,11 @@ std::vector<Field> OutputFields(bool with_tcp_offset) {
                                {"speed_scaling", "DOUBLE"},
                                {absl::StrCat("output_int_register_", kProgramRegister), "INT32"},
                                {absl::StrCat("output_int_register_", kPhaseRegister), "INT32"}};
-  if (with_tcp_offset) fields.push_back({"tcp_offset", "VECTOR6D"});
+  // Newer controllers tell these too: the tool, and our own beat as it has arrived.
+  if (with_tcp_offset) {
+    fields.push_back({"tcp_offset", "VECTOR6D"});
+    fields.push_back({absl::StrCat("input_int_register_", kBeatRegister), "INT32"});
+  }
   return fields;
 }
 
@@ -143,7 +147,10 @@ absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe
   sample.program_register = reader.I32();
   sample.phase_register = reader.I32();
   sample.has_tcp_offset = with_tcp_offset;
-  if (with_tcp_offset) sample.tcp_offset = Vector6(&reader);
+  if (with_tcp_offset) {
+    sample.tcp_offset = Vector6(&reader);
+    sample.beat_echo = reader.I32();
+  }
   if (!reader.ok() || !reader.AtEnd())
     return absl::DataLossError(
         absl::StrCat("RTDE: a data package of ", payload.size(), " bytes does not fit its recipe"));

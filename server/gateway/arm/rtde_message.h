@@ -56,7 +56,8 @@ struct RtdeSample {
   double speed_scaling = 0;
   int32_t program_register = 0, phase_register = 0;
   std::array<double, 6> tcp_offset{};  // of the tool that actual_tcp_pose is of
-  bool has_tcp_offset = false;         // old controllers do not tell it
+  int32_t beat_echo = 0;               // the newest beat that the controller has got
+  bool has_tcp_offset = false;         // and the beat; old controllers do not tell them
 };
 
 // "timestamp,actual_q,...": the names of a sample's fields.

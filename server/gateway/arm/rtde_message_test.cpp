@@ -20,6 +20,7 @@ std::string SamplePayload(double timestamp_s, bool with_tcp_offset = true) {
   for (int i = 0; i < 24; ++i) writer.F64(0.125 * i);
   writer.I32(7).I32(3).U32(2).U32(3).U32(4).F64(0.75).I32(17).I32(-1);
   for (int i = 0; with_tcp_offset && i < 6; ++i) writer.F64(0.5 * i);
+  if (with_tcp_offset) writer.I32(123);
   return writer.bytes();
 }
 
@@ -40,6 +41,7 @@ TEST(RtdeMessage, SampleIsReadInTheOrderOfItsNames) {
   EXPECT_EQ(sample->program_register, 17);
   EXPECT_EQ(sample->phase_register, -1);
   EXPECT_EQ(sample->tcp_offset[5], 2.5);
+  EXPECT_EQ(sample->beat_echo, 123);
 }
 
 TEST(RtdeMessage, SampleThatIsCutOrOfAnotherRecipeIsRefused) {

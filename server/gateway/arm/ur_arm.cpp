@@ -37,6 +37,33 @@ Eigen::Isometry3d PoseOf(const std::array<double, 6>& vector) {
   return pose;
 }
 
+// When the last beats were sent, host time.
+class SentBeats {
+ public:
+  void Sent(int32_t beat, double host_s) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    sent_[beat % kKept] = {beat, host_s};
+  }
+  // When that beat was sent, the first time that it is asked for; 0 afterwards, and if it is not known.
+  double TakeSendingOf(int32_t beat) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    Beat& kept = sent_[static_cast<uint32_t>(beat) % kKept];
+    if (kept.beat != beat || beat == last_) return 0;
+    last_ = beat;
+    return kept.host_s;
+  }
+
+ private:
+  struct Beat {
+    int32_t beat = 0;
+    double host_s = 0;
+  };
+  static constexpr int kKept = 256;
+  std::mutex mutex_;
+  std::array<Beat, kKept> sent_{};
+  int32_t last_ = 0;
+};
+
 class UrArmOnTcp final : public UrArm {
  public:
   UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, Signal* news)
@@ -69,6 +96,7 @@ class UrArmOnTcp final : public UrArm {
   absl::Status Stop() override;
   absl::Status PowerOn() override;
   void Beat() override;
+  absl::Status WriteBeat();  // inputs_mutex_ is held
 
   ClockEstimate ControllerClock() const override {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -119,6 +147,7 @@ class UrArmOnTcp final : public UrArm {
   mutable std::atomic<bool> suspect_{false};  // a program did not begin
   std::mutex inputs_mutex_;                   // of the registers
   int32_t beat_ = 0, command_ = 0;
+  SentBeats sent_beats_;
   std::atomic<uint64_t> stop_count_{0};
   std::atomic<bool> withhold_beats_{false};
 
@@ -157,7 +186,13 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     history_.Add(state);
-    clock_.AddOneWay(state.controller_time_s, host_s, options_.assumed_delay_s);
+    // A state that tells a new beat was made between the beat's sending and its own arrival; without beats,
+    // only the later of the two is known.
+    const double sent_s = sample.has_tcp_offset ? sent_beats_.TakeSendingOf(sample.beat_echo) : 0;
+    if (sent_s > 0)
+      clock_.AddRoundTrip(sent_s, state.controller_time_s, state.controller_time_s, host_s);
+    else
+      clock_.AddOneWay(state.controller_time_s, host_s, options_.assumed_delay_s);
     if (start_.program_id == state.program_id) start_ = Start();
   }
   news_->Notify();
@@ -276,14 +311,19 @@ absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eige
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
   std::lock_guard<std::mutex> lock(inputs_mutex_);
   command_ = CommandWord(program_id, command);
-  return rtde_.WriteInputs(++beat_ & 0x7fffffff, command_);
+  return WriteBeat();
 }
 
 void UrArmOnTcp::Beat() {
   if (withhold_beats_) return;
   std::lock_guard<std::mutex> lock(inputs_mutex_);
+  WriteBeat().IgnoreError();  // a lost link is told by State()
+}
+
+absl::Status UrArmOnTcp::WriteBeat() {
   beat_ = (beat_ + 1) & 0x7fffffff;
-  rtde_.WriteInputs(beat_, command_).IgnoreError();  // a lost link is told by State()
+  sent_beats_.Sent(beat_, HostNowS());
+  return rtde_.WriteInputs(beat_, command_);
 }
 
 absl::Status UrArmOnTcp::SendStop() {
