@@ -23,7 +23,7 @@ BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", ROOT / "build/release/bin
 EXAMPLE = ROOT / "client/python/examples/rig_run.py"
 
 # Simulated seconds in one second. A touch takes five of them; what is left is our own programs' time.
-SPEEDUP = 200
+SPEEDUP = 120
 SIGMA_US = 5000
 # Rigs that run at once: one spends half of its time waiting for the other side of a socket.
 RIGS_AT_ONCE = 2
@@ -67,7 +67,7 @@ CIRCLES = [
     Circle("oblique_slip", "python", {"oblique_slip": ("travel_mm", [0.5])}, seed=17, near={"oblique_slip": 0.1}),
     # The simulated clock goes on while our programs take their time: at a lower speed the drift depends less on theirs.
     Circle("thermal_drift", "command line", {"thermal_drift": ("rate_mm_per_h", [0.6, -0.15, -0.45])}, seed=18,
-           speedup=150, near={"thermal_drift": 0.12}),
+           speedup=100, near={"thermal_drift": 0.12}),
     Circle("return_hysteresis", "python", {"return_hysteresis": ("fraction", [0.08])}, seed=19,
            near={"return_hysteresis": 0.01}),
     Circle("pair", "command line", {"tip_radius": ("radius_mm", [1.5]), "object_push": ("shift_mm", [0.5])}, seed=20,

@@ -88,8 +88,8 @@ void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& ch
 }
 
 void PhysicalTest::StartGateway(std::vector<std::string> flags) {
-  flags.insert(flags.begin(), {"touchstone-gateway", "--config", emulator_->config_path(), "--listen", "127.0.0.1:0",
-                               "--supershape-triangles", "2000"});
+  flags.insert(flags.begin(), {"touchstone-gateway", "--config", emulator_->config_path(), "--listen",
+                               "127.0.0.1:0", "--supershape-triangles", "2000"});
   flags.insert(flags.begin() + 1, Patience().begin(), Patience().end());
   std::vector<const char*> argv;
   for (const std::string& flag : flags) argv.push_back(flag.c_str());
@@ -106,14 +106,16 @@ void PhysicalTest::StopGateway() {
 }
 
 void PhysicalTest::StartGatewayProcess() {
-  const std::string program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone-gateway";
+  const std::string program =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone-gateway";
   const std::string out = (folder_ / "gateway.out").string();
   std::filesystem::remove(out);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  std::vector<std::string> words = {program, "--config", emulator_->config_path(), "--listen", "127.0.0.1:0",
-                                    "--supershape-triangles", "2000"};
+  std::vector<std::string> words = {program,    "--config",    emulator_->config_path(),
+                                    "--listen", "127.0.0.1:0", "--supershape-triangles",
+                                    "2000"};
   words.insert(words.begin() + 1, Patience().begin(), Patience().end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -174,7 +176,8 @@ PhysicalTest::Answer PhysicalTest::Touch(const std::string& token, const v1::Com
   return answer;
 }
 
-std::future<PhysicalTest::Answer> PhysicalTest::TouchLater(const std::string& token, const v1::CommandedTouch& touch,
+std::future<PhysicalTest::Answer> PhysicalTest::TouchLater(const std::string& token,
+                                                           const v1::CommandedTouch& touch,
                                                            const std::string& id) {
   return std::async(std::launch::async, [=] { return Touch(token, touch, id); });
 }
@@ -258,7 +261,8 @@ void PhysicalTest::ExpectEveryResultIsItsOwnTouch() {
       // The same differences between its fingers.
       double furthest_s = 0;
       for (size_t i = 0; i < touch.result.fingers.size(); ++i) {
-        const double measured_s = touch.result.fingers[i].contact_time_s - touch.result.fingers[0].contact_time_s;
+        const double measured_s =
+            touch.result.fingers[i].contact_time_s - touch.result.fingers[0].contact_time_s;
         const double true_s = truth.reported_s[i] - truth.reported_s[0];
         if (std::isnan(measured_s) != std::isnan(true_s)) furthest_s = INFINITY;
         if (!std::isnan(true_s)) furthest_s = std::max(furthest_s, std::abs(measured_s - true_s));

@@ -1,4 +1,5 @@
-// An emulated rig, a gateway that drives it, and a client of the gateway. The emulator's data stand for no measurement.
+// An emulated rig, a gateway that drives it, and a client of the gateway. The emulator's data stand for no
+// measurement.
 #pragma once
 
 #include <atomic>
@@ -45,7 +46,8 @@ class PhysicalTest : public testing::Test {
   PhysicalTest();
   ~PhysicalTest() override;
 
-  // With changes to the emulator's options before it begins. Touches from above of lat00 need no change of the object.
+  // With changes to the emulator's options before it begins. Touches from above of lat00 need no change of
+  // the object.
   void StartRig(const std::function<void(rig::EmulatorOptions*)>& change = nullptr);
   // In this process, or (over the program touchstone-gateway) in another one that can be killed.
   void StartGateway(std::vector<std::string> flags = {});
@@ -62,7 +64,8 @@ class PhysicalTest : public testing::Test {
   };
   Answer Touch(const std::string& token, const v1::CommandedTouch& touch, const std::string& id,
                const std::string& object = "lat00");
-  std::future<Answer> TouchLater(const std::string& token, const v1::CommandedTouch& touch, const std::string& id);
+  std::future<Answer> TouchLater(const std::string& token, const v1::CommandedTouch& touch,
+                                 const std::string& id);
   // Waits, a minute at most.
   static void WaitUntil(const std::function<bool()>& done, const char* what);
   // Until the approach of the arm has come so far, rig metres.
@@ -75,8 +78,8 @@ class PhysicalTest : public testing::Test {
 
   // The journalled touches of session "test", oldest first. The gateway must be stopped.
   std::vector<JournalTouch> Journalled() const;
-  // Every journalled result is of a touch that the emulator saw, at the pose that was commanded, and no two are of the
-  // same one: nothing lost, doubled or at a wrong pose.
+  // Every journalled result is of a touch that the emulator saw, at the pose that was commanded, and no two
+  // are of the same one: nothing lost, doubled or at a wrong pose.
   void ExpectEveryResultIsItsOwnTouch();
 
   std::filesystem::path folder_;
