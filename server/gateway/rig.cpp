@@ -12,6 +12,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/run_command.h"
 #include "server/image/encode.h"
 
@@ -87,6 +88,23 @@ PhysicalFacts Rig::Facts() const {
   return facts;
 }
 
+absl::Status Rig::PowerUp(const Permit& permit) {
+  constexpr int kRunning = 7;
+  constexpr double kPatienceS = 10;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, parts_.arm->State());
+  if (state.robot_mode >= kRunning || !SafetyPermitsMotion(state.safety_mode).ok())
+    return parts_.arm->Ready();
+  audit().Write("power_on", {{"robot_mode", RobotModeName(state.robot_mode)}}).IgnoreError();
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn());
+  // The states tell it a little later than the dashboard.
+  const uint64_t stops = stops_;
+  for (const double until_s = HostNowS() + kPatienceS; !parts_.arm->Ready().ok() && HostNowS() < until_s;) {
+    TOUCHSTONE_RETURN_IF_ERROR(Allowed(permit, stops));
+    parts_.news->WaitForNews(parts_.news->count(), 0.01);
+  }
+  return parts_.arm->Ready();
+}
+
 absl::Status Rig::EnsureSession(const std::string& name) {
   std::lock_guard<std::mutex> lock(sessions_mutex_);
   if (sessions_.count(name) > 0) return absl::OkStatus();
@@ -129,7 +147,7 @@ absl::StatusOr<JournalTouch> Rig::Touch(const TouchOrder& order, const Permit& p
   if (known.has_value()) return *std::move(known);
 
   // Everything that can forbid it, before anything is written or moved.
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
   if (const EffectorState effector = parts_.effector->State(); !effector.connected)
     return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
   const std::string placement = PlacementFor(order.touch.approach);
@@ -199,7 +217,7 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewOrder& order, const Permit& perm
     return absl::FailedPreconditionError(
         "the calibration file has no flange_from_camera: where the camera sits");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
   const std::string placement = PlacementFor(order.object_from_camera.rotation().col(2));
   TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(order.object, placement, permit));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
@@ -261,7 +279,7 @@ absl::Status Rig::Home(const Permit& permit) {
 }
 
 absl::Status Rig::MoveHome(const Permit& permit) {
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
   return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, permit);

@@ -111,6 +111,8 @@ class Rig : public PhysicalSource {
   absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const Permit& permit);
   // The permit, and that nobody has stopped the rig since `stops`.
   absl::Status Allowed(const Permit& permit, uint64_t stops) const;
+  // Powers the arm on and releases its brakes if they are not: only ever for somebody who may move it now.
+  absl::Status PowerUp(const Permit& permit);
   absl::Status EnsureMounted(const std::string& object, const std::string& placement, const Permit& permit);
   absl::Status MoveHome(const Permit& permit);
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,

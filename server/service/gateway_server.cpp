@@ -1,7 +1,6 @@
 #include "server/service/gateway_server.h"
 
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -43,8 +42,6 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   arm.script.time_scale = options.time_scale;
   arm.script.watchdog_hz = options.arm.watchdog_hz;
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.news.get()));
-  if (const absl::Status powered = parts.arm->PowerOn(); !powered.ok())
-    spdlog::warn("the arm was not powered on: {}", std::string(powered.message()));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector, Effector::Open(options.effector, parts.news.get()));
   if (!options.camera.source.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(parts.camera, CameraDevice::Open(options.camera));

@@ -89,6 +89,9 @@ def journal_of_gateway(rig):
 
 
 def test_status_tells_every_part_and_that_it_is_emulated(rig):
+    # Looking powers nothing on; moving does.
+    assert "POWER_OFF" in touchstone("rig", "status", server=rig)
+    touchstone("rig", "home", server=rig)
     text = touchstone("rig", "status", server=rig)
     assert "emulator" in text and "not safety-rated" in text and "RUNNING" in text
     state = json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]
