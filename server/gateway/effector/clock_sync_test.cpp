@@ -59,6 +59,14 @@ struct Line {
   }
 };
 
+// Statistics over hours of queries: sanitizers would make minutes of it and find nothing that the rest does
+// not.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kUnderSanitizers = true;
+#else
+constexpr bool kUnderSanitizers = false;
+#endif
+
 TEST(ClockSync, KnowsNothingBeforeTheFirstMessage) {
   ClockSync sync;
   EXPECT_FALSE(sync.Estimate().valid);
@@ -68,9 +76,10 @@ TEST(ClockSync, KnowsNothingBeforeTheFirstMessage) {
 
 TEST(ClockSync, FindsTheOffsetUnderFiveMillisecondsOfJitter) {
   for (const double drift_ppm : {-200.0, -100.0, 0.0, 100.0, 200.0}) {
+    if (kUnderSanitizers && drift_ppm != 100) continue;
     for (const double jitter_s : {0.0, 0.001, 0.005}) {
       double worst_s = 0;
-      for (int seed = 0; seed < 6; ++seed) {
+      for (int seed = 0; seed < (kUnderSanitizers ? 1 : 6); ++seed) {
         RandomStream random(seed, RandomDomain::kTest, 1);
         Line line;
         line.drift_ppm = drift_ppm;
@@ -124,6 +133,7 @@ Quality Judge(const Line& line, double from_s, double to_s, int seeds) {
 }
 
 TEST(ClockSync, TellsItsUncertaintyHonestly) {
+  if (kUnderSanitizers) GTEST_SKIP() << "statistics; other builds look at them";
   Line uniform;
   Line quiet = uniform;
   quiet.jitter_s = 0.00005;
@@ -143,6 +153,7 @@ TEST(ClockSync, TellsItsUncertaintyHonestly) {
 }
 
 TEST(ClockSync, FollowsAClockThatWarms) {
+  if (kUnderSanitizers) GTEST_SKIP() << "statistics; other builds look at them";
   for (const double change : {-1.0, 1.0}) {
     Line line;
     line.drift_change_ppm_per_min = change;
