@@ -139,7 +139,7 @@ Outcome Machine::MoveJoints(const Joints& joints, double speed, double accelerat
 Outcome Machine::MoveAlong(const Vector6& twist, double acceleration, double duration_s, int thread) {
   const double linear = twist.head<3>().norm(), angular = twist.tail<3>().norm();
   // The measure of the line, as LinePath has it.
-  const double speed = std::max(linear, kMetresPerRadian * angular);
+  const double speed = linear > kTurnOnly ? linear : std::max(linear, kMetresPerRadian * angular);
   if (speed <= 0) return StopMotion(acceleration);
   if (MustWaitToMove(thread, true)) return {Outcome::Wait::kRetry, {}, 0};
   double first_speed = 0;

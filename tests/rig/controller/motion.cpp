@@ -37,9 +37,11 @@ LinePath::LinePath(const ArmGeometry& arm, const Joints& from, const Eigen::Isom
       to_(base_from_tip_end),
       turn_(RotationVector(to_.linear() * from_.linear().transpose())) {
   metres_ = (to_.translation() - from_.translation()).norm();
-  length_ = std::max(metres_, kMetresPerRadian * turn_.norm());
+  const double turned = kMetresPerRadian * turn_.norm();
+  length_ = metres_ > kTurnOnly ? metres_ : turned;
   if (length_ < 1e-9) length_ = metres_ = 0;
-  const int count = std::clamp(static_cast<int>(std::ceil(length_ / kKnotEvery)), 1, kMostKnots);
+  const int count =
+      std::clamp(static_cast<int>(std::ceil(std::max(metres_, turned) / kKnotEvery)), 1, kMostKnots);
   knot_spacing_ = length_ / count;
   knots_ = {from};
   for (int i = 1; i <= count && length_ > 0; ++i) {

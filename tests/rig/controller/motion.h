@@ -27,9 +27,10 @@ class Path {
   virtual std::optional<Obstacle> FirstObstacle(double speed, double acceleration) const = 0;
 };
 
-// A straight line of the tip, position and rotation together. A line that hardly moves is measured by its
-// turn, at kMetresPerRadian, so that `v` bounds the turn too.
+// A straight line of the tip, position and rotation together. `v` is the tip's speed, however much the tool
+// turns on the way; a line that only turns is measured by its turn, at kMetresPerRadian.
 inline constexpr double kMetresPerRadian = 0.25;
+inline constexpr double kTurnOnly = 1e-4;  // m; a shorter line only turns
 
 class LinePath : public Path {
  public:
