@@ -11,6 +11,7 @@
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/session/hdf5_file.h"
 
 namespace touchstone::client {
 namespace {
@@ -18,30 +19,7 @@ namespace {
 constexpr uint64_t kChunkBytes = 64 << 10;
 constexpr unsigned kImageDeflateLevel = 1;
 
-// An HDF5 handle with the function that closes it.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  Handle(Handle&& other) noexcept : id_(other.id_), close_(other.close_) { other.id_ = -1; }
-  Handle& operator=(Handle&& other) noexcept {
-    std::swap(id_, other.id_);
-    std::swap(close_, other.close_);
-    return *this;
-  }
-  ~Handle() { Close(); }
-  bool ok() const { return id_ >= 0; }
-  operator hid_t() const { return id_; }
-  bool Close() {
-    if (id_ < 0) return true;
-    const bool closed = close_(id_) >= 0;
-    id_ = -1;
-    return closed;
-  }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
+using Handle = Hdf5Handle;
 
 hid_t Hdf5Type(v1::DataType type) {
   switch (type) {

@@ -9,6 +9,7 @@
 
 #include "server/base/status.h"
 #include "server/service/convert.h"
+#include "server/service/permit.h"
 #include "server/service/physical_dataset.h"
 
 namespace touchstone {
@@ -109,15 +110,6 @@ grpc::Status PhysicalSourceService::Describe(grpc::ServerContext*, const v1::Des
   return grpc::Status::OK;
 }
 
-Permit PhysicalSourceService::PermitOf(grpc::ServerContext* context, const std::string& lease_token) const {
-  return [this, context, lease_token]() -> absl::Status {
-    if (context->IsCancelled())
-      return absl::CancelledError("the client is gone, or the call's deadline has passed");
-    if (resources_->draining) return absl::UnavailableError("the gateway is being shut down");
-    return leases_->Check(lease_token);
-  };
-}
-
 grpc::Status PhysicalSourceService::Touch(grpc::ServerContext* context, const v1::TouchRequest* request,
                                           v1::TouchResponse* response) {
   return ToGrpc(DoTouch(context, *request, response));
@@ -126,7 +118,7 @@ grpc::Status PhysicalSourceService::Touch(grpc::ServerContext* context, const v1
 absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request,
                                             v1::TouchResponse* response) {
   const RunningGuard running(&resources_->running_requests);
-  const Permit permit = PermitOf(context, request.lease_token());
+  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
@@ -169,7 +161,7 @@ grpc::Status PhysicalSourceService::Capture(grpc::ServerContext* context, const 
 absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request,
                                               v1::CaptureResponse* response) {
   const RunningGuard running(&resources_->running_requests);
-  const Permit permit = PermitOf(context, request.lease_token());
+  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
@@ -256,7 +248,7 @@ absl::Status PhysicalSourceService::DoStream(grpc::ServerContext* context,
   response.clear_header();
 
   const std::vector<ColumnInfo> columns = ColumnsOf(*specification);
-  const Permit permit = PermitOf(context, request.lease_token());
+  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
   for (;;) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch, dataset.Next(permit));
     if (!batch.has_value()) return absl::OkStatus();

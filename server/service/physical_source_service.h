@@ -27,8 +27,6 @@ class PhysicalSourceService final : public SourceService {
                          v1::CaptureResponse* response);
   absl::Status DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& request,
                         grpc::ServerWriter<v1::StreamDatasetResponse>* writer);
-  // The lease still holds, the client is still there, the process is not draining.
-  Permit PermitOf(grpc::ServerContext* context, const std::string& lease_token) const;
 
   PhysicalSource* source_;
 };

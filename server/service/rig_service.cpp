@@ -10,6 +10,7 @@
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/service/convert.h"
+#include "server/service/permit.h"
 
 namespace touchstone {
 namespace {
@@ -62,15 +63,6 @@ grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1:
   const grpc::Status status = ControlService::GetState(context, request, response);
   if (!resources_->draining) response->set_state(rig_->State());
   return status;
-}
-
-Permit RigService::PermitOf(grpc::ServerContext* context, const std::string& lease_token) const {
-  return [this, context, lease_token]() -> absl::Status {
-    if (context->IsCancelled())
-      return absl::CancelledError("the client is gone, or the call's deadline has passed");
-    if (resources_->draining) return absl::UnavailableError("the gateway is being shut down");
-    return leases_->Check(lease_token);
-  };
 }
 
 void RigService::Describe(v1::RigState* state) const {
@@ -200,13 +192,14 @@ absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountOb
   if (std::find(known.begin(), known.end(), placement) == known.end())
     return absl::InvalidArgumentError(absl::StrCat(
         "placement = '", placement, "': the face that points up, one of ", absl::StrJoin(known, ", ")));
-  return rig_->Mount(request.object(), placement, PermitOf(context, request.lease_token()));
+  return rig_->Mount(request.object(), placement,
+                     PermitOf(context, resources_, leases_, request.lease_token()));
 }
 
 grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request,
                               v1::RigState* response) {
   absl::Status status = leases_->Check(request->lease_token());
-  if (status.ok()) status = rig_->Home(PermitOf(context, request->lease_token()));
+  if (status.ok()) status = rig_->Home(PermitOf(context, resources_, leases_, request->lease_token()));
   if (status.ok()) Describe(response);
   return ToGrpc(status);
 }

@@ -38,7 +38,6 @@ class RigService final : public v1::Rig::Service {
  private:
   absl::Status DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response);
   absl::Status DoMount(grpc::ServerContext* context, const v1::MountObjectRequest& request);
-  Permit PermitOf(grpc::ServerContext* context, const std::string& lease_token) const;
   void Describe(v1::RigState* state) const;
 
   Resources* resources_;

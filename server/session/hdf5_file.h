@@ -1,4 +1,4 @@
-// An HDF5 file as named columns of numbers and texts. Internal to session/.
+// HDF5 handles, and an HDF5 file as named columns of numbers and texts.
 #pragma once
 
 #include <hdf5.h>
