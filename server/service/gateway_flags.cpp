@@ -1,6 +1,5 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <filesystem>
@@ -163,10 +162,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
       TakeList(raw.joint_max_deg, kRadiansPerDegree, "limits.joint_max_deg", &limits.joint_max_rad));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.home_deg, kRadiansPerDegree, "limits.home_deg", &limits.home_rad));
 
-  const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
-  if (std::find(levels.begin(), levels.end(), flags->log_level) == levels.end())
-    return absl::InvalidArgumentError(
-        absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckLogLevel(flags->log_level));
   if (o.replay.empty() && (o.arm.address.empty() || o.effector.port.empty()))
     return absl::InvalidArgumentError(
         "arm.address and effector.port say where the rig is: give --config FILE, or both; --replay FILE "
@@ -181,47 +177,30 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
   GatewayFlags flags;
   Raw raw;
   const std::vector<Option> options = OptionsOf(&flags, &raw);
-  CLI::App app(
-      "Examples:\n"
-      "  touchstone-gateway --config rig.toml\n"
-      "  touchstone-gateway --arm-address 192.168.0.10 --arm-model ur3e --effector-port /dev/ttyACM0\n"
-      "  touchstone-gateway --replay session.db\n"
-      "\nThe physical source: drives a UR3 arm, the end effector and a camera behind the same services as\n"
-      "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software stop "
-      "and\n"
-      "not safety-rated: keep the emergency stop within reach.",
-      "touchstone-gateway");
-  std::string config;
-  bool version = false;
-  app.add_option("--config", config, "TOML file; its keys are the flags below: arm.address = --arm-address");
-  app.add_flag("--version", version, "Print the version");
-  AddFlags(options, &app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
-    flags.done = true;
-    return flags;
-  } catch (const CLI::ExtrasError&) {
-    return UnknownFlag(options, app);
-  } catch (const CLI::ParseError& error) {
-    return absl::InvalidArgumentError(error.what());
-  }
-  if (version) {
-    std::printf("touchstone-gateway %s\n", kVersion);
-    flags.done = true;
-    return flags;
-  }
-  if (!config.empty()) {
-    const std::set<std::string> given = GivenKeys(options, app);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(config, 1 << 20));
-    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, given));
-    const std::filesystem::path folder = std::filesystem::path(config).parent_path();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const CommandLine line,
+      ReadCommandLine(
+          "touchstone-gateway",
+          "Examples:\n"
+          "  touchstone-gateway --config rig.toml\n"
+          "  touchstone-gateway --arm-address 192.168.0.10 --arm-model ur3e --effector-port /dev/ttyACM0\n"
+          "  touchstone-gateway --replay session.db\n"
+          "\nThe physical source: drives a UR3 arm, the end effector and a camera behind the same services "
+          "as\n"
+          "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software "
+          "stop "
+          "and\n"
+          "not safety-rated: keep the emergency stop within reach.",
+          "TOML file; its keys are the flags below: arm.address = --arm-address", options, argc, argv));
+  flags.done = line.done;
+  if (line.done) return flags;
+  if (!line.config.empty()) {
+    const std::filesystem::path folder = std::filesystem::path(line.config).parent_path();
     for (const auto& [key, path] :
          {std::pair("journal", &flags.options.journal), std::pair("audit_log", &flags.options.audit_log),
           std::pair("calibration", &flags.options.calibration), std::pair("replay", &flags.options.replay),
           std::pair("camera.intrinsics", &flags.options.camera.intrinsics)})
-      if (given.count(key) == 0 && !path->empty()) *path = (folder / *path).string();
+      if (line.given.count(key) == 0 && !path->empty()) *path = (folder / *path).string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));
   return flags;

@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/resources.h"
 
 namespace touchstone {
 namespace {
@@ -135,6 +137,46 @@ absl::Status UnknownFlag(const std::vector<Option>& options, const CLI::App& app
   const std::vector<std::string> extras = app.remaining();
   const std::string word = extras.empty() ? "" : extras[0].substr(0, extras[0].find('='));
   return absl::InvalidArgumentError(absl::StrCat("unknown flag ", word, DidYouMean(word, known)));
+}
+
+absl::StatusOr<CommandLine> ReadCommandLine(const std::string& program, const std::string& help,
+                                            const std::string& config_help,
+                                            const std::vector<Option>& options, int argc,
+                                            const char* const* argv) {
+  CommandLine line;
+  CLI::App app(help, program);
+  bool version = false;
+  app.add_option("--config", line.config, config_help);
+  app.add_flag("--version", version, "Print the version");
+  AddFlags(options, &app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    line.done = true;
+    return line;
+  } catch (const CLI::ExtrasError&) {
+    return UnknownFlag(options, app);
+  } catch (const CLI::ParseError& error) {
+    return absl::InvalidArgumentError(error.what());
+  }
+  if (version) {
+    std::printf("%s %s\n", program.c_str(), kVersion);
+    line.done = true;
+    return line;
+  }
+  line.given = GivenKeys(options, app);
+  if (!line.config.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(line.config, 1 << 20));
+    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, line.config, options, line.given));
+  }
+  return line;
+}
+
+absl::Status CheckLogLevel(const std::string& level) {
+  const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
+  if (std::find(levels.begin(), levels.end(), level) != levels.end()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("log_level = '", level, "'", DidYouMean(level, levels)));
 }
 
 absl::Status CheckRange(double value, double lower, double upper, const std::string& name) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 namespace CLI {
 class App;
@@ -37,6 +38,21 @@ void AddFlags(const std::vector<Option>& options, CLI::App* app);
 std::set<std::string> GivenKeys(const std::vector<Option>& options, const CLI::App& app);
 // What is wrong with the first word that no flag took; suggests a near one.
 absl::Status UnknownFlag(const std::vector<Option>& options, const CLI::App& app);
+
+// The command line of a server, read into the options' targets, and the file that its --config names.
+struct CommandLine {
+  bool done = false;            // help or version was printed
+  std::string config;           // empty: none was named
+  std::set<std::string> given;  // keys whose flags were given: those win
+};
+// `help` is the text above the flags; `config_help` that of --config.
+absl::StatusOr<CommandLine> ReadCommandLine(const std::string& program, const std::string& help,
+                                            const std::string& config_help,
+                                            const std::vector<Option>& options, int argc,
+                                            const char* const* argv);
+
+// "trace" to "off".
+absl::Status CheckLogLevel(const std::string& level);
 
 // "must be from 1 to 9".
 absl::Status CheckRange(double value, double lower, double upper, const std::string& name);

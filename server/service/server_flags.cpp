@@ -1,7 +1,6 @@
 #include "server/service/server_flags.h"
 
 #include <absl/strings/str_cat.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <vector>
@@ -75,11 +74,7 @@ absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
     return absl::InvalidArgumentError(
         absl::StrCat("renderer = '", raw.renderer, "'", DidYouMean(raw.renderer, {"auto", "egl", "cpu"})));
   }
-  const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
-  if (std::find(levels.begin(), levels.end(), flags->log_level) == levels.end())
-    return absl::InvalidArgumentError(
-        absl::StrCat("log_level = '", flags->log_level, "'", DidYouMean(flags->log_level, levels)));
-  return absl::OkStatus();
+  return CheckLogLevel(flags->log_level);
 }
 
 }  // namespace
@@ -94,40 +89,20 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
   ServerFlags flags;
   Raw raw;
   const std::vector<Option> options = OptionsOf(&flags, &raw);
-  CLI::App app(
-      "Examples:\n"
-      "  touchstone-server\n"
-      "  touchstone-server --listen 0.0.0.0:50051 --mesh cup=cup.off,fit_mm=150,up=y\n"
-      "  touchstone-server --config server.toml --threads 8\n"
-      "\nThe virtual source: simulates touches, renders images and streams datasets over gRPC.\n"
-      "It prints 'listening on HOST:PORT' when it is ready and drains on SIGTERM.",
-      "touchstone-server");
-  std::string config;
-  bool version = false;
-  app.add_option("--config", config,
-                 "TOML file; its keys are the flags below with underscores (listen = \"127.0.0.1:0\")");
-  app.add_flag("--version", version, "Print the version");
-  AddFlags(options, &app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
-    flags.done = true;
-    return flags;
-  } catch (const CLI::ExtrasError&) {
-    return UnknownFlag(options, app);
-  } catch (const CLI::ParseError& error) {
-    return absl::InvalidArgumentError(error.what());
-  }
-  if (version) {
-    std::printf("touchstone-server %s\n", kVersion);
-    flags.done = true;
-    return flags;
-  }
-  if (!config.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(config, 1 << 20));
-    TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, config, options, GivenKeys(options, app)));
-  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const CommandLine line,
+      ReadCommandLine(
+          "touchstone-server",
+          "Examples:\n"
+          "  touchstone-server\n"
+          "  touchstone-server --listen 0.0.0.0:50051 --mesh cup=cup.off,fit_mm=150,up=y\n"
+          "  touchstone-server --config server.toml --threads 8\n"
+          "\nThe virtual source: simulates touches, renders images and streams datasets over gRPC.\n"
+          "It prints 'listening on HOST:PORT' when it is ready and drains on SIGTERM.",
+          "TOML file; its keys are the flags below with underscores (listen = \"127.0.0.1:0\")", options,
+          argc, argv));
+  flags.done = line.done;
+  if (line.done) return flags;
   TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));
   return flags;
 }
