@@ -16,9 +16,9 @@ namespace touchstone::cli {
 
 namespace {
 
-constexpr uint64_t kMostModelBytes = 16 << 20;
+constexpr uint64_t kMaxModelBytes = 16 << 20;
 constexpr size_t kTableWidth = 120;
-constexpr size_t kLeastLastColumn = 40;
+constexpr size_t kMinLastColumn = 40;
 
 }  // namespace
 
@@ -66,7 +66,7 @@ absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {
   const bool looks_like_file =
       text.find('/') != std::string::npos || path.extension() == ".yaml" || path.extension() == ".yml";
   if (looks_like_file) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMostModelBytes));
+    TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMaxModelBytes));
     return ref;
   }
   const bool hex = text.size() >= 8 && text.size() <= 64 &&
@@ -100,7 +100,7 @@ std::string Table::Text() const {
   }
   size_t indent = 0;
   for (size_t i = 0; i + 1 < widths.size(); ++i) indent += widths[i] + 2;
-  const size_t width = std::max(kTableWidth, indent + kLeastLastColumn);
+  const size_t width = std::max(kTableWidth, indent + kMinLastColumn);
   std::string text;
   for (const auto& row : rows_) {
     for (size_t i = 0; i < row.size(); ++i) {

@@ -29,11 +29,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMostModelBytes = 1 << 20;
-constexpr size_t kMostInline = 16 << 20;  // a larger set is sent in pieces, as a session
+constexpr uint64_t kMaxModelBytes = 1 << 20;
+constexpr size_t kMaxInline = 16 << 20;  // a larger set is sent in pieces, as a session
 constexpr size_t kPiece = 1 << 20;
 constexpr int kWidthOfNoTerminal = 110;
-constexpr int kLeastWidth = 60, kMostWidth = 160;
+constexpr int kMinWidth = 60, kMaxWidth = 160;
 
 // A set as the user names it: its file's text, or the name of a session that the server keeps.
 struct SetText {
@@ -123,7 +123,7 @@ absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vect
 int TerminalWidth() {
   winsize size{};
   if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kWidthOfNoTerminal;
-  return std::clamp<int>(size.ws_col, kLeastWidth, kMostWidth);
+  return std::clamp<int>(size.ws_col, kMinWidth, kMaxWidth);
 }
 
 }  // namespace
@@ -196,7 +196,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   if (evidence.model().has_yaml())
     TOUCHSTONE_RETURN_IF_ERROR(ParseModel(evidence.model().yaml(), options.model, Catalogue()).status());
   for (const std::string& path : options.also) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMostModelBytes));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxModelBytes));
     TOUCHSTONE_RETURN_IF_ERROR(ParseModel(AsModelFile(text), path, Catalogue()).status());
     evidence.add_also_yaml(text);
   }
@@ -227,7 +227,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
   if (!set.session.empty()) return comparison;
-  if (set.csv.size() > kMostInline)
+  if (set.csv.size() > kMaxInline)
     TOUCHSTONE_RETURN_IF_ERROR(comparison->SendAhead(set.csv));
   else
     evidence.set_csv(std::move(set.csv));
@@ -271,7 +271,7 @@ absl::Status Comparison::SendMeshes(const std::vector<MeshSource>& meshes) {
     file->set_fit_mm(source.fit_mm);
   }
   const size_t bytes = evidence_.ByteSizeLong();
-  if (bytes + kMostInline > static_cast<size_t>(client::kMostMessageBytes))
+  if (bytes + kMaxInline > static_cast<size_t>(client::kMaxMessageBytes))
     return absl::InvalidArgumentError(absl::StrCat(
         "--mesh: the meshes have ", bytes >> 20,
         " MiB, too much for one request; give them to touchstone-server (the same option there)"));

@@ -175,9 +175,9 @@ class Doctor {
     else
       Add("Camera", true, d.renderer_description());
     Add("Limits", true,
-        absl::StrCat(d.most_touches_per_request(), " touches and ", d.most_images_per_request(),
-                     " images a request, images up to ", d.most_image_side(), " x ", d.most_image_side(),
-                     " pixels, batches of up to ", d.most_batch_size(), " samples, ", d.most_fingers(),
+        absl::StrCat(d.max_touches_per_request(), " touches and ", d.max_images_per_request(),
+                     " images a request, images up to ", d.max_image_side(), " x ", d.max_image_side(),
+                     " pixels, batches of up to ", d.max_batch_size(), " samples, ", d.max_fingers(),
                      " fingers"));
     json_["source"] = {{"reachable", true},
                        {"address", (*connection)->address()},
@@ -187,11 +187,11 @@ class Doctor {
                        {"default_model", d.default_model()},
                        {"default_model_hash", d.default_model_hash()},
                        {"renderer", d.renderer_description()},
-                       {"most_touches_per_request", d.most_touches_per_request()},
-                       {"most_images_per_request", d.most_images_per_request()},
-                       {"most_image_side_px", d.most_image_side()},
-                       {"most_batch_size", d.most_batch_size()},
-                       {"most_fingers", d.most_fingers()},
+                       {"max_touches_per_request", d.max_touches_per_request()},
+                       {"max_images_per_request", d.max_images_per_request()},
+                       {"max_image_side_px", d.max_image_side()},
+                       {"max_batch_size", d.max_batch_size()},
+                       {"max_fingers", d.max_fingers()},
                        {"lease_required", d.lease_required()},
                        {"touch_duration_s", d.touch_duration_s()},
                        {"clock_uncertainty_s", d.clock_uncertainty_s()}};

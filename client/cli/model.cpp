@@ -61,9 +61,9 @@ absl::Status Save(const Cli& cli, const Model& model, const ModelOptions& option
 }
 
 absl::Status RunNew(const Cli& cli, const ModelOptions& options) {
-  if (options.fingers < 1 || options.fingers > kMostFingers)
+  if (options.fingers < 1 || options.fingers > kMaxFingers)
     return absl::InvalidArgumentError(
-        absl::StrCat("--fingers: ", options.fingers, " is out of range; 1 to ", kMostFingers));
+        absl::StrCat("--fingers: ", options.fingers, " is out of range; 1 to ", kMaxFingers));
   if (!(options.spacing_mm > 0))
     return absl::InvalidArgumentError(
         absl::StrCat("--spacing-mm: ", ShortestNumber(options.spacing_mm), " is out of range; above 0"));

@@ -16,14 +16,14 @@ namespace {
 constexpr char kPlanGroup[] = "Plan";
 constexpr char kImageGroup[] = "Image";
 constexpr char kTouchGroup[] = "Touch";
-constexpr uint64_t kMostPlanBytes = 1 << 30;
+constexpr uint64_t kMaxPlanBytes = 1 << 30;
 
 // The generators' defaults (source.proto), in the units of files.
 constexpr double kStepAngleDeg = 1;
 constexpr double kRadiusRatio = 1.05;
 constexpr uint32_t kSamplesPerFace = 8;
 constexpr uint32_t kRounds = 4;
-constexpr double kMostTiltDeg = 20;
+constexpr double kMaxTiltDeg = 20;
 constexpr double kSpread = 0.6;
 constexpr double kStandoffMm = 60;
 constexpr double kSpeedMmS = 20;
@@ -61,7 +61,7 @@ void AddPlanOptions(CLI::App* command, PlanOptions* options) {
       "sphere: radius of the start sphere over half the box's diagonal. Default: 1.05");
   add("--samples-per-face", options->samples_per_face, "N", "faces: poses a face. Default: 8");
   add("--rounds", options->rounds, "N", "faces: repeats of all poses. Default: 4");
-  add("--most-tilt-deg", options->most_tilt_deg, "DEG",
+  add("--max-tilt-deg", options->max_tilt_deg, "DEG",
       "faces: largest angle to the face's normal. Default: 20");
   add("--spread", options->spread, "RATIO", "faces: targets lie within this share of a face. Default: 0.6");
   add("--standoff-mm", options->standoff_mm, "MM",
@@ -75,7 +75,7 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
                                                       {"--radius-ratio", o.radius_ratio.has_value()}};
   const std::pair<const char*, bool> faces_only[] = {{"--samples-per-face", o.samples_per_face.has_value()},
                                                      {"--rounds", o.rounds.has_value()},
-                                                     {"--most-tilt-deg", o.most_tilt_deg.has_value()},
+                                                     {"--max-tilt-deg", o.max_tilt_deg.has_value()},
                                                      {"--spread", o.spread.has_value()},
                                                      {"--standoff-mm", o.standoff_mm.has_value()}};
   const std::pair<const char*, bool> not_in_list[] = {{"--speed-mm-s", o.speed_mm_s.has_value()},
@@ -118,7 +118,7 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
     v1::FacesPlan* faces = plan.mutable_faces();
     faces->set_samples_per_face(o.samples_per_face.value_or(kSamplesPerFace));
     faces->set_rounds(o.rounds.value_or(kRounds));
-    faces->set_most_tilt_rad(ToSi(Unit::kDegree, o.most_tilt_deg.value_or(kMostTiltDeg)));
+    faces->set_max_tilt_rad(ToSi(Unit::kDegree, o.max_tilt_deg.value_or(kMaxTiltDeg)));
     faces->set_spread(o.spread.value_or(kSpread));
     faces->set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm.value_or(kStandoffMm)));
     return plan;
@@ -138,7 +138,7 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMostPlanBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxPlanBytes));
   return client::ParseMeasurements(text, path);
 }
 

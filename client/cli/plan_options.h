@@ -15,7 +15,7 @@ struct PlanOptions {
   std::string plan = "sphere";  // sphere, faces or a CSV file
   std::optional<double> step_angle_deg, roll_step_deg, radius_ratio;
   std::optional<uint32_t> samples_per_face, rounds;
-  std::optional<double> most_tilt_deg, spread, standoff_mm;
+  std::optional<double> max_tilt_deg, spread, standoff_mm;
   std::optional<double> speed_mm_s, touch_interval_s;
 };
 void AddPlanOptions(CLI::App* command, PlanOptions* options);

@@ -74,12 +74,12 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
   return absl::OkStatus();
 }
 
-std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t most_lines) {
+std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines) {
   Table table({"TOUCH", "OBJECT", "FACE UP", "WHY NOT"});
   size_t lines = 0, more = 0;
   for (const PlannedRow& row : rows) {
     if (row.possible) continue;
-    if (lines == most_lines) {
+    if (lines == max_lines) {
       ++more;
       continue;
     }

@@ -31,7 +31,7 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
                        std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks);
 
 // "2 of 192 touches are impossible: ...", with a line for each of the first few.
-std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t most_lines);
+std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines);
 
 // One file a command.
 void AddRigStatus(Cli* cli, CLI::App* group);

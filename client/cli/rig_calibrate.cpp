@@ -23,7 +23,7 @@ constexpr double kMilli = 1e3;
 constexpr double kMicro = 1e6;
 constexpr double kStraight = 0.9999;  // an approach along an axis of the object, within about a degree
 constexpr double kStandoffM = 0.03;
-constexpr int kMostTouches = 10000;
+constexpr int kMaxTouches = 10000;
 
 using Options = CalibrateOptions;
 
@@ -191,9 +191,9 @@ absl::Status RunCalibrate(const Cli& cli, const Options& options) {
   if (!(options.spacing_mm >= 0))
     return absl::InvalidArgumentError(absl::StrCat("--spacing-mm: ", options.spacing_mm, " is below 0"));
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("KIND", options.kind, {"flat", "object", "tip"}).status());
-  if (options.touches < 2 || options.touches > kMostTouches)
+  if (options.touches < 2 || options.touches > kMaxTouches)
     return absl::InvalidArgumentError(
-        absl::StrCat("--touches: ", options.touches, " is out of range; 2 to ", kMostTouches));
+        absl::StrCat("--touches: ", options.touches, " is out of range; 2 to ", kMaxTouches));
   if (options.kind == "object") return RunCalibrateObject(cli, options);
   return options.kind == "tip" ? RunTip(cli, options) : RunFlat(cli, options);
 }

@@ -25,8 +25,8 @@ constexpr double kTiltsRad[] = {15 * kDegree, 30 * kDegree,
 constexpr double kSpread = 0.5;                 // targets lie within this share of the box's half sides
 constexpr double kHeight = 0.4;                 // and this share of its half height above its middle
 constexpr double kBeyondBoxM = 0.03;            // every finger starts so far outside the box
-constexpr size_t kMostLines = 5;
-constexpr size_t kFewestTouches = 6;
+constexpr size_t kMaxLines = 5;
+constexpr size_t kMinTouches = 6;
 constexpr uint64_t kTriangles = 20000;
 
 absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const CalibrateOptions& options) {
@@ -119,13 +119,13 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
     rows.push_back(std::move(row));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig.connection.get(), all, &rows, nullptr));
-  const std::string impossible = ImpossibleTable(rows, kMostLines);
+  const std::string impossible = ImpossibleTable(rows, kMaxLines);
   if (!impossible.empty()) cli.Log(impossible + "these are left out");
   const auto makes = [](const PlannedRow& row) { return row.possible && row.placement == "+z"; };
-  if (std::count_if(rows.begin(), rows.end(), makes) < static_cast<int>(kFewestTouches))
+  if (std::count_if(rows.begin(), rows.end(), makes) < static_cast<int>(kMinTouches))
     return absl::FailedPreconditionError(absl::StrCat(
         "the rig can make only ", std::count_if(rows.begin(), rows.end(), makes), " of ", rows.size(),
-        " touches of ", options.object, ", ", kFewestTouches, " are needed, so nothing was moved"));
+        " touches of ", options.object, ", ", kMinTouches, " are needed, so nothing was moved"));
 
   ProgressBar bar(!cli.output().quiet);
   TOUCHSTONE_ASSIGN_OR_RETURN(

@@ -11,7 +11,7 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kMostLines = 40;
+constexpr size_t kMaxLines = 40;
 
 struct Options {
   std::string plan, drawing;
@@ -92,7 +92,7 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
                {"groups", list},
                {"checks", RowsJson(rows)}});
   } else {
-    std::string text = ImpossibleTable(rows, kMostLines);
+    std::string text = ImpossibleTable(rows, kMaxLines);
     if (!text.empty()) text += "\n";
     Table table({"OBJECT", "FACE UP", "TOUCHES", "TIME"});
     for (const RigGroup& group : groups)

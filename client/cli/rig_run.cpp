@@ -14,7 +14,7 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kMostLines = 20;
+constexpr size_t kMaxLines = 20;
 constexpr double kMicro = 1e6;
 
 struct Options {
@@ -62,7 +62,7 @@ class Run {
     TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig_.connection.get(), wanted, &rows_, nullptr));
     for (const PlannedRow& row : rows_) impossible_ += !row.possible;
     if (impossible_ == 0) return absl::OkStatus();
-    cli_.Log(ImpossibleTable(rows_, kMostLines));
+    cli_.Log(ImpossibleTable(rows_, kMaxLines));
     if (options_.skip_impossible) {
       cli_.Log(absl::StrCat(impossible_, " impossible touches are left out"));
       return absl::OkStatus();

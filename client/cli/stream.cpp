@@ -25,7 +25,7 @@ struct Options {
   std::string model;
   uint64_t samples = 0;
   uint64_t seed = 0;
-  uint32_t most_draws = 1000;
+  uint32_t max_draws = 1000;
   std::string encoding;
   std::string output;
   std::string format = "webdataset";
@@ -37,7 +37,7 @@ struct Options {
 };
 
 constexpr uint64_t kDefaultSamples = 1000;
-constexpr uint64_t kMostManifestBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxManifestBytes = uint64_t{1} << 30;
 
 // The objects of the source, for "all".
 absl::StatusOr<std::vector<std::string>> AllObjects(client::Connection* connection) {
@@ -73,7 +73,7 @@ absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const Options& o, clien
   spec.set_seed(o.seed);
   // A plan that ends gives the number itself.
   spec.set_samples(o.samples == 0 && spec.plan().has_sphere() ? kDefaultSamples : o.samples);
-  spec.set_most_draws(o.most_draws);
+  spec.set_max_draws(o.max_draws);
 
   std::vector<std::string> columns = SplitCommas(o.columns);
   if (columns.empty()) columns = {"index", "object", "pose", "descriptor"};
@@ -116,7 +116,7 @@ absl::Status ParseShards(const std::string& text, client::DatasetJob* job) {
 
 // What another dataset was made of, so that it is made again.
 absl::Status RepeatManifest(const Options& o, client::DatasetJob* job, bool shard_size_given) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(o.like, kMostManifestBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(o.like, kMaxManifestBytes));
   TOUCHSTONE_ASSIGN_OR_RETURN(const client::DatasetManifest manifest, client::ParseManifest(text, o.like));
   TOUCHSTONE_ASSIGN_OR_RETURN(job->spec, client::SpecOfManifest(manifest.identity, o.like));
   TOUCHSTONE_ASSIGN_OR_RETURN(job->format, client::ParseShardFormat(manifest.identity.value("format", "")));
@@ -243,7 +243,7 @@ void AddStream(Cli* cli) {
                               what));
   specification.back()->take_all()->expected(1);
   specification.push_back(
-      add("--most-draws", options->most_draws, "N",
+      add("--max-draws", options->max_draws, "N",
           "A touch that misses is drawn again this often before the stream fails. Default: 1000", what));
   const char* files = "Files";
   add("--out", options->output, "FOLDER", "Where the shards and dataset.json go", files)->required();

@@ -16,8 +16,8 @@ namespace touchstone::client {
 namespace {
 
 constexpr int kColours = 7;
-constexpr size_t kMostPoints = 6000;  // of all objects together
-constexpr size_t kMostObjects = 12;
+constexpr size_t kMaxPoints = 6000;  // of all objects together
+constexpr size_t kMaxObjects = 12;
 
 struct Object {
   const v1::ObjectOutline* outline = nullptr;
@@ -26,7 +26,7 @@ struct Object {
 
 std::map<std::string, Object> Objects(const v1::Report& report, std::vector<std::string>* order) {
   std::map<std::string, Object> objects;
-  const size_t step = 1 + report.surface_points_size() / kMostPoints;
+  const size_t step = 1 + report.surface_points_size() / kMaxPoints;
   for (const v1::ObjectOutline& outline : report.outlines()) {
     if (objects.count(outline.object()) == 0) order->push_back(outline.object());
     objects[outline.object()].outline = &outline;
@@ -189,7 +189,7 @@ std::string HtmlObjects(const v1::Report& report) {
                                   "the arrow keys\"></canvas><p class=\"legend\" id=\"told\" "
                                   "aria-live=\"polite\">Drag, or use the arrow keys, to "
                                   "turn it.</p></div>\n");
-  for (size_t i = 0; i < order.size() && i < kMostObjects; ++i) {
+  for (size_t i = 0; i < order.size() && i < kMaxObjects; ++i) {
     body += Stills(order[i], objects.at(order[i]), static_cast<int>(i), improved, limit_us);
   }
   absl::StrAppend(
@@ -198,8 +198,8 @@ std::string HtmlObjects(const v1::Report& report) {
       "model puts it, coloured by its residual. Front: seen from the front and above; back: from behind and "
       "below. ",
       Count(shown), " of ", Count(report.surface_points_size()), " contacts are drawn");
-  if (order.size() > kMostObjects)
-    absl::StrAppend(&body, ", stills of the first ", kMostObjects, " objects only");
+  if (order.size() > kMaxObjects)
+    absl::StrAppend(&body, ", stills of the first ", kMaxObjects, " objects only");
   absl::StrAppend(&body, ".</p>\n<script type=\"application/json\" id=\"objects-data\">",
                   Data(report, objects, order, limit_us, improved), "</script>\n");
   return Section("objects", "On the object", "Where on the surface the model is early or late.", body);

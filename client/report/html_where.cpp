@@ -14,7 +14,7 @@ namespace touchstone::client {
 namespace {
 
 constexpr double kTellingP = 0.01;
-constexpr size_t kLeastCurves = 4;  // shown though they tell nothing
+constexpr size_t kMinCurves = 4;  // shown though they tell nothing
 
 std::string Slices(const v1::Report& report) {
   if (report.where().empty()) return "";
@@ -142,7 +142,7 @@ std::string Curves(const v1::Report& report) {
   std::vector<std::pair<std::string, std::string>> keys;
   size_t shown = 0;
   for (const v1::CovariateCurve* curve : curves) {
-    const bool telling = curve->p() < kTellingP || shown < kLeastCurves;
+    const bool telling = curve->p() < kTellingP || shown < kMinCurves;
     (telling ? open : folded) += CurvePair(report, *curve);
     shown += telling;
     for (const v1::CurveBin& bin : curve->bins()) {

@@ -13,7 +13,7 @@
 namespace touchstone::client {
 namespace {
 
-constexpr int kMostParameters = 4;  // of a candidate
+constexpr int kMaxParameters = 4;  // of a candidate
 
 double Unseen(double heldout_us, double rmse_us) {
   return heldout_us > 0 ? heldout_us : rmse_us;
@@ -46,7 +46,7 @@ std::string NotFitted(const v1::Report& report) {
 template <typename Parameters>
 std::string ParameterCells(const Parameters& parameters) {
   std::string names, pictures;
-  const int shown = parameters.size() > kMostParameters ? kMostParameters - 1 : parameters.size();
+  const int shown = parameters.size() > kMaxParameters ? kMaxParameters - 1 : parameters.size();
   for (int i = 0; i < shown; ++i) {
     const v1::ParameterValue& parameter = parameters[i];
     const std::string interval = Interval(parameter);

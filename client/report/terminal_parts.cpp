@@ -16,8 +16,8 @@ namespace touchstone::client {
 namespace {
 
 using Cell = TextLayout::Cell;
-constexpr int kMostParameters = 6;  // of one effect
-constexpr int kMostRivals = 3;
+constexpr int kMaxParameters = 6;  // of one effect
+constexpr int kMaxRivals = 3;
 
 // "2.98 +- 0.02 mm", with the name where it does not go without saying.
 std::string Parameter(const v1::ParameterValue& parameter, bool named) {
@@ -59,13 +59,13 @@ void AddEffect(const Effect& effect, const std::string& name, double probability
                    {p, true, style},
                    {change, true, style},
                    {note, false, TextLayout::kDim}});
-  for (int i = 1; i < std::min<int>(parameters.size(), kMostParameters); ++i) {
+  for (int i = 1; i < std::min<int>(parameters.size(), kMaxParameters); ++i) {
     rows->push_back({{""}, {Parameter(parameters[i], true), false, style}, {""}, {""}, {""}});
   }
-  if (parameters.size() > kMostParameters) {
+  if (parameters.size() > kMaxParameters) {
     rows->push_back(
         {{""},
-         {absl::StrCat("... ", parameters.size() - kMostParameters, " more values"), false, TextLayout::kDim},
+         {absl::StrCat("... ", parameters.size() - kMaxParameters, " more values"), false, TextLayout::kDim},
          {""},
          {""},
          {""}});
@@ -137,7 +137,7 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(before, after), "", TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
-    for (int rival = 0, shown = 0; i == 0 && rival < report.candidates_size() && shown < kMostRivals;
+    for (int rival = 0, shown = 0; i == 0 && rival < report.candidates_size() && shown < kMaxRivals;
          ++rival) {
       const v1::Candidate& candidate = report.candidates(rival);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;

@@ -75,8 +75,8 @@ absl::Status Connection::ConnectToNext() {
 absl::Status Connection::Connect(int server_index) {
   const std::string& address = options_.servers[server_index];
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMostMessageBytes);
-  arguments.SetMaxSendMessageSize(kMostMessageBytes);
+  arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  arguments.SetMaxSendMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   // A server whose machine died sends nothing: ask for a sign of life, so that a stream does not wait for

@@ -23,7 +23,7 @@
 namespace touchstone::client {
 
 // The largest message that a client accepts: a batch of images goes well beyond gRPC's 4 MiB.
-inline constexpr int kMostMessageBytes = 256 << 20;
+inline constexpr int kMaxMessageBytes = 256 << 20;
 
 struct ConnectionOptions {
   std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process

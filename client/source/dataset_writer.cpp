@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMostManifestBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxManifestBytes = uint64_t{1} << 30;
 constexpr double kManifestIntervalS = 1;
 constexpr char kHowToGoOn[] = "Use another folder, or --restart to delete what is there";
 
@@ -182,7 +182,7 @@ absl::Status DatasetWriter::Resolve() {
   if (request_spec_.image().renderer() == v1::RENDERER_KIND_UNSPECIFIED && request_spec_.has_image()) {
     for (const fs::path& path : ListFolder(job_.folder)) {
       if (!IsWholeManifest(path)) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path.string(), kMostManifestBytes));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path.string(), kMaxManifestBytes));
       TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ParseManifest(text, path.string()));
       request_spec_.mutable_image()->set_renderer(RendererOfName(before.identity.value("renderer", "")));
       break;
@@ -216,7 +216,7 @@ absl::Status DatasetWriter::FindFinishedShards() {
   std::map<uint64_t, ShardFacts> listed;
   for (const fs::path& path : ListFolder(job_.folder)) {
     if (!IsWholeManifest(path)) continue;
-    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMostManifestBytes);
+    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMaxManifestBytes);
     if (absl::IsNotFound(text.status()) && job_.job_count > 1)
       continue;  // another job has just completed the dataset
     TOUCHSTONE_RETURN_IF_ERROR(text.status());
@@ -325,7 +325,7 @@ absl::Status DatasetWriter::CompleteTogether() {
   DatasetManifest merged = manifest_;
   for (const fs::path& path : ListFolder(job_.folder)) {
     if (!IsWholeManifest(path)) continue;
-    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMostManifestBytes);
+    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMaxManifestBytes);
     if (!text.ok()) continue;  // removed by a job that has completed the dataset
     TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest other, ParseManifest(*text, path.string()));
     merged.shards.insert(other.shards.begin(), other.shards.end());

@@ -120,13 +120,13 @@ std::string LabText(const FileColumn& column, const v1::Column& wire, size_t i) 
   if (column.type == v1::DATA_TYPE_FLOAT64) return ShortestNumber(LabNumber(column.unit, value));
   if (column.type != v1::DATA_TYPE_FLOAT32) return ShortestNumber(value);
   // A float's shortest decimal, its unit changed: with the units' powers of ten the digits stay as they are.
-  constexpr int kMostDigitsOfFloat = 9;
+  constexpr int kMaxDigitsOfFloat = 9;
   char text[64];
   const auto shortest = std::to_chars(text, text + sizeof text, static_cast<float>(value));
   double decimal = value;
   std::from_chars(text, shortest.ptr, decimal);
   const auto end = std::to_chars(text, text + sizeof text, FromSi(column.unit, decimal),
-                                 std::chars_format::general, kMostDigitsOfFloat);
+                                 std::chars_format::general, kMaxDigitsOfFloat);
   return std::string(text, end.ptr);
 }
 

@@ -125,7 +125,7 @@ class FakeRig : public v1::Control::Service {
                           v1::DescribeResponse* response) override {
       response->set_kind("physical");
       response->set_lease_required(true);
-      response->set_most_touches_per_request(100);
+      response->set_max_touches_per_request(100);
       return grpc::Status::OK;
     }
     grpc::Status Touch(grpc::ServerContext* context, const v1::TouchRequest* request,

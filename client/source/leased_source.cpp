@@ -35,7 +35,7 @@ absl::StatusOr<std::unique_ptr<LeasedSource>> LeasedSource::Open(Connection* con
 
 size_t LeasedSource::touches_a_request() const {
   // What moves takes seconds a touch; a recorded source tells repeats apart within a request only.
-  return description_.lease_required() ? 1 : std::max<uint32_t>(1, description_.most_touches_per_request());
+  return description_.lease_required() ? 1 : std::max<uint32_t>(1, description_.max_touches_per_request());
 }
 
 template <typename Stub, typename Request, typename Response>

@@ -12,7 +12,7 @@
 namespace touchstone::client {
 namespace {
 
-constexpr size_t kLeastKeyDigits = 6;
+constexpr size_t kMinKeyDigits = 6;
 constexpr size_t kShardDigits = 6;
 
 std::string Padded(uint64_t number, size_t digits) {
@@ -64,7 +64,7 @@ std::string DatasetLayout::ShardName(uint64_t shard) const {
 
 std::string DatasetLayout::Key(uint64_t index) const {
   const size_t digits = samples == 0 ? 1 : std::to_string(samples - 1).size();
-  return Padded(index, std::max(digits, kLeastKeyDigits));
+  return Padded(index, std::max(digits, kMinKeyDigits));
 }
 
 const FileColumn* DatasetLayout::FindColumn(const std::string& wire_name) const {

@@ -11,8 +11,8 @@
 namespace touchstone::client {
 namespace {
 
-constexpr size_t kMostIdBytes = 128;
-constexpr size_t kMostSessionBytes = 64;
+constexpr size_t kMaxIdBytes = 128;
+constexpr size_t kMaxSessionBytes = 64;
 constexpr size_t kHashDigits = 16;
 
 bool IsNameCharacter(char c) {
@@ -23,7 +23,7 @@ bool IsNameCharacter(char c) {
 
 std::string TouchId(const std::string& session, const std::string& object, uint64_t number) {
   const std::string id = absl::StrCat(session, "/", object, "/", number);
-  if (id.size() <= kMostIdBytes) return id;
+  if (id.size() <= kMaxIdBytes) return id;
   // An object's name may be long: its hash stands for it.
   return absl::StrCat(session, "/", Sha256Hex(object).substr(0, kHashDigits), "/", number);
 }
@@ -38,7 +38,7 @@ std::string NewTouchId(uint64_t number) {
 }
 
 absl::Status CheckSessionName(const std::string& name, const std::string& where) {
-  bool good = !name.empty() && name.size() <= kMostSessionBytes;
+  bool good = !name.empty() && name.size() <= kMaxSessionBytes;
   for (const char c : name) good = good && IsNameCharacter(c);
   if (good) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
@@ -46,7 +46,7 @@ absl::Status CheckSessionName(const std::string& name, const std::string& where)
 }
 
 std::string SessionNameOf(const std::string& path) {
-  std::string name = std::filesystem::path(path).stem().string().substr(0, kMostSessionBytes);
+  std::string name = std::filesystem::path(path).stem().string().substr(0, kMaxSessionBytes);
   for (char& c : name)
     if (!IsNameCharacter(c)) c = '-';
   return name.empty() ? "default" : name;

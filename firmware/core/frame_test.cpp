@@ -169,14 +169,14 @@ TEST(Messages, RefuseValuesOutOfTheirRange) {
   EXPECT_TRUE(refuses(event));
   event = EventOf(1), event.kind = static_cast<EventKind>(3);
   EXPECT_TRUE(refuses(event));
-  event = EventOf(1), event.ticks = kMostTicks + 1;
+  event = EventOf(1), event.ticks = kMaxTicks + 1;
   EXPECT_TRUE(refuses(event));
 
   Configure configure;
   EXPECT_TRUE(refuses(configure));  // no finger
   configure.fingers = kMaxFingers;
   EXPECT_FALSE(refuses(configure));
-  configure.finger[7].debounce_us = kMostDebounceUs + 1;
+  configure.finger[7].debounce_us = kMaxDebounceUs + 1;
   EXPECT_TRUE(refuses(configure));
   configure.finger[7] = FingerConfig{};
   configure.finger[0].sensor = Sensor::kResistor;

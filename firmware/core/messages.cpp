@@ -56,7 +56,7 @@ class Reader {
 };
 
 bool GoodTicks(uint64_t ticks) {
-  return ticks <= kMostTicks;
+  return ticks <= kMaxTicks;
 }
 
 bool GoodFingers(uint8_t fingers) {
@@ -64,7 +64,7 @@ bool GoodFingers(uint8_t fingers) {
 }
 
 bool GoodFinger(const FingerConfig& finger) {
-  if (finger.active_level > 1 || finger.debounce_us > kMostDebounceUs) return false;
+  if (finger.active_level > 1 || finger.debounce_us > kMaxDebounceUs) return false;
   if (finger.sensor > Sensor::kResistor) return false;
   return finger.sensor != Sensor::kResistor || finger.hysteresis < finger.threshold;
 }
@@ -116,20 +116,20 @@ bool Decode(const uint8_t* payload, size_t size, Hello* message) {
 
 size_t Encode(const HelloReply& m, uint8_t* out) {
   Writer writer(Type::kHelloReply, out);
-  writer.Put(m.version).Put(m.nonce).Put(m.boot_id).Put(m.tick_hz).Put(m.most_fingers);
+  writer.Put(m.version).Put(m.nonce).Put(m.boot_id).Put(m.tick_hz).Put(m.max_fingers);
   for (char letter : m.firmware) writer.Put(static_cast<uint8_t>(letter));
   return writer.Finish();
 }
 bool Decode(const uint8_t* payload, size_t size, HelloReply* message) {
   HelloReply m;
   Reader reader(Type::kHelloReply, payload, size);
-  reader.Get(&m.version).Get(&m.nonce).Get(&m.boot_id).Get(&m.tick_hz).Get(&m.most_fingers);
+  reader.Get(&m.version).Get(&m.nonce).Get(&m.boot_id).Get(&m.tick_hz).Get(&m.max_fingers);
   for (char& letter : m.firmware) {
     uint8_t byte = 0;
     reader.Get(&byte);
     letter = static_cast<char>(byte);
   }
-  return Accept(reader.Done() && m.tick_hz > 0 && GoodFingers(m.most_fingers) && GoodName(m.firmware), m,
+  return Accept(reader.Done() && m.tick_hz > 0 && GoodFingers(m.max_fingers) && GoodName(m.firmware), m,
                 message);
 }
 

@@ -11,9 +11,9 @@ namespace touchstone::firmware {
 constexpr uint8_t kProtocolVersion = 1;
 constexpr int kMaxFingers = 8;
 constexpr uint8_t kNoTouch = 0;  // touch ids are never 0
-constexpr uint64_t kMostTicks =
+constexpr uint64_t kMaxTicks =
     (uint64_t{1} << 53) - 1;  // 17 years at 16 MHz; later ones are refused by Decode
-constexpr uint32_t kMostDebounceUs = 1000000;
+constexpr uint32_t kMaxDebounceUs = 1000000;
 
 // The check at the end of every message: CRC-32 (reflected 0x04C11DB7, start and end inverted; "123456789"
 // gives 0xCBF43926) of all before it. The frame's CRC-16 alone lets 1 damaged frame in 65,536 through; both,
@@ -50,7 +50,7 @@ enum class Sensor : uint8_t { kOptical = 0, kMicroswitch = 1, kResistor = 2 };
 struct FingerConfig {
   Sensor sensor = Sensor::kOptical;
   uint8_t active_level = 1;  // the pin's level while pressed: optical, microswitch
-  // Microswitch, at most kMostDebounceUs: a press counts once the pin has been active for this much longer
+  // Microswitch, at most kMaxDebounceUs: a press counts once the pin has been active for this much longer
   // than inactive; its time is that of the first edge of the bounce, which lasts no longer than this either
   // (debouncer.h).
   uint32_t debounce_us = 0;
@@ -79,7 +79,7 @@ struct HelloReply {
   uint32_t nonce = 0;    // the Hello's
   uint32_t boot_id = 0;  // another one after every reset
   uint32_t tick_hz = 0;  // nominal
-  uint8_t most_fingers = kMaxFingers;
+  uint8_t max_fingers = kMaxFingers;
   char firmware[24] = {};  // "nano33ble 0.1.0", zero-terminated
 };
 

@@ -16,7 +16,7 @@ void Fields(Hello& m, V& v) {
 template <typename V>
 void Fields(HelloReply& m, V& v) {
   v("version", m.version), v("nonce", m.nonce), v("boot_id", m.boot_id), v("tick_hz", m.tick_hz);
-  v("most_fingers", m.most_fingers), v("firmware", m.firmware);
+  v("max_fingers", m.max_fingers), v("firmware", m.firmware);
 }
 template <typename V>
 void Fields(Configure& m, V& v) {

@@ -15,7 +15,7 @@ namespace touchstone::firmware {
 namespace {
 
 // What is not read for so long is lost, frame by frame, as on a real line; the core repeats what matters.
-constexpr size_t kMostUnsent = 4096;
+constexpr size_t kMaxUnsent = 4096;
 
 Identity MakeIdentity() {
   Identity identity;
@@ -81,7 +81,7 @@ void PtyEffector::Sample(int finger, uint16_t value) {
 
 void PtyEffector::Write(void* context, const uint8_t* frame, size_t size) {
   PtyEffector* self = static_cast<PtyEffector*>(context);
-  if (self->unsent_.size() + size > kMostUnsent) return;
+  if (self->unsent_.size() + size > kMaxUnsent) return;
   self->unsent_.insert(self->unsent_.end(), frame, frame + size);
   self->Flush();
 }

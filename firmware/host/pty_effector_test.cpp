@@ -25,8 +25,8 @@ class Host {
   }
   // The next message of this type; false if none comes.
   template <typename Message>
-  bool Wait(Message* message, int most_s = 20) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(most_s);
+  bool Wait(Message* message, int max_s = 20) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(max_s);
     while (std::chrono::steady_clock::now() < until) {
       effector_->Run();
       uint8_t byte;

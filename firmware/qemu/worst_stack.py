@@ -1,6 +1,6 @@
 """The most stack that the core's public functions can take: the longest way down the call graph.
 
-    worst_stack.py --most BYTES FILE.ci ...
+    worst_stack.py --max BYTES FILE.ci ...
 
 The files are GCC's (-fcallgraph-info=su): every function with the bytes of its own frame, every call as an edge. A
 cycle, a frame of unknown size or a call of an unknown function is an error, since then there is no bound. Calls through
@@ -63,7 +63,7 @@ def deepest(name, frames, calls, known, under_way):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--most", type=int, required=True, metavar="BYTES")
+    parser.add_argument("--max", type=int, required=True, metavar="BYTES")
     parser.add_argument("files", nargs="+", metavar="FILE.ci")
     options = parser.parse_args()
     frames, labels, calls = read(options.files)
@@ -73,10 +73,10 @@ def main():
         sys.exit(f"worst_stack: found {len(entries)} of the core's public functions, expected 5")
     for name in entries:
         worst = max(worst, deepest(name, frames, calls, known, frozenset()))
-    print(f"Worst-case stack of the core: {worst[0]} bytes of {options.most} allowed, by the way")
+    print(f"Worst-case stack of the core: {worst[0]} bytes of {options.max} allowed, by the way")
     for step in worst[1]:
         print(f"  {step}")
-    return worst[0] > options.most
+    return worst[0] > options.max
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 
 namespace {
 
-constexpr int kMostFingers = 8;
+constexpr int kMaxFingers = 8;
 constexpr int kFingersPerTimer = 4;
 constexpr int kNowChannel = 5;        // of TIMER3: where ReadTicks captures
 constexpr int kFirstPpiChannel = 4;   // to 11 for the fingers; those from 20 on are wired by the manufacturer
@@ -17,7 +17,7 @@ volatile uint32_t ring_head = 0;
 volatile uint32_t ring_tail = 0;
 
 int finger_count = 0;
-uint32_t pin_names[kMostFingers];  // port * 32 + pin
+uint32_t pin_names[kMaxFingers];  // port * 32 + pin
 
 uint32_t Captured(int finger) {
   return finger < kFingersPerTimer ? NRF_TIMER3->CC[finger] : NRF_TIMER4->CC[finger - kFingersPerTimer];
@@ -71,7 +71,7 @@ void BeginCapture(const uint8_t* pins, int count) {
   NRF_PPI->CHENSET = 1u << kStartPpiChannel;
   NRF_EGU3->TASKS_TRIGGER[0] = 1;
 
-  finger_count = count < kMostFingers ? count : kMostFingers;
+  finger_count = count < kMaxFingers ? count : kMaxFingers;
   for (int finger = 0; finger < finger_count; ++finger) {
     pinMode(pins[finger], INPUT_PULLUP);
     pin_names[finger] = static_cast<uint32_t>(digitalPinToPinName(pins[finger]));

@@ -70,8 +70,8 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
     if (distance < best_distance) best = &candidate, best_distance = distance;
   }
   if (best != nullptr) return absl::StrCat(", did you mean '", *best, "'?");
-  constexpr size_t kMost = 12;
-  const size_t shown = std::min(kMost, known.size());
+  constexpr size_t kMax = 12;
+  const size_t shown = std::min(kMax, known.size());
   std::string list = absl::StrJoin(known.begin(), known.begin() + shown, ", ");
   if (shown < known.size()) absl::StrAppend(&list, ", ... (", known.size(), " in all)");
   return absl::StrCat("; known: ", list);

@@ -82,7 +82,7 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
   for (uint32_t attempt = 0; !workspace->slots.empty(); ++attempt) {
     const std::vector<uint32_t>& slots = workspace->slots;
     const size_t pending = slots.size();
-    if (attempt == specification_.most_draws) return Hopeless(object, indices[slots[0]]);
+    if (attempt == specification_.max_draws) return Hopeless(object, indices[slots[0]]);
     if (attempt == kProbeAfter)
       TOUCHSTONE_RETURN_IF_ERROR(ProbeDraws(object, indices[slots[0]], attempt, workspace));
 
@@ -185,12 +185,12 @@ absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
   const Eigen::Vector3d size_mm = (surface.bounds().max_m - surface.bounds().min_m) / kMetresPerMillimetre;
   const Model& model = *specification_.model;
   return absl::FailedPreconditionError(absl::StrCat(
-      "object '", surface.name(), "', sample ", index, ": in ", specification_.most_draws,
+      "object '", surface.name(), "', sample ", index, ": in ", specification_.max_draws,
       " draws no touch met it with all ", model.fingers, " fingers; they span ",
       ShortestNumber((model.fingers - 1) * model.spacing_m / kMetresPerMillimetre),
       " mm and the object measures ", static_cast<int>(size_mm.x()), " x ", static_cast<int>(size_mm.y()),
       " x ", static_cast<int>(size_mm.z()),
-      " mm: use a larger object (scale at import), a narrower end effector, or a higher most_draws"));
+      " mm: use a larger object (scale at import), a narrower end effector, or a higher max_draws"));
 }
 
 // All further draws of one index at once.
@@ -199,7 +199,7 @@ absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t fi
   TouchBatch batch;
   TouchWorkspace touch_workspace;
   const uint64_t number = NumberOf(index);
-  for (uint32_t attempt = first_attempt; attempt < specification_.most_draws; ++attempt) {
+  for (uint32_t attempt = first_attempt; attempt < specification_.max_draws; ++attempt) {
     TouchPose pose;
     generators_[object]->Draw({&number, 1}, attempt, &pose);
     simulator_.Prepare(1, &batch);

@@ -68,9 +68,9 @@ absl::Status ValidateDataset(DatasetSpecification* specification) {
         absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
   TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&specification->plan));
   if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image));
-  if (specification->most_draws < 1 || specification->most_draws > 1'000'000)
+  if (specification->max_draws < 1 || specification->max_draws > 1'000'000)
     return absl::InvalidArgumentError(
-        absl::StrCat("most_draws = ", specification->most_draws, ": must be from 1 to 1000000"));
+        absl::StrCat("max_draws = ", specification->max_draws, ": must be from 1 to 1000000"));
 
   const auto generator =
       MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);

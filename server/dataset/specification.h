@@ -49,7 +49,7 @@ struct DatasetSpecification {
   uint64_t samples = 0;  // 0 with a plan that ends: all of its touches, for every object
   ColumnChoice columns;
   DatasetImage image;
-  uint32_t most_draws = 1000;  // for one index, before the stream fails
+  uint32_t max_draws = 1000;  // for one index, before the stream fails
 };
 
 // Checks every field and fills in `samples`; errors name the field and what would be right.

@@ -12,11 +12,11 @@ namespace {
 // Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more
 // touches together makes each cheaper.
 constexpr uint64_t kFirstChunkSamples = 8192;
-constexpr uint64_t kMostChunkSamples = 262144;
+constexpr uint64_t kMaxChunkSamples = 262144;
 // Bytes that one chunk may hold, whatever its columns.
-constexpr uint64_t kMostChunkBytes = 16 << 20;
+constexpr uint64_t kMaxChunkBytes = 16 << 20;
 // Bytes of one batch, safely below the message limit.
-constexpr uint64_t kMostBatchBytes = 192 << 20;
+constexpr uint64_t kMaxBatchBytes = 192 << 20;
 
 }  // namespace
 
@@ -49,26 +49,26 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
     bytes += column.type == ColumnType::kBytes
                  ? specification->image.options.width * specification->image.options.height
                  : column.BytesPerSample();
-  const uint64_t most_rows = std::max<uint64_t>(1, kMostBatchBytes / bytes);
+  const uint64_t max_rows = std::max<uint64_t>(1, kMaxBatchBytes / bytes);
 
   DatasetPart& resolved = stream->part_;
   resolved = part;
   if (resolved.stop_index == 0) resolved.stop_index = specification->samples;
   if (resolved.batch_size == 0)
-    resolved.batch_size = std::min<uint64_t>(specification->columns.image ? 64 : 4096, most_rows);
+    resolved.batch_size = std::min<uint64_t>(specification->columns.image ? 64 : 4096, max_rows);
   if (resolved.batch_stride == 0) resolved.batch_stride = 1;
   if (resolved.stop_index > specification->samples)
     return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
                                               specification->samples, " samples"));
-  if (resolved.batch_size > most_rows)
+  if (resolved.batch_size > max_rows)
     return absl::InvalidArgumentError(absl::StrCat("batch_size = ", part.batch_size,
                                                    ": a sample of these columns has ", bytes,
-                                                   " bytes, so at most ", most_rows, " go into a batch"));
+                                                   " bytes, so at most ", max_rows, " go into a batch"));
   // A part may be empty: a worker beyond the last batch, or a resumption at the very end.
   stream->next_index_ = part.start_index;
-  stream->most_chunk_samples_ =
-      specification->columns.image ? 64 : std::clamp<uint64_t>(kMostChunkBytes / bytes, 1, kMostChunkSamples);
-  stream->chunk_samples_ = std::min(kFirstChunkSamples, stream->most_chunk_samples_);
+  stream->max_chunk_samples_ =
+      specification->columns.image ? 64 : std::clamp<uint64_t>(kMaxChunkBytes / bytes, 1, kMaxChunkSamples);
+  stream->chunk_samples_ = std::min(kFirstChunkSamples, stream->max_chunk_samples_);
   return stream;
 }
 
@@ -94,7 +94,7 @@ std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
     next_index_ = step > part_.stop_index - next_index_ ? part_.stop_index : next_index_ + step;
   }
   if (chunk->batches.empty()) return nullptr;
-  chunk_samples_ = std::min(2 * chunk_samples_, most_chunk_samples_);
+  chunk_samples_ = std::min(2 * chunk_samples_, max_chunk_samples_);
   return chunk;
 }
 

@@ -94,7 +94,7 @@ class DatasetStream {
   ThreadPool* pool_ = nullptr;
   uint64_t next_index_ = 0;     // start of the first batch that is not scheduled yet
   uint64_t chunk_samples_ = 0;  // about, of the next chunk: grows, so that the first batch comes soon
-  uint64_t most_chunk_samples_ = 0;
+  uint64_t max_chunk_samples_ = 0;
   std::deque<std::shared_ptr<Chunk>> chunks_;
 };
 

@@ -15,7 +15,7 @@ namespace touchstone {
 namespace {
 
 constexpr int kRanked = 8;  // candidates that are fitted in full
-constexpr int kMostCovariates = 6;
+constexpr int kMaxCovariates = 6;
 constexpr double kCovariateP = 0.01;
 constexpr char kUnseen[] = "this experiment cannot see it";
 constexpr char kNeutral[] = "fits best where it changes nothing";
@@ -144,7 +144,7 @@ absl::Status DescribeUnexplained(const Study& study, const Explained& explained,
       return test.name() == explained.term.covariate;
     });
   for (const v1::CovariateTest& test : sorted)
-    if (unexplained->covariates_size() < kMostCovariates && test.p() < kCovariateP)
+    if (unexplained->covariates_size() < kMaxCovariates && test.p() < kCovariateP)
       *unexplained->add_covariates() = test;
   if (explained.formula < 0) return absl::OkStatus();
 

@@ -10,9 +10,9 @@
 namespace touchstone {
 namespace {
 
-constexpr size_t kMostParityPoints = 2000;
-constexpr int kMostSurfacePoints = 4000;
-constexpr int kMostSurfacePointsAnObject = 1500;
+constexpr size_t kMaxParityPoints = 2000;
+constexpr int kMaxSurfacePoints = 4000;
+constexpr int kMaxSurfacePointsAnObject = 1500;
 constexpr int kOutlineTriangles = 400;
 
 // Measured over simulated times, each less its mean over the touch: what only differences can tell.
@@ -24,7 +24,7 @@ void AddParity(const Observations& observations, const Prediction& initial, cons
     if (observations.used[k])
       for (int i = 0; i < fingers; ++i)
         if (!std::isnan(before[size_t(k) * fingers + i])) cells.push_back(size_t(k) * fingers + i);
-  const size_t points = std::min(kMostParityPoints, cells.size());
+  const size_t points = std::min(kMaxParityPoints, cells.size());
   for (size_t n = 0; n < points; ++n) {
     // Evenly over the session; the finger changes from point to point.
     const size_t cell = cells[cells.size() * n / points];
@@ -68,7 +68,7 @@ void AddSurfacePoints(const Observations& observations, const Prediction& improv
   for (size_t s = 0; s < spots.size(); ++s)
     if (spots[s].touch >= 0) of_object[observations.object[spots[s].touch]].push_back(s);
   const size_t most =
-      std::max(1, std::min(kMostSurfacePointsAnObject, kMostSurfacePoints / std::max(1, objects)));
+      std::max(1, std::min(kMaxSurfacePointsAnObject, kMaxSurfacePoints / std::max(1, objects)));
   for (int o = 0; o < objects; ++o) {
     const size_t points = std::min(most, of_object[o].size());
     for (size_t n = 0; n < points; ++n) {

@@ -17,7 +17,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostRivals = 4;
+constexpr int kMaxRivals = 4;
 constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is ambiguous
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
@@ -88,7 +88,7 @@ absl::Status AddNextTouches(const Study& study, const Explained& explained, cons
     names[0] = NameOf(*explained.fit.model.base().effects[closest->effect].effect);
     for (const Rival& rival : closest->rivals) {
       if (!rival.equivalent && rivals.size() > 1) break;
-      if (static_cast<int>(rivals.size()) == kMostRivals) break;
+      if (static_cast<int>(rivals.size()) == kMaxRivals) break;
       rivals.push_back(std::make_shared<const Model>(rival.model));
       names.push_back(rival.name);
     }

@@ -11,7 +11,7 @@ namespace touchstone {
 namespace {
 
 constexpr int kTermsFitted = 3;
-constexpr int kMostFormulaTerms = 2;
+constexpr int kMaxFormulaTerms = 2;
 constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // data that differ by less tell nothing
 
@@ -86,7 +86,7 @@ absl::Status FindCauses(const Study& study, Explained* explained) {
   TOUCHSTONE_ASSIGN_OR_RETURN(Explanation best, search.Run(base, given));
   explained->formula = -1;
   FormulaTerm* first = nullptr;
-  for (int terms = 0; terms < kMostFormulaTerms; ++terms) {
+  for (int terms = 0; terms < kMaxFormulaTerms; ++terms) {
     TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(study, search, best, first));
     if (!with.found) break;
     // From scratch, with the formula's term as one effect among the others.

@@ -12,7 +12,7 @@ namespace {
 constexpr double kStep = 0.02;     // of a coordinate's scale, for derivatives
 constexpr double kJumpM = 0.3e-3;  // a finger that moves so far within a step has met another face
 constexpr double kJumpOverMedian = 200;
-constexpr int kMostHalvings = 5;
+constexpr int kMaxHalvings = 5;
 constexpr double kConverged = 0.02;  // nats
 constexpr double kSmallStep = 0.05;  // standard errors
 
@@ -101,7 +101,7 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
   return columns;
 }
 
-absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int most_iterations) {
+absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int max_iterations) {
   const Likelihood& likelihood = *experiment.likelihood;
   Fit fit;
   fit.point = start.Clip(start.Start());
@@ -117,7 +117,7 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int 
     values << ResidualContrasts(experiment, fit.time_s), derivatives;
     fit.columns = likelihood.Prepare(values);
     judgement = Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
-    if (start.size() == 0 || iteration == most_iterations) break;
+    if (start.size() == 0 || iteration == max_iterations) break;
 
     // Along the step, as far as the likelihood of the best hypothesis really grows.
     const int s = judgement.surface;
@@ -126,7 +126,7 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int 
         LogPriorOfValues(start.coordinates(), fit.point);
     double fraction = 1, gain = 0;
     bool moved = false;
-    for (int halving = 0; halving <= kMostHalvings; ++halving, fraction /= 2) {
+    for (int halving = 0; halving <= kMaxHalvings; ++halving, fraction /= 2) {
       const Eigen::VectorXd point = start.Clip(fit.point + fraction * judgement.step);
       TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> times, PredictTimes(experiment, start.At(point)));
       const Likelihood::Columns r = likelihood.Prepare(ResidualContrasts(experiment, times));

@@ -50,9 +50,9 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
                                             const Eigen::VectorXd& point, const std::vector<double>& at_s,
                                             int first);
 
-// `most_iterations` 0 only judges the start.
-inline constexpr int kMostIterations = 10;
+// `max_iterations` 0 only judges the start.
+inline constexpr int kMaxIterations = 10;
 absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start,
-                             int most_iterations = kMostIterations);
+                             int max_iterations = kMaxIterations);
 
 }  // namespace touchstone

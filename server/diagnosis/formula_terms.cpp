@@ -18,7 +18,7 @@ namespace {
 // The size of a term that rigs show: scale of the prior.
 constexpr double kTypicalTravelM = 0.2e-3;
 constexpr int kPeriods = 40;
-constexpr double kLeastPeriodMm = 1.5, kMostPeriodMm = 40;
+constexpr double kMinPeriodMm = 1.5, kMaxPeriodMm = 40;
 
 ParameterInfo Bounded(const std::string& name, Unit unit, double most) {
   ParameterInfo parameter;
@@ -197,7 +197,7 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit
   std::vector<FormulaTerm> periodic;
   list.clear(), scales.clear();
   for (int n = 0; n < kPeriods; ++n) {
-    const double period_mm = kLeastPeriodMm * std::pow(kMostPeriodMm / kLeastPeriodMm, n / (kPeriods - 1.0));
+    const double period_mm = kMinPeriodMm * std::pow(kMaxPeriodMm / kMinPeriodMm, n / (kPeriods - 1.0));
     for (const double shift : {0.0, 0.25}) {
       list.push_back(column(false, [&](int k, int i) {
         return std::sin(2 * kPi *

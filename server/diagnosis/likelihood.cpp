@@ -13,9 +13,9 @@ namespace {
 // Correlation lengths over the longest side of the object, and bump sizes over sigma (as contact time).
 constexpr double kLengths[] = {0.04, 0.07, 0.12, 0.2, 0.35};
 constexpr double kRatios[] = {0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9, 1.35, 2, 3, 5, 8, 15, 30};
-constexpr double kLeastCosine = 0.1;
-constexpr int kMostPoints = 160;
-constexpr int kMostWithInner = 128;  // columns
+constexpr double kMinCosine = 0.1;
+constexpr int kMaxPoints = 160;
+constexpr int kMaxWithInner = 128;  // columns
 
 double Matern52(double distance, double length) {
   const double x = std::sqrt(5.0) * distance / length;
@@ -24,10 +24,10 @@ double Matern52(double distance, double length) {
 
 // Points that stand for all: every one if there are few, else far from one another (greedy).
 std::vector<Eigen::Vector3d> Inducing(const std::vector<Eigen::Vector3d>& points) {
-  if (static_cast<int>(points.size()) <= kMostPoints) return points;
+  if (static_cast<int>(points.size()) <= kMaxPoints) return points;
   std::vector<Eigen::Vector3d> chosen = {points[0]};
   std::vector<double> nearest(points.size(), INFINITY);
-  while (static_cast<int>(chosen.size()) < kMostPoints) {
+  while (static_cast<int>(chosen.size()) < kMaxPoints) {
     size_t farthest = 0;
     for (size_t k = 0; k < points.size(); ++k) {
       nearest[k] = std::min(nearest[k], (points[k] - chosen.back()).squaredNorm());
@@ -104,8 +104,7 @@ Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const 
         for (int i = 0; i < o.fingers; ++i) {
           if (!contrasts.TakesPart(t, i)) continue;
           const size_t entry = static_cast<size_t>(k) * o.fingers + i;
-          const double gain =
-              -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kLeastCosine);
+          const double gain = -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kMinCosine);
           for (int a = 0; a < m; ++a)
             feature[a] = Matern52((details.contact_m[entry] - inducing[a]).norm(), length_m[l]);
           for (int j = 0; j < h.rows(); ++j)
@@ -146,7 +145,7 @@ Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const 
 
 Likelihood::Columns Likelihood::Prepare(const Eigen::MatrixXd& values) const {
   Columns columns{values, {}, {}};
-  if (values.cols() <= kMostWithInner) columns.inner = values.transpose() * values;
+  if (values.cols() <= kMaxWithInner) columns.inner = values.transpose() * values;
   for (const Basis& basis : bases_) {
     Eigen::MatrixXd projected(basis.energies.size(), values.cols());
     int next = 0;
@@ -171,7 +170,7 @@ Likelihood::Columns Likelihood::Join(const Columns& a, const Columns& b) {
     joined << a.projected[l], b.projected[l];
     all.projected.push_back(std::move(joined));
   }
-  if (all.values.cols() <= kMostWithInner) all.inner = all.values.transpose() * all.values;
+  if (all.values.cols() <= kMaxWithInner) all.inner = all.values.transpose() * all.values;
   return all;
 }
 

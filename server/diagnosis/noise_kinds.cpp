@@ -10,12 +10,12 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostTouches = 1500;          // that a shape is judged on
+constexpr int kMaxTouches = 1500;           // that a shape is judged on
 constexpr double kEnterNats = 10;           // gain in log likelihood that a further noise parameter needs
 constexpr double kKurtosisSigmas = 4;       // of the sample's excess kurtosis before tails are looked at
 constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
-constexpr double kLeastTick = 20e-6;        // s
-constexpr double kMostSlope = 10;
+constexpr double kMinTick = 20e-6;          // s
+constexpr double kMaxSlope = 10;
 
 // The maximum of f on [low, high] by golden section.
 double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* most) {
@@ -57,9 +57,9 @@ std::vector<NoisyTouch> Collect(const Observations& o, const std::vector<double>
 }
 
 std::vector<NoisyTouch> Thinned(const std::vector<NoisyTouch>& all) {
-  if (static_cast<int>(all.size()) <= kMostTouches) return all;
+  if (static_cast<int>(all.size()) <= kMaxTouches) return all;
   std::vector<NoisyTouch> part;
-  for (int j = 0; j < kMostTouches; ++j) part.push_back(all[all.size() * j / kMostTouches]);
+  for (int j = 0; j < kMaxTouches; ++j) part.push_back(all[all.size() * j / kMaxTouches]);
   return part;
 }
 
@@ -96,14 +96,14 @@ NoiseEstimate FindPolling(const Observations& o) {
   if (differences.size() < 20) return none;
   std::sort(differences.begin(), differences.end());
   // The smallest step between different values is the interval, or a small multiple of it.
-  double least_gap = differences[0];
+  double min_gap = differences[0];
   for (size_t j = 1; j < differences.size(); ++j) {
     const double gap = differences[j] - differences[j - 1];
-    if (gap > 2 * kTickTolerance) least_gap = std::min(least_gap, gap);
+    if (gap > 2 * kTickTolerance) min_gap = std::min(min_gap, gap);
   }
   for (int divisor = 1; divisor <= 3; ++divisor) {
-    double interval = least_gap / divisor;
-    if (interval < kLeastTick) break;
+    double interval = min_gap / divisor;
+    if (interval < kMinTick) break;
     // Refined over ever larger differences, so that the count of ticks stays certain.
     bool fits = true;
     for (size_t known = 1; known < differences.size() && fits; known *= 2) {
@@ -198,7 +198,7 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
       return ProfileSigma(touches, &sloped);
     };
     const int steps = from.shape == NoiseShape::kGaussian ? 20 : 8;
-    const double log_slope = Maximise(at, std::log(0.02), std::log(kMostSlope), steps, log_likelihood);
+    const double log_slope = Maximise(at, std::log(0.02), std::log(kMaxSlope), steps, log_likelihood);
     at(log_slope);
     return sloped;
   };

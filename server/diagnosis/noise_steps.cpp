@@ -8,9 +8,9 @@
 namespace touchstone {
 namespace {
 
-constexpr double kSignificant = 3.3;     // standard errors, for a refit
-constexpr double kRelevant = 0.02;       // relative change, for a refit
-constexpr double kLeastSigmaS = 1.5e-6;  // less is the rounding of the file
+constexpr double kSignificant = 3.3;   // standard errors, for a refit
+constexpr double kRelevant = 0.02;     // relative change, for a refit
+constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
 
 class NoiseWriter {
  public:
@@ -84,7 +84,7 @@ void AddNoise(const NoiseFindings& noise, Ladder* ladder, v1::Report* report) {
   NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = 1e3;  // noise is there or not: any scatter beyond rounding proves it
   // Where ticks explain the scatter there is no further noise to be seen.
-  const bool scatter = sigma.value > kLeastSigmaS;
+  const bool scatter = sigma.value > kMinSigmaS;
   writer.Write("gaussian_noise", sigma, has_sigma ? scatter : scatter && report->noise_floor_us() > 2);
   writer.Write("incidence_noise", noise.slope, noise.slope.gain_nats > 0);
   writer.Write("heavy_tail_noise", noise.degrees_of_freedom, noise.degrees_of_freedom.gain_nats > 0);

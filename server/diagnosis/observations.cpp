@@ -14,9 +14,9 @@
 namespace touchstone {
 namespace {
 
-constexpr size_t kMostExamples = 5;
+constexpr size_t kMaxExamples = 5;
 // More backward steps of the session time than this share: the file is not in the order of the session.
-constexpr double kMostBackward = 0.05;
+constexpr double kMaxBackward = 0.05;
 
 absl::Status CheckInput(const DiagnosisInput& input) {
   const MeasurementSet& set = *input.set;
@@ -50,7 +50,7 @@ std::vector<int> SessionOrder(const MeasurementSet& set) {
   if (!set.has_session_time) return rows;
   int backward = 0;
   for (int k = 1; k < set.size(); ++k) backward += set.session_time_s[k] < set.session_time_s[k - 1];
-  if (backward > kMostBackward * set.size())
+  if (backward > kMaxBackward * set.size())
     std::stable_sort(rows.begin(), rows.end(),
                      [&](int a, int b) { return set.session_time_s[a] < set.session_time_s[b]; });
   return rows;
@@ -116,7 +116,7 @@ void LeaveOut(Observations* observations, int k, const std::string& reason) {
   v1::UnusedRows& unused = observations->unused[reason];
   unused.set_rows(unused.rows() + 1);
   unused.set_reason(reason);
-  if (static_cast<size_t>(unused.examples_size()) < kMostExamples)
+  if (static_cast<size_t>(unused.examples_size()) < kMaxExamples)
     unused.add_examples(observations->set->touch[observations->row[k]]);
 }
 

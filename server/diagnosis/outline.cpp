@@ -47,14 +47,14 @@ TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells
 
 }  // namespace
 
-TriangleMesh Decimated(const TriangleMesh& mesh, int most_triangles) {
-  if (static_cast<int>(mesh.triangles.size()) <= most_triangles) return mesh;
+TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles) {
+  if (static_cast<int>(mesh.triangles.size()) <= max_triangles) return mesh;
   const Bounds bounds = ComputeBounds(mesh);
   // Up from the coarsest: those are cheap. A closed surface has about 12 cells^2 triangles.
   TriangleMesh best;
   for (int cells = 2; cells <= 64; ++cells) {
     TriangleMesh coarse = Clustered(mesh, bounds, cells);
-    if (static_cast<int>(coarse.triangles.size()) > most_triangles) break;
+    if (static_cast<int>(coarse.triangles.size()) > max_triangles) break;
     best = std::move(coarse);
   }
   return best;

@@ -5,8 +5,8 @@
 
 namespace touchstone {
 
-// At most `most_triangles` triangles that follow the mesh: vertices in one cell of the finest grid that is
+// At most `max_triangles` triangles that follow the mesh: vertices in one cell of the finest grid that is
 // coarse enough become one, at their mean (Rossignac and Borrel 1993).
-TriangleMesh Decimated(const TriangleMesh& mesh, int most_triangles);
+TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles);
 
 }  // namespace touchstone

@@ -15,11 +15,11 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostData = 3000;           // touches that stand for the present data
-constexpr int kRunLength = 50;            // in runs, so that a press still reaches the next touch
-constexpr double kStep = 0.02;            // of a coordinate's scale, for derivatives
-constexpr double kNothing = 0.5;          // squared sigmas in all, below which no touch tells anything
-constexpr double kMostADerivative = 200;  // sigmas a step; more is a finger that slips off a face
+constexpr int kMaxData = 3000;           // touches that stand for the present data
+constexpr int kRunLength = 50;           // in runs, so that a press still reaches the next touch
+constexpr double kStep = 0.02;           // of a coordinate's scale, for derivatives
+constexpr double kNothing = 0.5;         // squared sigmas in all, below which no touch tells anything
+constexpr double kMaxADerivative = 200;  // sigmas a step; more is a finger that slips off a face
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -55,7 +55,7 @@ absl::StatusOr<std::vector<Matrix>> Derivatives(const Observations& observations
     for (int k = 0; k < observations.size(); ++k) {
       const Vector change =
           Projected(moved.time_s, k, fingers, sigma_s) - Projected(at_start, k, fingers, sigma_s);
-      if (change.allFinite() && change.cwiseAbs().maxCoeff() < kMostADerivative)
+      if (change.allFinite() && change.cwiseAbs().maxCoeff() < kMaxADerivative)
         columns[k].col(c) = change * (coordinate.scale / step);
     }
   }
@@ -182,7 +182,7 @@ absl::StatusOr<std::vector<v1::ProposedTouch>> ProposeTouches(
   // The present data, or runs of them.
   std::vector<int> keep;
   const int runs = (observations.size() + kRunLength - 1) / kRunLength;
-  const int run_step = std::max(1, (observations.size() + kMostData - 1) / kMostData);
+  const int run_step = std::max(1, (observations.size() + kMaxData - 1) / kMaxData);
   for (int run = 0; run < runs; run += run_step)
     for (int k = run * kRunLength; k < std::min(observations.size(), (run + 1) * kRunLength); ++k)
       keep.push_back(k);
@@ -210,14 +210,14 @@ absl::StatusOr<std::vector<v1::ProposedTouch>> ProposeTouches(
 
   // One after the other, spread over the objects.
   const int objects = static_cast<int>(observations.objects.size());
-  const int most_an_object = std::max(1, (3 * touches / 2 + objects - 1) / objects);
+  const int max_an_object = std::max(1, (3 * touches / 2 + objects - 1) / objects);
   std::vector<int> of_object(objects, 0);
   std::vector<char> taken(candidates.size(), 0);
   for (int n = 0; n < touches; ++n) {
     int best = -1;
     double best_worth = 0;
     for (int k = 0; k < candidates.size(); ++k) {
-      if (taken[k] || of_object[candidates.object[k]] >= most_an_object) continue;
+      if (taken[k] || of_object[candidates.object[k]] >= max_an_object) continue;
       if (!explanations[0].said[k].allFinite()) continue;
       double worth = 0;
       // A rival that is as good as told apart counts less and less.
@@ -226,16 +226,16 @@ absl::StatusOr<std::vector<v1::ProposedTouch>> ProposeTouches(
       if (worth > best_worth) best = k, best_worth = worth;
     }
     if (best < 0) break;
-    size_t most_told = 0;
+    size_t max_told = 0;
     double most = -1;
     for (size_t j = 0; j < pairs.size(); ++j) {
       const double told = pairs[j].Gain(best) / (1 + pairs[j].separation());
-      if (told > most) most = told, most_told = j;
+      if (told > most) most = told, max_told = j;
     }
     proposed.push_back(Describe(candidates, best,
                                 alone ? absl::StrCat("learns the values of ", names[0])
-                                      : absl::StrCat("tells ", names[0], " from ", names[most_told + 1]),
-                                alone ? pairs[0].best.Open(best) : std::sqrt(pairs[most_told].Gain(best))));
+                                      : absl::StrCat("tells ", names[0], " from ", names[max_told + 1]),
+                                alone ? pairs[0].best.Open(best) : std::sqrt(pairs[max_told].Gain(best))));
     for (Pair& pair : pairs) pair.rival.Take(best), pair.best.Take(best);
     taken[best] = 1;
     ++of_object[candidates.object[best]];

@@ -9,12 +9,12 @@
 namespace touchstone {
 namespace {
 
-constexpr double kLeastDegrees = 8;
+constexpr double kMinDegrees = 8;
 
 }  // namespace
 
 bool HasRepeats(const SumOfSquares& error) {
-  return error.degrees >= kLeastDegrees;
+  return error.degrees >= kMinDegrees;
 }
 
 double LackOfFitP(const Observations& o, const std::vector<double>& residuals, double parameters) {

@@ -11,8 +11,8 @@ namespace touchstone {
 namespace {
 
 constexpr int kBins = 12;
-constexpr int kMostTouches = 60000;
-constexpr int kMostPosesPermuted = 20000;
+constexpr int kMaxTouches = 60000;
+constexpr int kMaxPosesPermuted = 20000;
 constexpr int kPermutations = 200;
 
 // One finger of one touch.
@@ -77,7 +77,7 @@ class CurveMaker {
         before_(before),
         after_(after),
         seed_(seed),
-        touches_(ThinnedTouches(observations, before, kMostTouches)) {
+        touches_(ThinnedTouches(observations, before, kMaxTouches)) {
     // Touches of one pose side by side: so are the cells that are made from them.
     std::stable_sort(touches_.begin(), touches_.end(),
                      [&](int a, int b) { return observations.pose[a] < observations.pose[b]; });
@@ -199,7 +199,7 @@ double CurveMaker::Test(const std::vector<Cell>& cells, const std::vector<double
   std::vector<Unit> units;
   std::vector<std::pair<int, int>> blocks;  // begin, end
   int poses = 0;
-  for (size_t begin = 0; begin < cells.size() && poses < kMostPosesPermuted; ++poses) {
+  for (size_t begin = 0; begin < cells.size() && poses < kMaxPosesPermuted; ++poses) {
     size_t end = begin;
     std::vector<double> mean(fingers, 0), count(fingers, 0), value(fingers, 0);
     for (; end < cells.size() && cells[end].pose == cells[begin].pose; ++end) {

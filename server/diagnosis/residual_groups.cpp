@@ -13,7 +13,7 @@ namespace touchstone {
 namespace {
 
 constexpr int kTimeBins = 8;
-constexpr size_t kMostGroups = 200;  // of one kind
+constexpr size_t kMaxGroups = 200;  // of one kind
 constexpr size_t kWorstTouches = 10;
 
 struct Group {
@@ -41,7 +41,7 @@ class Groups {
 
   void Report(const std::string& kind, const std::vector<Group>& groups, double all_excess,
               v1::Report* report) const {
-    if (groups.size() > kMostGroups) return;
+    if (groups.size() > kMaxGroups) return;
     for (const Group& group : groups) {
       if (group.touches == 0 || group.degrees == 0) continue;
       v1::GroupError* message = report->add_groups();

@@ -10,10 +10,10 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostPosesTested = 20000;
+constexpr int kMaxPosesTested = 20000;
 constexpr int kPermutations = 499;
-constexpr int kRanks = 256;              // into how many parts the test sorts the values
-constexpr size_t kMostPlotted = 200000;  // values a side whose quantiles set the edges
+constexpr int kRanks = 256;             // into how many parts the test sorts the values
+constexpr size_t kMaxPlotted = 200000;  // values a side whose quantiles set the edges
 
 // Values of one quantity, the poses they belong to, and the objects.
 struct Sample {
@@ -64,7 +64,7 @@ double SwapP(const std::vector<double>& a, const std::vector<double>& b, const s
   std::vector<size_t> pose_end;
   for (size_t n = 1; n <= pairs.size(); ++n)
     if (n == pairs.size() || pairs[n].pose != pairs[n - 1].pose) pose_end.push_back(n);
-  if (pose_end.size() > kMostPosesTested) pose_end.resize(kMostPosesTested);
+  if (pose_end.size() > kMaxPosesTested) pose_end.resize(kMaxPosesTested);
 
   std::vector<int> difference(kRanks);
   const auto gap = [&](auto sign) {
@@ -96,7 +96,7 @@ double SwapP(const std::vector<double>& a, const std::vector<double>& b, const s
 }
 
 std::vector<double> Thinned(const std::vector<double>& values) {
-  const size_t step = 1 + values.size() / kMostPlotted;
+  const size_t step = 1 + values.size() / kMaxPlotted;
   std::vector<double> some;
   for (size_t n = 0; n < values.size(); n += step) some.push_back(values[n]);
   return some;

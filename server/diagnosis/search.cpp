@@ -29,7 +29,7 @@ double ChiSquaredTail(double x, int q) {
 
 bool Search::Accepts(const Fit& before, const Fit& after, size_t moves) const {
   // So few numbers are followed by anything.
-  if (experiment_.contrasts->rows() < rules_.least_rows_a_value * (after.model.size() + 1)) return false;
+  if (experiment_.contrasts->rows() < rules_.min_rows_a_value * (after.model.size() + 1)) return false;
   if (after.evidence - before.evidence < rules_.enter_nats) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
@@ -186,7 +186,7 @@ absl::StatusOr<bool> Search::Grow(Explanation* explanation) const {
   for (const Move& move : moves) {
     const bool ramp = !move.visible && move.start.coordinates().back().inverse;
     const bool user = move.candidate >= 0 && candidates_[move.candidate].of_user;
-    const bool near = move.visible && fitted < rules_.most_refits &&
+    const bool near = move.visible && fitted < rules_.max_refits &&
                       move.evidence > moves[0].evidence - kNearForecast &&
                       move.evidence > explanation->fit.evidence;
     if (!near && !ramp && !user) continue;
@@ -229,7 +229,7 @@ absl::StatusOr<std::vector<Alternative>> Search::Alternatives(const Explanation&
       {NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
   int fitted = 0;
   for (const Move& move : moves) {
-    if (move.candidate < 0 || !move.visible || fitted >= rules_.most_refits) continue;
+    if (move.candidate < 0 || !move.visible || fitted >= rules_.max_refits) continue;
     if (move.name == NameOf(own) &&
         candidates_[move.candidate].per_object == explanation.fit.model.base().effects[index].per_object)
       continue;
@@ -260,7 +260,7 @@ absl::StatusOr<Explanation> Search::Run(FreeModel start, int given) const {
   Explanation explanation;
   explanation.given = given;
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation.fit, FitModel(experiment_, std::move(start)));
-  for (int step = 0; step < rules_.most_steps; ++step) {
+  for (int step = 0; step < rules_.max_steps; ++step) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool grown, Grow(&explanation));
     if (!grown) break;
     // Two true effects together may have let in a third that mixes them.

@@ -20,9 +20,9 @@ struct SearchRules {
   double practical = 0.003;     // share by which the error on touches left out must fall
   double equivalent_nats = 3;   // explanations as near as this are named together
   double formula_nats = 11;     // price of a term that was picked from a dictionary
-  int least_rows_a_value = 8;   // contrasts that each fitted value needs
-  int most_steps = 6;
-  int most_refits = 6;  // candidates that are fitted in full a step
+  int min_rows_a_value = 8;     // contrasts that each fitted value needs
+  int max_steps = 6;
+  int max_refits = 6;  // candidates that are fitted in full a step
 };
 
 // One way on from a fit.

@@ -63,7 +63,7 @@ double SliceScore(const SliceSums& slice, const SliceSums& all) {
 SliceBins::SliceBins(const ResidualCovariate* covariate, std::vector<double> values) : covariate_(covariate) {
   if (covariate->is_category()) {
     category_ = true;
-    count_ = covariate->labels.size() <= kMost ? static_cast<int>(covariate->labels.size()) : 1;
+    count_ = covariate->labels.size() <= kMax ? static_cast<int>(covariate->labels.size()) : 1;
     return;
   }
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
@@ -86,7 +86,7 @@ SliceBins::SliceBins(const ResidualCovariate* covariate, std::vector<double> val
   const double low = values[values.size() / 40], high = values[values.size() - 1 - values.size() / 40];
   if (high <= low) return;
   const double step = ReadableStep((high - low) / kThresholds);
-  for (double t = std::ceil(low / step) * step; t < high && thresholds_.size() < kMost - 1; t += step)
+  for (double t = std::ceil(low / step) * step; t < high && thresholds_.size() < kMax - 1; t += step)
     thresholds_.push_back(std::round(t / step) * step);
   count_ = static_cast<int>(thresholds_.size()) + 1;
 }
@@ -126,7 +126,7 @@ std::string SliceBins::Words(int low, int high) const {
 }
 
 std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
-                                         const std::vector<int>& live, int least_cells, int most) {
+                                         const std::vector<int>& live, int min_cells, int most) {
   Sums all;
   for (const int cell : live) all += {1, cells.excess_s2[cell], cells.residual_s[cell]};
   if (all.count == 0) return {};
@@ -134,7 +134,7 @@ std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, con
   std::vector<SliceCandidate> found;
   const auto score = [&](const Sums& sums) -> double {
     // What is left outside must be a part of its own, too.
-    if (sums.count < least_cells || all.count - sums.count < least_cells) return -HUGE_VAL;
+    if (sums.count < min_cells || all.count - sums.count < min_cells) return -HUGE_VAL;
     return SliceScore(sums, all);
   };
   const auto keep = [&](SliceCandidate* best) {
@@ -143,7 +143,7 @@ std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, con
 
   // One condition, or a range of one number.
   for (int c = 0; c < covariates; ++c) {
-    std::array<Sums, SliceBins::kMost + 1> below{};  // below[b]: of all bins before b
+    std::array<Sums, SliceBins::kMax + 1> below{};  // below[b]: of all bins before b
     for (const int cell : live) {
       const uint8_t bin = cells.bin[c][cell];
       if (bin != SliceBins::kUnknown) below[bin + 1] += {1, cells.excess_s2[cell], cells.residual_s[cell]};

@@ -14,7 +14,7 @@ namespace touchstone {
 // Cuts of one covariate at numbers that are easy to read.
 class SliceBins {
  public:
-  static constexpr int kMost = 64;
+  static constexpr int kMax = 64;
   static constexpr uint8_t kUnknown = 255;
 
   // `values` are the cells' values, NaN where unknown.
@@ -65,10 +65,10 @@ struct SliceSums {
 };
 double SliceScore(const SliceSums& slice, const SliceSums& all);
 
-// The best slices of at least `least_cells` of the cells listed in `live`, best first, at most one for each
+// The best slices of at least `min_cells` of the cells listed in `live`, best first, at most one for each
 // set of covariates, at most `most`.
 std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
-                                         const std::vector<int>& live, int least_cells, int most);
+                                         const std::vector<int>& live, int min_cells, int most);
 
 // Without the condition that hardly matters: a person pictures one condition sooner than two.
 SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& cells,

@@ -12,9 +12,9 @@
 namespace touchstone {
 namespace {
 
-constexpr double kMostMissed = 0.5;  // share of an object's touches
+constexpr double kMaxMissed = 0.5;  // share of an object's touches
 constexpr double kWarnMissed = 0.05;
-constexpr double kMostTravel = 2.5;  // over the standoff: whoever goes farther has met nothing at the target
+constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther has met nothing at the target
 constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
 constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
 constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
@@ -31,8 +31,7 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
     ++touches[o.object[k]];
     bool misses = false;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
-      misses |=
-          !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMostTravel * o.set->standoff_m[o.row[k]]);
+      misses |= !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMaxTravel * o.set->standoff_m[o.row[k]]);
     missed[o.object[k]] += misses;
     const Bounds& bounds = o.surfaces[o.object[k]]->bounds();
     const Eigen::Vector3d& target = o.set->target_m[o.row[k]];
@@ -50,7 +49,7 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
         "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
         off_m[object] * 1e3);
-    if (missed[object] > kMostMissed * touches[object])
+    if (missed[object] > kMaxMissed * touches[object])
       return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
                                                      ". Is it this object's mesh, in mm, with z up? (--mesh ",
                                                      o.objects[object], "=FILE,unit=mm,up=z)"));
@@ -63,15 +62,15 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
 absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
   std::vector<double> measured, predicted;
   for (int k = 0; k < o.size(); ++k) {
-    double least = INFINITY, most = -INFINITY, least_p = INFINITY, most_p = -INFINITY;
+    double least = INFINITY, most = -INFINITY, min_p = INFINITY, max_p = -INFINITY;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e) {
       if (std::isnan(o.time_s[e]) || std::isnan(nominal.time_s[e])) continue;
       least = std::min(least, o.time_s[e]), most = std::max(most, o.time_s[e]);
-      least_p = std::min(least_p, nominal.time_s[e]), most_p = std::max(most_p, nominal.time_s[e]);
+      min_p = std::min(min_p, nominal.time_s[e]), max_p = std::max(max_p, nominal.time_s[e]);
     }
     if (most < least) continue;
     measured.push_back(most - least);
-    predicted.push_back(most_p - least_p);
+    predicted.push_back(max_p - min_p);
   }
   if (measured.empty()) return absl::OkStatus();
   const auto median = [](std::vector<double>* values) {
@@ -175,7 +174,7 @@ SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& resid
 absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_row) {
   const Observations& o = *study->observations;
   std::vector<int> kept;
-  study->thinned = o.size() > kMostSearched;
+  study->thinned = o.size() > kMaxSearched;
   if (!study->thinned) {
     for (int k = 0; k < o.size(); ++k) kept.push_back(k);
   } else {
@@ -184,7 +183,7 @@ absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_r
     for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
     int total = 0;
     for (int& count : usable) count = std::min(count, kRepeatsSearched), total += count;
-    const double stride = std::max(1.0, static_cast<double>(total) / kMostSearched);
+    const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
     std::vector<int> quota(o.poses, 0);
     double credit = 0;
     for (int pose = 0; pose < o.poses; ++pose) {

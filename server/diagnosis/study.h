@@ -13,7 +13,7 @@
 namespace touchstone {
 
 // The search works on at most so many touches: its likelihood costs the square of an object's touches.
-inline constexpr int kMostSearched = 2400;
+inline constexpr int kMaxSearched = 2400;
 
 struct Study {
   DiagnosisInput input;

@@ -29,8 +29,8 @@ std::string Value(const v1::ParameterValue& value) {
 
 template <typename Parameters>
 std::string Values(const Parameters& parameters) {
-  constexpr int kMostShown = 4;
-  if (parameters.size() > kMostShown) return absl::StrCat(parameters.size(), " values");
+  constexpr int kMaxShown = 4;
+  if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
   std::vector<std::string> texts;
   for (const auto& value : parameters) texts.push_back(Value(value));
   return absl::StrJoin(texts, ", ");

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSpread = 0.8;
 constexpr double kNearEdgeM = 0.001;
-constexpr double kMostTurnOfNormal = 15 * kPi / 180;  // within kNearEdgeM; more is an edge
+constexpr double kMaxTurnOfNormal = 15 * kPi / 180;  // within kNearEdgeM; more is an edge
 constexpr double kSpeedFactors[] = {1, 0.5, 2};
 
 double Median(std::vector<double> values) {
@@ -62,7 +62,7 @@ bool Steady(const Prediction& here, const Prediction& beside, int k) {
   for (int i = 0; i < here.fingers; ++i) {
     const size_t at = size_t(k) * here.fingers + i;
     if (std::isnan(beside.time_s[at])) return false;
-    if (here.normal[at].dot(beside.normal[at]) < std::cos(kMostTurnOfNormal)) return false;
+    if (here.normal[at].dot(beside.normal[at]) < std::cos(kMaxTurnOfNormal)) return false;
     // On a slope of incidence the travel may change by the step times its tangent, and a little more.
     const double tangent =
         std::sqrt(std::max(0.0, 1 / std::max(1e-3, std::pow(here.cos_incidence[at], 2)) - 1));
@@ -110,7 +110,7 @@ absl::StatusOr<Observations> MakeCandidates(const Observations& observations, co
   set->objects = observations.objects;
   Plan plan;
   plan.kind = Plan::Kind::kFaces;
-  plan.faces.most_tilt_rad = choice.most_tilt_rad;
+  plan.faces.max_tilt_rad = choice.max_tilt_rad;
   plan.faces.spread = kSpread;
   plan.faces.standoff_m = standoff_m;
   plan.faces.rounds = 1;

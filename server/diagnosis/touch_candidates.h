@@ -10,7 +10,7 @@ namespace touchstone {
 
 struct CandidateChoice {
   int most = 1500;               // candidates
-  double most_tilt_rad = 0.7;    // between the approach and a face of the bounding box
+  double max_tilt_rad = 0.7;     // between the approach and a face of the bounding box
   bool different_times = false;  // also at the beginning of a session, for what drifts
   uint64_t seed = 0;
 };

@@ -15,8 +15,8 @@ namespace {
 
 constexpr int kMeasuredTouches = 1500;  // at most, all objects together
 // About, all objects together. Distances among an object's own grow with their square.
-constexpr int kReferenceTouches = 1200, kMostReferenceAnObject = 600;
-constexpr int kQuickTouches = 480, kMostQuickAnObject = 360;
+constexpr int kReferenceTouches = 1200, kMaxReferenceAnObject = 600;
+constexpr int kQuickTouches = 480, kMaxQuickAnObject = 360;
 constexpr uint64_t kReferenceSeed = 1;  // sets are 2, 3, ...
 
 }  // namespace
@@ -118,14 +118,14 @@ absl::StatusOr<std::vector<double>> UnposedCase::TimesOfSet(const std::shared_pt
 // two models differ by the models alone.
 absl::StatusOr<std::shared_ptr<const UnposedTouches>> UnposedCase::TouchesOfReference(
     int object, const SupposedPoses& poses, ReferenceSize size) const {
-  const auto key = std::make_tuple(object, poses.most_tilt_rad, poses.spread, size);
+  const auto key = std::make_tuple(object, poses.max_tilt_rad, poses.spread, size);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = touches_.find(key);
     if (found != touches_.end()) return found->second;
   }
   const bool quick = size == ReferenceSize::kQuick;
-  const int most = quick ? kMostQuickAnObject : kMostReferenceAnObject,
+  const int most = quick ? kMaxQuickAnObject : kMaxReferenceAnObject,
             together = quick ? kQuickTouches : kReferenceTouches;
   Plan plan = WithPoses(objects[object].plan, poses);
   plan.faces.rounds = 1;

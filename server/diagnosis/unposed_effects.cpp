@@ -20,7 +20,7 @@ constexpr double kPlainlyCompatibleP = 0.5;      // no need to look for better v
 constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
 constexpr size_t kRefined = 10;                  // directions that are looked at closely
 constexpr int kRefinedOfAnEffect = 2;
-constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMostTiltRad = 50 * kRadiansPerDegree;
+constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMaxTiltRad = 50 * kRadiansPerDegree;
 constexpr double kSpreadStep = 0.1;
 constexpr int kMovesAStep = 3;  // in one direction
 // Octaves of the strength, and of the steps above. A strength must be right to a few percent, poses need not.
@@ -161,11 +161,11 @@ absl::Status Screen(const Model& model, const Direction& direction, const std::v
 Trial Moved(const Trial& trial, size_t what, double step) {
   Trial moved = trial;
   double& amount = moved.amounts[trial.direction.entry];
-  double& tilt_rad = moved.poses.most_tilt_rad;
+  double& tilt_rad = moved.poses.max_tilt_rad;
   if (what == 0)
     amount *= std::exp2(step);
   else if (what == 1)
-    tilt_rad = std::clamp(tilt_rad + step * kTiltStepRad, 0.0, kMostTiltRad);
+    tilt_rad = std::clamp(tilt_rad + step * kTiltStepRad, 0.0, kMaxTiltRad);
   else if (what == 2)
     moved.poses.spread = std::clamp(moved.poses.spread + step * kSpreadStep, 0.1, 1.0);
   else

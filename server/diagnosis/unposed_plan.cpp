@@ -12,11 +12,11 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostRepeats = 60;
-constexpr int kMostForNeighbours = 600;  // touches whose neighbours are looked up
-constexpr double kSamePlace = 0.2;       // distance of repeats over that of any two touches, at most
-constexpr double kGap = 3;               // the first stranger is so much farther than the last repeat
-constexpr uint32_t kMostAttempts = 64;
+constexpr int kMaxRepeats = 60;
+constexpr int kMaxForNeighbours = 600;  // touches whose neighbours are looked up
+constexpr double kSamePlace = 0.2;      // distance of repeats over that of any two touches, at most
+constexpr double kGap = 3;              // the first stranger is so much farther than the last repeat
+constexpr uint32_t kMaxAttempts = 64;
 constexpr double kTouchIntervalS = 10;
 
 double Median(std::vector<double> values) {
@@ -56,7 +56,7 @@ int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds
   const double far = Median(apart);
 
   // Rounds: a constant number of rows later the same touch comes again. The shortest period counts.
-  for (int repeats = std::min(kMostRepeats, count / 2); repeats >= 2; --repeats) {
+  for (int repeats = std::min(kMaxRepeats, count / 2); repeats >= 2; --repeats) {
     if (count % repeats != 0) continue;
     const int period = count / repeats;
     std::vector<double> again;
@@ -70,7 +70,7 @@ int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds
   }
 
   // In any order: everybody has repeats - 1 neighbours much closer than the next.
-  const int looked_up = std::min(count, kMostForNeighbours), most = std::min(kMostRepeats, count - 1);
+  const int looked_up = std::min(count, kMaxForNeighbours), most = std::min(kMaxRepeats, count - 1);
   std::vector<std::vector<double>> nearest(most);
   for (int n = 0; n < looked_up; ++n) {
     std::vector<double> distances;
@@ -92,7 +92,7 @@ int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds
 }
 
 UnposedObject SupposePlan(const MeasurementSet& set, int object, std::shared_ptr<const Surface> surface,
-                          double speed_m_s, int most_touches) {
+                          double speed_m_s, int max_touches) {
   UnposedObject result;
   result.surface = std::move(surface);
   std::vector<int> rows;
@@ -113,7 +113,7 @@ UnposedObject SupposePlan(const MeasurementSet& set, int object, std::shared_ptr
 
   // Row n was the plan's touch n, unless a round of the plan has a few poses more than a round of the set.
   // Large sets are thinned by whole poses, evenly: so every face keeps its part.
-  const int kept = std::max(1, std::min(poses, most_touches / result.repeats));
+  const int kept = std::max(1, std::min(poses, max_touches / result.repeats));
   const uint64_t poses_a_round = 6ull * result.plan.faces.samples_per_face;
   for (int n = 0; n < count; ++n) {
     const int64_t pose = n % poses;
@@ -172,7 +172,7 @@ void Fill(const std::vector<CommandedTouch>& touches, const std::vector<uint64_t
 
 Plan WithPoses(const Plan& plan, const SupposedPoses& poses) {
   Plan changed = plan;
-  changed.faces.most_tilt_rad = poses.most_tilt_rad;
+  changed.faces.max_tilt_rad = poses.max_tilt_rad;
   changed.faces.spread = poses.spread;
   return changed;
 }
@@ -198,7 +198,7 @@ absl::StatusOr<UnposedTouches> DrawUnposed(std::shared_ptr<const Model> model,
   TouchWorkspace workspace;
   batch.surface = surface;
   batch.seed = seed;
-  for (uint32_t n = 0; n < kMostAttempts && !slots.empty(); ++n) {
+  for (uint32_t n = 0; n < kMaxAttempts && !slots.empty(); ++n) {
     simulator.Prepare(static_cast<int>(slots.size()), &batch);
     for (size_t t = 0; t < slots.size(); ++t)
       Fill(drawn.touches, numbers, slots[t], static_cast<int>(t), &batch);

@@ -25,7 +25,7 @@ struct UnposedObject {
 
 // How the poses were probably spread: what a set without poses does not tell. The faces plan's usual ones.
 struct SupposedPoses {
-  double most_tilt_rad = FacesPlan().most_tilt_rad;
+  double max_tilt_rad = FacesPlan().max_tilt_rad;
   double spread = FacesPlan().spread;
 };
 Plan WithPoses(const Plan& plan, const SupposedPoses& poses);
@@ -34,9 +34,9 @@ Plan WithPoses(const Plan& plan, const SupposedPoses& poses);
 // `time_s` [touch * fingers + finger]; `in_rounds`: whether the set goes through all poses again and again.
 int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds);
 
-// Object `object` of a set, with at most `most_touches` of its touches: whole poses.
+// Object `object` of a set, with at most `max_touches` of its touches: whole poses.
 UnposedObject SupposePlan(const MeasurementSet& set, int object, std::shared_ptr<const Surface> surface,
-                          double speed_m_s, int most_touches);
+                          double speed_m_s, int max_touches);
 
 // Standard deviation of one finger's time among the rounds of a pose, pooled over objects; `degrees` is 0 if
 // there are no rounds.

@@ -109,7 +109,7 @@ absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const Unpose
   least = null.Together(rank.distances());
   for (const double tilt_deg : {-2.5, 0.0, 2.5})
     for (const double spread : {-0.1, 0.0, 0.1})
-      TOUCHSTONE_RETURN_IF_ERROR(attempt(coarse.most_tilt_rad / kRadiansPerDegree + tilt_deg,
+      TOUCHSTONE_RETURN_IF_ERROR(attempt(coarse.max_tilt_rad / kRadiansPerDegree + tilt_deg,
                                          coarse.spread + spread, ReferenceSize::kFull));
   return best;
 }

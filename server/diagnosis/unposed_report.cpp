@@ -118,7 +118,7 @@ std::string PlanInWords(const UnposedCase& the_case, const SupposedPoses& poses,
   const FacesPlan faces = WithPoses(first.plan, poses).faces;
   return absl::StrCat("faces of the bounding box, ", faces.samples_per_face, " poses a face, ", first.repeats,
                       first.repeats == 1 ? " touch" : " touches", " a pose, tilt up to ",
-                      std::round(10 * faces.most_tilt_rad / kRadiansPerDegree) / 10, " deg, spread over ",
+                      std::round(10 * faces.max_tilt_rad / kRadiansPerDegree) / 10, " deg, spread over ",
                       std::lround(100 * faces.spread), " % of the face", fitted ? " (what fits best)" : "",
                       ", standoff ", FromSi(Unit::kMillimetre, faces.standoff_m), " mm, ",
                       FromSi(Unit::kMillimetrePerSecond, the_case.speed_m_s), " mm/s");

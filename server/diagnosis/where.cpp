@@ -13,15 +13,15 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostSlices = 6;
-constexpr int kMostTouchesSearched = 30000;
-constexpr int kTries = 8;             // candidates that the other half is asked about, a slice
-constexpr double kLeastShare = 0.03;  // of the excess, for a slice to be worth a line
-constexpr double kLeastZ = 4;         // on the other half, for a slice to be believed
+constexpr int kMaxSlices = 6;
+constexpr int kMaxTouchesSearched = 30000;
+constexpr int kTries = 8;           // candidates that the other half is asked about, a slice
+constexpr double kMinShare = 0.03;  // of the excess, for a slice to be worth a line
+constexpr double kMinZ = 4;         // on the other half, for a slice to be believed
 // ... and where the excess as a whole stands so many standard deviations above noise: something is there, and
 // a slice of a few poses cannot reach four.
-constexpr double kLeastZOfMisfit = 1.8, kCertainMisfit = 10;
-constexpr int kLeastPoses = 5;          // a half
+constexpr double kMinZOfMisfit = 1.8, kCertainMisfit = 10;
+constexpr int kMinPoses = 5;            // a half
 constexpr double kCoherentShare = 0.2;  // of a slice's excess in its mean, to call it early or late
 
 struct Half {
@@ -115,7 +115,7 @@ Verdict SliceFinder::Judge(const SliceCandidate& slice, const std::vector<int>& 
     mean += cells_.residual_s[cell] - residual_a_cell;
   }
   Verdict verdict;
-  if (sums.size() < kLeastPoses) return verdict;
+  if (sums.size() < kMinPoses) return verdict;
   double lift = 0, lift2 = 0, mean = 0, mean2 = 0;
   for (const auto& [pose, sum] : sums) {
     lift += sum.first, lift2 += sum.first * sum.first;
@@ -177,7 +177,7 @@ v1::Slice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_s
 }
 
 std::vector<v1::Slice> SliceFinder::Find() {
-  const std::vector<int> touches = ThinnedTouches(observations_, residuals_, kMostTouchesSearched);
+  const std::vector<int> touches = ThinnedTouches(observations_, residuals_, kMaxTouchesSearched);
   Collect(touches);
   const double total = TotalExcess();
   if (!(total > 0) || !(search_.excess > 0)) return {};
@@ -185,25 +185,25 @@ std::vector<v1::Slice> SliceFinder::Find() {
   for (int k = 0; k < observations_.size(); ++k)
     if (observations_.used[k]) squares += std::max(0, FingersCompared(observations_, residuals_, k) - 1);
   const bool certain = total > kCertainMisfit * sigma_s_ * sigma_s_ * std::sqrt(2 * squares);
-  const double least_z = certain ? kLeastZOfMisfit : kLeastZ;
+  const double min_z = certain ? kMinZOfMisfit : kMinZ;
 
   // A part must be large enough to picture; in a small set a fifth of it is.
-  const double least_touches =
+  const double min_touches =
       std::min(std::max(50.0, 0.02 * touches.size()), std::max(4.0, 0.2 * touches.size()));
-  const int least_cells = static_cast<int>(std::ceil(0.5 * least_touches));
+  const int min_cells = static_cast<int>(std::ceil(0.5 * min_touches));
 
   std::vector<v1::Slice> slices;
-  while (static_cast<int>(slices.size()) < kMostSlices) {
-    const auto candidates = SearchSlices(bins_, cells_, search_.live, least_cells, kTries);
+  while (static_cast<int>(slices.size()) < kMaxSlices) {
+    const auto candidates = SearchSlices(bins_, cells_, search_.live, min_cells, kTries);
     std::vector<int> live = search_.live;
     live.insert(live.end(), check_.live.begin(), check_.live.end());
     bool found = false;
     SliceCandidate chosen;
     for (const SliceCandidate& candidate : candidates) {
-      if (candidate.score < kLeastShare * search_.excess) break;
+      if (candidate.score < kMinShare * search_.excess) break;
       const Verdict there = Judge(candidate, search_.live), here = Judge(candidate, check_.live);
-      const bool same_bias = there.z_mean * here.z_mean > 0 && std::abs(here.z_mean) > least_z;
-      found = here.z_excess > least_z || same_bias;
+      const bool same_bias = there.z_mean * here.z_mean > 0 && std::abs(here.z_mean) > min_z;
+      found = here.z_excess > min_z || same_bias;
       if (found) {
         chosen = Simplified(bins_, cells_, live, candidate);
         break;

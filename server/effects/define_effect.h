@@ -19,7 +19,7 @@
 namespace touchstone {
 
 // A parameter with one value a finger; entries from the batch's number of fingers on are zero.
-using PerFinger = std::array<double, kMostFingers>;
+using PerFinger = std::array<double, kMaxFingers>;
 
 // One parameter of an effect whose values live in the struct P. Numbers here are in the unit of files;
 // the field gets SI. The kind of field (one number, a vector, one number a finger) follows from its type.
@@ -66,7 +66,7 @@ template <typename P>
       for (int axis = 0; axis < 3; ++axis) (parameters->*(*vector))[axis] = values.at(next++);
     } else {
       PerFinger& entries = parameters->*(std::get<PerFinger P::*>(row.field));
-      for (int finger = 0; finger < kMostFingers; ++finger)
+      for (int finger = 0; finger < kMaxFingers; ++finger)
         entries[finger] = finger < fingers ? values.at(next++) : 0.0;
     }
   }

@@ -135,9 +135,9 @@ bool IsTaken(const std::string& name) {
 }
 
 absl::Status CheckParameters(const FormulaSpec& spec) {
-  if (spec.parameters.size() > kMostFormulaParameters)
+  if (spec.parameters.size() > kMaxFormulaParameters)
     return absl::InvalidArgumentError(absl::StrCat("it has ", spec.parameters.size(), " parameters; at most ",
-                                                   kMostFormulaParameters, " are taken"));
+                                                   kMaxFormulaParameters, " are taken"));
   if (spec.values.size() != spec.parameters.size())
     return absl::InvalidArgumentError(absl::StrCat("it has ", spec.parameters.size(), " parameters and ",
                                                    spec.values.size(), " values; every parameter needs one"));

@@ -31,8 +31,8 @@ struct FormulaWord {
 absl::Span<const FormulaWord> FormulaFunctions();
 absl::Span<const FormulaWord> FormulaConstants();
 
-inline constexpr int kMostFormulaCharacters = 1000;
-inline constexpr int kMostFormulaParameters = 32;
+inline constexpr int kMaxFormulaCharacters = 1000;
+inline constexpr int kMaxFormulaParameters = 32;
 
 // Checks and compiles a formula. Errors name the formula, the place in the expression and what would be
 // right. The effect may be applied by any number of threads at once. Its name is "formula"; spec.name is in

@@ -125,9 +125,9 @@ absl::Status Wrong(size_t index, absl::string_view what) {
 absl::Status CheckCharacters(const std::string& expression) {
   if (expression.find_first_not_of(" \t\n") == std::string::npos)
     return absl::InvalidArgumentError("it is empty; write for example \"k * finger\"");
-  if (expression.size() > kMostFormulaCharacters)
+  if (expression.size() > kMaxFormulaCharacters)
     return absl::InvalidArgumentError(absl::StrCat("it has ", expression.size(), " characters; at most ",
-                                                   kMostFormulaCharacters, " are taken"));
+                                                   kMaxFormulaCharacters, " are taken"));
   for (size_t i = 0; i < expression.size(); ++i) {
     const char c = expression[i];
     if (!IsNameCharacter(c) &&

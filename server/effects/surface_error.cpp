@@ -17,9 +17,9 @@
 namespace touchstone {
 namespace {
 
-constexpr double kLeastCosine = 0.1;
+constexpr double kMinCosine = 0.1;
 constexpr int kSurfacePoints = 4096;
-constexpr size_t kMostRemembered = 64;
+constexpr size_t kMaxRemembered = 64;
 
 struct Parameters {
   double rms_m;
@@ -75,8 +75,8 @@ class FieldMemory {
     const Key key(surface.hash(), surface.name(), seed, length_m);
     auto field = fields_.find(key);
     if (field != fields_.end()) return field->second;
-    if (fields_.size() >= kMostRemembered) fields_.clear();
-    if (points_.size() >= kMostRemembered) points_.clear();
+    if (fields_.size() >= kMaxRemembered) fields_.clear();
+    if (points_.size() >= kMaxRemembered) points_.clear();
     auto points = points_.find(surface.hash());
     if (points == points_.end())
       points = points_.emplace(surface.hash(), PointsOnSurface(surface.mesh())).first;
@@ -104,7 +104,7 @@ void Apply(const Parameters& p, TouchBatch& touches) {
       const Eigen::Vector3d point_in_mesh =
           mesh_from_object * (touches.contact_m[entry] - touches.surface_translation_m);
       const double height_m = p.rms_m * field->At(point_in_mesh);
-      const double earlier_m = height_m / std::max(touches.cos_incidence[entry], kLeastCosine);
+      const double earlier_m = height_m / std::max(touches.cos_incidence[entry], kMinCosine);
       touches.travel_m[entry] -= earlier_m;
       touches.contact_m[entry] -= earlier_m * touches.approach[touch];
     }

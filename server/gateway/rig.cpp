@@ -25,7 +25,7 @@ double UnixNowS() {
 
 // Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens.
 constexpr uint32_t kProgramIdBlock = 1000;
-constexpr uint32_t kMostProgramId = (1u << 28) - kProgramIdBlock;
+constexpr uint32_t kMaxProgramId = (1u << 28) - kProgramIdBlock;
 
 }  // namespace
 
@@ -48,7 +48,7 @@ Rig::~Rig() {
 }
 
 uint32_t Rig::NextProgramId() {
-  if (next_program_id_ >= kMostProgramId) next_program_id_ = reserved_program_id_ = 1;
+  if (next_program_id_ >= kMaxProgramId) next_program_id_ = reserved_program_id_ = 1;
   if (next_program_id_ >= reserved_program_id_) {
     reserved_program_id_ = next_program_id_ + kProgramIdBlock;
     const absl::Status kept = journal().SetFact("next_program_id", absl::StrCat(reserved_program_id_));

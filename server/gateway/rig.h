@@ -33,7 +33,7 @@ struct RigOptions {
   int fingers = 3;
   double spacing_m = 0.030;
   double time_scale = 1;  // rig seconds in one host second; above 1 only with an emulator on a faster clock
-  double most_press_m = 0.045;  // how far the first finger may be pushed while the others are on their way
+  double max_press_m = 0.045;  // how far the first finger may be pushed while the others are on their way
   // Run to change the object: program and arguments, in which {object} and {placement} stand for themselves.
   // Empty: a person does it and tells (Mount).
   std::vector<std::string> mount_command;
@@ -167,6 +167,6 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record);
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within 0.1
 // rig s.
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
-                                        double most_gap_s);
+                                        double max_gap_s);
 
 }  // namespace touchstone

@@ -29,9 +29,9 @@ class Signal {
     return count_;
   }
   // Waits until there is news since `seen`, at most so long.
-  void WaitForNews(uint64_t seen, double most_s) const {
+  void WaitForNews(uint64_t seen, double max_s) const {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(most_s), [&] { return count_ != seen; });
+    changed_.wait_for(lock, std::chrono::duration<double>(max_s), [&] { return count_ != seen; });
   }
 
  private:

@@ -46,7 +46,7 @@ std::array<double, 6> NoPose() {
 }  // namespace
 
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
-                                        double most_gap_s) {
+                                        double max_gap_s) {
   const auto after =
       std::lower_bound(states.begin(), states.end(), controller_s,
                        [](const ArmState& state, double time_s) { return state.controller_time_s < time_s; });
@@ -54,7 +54,7 @@ std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, dou
   const ArmState& a = *(after - 1);
   const ArmState& b = *after;
   const double gap_s = b.controller_time_s - a.controller_time_s;
-  if (!(gap_s > 0) || gap_s > most_gap_s) return std::nullopt;
+  if (!(gap_s > 0) || gap_s > max_gap_s) return std::nullopt;
   const double share = (controller_s - a.controller_time_s) / gap_s;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(a.base_from_tip.rotation())
@@ -76,19 +76,19 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record) {
     if (state.program_id == motion.program_id && state.phase == static_cast<int>(MotionPhase::kApproach))
       states.push_back(&state);
   std::vector<std::pair<double, double>> full_speed;
-  double least_scaling = 1;
+  double min_scaling = 1;
   const double origin_s = states.empty() ? 0 : states.front()->controller_time_s;
   const double ramp_m = motion.speed_m_s * motion.speed_m_s / (2 * record.acceleration_m_s2);
   for (const ArmState* state : states) {
-    least_scaling = std::min(least_scaling, state->speed_scaling);
+    min_scaling = std::min(min_scaling, state->speed_scaling);
     const double distance_m = approach.dot(state->base_from_tip.translation() - start);
     const double speed_m_s = approach.dot(state->tip_velocity_m_s);
     if (distance_m > 2 * ramp_m && std::abs(speed_m_s - motion.speed_m_s) < 0.1 * motion.speed_m_s)
       full_speed.emplace_back(state->controller_time_s - origin_s, distance_m);
   }
-  if (least_scaling < 0.995)
+  if (min_scaling < 0.995)
     return absl::FailedPreconditionError(absl::StrCat(
-        "the controller scaled the speed to ", ShortestNumber(std::round(1000 * least_scaling) / 10),
+        "the controller scaled the speed to ", ShortestNumber(std::round(1000 * min_scaling) / 10),
         " % during the approach, so its contact times cannot be compared with others: set the speed "
         "slider to 100 % and touch again"));
 

@@ -47,8 +47,8 @@ template <typename Number>
 inline bool MeetsInside(const LineTriangle<double>& meet, const Triple1& direction, const Triple1& a,
                         const Triple1& b, const Triple1& c) {
   // Seen edge-on, the plane says nothing: a line along a face does not touch it.
-  constexpr double kLeastCosine = 1e-8;
-  if (!(meet.facing * meet.facing > kLeastCosine * kLeastCosine * Dot(meet.area_vector, meet.area_vector)))
+  constexpr double kMinCosine = 1e-8;
+  if (!(meet.facing * meet.facing > kMinCosine * kMinCosine * Dot(meet.area_vector, meet.area_vector)))
     return false;
   const double side = meet.facing > 0 ? 1 : -1;
   const Triple1* const start[3] = {&b, &c, &a};

@@ -129,7 +129,7 @@ absl::StatusOr<TriangleMesh> Finish(const MeshReading& reading, const MeshImport
   for (uint32_t size : polygons.sizes) {
     Triangulate(polygons.points, absl::MakeConstSpan(&polygons.corners[begin], size), &mesh.triangles, &work);
     begin += size;
-    if (work > kMostTriangulationWork)
+    if (work > kMaxTriangulationWork)
       return reading.Error(
           "it has faces of too many corners to split into triangles; export it with triangles only");
   }
@@ -163,7 +163,7 @@ absl::StatusOr<TriangleMesh> ReadMeshFile(const std::string& path, const MeshImp
     return absl::InvalidArgumentError(absl::StrCat(path, ": the extension '", extension,
                                                    "' names no mesh format",
                                                    "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path, import.most_bytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path, import.max_bytes));
   return ReadMeshBytes(path, extension, bytes, import, notes);
 }
 
@@ -175,9 +175,9 @@ absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string
   if (reader == nullptr)
     return absl::InvalidArgumentError(absl::StrCat(name, ": unknown mesh format '", format, "'",
                                                    "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
-  if (bytes.size() > import.most_bytes)
+  if (bytes.size() > import.max_bytes)
     return absl::InvalidArgumentError(
-        absl::StrCat(name, ": has ", bytes.size(), " bytes; at most ", import.most_bytes, " are read"));
+        absl::StrCat(name, ": has ", bytes.size(), " bytes; at most ", import.max_bytes, " are read"));
   // A byte order mark is no part of any format, but some editors leave one.
   if (absl::StartsWith(bytes, "\xEF\xBB\xBF")) bytes.remove_prefix(3);
   MeshReading reading(name, bytes, import);

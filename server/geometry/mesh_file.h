@@ -26,9 +26,9 @@ struct MeshImport {
   std::optional<double> fit_mm;  // instead of unit and scale: the longest side of the bounding box, > 0
 
   // What is refused.
-  uint64_t most_bytes = uint64_t{2} << 30;
-  uint64_t most_vertices = 12'000'000;
-  uint64_t most_triangles = 4'000'000;
+  uint64_t max_bytes = uint64_t{2} << 30;
+  uint64_t max_vertices = 12'000'000;
+  uint64_t max_triangles = 4'000'000;
 };
 
 std::vector<std::string> MeshUnitNames();    // mm, cm, m, inch

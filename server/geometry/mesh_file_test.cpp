@@ -92,13 +92,13 @@ TEST(MeshImport, RefusesWhatItDoesNotKnow) {
 
 TEST(MeshImport, RefusesMeshesBeyondItsLimits) {
   MeshImport import;
-  import.most_triangles = 3;
+  import.max_triangles = 3;
   EXPECT_THAT(Refusal(import), HasSubstr("line 10: more than 3 triangles"));
   import = {};
-  import.most_vertices = 3;
+  import.max_vertices = 3;
   EXPECT_THAT(Refusal(import), HasSubstr("line 2: more than 3 vertices"));
   import = {};
-  import.most_bytes = 20;
+  import.max_bytes = 20;
   EXPECT_THAT(Refusal(import), HasSubstr("at most 20 are read"));
 }
 

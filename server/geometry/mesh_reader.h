@@ -37,8 +37,8 @@ class MeshReading {
   absl::Status ErrorAtByte(uint64_t byte, absl::string_view what) const;
   absl::Status Error(absl::string_view what) const;
 
-  // Refuses counts of a header beyond the limits, or that `bytes_left` cannot hold at `least_bytes` for each.
-  absl::Status CheckCount(uint64_t line, absl::string_view things, uint64_t count, uint64_t least_bytes,
+  // Refuses counts of a header beyond the limits, or that `bytes_left` cannot hold at `min_bytes` for each.
+  absl::Status CheckCount(uint64_t line, absl::string_view things, uint64_t count, uint64_t min_bytes,
                           uint64_t bytes_left) const;
   absl::Status CheckVertexCount(uint64_t line, uint64_t count) const;
   absl::Status CheckTriangleCount(uint64_t line, uint64_t count) const;
@@ -109,7 +109,7 @@ absl::Status ParsePoint(const MeshReading& reading, absl::string_view* line, uin
 // where the face is convex or has no area. Always appends polygon.size() - 2 triangles. `work` counts point
 // tests over a whole file; beyond the limit corners are cut off as they come, and the caller refuses the
 // file.
-inline constexpr uint64_t kMostTriangulationWork = 4'000'000'000;
+inline constexpr uint64_t kMaxTriangulationWork = 4'000'000'000;
 void Triangulate(const std::vector<Eigen::Vector3d>& points, absl::Span<const uint32_t> polygon,
                  std::vector<std::array<uint32_t, 3>>* triangles, uint64_t* work);
 

@@ -74,8 +74,8 @@ bool ParseWhole(absl::string_view word, int64_t* value) {
 
 std::string Quoted(absl::string_view word) {
   if (word.empty()) return "nothing";
-  constexpr size_t kMost = 40;
-  return absl::StrCat("'", absl::CHexEscape(word.substr(0, kMost)), word.size() > kMost ? "...'" : "'");
+  constexpr size_t kMax = 40;
+  return absl::StrCat("'", absl::CHexEscape(word.substr(0, kMax)), word.size() > kMax ? "...'" : "'");
 }
 
 absl::Status ParsePoint(const MeshReading& reading, absl::string_view* line, uint64_t line_number,
@@ -105,9 +105,9 @@ absl::Status MeshReading::Error(absl::string_view what) const {
 }
 
 absl::Status MeshReading::CheckCount(uint64_t line, absl::string_view things, uint64_t count,
-                                     uint64_t least_bytes, uint64_t bytes_left) const {
+                                     uint64_t min_bytes, uint64_t bytes_left) const {
   // A last line may lack its line break.
-  if (count > (bytes_left + 1) / std::max<uint64_t>(1, least_bytes))
+  if (count > (bytes_left + 1) / std::max<uint64_t>(1, min_bytes))
     return ErrorAtLine(line,
                        absl::StrCat("the header promises ", count, " ", things, ", but the ", bytes_left,
                                     " bytes that follow cannot hold them; the file is cut off, or its "
@@ -116,15 +116,15 @@ absl::Status MeshReading::CheckCount(uint64_t line, absl::string_view things, ui
 }
 
 absl::Status MeshReading::CheckVertexCount(uint64_t line, uint64_t count) const {
-  if (count > limits_.most_vertices)
-    return ErrorAtLine(line, absl::StrCat("more than ", limits_.most_vertices,
+  if (count > limits_.max_vertices)
+    return ErrorAtLine(line, absl::StrCat("more than ", limits_.max_vertices,
                                           " vertices; reduce the mesh before importing it"));
   return absl::OkStatus();
 }
 
 absl::Status MeshReading::CheckTriangleCount(uint64_t line, uint64_t count) const {
-  if (count > limits_.most_triangles)
-    return ErrorAtLine(line, absl::StrCat("more than ", limits_.most_triangles,
+  if (count > limits_.max_triangles)
+    return ErrorAtLine(line, absl::StrCat("more than ", limits_.max_triangles,
                                           " triangles; reduce the mesh before importing it"));
   return absl::OkStatus();
 }
@@ -135,7 +135,7 @@ absl::Status MeshReading::AddPoint(const double point[3], uint64_t line) {
       return ErrorAtLine(line, absl::StrCat("vertex ", mesh_.points.size(), " has the coordinate ", point[k],
                                             "; only finite numbers are places"));
   }
-  if (mesh_.points.size() >= limits_.most_vertices) return CheckVertexCount(line, mesh_.points.size() + 1);
+  if (mesh_.points.size() >= limits_.max_vertices) return CheckVertexCount(line, mesh_.points.size() + 1);
   mesh_.points.emplace_back(point[0], point[1], point[2]);
   return absl::OkStatus();
 }
@@ -146,7 +146,7 @@ absl::Status MeshReading::AddFace(absl::Span<const uint32_t> corners, uint64_t l
     return absl::OkStatus();
   }
   triangles_ += corners.size() - 2;
-  if (triangles_ > limits_.most_triangles) return CheckTriangleCount(line, triangles_);
+  if (triangles_ > limits_.max_triangles) return CheckTriangleCount(line, triangles_);
   mesh_.corners.insert(mesh_.corners.end(), corners.begin(), corners.end());
   mesh_.sizes.push_back(static_cast<uint32_t>(corners.size()));
   return absl::OkStatus();

@@ -111,9 +111,9 @@ class ObjReader {
       if (index < 0)
         return Error(
             absl::StrCat("a face uses vertex ", number, ", but only ", vertices, " stand before it"));
-      if (static_cast<uint64_t>(index) >= reading_->limits().most_vertices)
+      if (static_cast<uint64_t>(index) >= reading_->limits().max_vertices)
         return Error(absl::StrCat("a face uses vertex ", number, "; at most ",
-                                  reading_->limits().most_vertices, " vertices are read"));
+                                  reading_->limits().max_vertices, " vertices are read"));
       if (static_cast<uint64_t>(index) > highest_ || highest_line_ == 0)
         highest_ = index, highest_line_ = line_;
       corners_.push_back(static_cast<uint32_t>(index));

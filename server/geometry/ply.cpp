@@ -40,7 +40,7 @@ class BodyReader {
   absl::Status CheckElement(const Element& element) {
     uint64_t least = 0;
     for (const Property& property : element.properties)
-      least += rows_.LeastBytes(property.is_list ? property.count_type : property.type);
+      least += rows_.MinBytes(property.is_list ? property.count_type : property.type);
     if (least == 0 && element.count > 0)
       return reading_.ErrorAtLine(
           element.line, absl::StrCat("the element ", Quoted(element.name), " has rows but no property"));
@@ -98,8 +98,7 @@ class BodyReader {
   absl::Status ReadList(const Property& property, uint64_t row, bool is_corners) {
     double length;
     TOUCHSTONE_RETURN_IF_ERROR(rows_.Number(property.count_type, property, &length));
-    if (length < 0 ||
-        length > static_cast<double>(rows_.bytes_left_in_row() / rows_.LeastBytes(property.type)))
+    if (length < 0 || length > static_cast<double>(rows_.bytes_left_in_row() / rows_.MinBytes(property.type)))
       return rows_.Error(absl::StrCat("row ", row, " has a list ", Quoted(property.name), " of ", length,
                                       " entries, which do not stand there"));
     if (is_corners) corners_.clear();
@@ -107,7 +106,7 @@ class BodyReader {
       double value;
       TOUCHSTONE_RETURN_IF_ERROR(rows_.Number(property.type, property, &value));
       if (!is_corners) continue;
-      if (value < 0 || value >= static_cast<double>(reading_.limits().most_vertices))
+      if (value < 0 || value >= static_cast<double>(reading_.limits().max_vertices))
         return rows_.Error(absl::StrCat("face ", row, " uses vertex ", static_cast<int64_t>(value),
                                         "; expected the number of a vertex, from 0 on"));
       corners_.push_back(static_cast<uint32_t>(value));

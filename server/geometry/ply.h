@@ -65,9 +65,9 @@ class Rows {
   // After the last row.
   virtual absl::Status End() = 0;
   virtual uint64_t bytes_left() const = 0;
-  virtual uint64_t bytes_left_in_row() const = 0;    // at most
-  virtual uint64_t LeastBytes(Type type) const = 0;  // that a number takes
-  virtual uint64_t line() const { return 0; }        // 0: there are no lines
+  virtual uint64_t bytes_left_in_row() const = 0;  // at most
+  virtual uint64_t MinBytes(Type type) const = 0;  // that a number takes
+  virtual uint64_t line() const { return 0; }      // 0: there are no lines
 
   // An error about the place reached.
   virtual absl::Status Error(absl::string_view what) const = 0;

@@ -49,7 +49,7 @@ class TextRows final : public Rows {
 
   uint64_t bytes_left() const override { return lines_.bytes_left(); }
   uint64_t bytes_left_in_row() const override { return rest_.size(); }
-  uint64_t LeastBytes(Type) const override { return 2; }  // a digit and a blank
+  uint64_t MinBytes(Type) const override { return 2; }  // a digit and a blank
   uint64_t line() const override { return lines_.number(); }
   absl::Status Error(absl::string_view what) const override {
     return reading_.ErrorAtLine(lines_.number(), what);
@@ -128,7 +128,7 @@ class BinaryRows final : public Rows {
 
   uint64_t bytes_left() const override { return rows_.size() - at_; }
   uint64_t bytes_left_in_row() const override { return bytes_left(); }
-  uint64_t LeastBytes(Type type) const override { return kTypeBytes[static_cast<int>(type)]; }
+  uint64_t MinBytes(Type type) const override { return kTypeBytes[static_cast<int>(type)]; }
   absl::Status Error(absl::string_view what) const override {
     return reading_.ErrorAtByte(rows_.data() - reading_.bytes().data() + at_, what);
   }

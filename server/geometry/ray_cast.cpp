@@ -49,18 +49,18 @@ struct EmbreePacket<4> {
 // Whether lines are alike enough to be traced as one frustum. Embree 3.13 misses whole faces with a frustum
 // that holds a direction component of nearly zero beside larger ones; a wide frustum is slower than none,
 // too.
-constexpr double kLeastComponent = 1.0 / 256;
+constexpr double kMinComponent = 1.0 / 256;
 template <int kWidth>
 bool RunTogether(const double (&direction)[3][kWidth]) {
-  constexpr double kMostSpread = 1.0 / 8;
+  constexpr double kMaxSpread = 1.0 / 8;
   for (int axis = 0; axis < 3; ++axis) {
     double least = direction[axis][0], most = least;
     for (int k = 1; k < kWidth; ++k) {
       least = std::min(least, direction[axis][k]);
       most = std::max(most, direction[axis][k]);
     }
-    const bool one_sign = least >= kLeastComponent || most <= -kLeastComponent;
-    if (!one_sign || most - least > kMostSpread) return false;
+    const bool one_sign = least >= kMinComponent || most <= -kMinComponent;
+    if (!one_sign || most - least > kMaxSpread) return false;
   }
   return true;
 }
@@ -249,7 +249,7 @@ void Surface::Search::CastPackets(absl::Span<const Eigen::Vector3d> origins_m,
   for (uint32_t line = 0; line < size; ++line) {
     const bool first = line == 0 || !SameLine(origins_m, directions, line - 1, line);
     repeats[line] = !first;
-    const bool flat = directions[line].cwiseAbs().minCoeff() < kLeastComponent;
+    const bool flat = directions[line].cwiseAbs().minCoeff() < kMinComponent;
     together[together_count] = line;
     together_count += first & !flat;
     apart[apart_count] = line;

@@ -174,25 +174,24 @@ absl::StatusOr<double> SupershapeScaleM(const SupershapeParameters& parameters) 
 }
 
 absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles) {
-  if (triangles < kLeastSupershapeTriangles || triangles > kMostSupershapeTriangles)
+  if (triangles < kMinSupershapeTriangles || triangles > kMaxSupershapeTriangles)
     return absl::InvalidArgumentError(absl::StrCat("supershape: ", triangles, " triangles; expected ",
-                                                   kLeastSupershapeTriangles, " to ",
-                                                   kMostSupershapeTriangles));
+                                                   kMinSupershapeTriangles, " to ", kMaxSupershapeTriangles));
   // Round the axis a multiple of 8, from pole to pole a multiple of 4; squares on a sphere would be 2 to 1.
   // No factor 3 or 5 round the axis: else meridians stand at whole degrees, where plans put their touches,
   // and every such touch would fall exactly on an edge, where the normal is a matter of rounding.
   constexpr uint64_t kCoarse = 1000;  // too few choices there
   SupershapeSegments best;
-  double least_cost = 1e300;
+  double min_cost = 1e300;
   for (uint32_t up = 4; up <= 4096; up += 4) {
     const double wanted = static_cast<double>(triangles) / (2.0 * (up - 1));
     for (uint32_t around = 8 * static_cast<uint32_t>(wanted / 8); around <= wanted + 8; around += 8) {
       const SupershapeSegments candidate = {around, up};
-      if (around < 8 || candidate.Triangles() > kMostSupershapeTriangles) continue;
+      if (around < 8 || candidate.Triangles() > kMaxSupershapeTriangles) continue;
       if (triangles > kCoarse && (around % 3 == 0 || around % 5 == 0)) continue;
       const double off = std::abs(static_cast<double>(candidate.Triangles()) / triangles - 1.0);
       const double skew = std::abs(std::log(around / (2.0 * up)));
-      if (const double cost = off + 0.2 * skew; cost < least_cost) least_cost = cost, best = candidate;
+      if (const double cost = off + 0.2 * skew; cost < min_cost) min_cost = cost, best = candidate;
     }
   }
   return best;
@@ -206,14 +205,13 @@ absl::StatusOr<TriangleMesh> MakeSupershape(const SupershapeParameters& paramete
 absl::StatusOr<TriangleMesh> MakeSupershape(const SupershapeParameters& parameters,
                                             const SupershapeSegments& segments) {
   const uint32_t around = segments.around, rings_count = segments.from_pole_to_pole - 1;
-  if (around < 3 || segments.from_pole_to_pole < 2 || around > kMostSupershapeTriangles ||
-      segments.from_pole_to_pole > kMostSupershapeTriangles ||
-      segments.Triangles() > kMostSupershapeTriangles)
+  if (around < 3 || segments.from_pole_to_pole < 2 || around > kMaxSupershapeTriangles ||
+      segments.from_pole_to_pole > kMaxSupershapeTriangles || segments.Triangles() > kMaxSupershapeTriangles)
     return absl::InvalidArgumentError(absl::StrCat("supershape: ", around, " segments around and ",
                                                    segments.from_pole_to_pole,
                                                    " from pole to pole; expected at least "
                                                    "3 and 2, and at most ",
-                                                   kMostSupershapeTriangles, " triangles"));
+                                                   kMaxSupershapeTriangles, " triangles"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const double scale_m, SupershapeScaleM(parameters));
 
   // South pole, rings from south to north, north pole.

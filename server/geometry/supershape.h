@@ -51,12 +51,12 @@ struct SupershapeSegments {
   uint64_t Triangles() const { return uint64_t{2} * around * (from_pole_to_pole - 1); }
 };
 
-inline constexpr uint64_t kLeastSupershapeTriangles = 48;
-inline constexpr uint64_t kMostSupershapeTriangles = 4'000'000;
+inline constexpr uint64_t kMinSupershapeTriangles = 48;
+inline constexpr uint64_t kMaxSupershapeTriangles = 4'000'000;
 
 // The tessellation nearest to a number of triangles (20,000 gives 20,368), with steps of about the same size
 // both ways, lines on the equator, on every quarter and between two quarters, where the seed's shapes have
-// their edges. Never more than kMostSupershapeTriangles.
+// their edges. Never more than kMaxSupershapeTriangles.
 absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles);
 
 // The mesh: closed, wound outwards, each pole one vertex, without degenerate or duplicate triangles. The

@@ -121,8 +121,8 @@ TEST(Supershape, AnyTessellationIsWellMade) {
 TEST(Supershape, FourMillionTrianglesAreWellMade) {
   for (const char* name : {"lat00", "lat20"}) {
     SCOPED_TRACE(name);
-    const TriangleMesh mesh = Named(name, kMostSupershapeTriangles);
-    EXPECT_LE(mesh.triangles.size(), kMostSupershapeTriangles);
+    const TriangleMesh mesh = Named(name, kMaxSupershapeTriangles);
+    EXPECT_LE(mesh.triangles.size(), kMaxSupershapeTriangles);
     EXPECT_GT(mesh.triangles.size(), 3'900'000u);
     ExpectWellMade(mesh);
   }
@@ -184,19 +184,19 @@ TEST(Supershape, AgreesWithMeshesMadeElsewhere) {
     SCOPED_TRACE(name);
     const TriangleMesh theirs = ReadMeshFile(folder + name + ".off").value();
     const double scale_m = SupershapeScaleM(NamedSupershape(name).value()).value();
-    double most_m = 0, least_ratio = 1e9, most_ratio = 0;
+    double max_m = 0, min_ratio = 1e9, max_ratio = 0;
     for (const Eigen::Vector3f& vertex_m : theirs.vertices_m) {
       const double off_m = OffSurfaceM(vertex_m.cast<double>(), n2, scale_m);
       const double ratio = 1.0 / (1.0 - off_m / vertex_m.cast<double>().norm());
-      most_m = std::max(most_m, std::abs(off_m));
-      least_ratio = std::min(least_ratio, ratio);
-      most_ratio = std::max(most_ratio, ratio);
+      max_m = std::max(max_m, std::abs(off_m));
+      min_ratio = std::min(min_ratio, ratio);
+      max_ratio = std::max(max_ratio, ratio);
     }
     // The same surface up to one factor ...
-    EXPECT_LT(most_ratio / least_ratio - 1, 5e-7);
+    EXPECT_LT(max_ratio / min_ratio - 1, 5e-7);
     // ... which is 1 within what their lines miss of the widest latitude: they scaled their vertices to 150
     // mm, we scale the surface.
-    EXPECT_LT(most_m, n2 <= 10 ? 1e-7 : 80e-6);
+    EXPECT_LT(max_m, n2 <= 10 ? 1e-7 : 80e-6);
     const Bounds ours = ComputeBounds(Named(name, 65'024)), other = ComputeBounds(theirs);
     EXPECT_LT((ours.min_m - other.min_m).cwiseAbs().maxCoeff(), n2 <= 10 ? 1e-7 : 60e-6);
     EXPECT_LT((ours.max_m - other.max_m).cwiseAbs().maxCoeff(), n2 <= 10 ? 1e-7 : 60e-6);

@@ -14,9 +14,9 @@ absl::Status CheckMesh(const std::string& name, const TriangleMesh& mesh) {
   if (mesh.triangles.empty())
     return absl::InvalidArgumentError(
         absl::StrCat("mesh '", name, "' has no triangles; there is nothing to touch"));
-  if (mesh.triangles.size() > Surface::kMostTriangles)
+  if (mesh.triangles.size() > Surface::kMaxTriangles)
     return absl::InvalidArgumentError(absl::StrCat("mesh '", name, "' has ", mesh.triangles.size(),
-                                                   " triangles; at most ", Surface::kMostTriangles,
+                                                   " triangles; at most ", Surface::kMaxTriangles,
                                                    " are allowed"));
   for (size_t v = 0; v < mesh.vertices_m.size(); ++v) {
     const Eigen::Vector3f& p = mesh.vertices_m[v];

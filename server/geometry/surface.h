@@ -35,12 +35,12 @@ struct Contacts {
 class Surface {
  public:
   // Builds the BVH (all cores). Triangles keep their order. Fails on a mesh without a triangle of positive
-  // area, with an index out of range, with a coordinate that is not finite, or with more than kMostTriangles
+  // area, with an index out of range, with a coordinate that is not finite, or with more than kMaxTriangles
   // triangles. Degenerate and exactly repeated triangles are dropped first: mesh() is what is left.
   static absl::StatusOr<std::shared_ptr<const Surface>> Create(std::string name, TriangleMesh mesh);
   ~Surface();
 
-  static constexpr uint64_t kMostTriangles = 4'000'000;
+  static constexpr uint64_t kMaxTriangles = 4'000'000;
 
   const std::string& name() const { return name_; }
   const std::string& hash() const { return hash_; }

@@ -55,7 +55,7 @@ uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int dept
   const uint32_t half = range.begin + range.size() / 2;
   // The last two levels become full nodes and leaves: memory counts, and their boxes are much alike.
   if (range.size() <= kFull) {
-    const uint32_t part = range.size() <= kFull / 8 ? kMostInLeaf : kFull / 8;
+    const uint32_t part = range.size() <= kFull / 8 ? kMaxInLeaf : kFull / 8;
     const uint32_t first_part = (range.size() / 2 + part - 1) / part * part;
     Primitive* const middle = primitives + range.begin + first_part;
     std::nth_element(primitives + range.begin, middle, primitives + range.end,
@@ -115,7 +115,7 @@ int TriangleTree::SplitInEight(Primitive* primitives, const Range& range, int de
   while (count < 8) {
     int widest = -1;
     for (int i = 0; i < count; ++i) {
-      if (children[i].size() <= kMostInLeaf) continue;
+      if (children[i].size() <= kMaxInLeaf) continue;
       const bool wider =
           widest < 0 || (range.size() <= kFull ? children[i].size() > children[widest].size()
                                                : children[i].HalfArea() > children[widest].HalfArea());
@@ -131,7 +131,7 @@ int TriangleTree::SplitInEight(Primitive* primitives, const Range& range, int de
 }
 
 uint32_t TriangleTree::Build(Primitive* primitives, const Range& range, int depth, std::vector<Node>* nodes) {
-  if (range.size() <= kMostInLeaf) return kLeaf | range.begin << kLeafBits | range.size();
+  if (range.size() <= kMaxInLeaf) return kLeaf | range.begin << kLeafBits | range.size();
   const uint32_t self = static_cast<uint32_t>(nodes->size());
   nodes->emplace_back();
   Range children[8];

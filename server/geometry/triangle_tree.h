@@ -46,8 +46,8 @@ class TriangleTree {
   static constexpr int kLeafBits = 4;  // a leaf's reference: first << 4 | count, with the top bit
   static constexpr uint32_t kLeaf = 0x80000000u;
   static constexpr uint32_t kEmpty = 0xFFFFFFFFu;
-  static constexpr int kMostInLeaf = 8;
-  static constexpr uint32_t kFull = 8 * 8 * kMostInLeaf;  // what two levels of nodes hold
+  static constexpr int kMaxInLeaf = 8;
+  static constexpr uint32_t kFull = 8 * 8 * kMaxInLeaf;  // what two levels of nodes hold
   // Deeper than this, ranges are halved, whatever the cost: at most 22 more levels for 4 million triangles.
   // Seven children a level may wait, so the stack never overflows.
   static constexpr int kDepthOfHalves = 12;

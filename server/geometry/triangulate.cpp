@@ -75,7 +75,7 @@ class EarClipper {
 
   bool IsEar(size_t corner, int patience) {
     ++*work_;
-    if (patience >= 2 || *work_ > kMostTriangulationWork) return true;
+    if (patience >= 2 || *work_ > kMaxTriangulationWork) return true;
     const Point2 &a = at_[previous_[corner]], &b = at_[corner], &c = at_[next_[corner]];
     const double turn = Turn(a, b, c);
     if (turn < 0 || (turn == 0 && patience == 0)) return false;

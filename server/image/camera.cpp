@@ -31,9 +31,9 @@ absl::Status CheckPosition(const char* field, const Eigen::Vector3d& position_m)
 }
 
 absl::Status CheckSide(const char* field, int pixels) {
-  if (pixels >= 1 && pixels <= kMostImageSide) return absl::OkStatus();
+  if (pixels >= 1 && pixels <= kMaxImageSide) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      absl::StrFormat("%s is %d pixels; must be from 1 to %d", field, pixels, kMostImageSide));
+      absl::StrFormat("%s is %d pixels; must be from 1 to %d", field, pixels, kMaxImageSide));
 }
 
 // 0 means "enclose the object".

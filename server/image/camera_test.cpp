@@ -139,7 +139,7 @@ TEST(View, BoxOfPixelsHoldsEveryCorner) {
 TEST(ImageRequest, AcceptsTheLargestAndTheSmallest) {
   ImageOptions options;
   options.width = 1;
-  options.height = kMostImageSide;
+  options.height = kMaxImageSide;
   EXPECT_TRUE(ValidateImageRequest(GoodCamera(), options).ok());
 }
 

@@ -20,8 +20,8 @@ float Most(float a, float b) {
 
 // Hits that wait to be shaded, a lane a pixel. What the loops over lanes write stands before what they read.
 struct Hits {
-  static constexpr int kMost = 256;
-  static constexpr int kRoom = kMost + 8;  // one is written beyond the last before it is counted
+  static constexpr int kMax = 256;
+  static constexpr int kRoom = kMax + 8;  // one is written beyond the last before it is counted
   int count = 0;
   alignas(64) int pixel[kRoom] = {};     // row * width + column
   alignas(64) int triangle[kRoom] = {};  // 3 * index
@@ -147,16 +147,16 @@ void ShadeVisible(const CpuFrame& frame, Visibility& visibility, Image* image) {
     const uint32_t* const triangle = visibility.Row(row);
     const int first_pixel = row * frame.view.width + box.first_column;
     const int columns = box.last_column - box.first_column;
-    for (int first = 0; first < columns; first += Hits::kMost / 2) {
+    for (int first = 0; first < columns; first += Hits::kMax / 2) {
       // Always written, counted only if there is a triangle: no branch to mispredict.
       int count = hits->count;
-      for (int i = first; i < std::min(first + Hits::kMost / 2, columns); ++i) {
+      for (int i = first; i < std::min(first + Hits::kMax / 2, columns); ++i) {
         hits->pixel[count] = first_pixel + i;
         hits->triangle[count] = static_cast<int>(3 * triangle[i]);
         count += triangle[i] != kNoTriangle;
       }
       hits->count = count;
-      if (hits->count > Hits::kMost / 2) finish();
+      if (hits->count > Hits::kMax / 2) finish();
     }
   }
   finish();

@@ -14,7 +14,7 @@
 namespace touchstone {
 namespace {
 
-constexpr EGLint kMostDevices = 64;
+constexpr EGLint kMaxDevices = 64;
 
 const char* EglErrorText(EGLint error) {
   switch (error) {
@@ -92,9 +92,9 @@ std::vector<EglDisplay> OpenDisplays() {
   const bool enumerates = Has(client, "EGL_EXT_device_base") ||
                           (Has(client, "EGL_EXT_device_enumeration") && Has(client, "EGL_EXT_device_query"));
   if (enumerates && Has(client, "EGL_EXT_platform_device")) {
-    EGLDeviceEXT devices[kMostDevices];
+    EGLDeviceEXT devices[kMaxDevices];
     EGLint count = 0;
-    if (!eglQueryDevicesEXT(kMostDevices, devices, &count)) count = 0;
+    if (!eglQueryDevicesEXT(kMaxDevices, devices, &count)) count = 0;
     for (EGLint i = 0; i < count; ++i) {
       EglDisplay display;
       const char* extensions = eglQueryDeviceStringEXT(devices[i], EGL_EXTENSIONS);

@@ -24,9 +24,9 @@ struct FreeDelete {
 
 absl::Status CheckPixels(const uint8_t* pixels, int width, int height, int channels) {
   if (pixels == nullptr) return absl::InvalidArgumentError("image has no pixels");
-  if (width < 1 || width > kMostImageSide || height < 1 || height > kMostImageSide) {
+  if (width < 1 || width > kMaxImageSide || height < 1 || height > kMaxImageSide) {
     return absl::InvalidArgumentError(absl::StrFormat(
-        "image is %d x %d pixels; each side must be from 1 to %d", width, height, kMostImageSide));
+        "image is %d x %d pixels; each side must be from 1 to %d", width, height, kMaxImageSide));
   }
   if (channels != 1 && channels != 3) {
     return absl::InvalidArgumentError(
@@ -106,14 +106,14 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 absl::StatusOr<Image> DecodePng(const std::string& png) {
   SpngContext context(spng_ctx_new(0));
   if (context == nullptr) return absl::ResourceExhaustedError("PNG: no memory for a decoder");
-  spng_set_image_limits(context.get(), kMostImageSide, kMostImageSide);
+  spng_set_image_limits(context.get(), kMaxImageSide, kMaxImageSide);
   spng_set_chunk_limits(context.get(), 1 << 20, 1 << 22);
   spng_set_crc_action(context.get(), SPNG_CRC_ERROR, SPNG_CRC_ERROR);
   if (int code = spng_set_png_buffer(context.get(), png.data(), png.size()); code != 0)
     return BadPng("no data", code);
   spng_ihdr header{};
   if (int code = spng_get_ihdr(context.get(), &header); code != 0)
-    return BadPng(absl::StrFormat("header (each side must be from 1 to %d)", kMostImageSide).c_str(), code);
+    return BadPng(absl::StrFormat("header (each side must be from 1 to %d)", kMaxImageSide).c_str(), code);
 
   Image image;
   image.width = static_cast<int>(header.width);

@@ -21,7 +21,7 @@ std::vector<uint8_t> TestPixels(int width, int height, int channels) {
 TEST(Png, ReadsBackExactly) {
   for (const auto& [width, height, channels] :
        {std::tuple(1, 1, 1), std::tuple(1, 1, 3), std::tuple(224, 224, 1), std::tuple(53, 31, 3),
-        std::tuple(kMostImageSide, 2, 1), std::tuple(3, kMostImageSide, 3)}) {
+        std::tuple(kMaxImageSide, 2, 1), std::tuple(3, kMaxImageSide, 3)}) {
     const std::vector<uint8_t> pixels = TestPixels(width, height, channels);
     const auto png = EncodePng(pixels.data(), width, height, channels);
     ASSERT_TRUE(png.ok()) << png.status().message();

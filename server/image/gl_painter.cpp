@@ -174,7 +174,7 @@ absl::StatusOr<uint32_t> GlPainter::VertexArrayOf(const std::shared_ptr<const Su
   Buffers buffers;
   buffers.surface = surface;
   buffers.bytes = mesh.MemoryBytes();
-  while (!meshes_.empty() && (meshes_.size() >= kMostMeshes || bytes + buffers.bytes > kMostBytes)) {
+  while (!meshes_.empty() && (meshes_.size() >= kMaxMeshes || bytes + buffers.bytes > kMaxBytes)) {
     bytes -= meshes_.back().bytes;
     Delete(meshes_.back());
     meshes_.pop_back();

@@ -41,8 +41,8 @@ class GlPainter {
     uint32_t corners = 0;
     uint64_t bytes = 0;
   };
-  static constexpr size_t kMostMeshes = 64;
-  static constexpr uint64_t kMostBytes = uint64_t{1} << 30;
+  static constexpr size_t kMaxMeshes = 64;
+  static constexpr uint64_t kMaxBytes = uint64_t{1} << 30;
 
   // What the frame buffer has; it is made anew when this changes.
   struct Target {

@@ -31,14 +31,14 @@ enum class Look {
 };
 
 struct ImageOptions {
-  int width = 224;  // 1 to kMostImageSide
+  int width = 224;  // 1 to kMaxImageSide
   int height = 224;
   PixelFormat format = PixelFormat::kGrey;
   Look look = Look::kShaded;
   bool depth = false;  // also return depth
   bool mask = false;   // also return the object mask
 };
-inline constexpr int kMostImageSide = 2048;
+inline constexpr int kMaxImageSide = 2048;
 
 struct Image {
   int width = 0;

@@ -215,14 +215,14 @@ TEST_P(RendererTest, DrawsTheSmallestAndTheLargest) {
   ASSERT_EQ(dot.pixels.size(), 1u);
   EXPECT_GT(dot.pixels[0], 0);
   EXPECT_NEAR(dot.depth_m[0], 0.13, 0.002);
-  const Image large = MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(kMostImageSide, kMostImageSide));
-  ASSERT_EQ(large.pixels.size(), size_t{kMostImageSide} * kMostImageSide);
+  const Image large = MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(kMaxImageSide, kMaxImageSide));
+  ASSERT_EQ(large.pixels.size(), size_t{kMaxImageSide} * kMaxImageSide);
   const Extent extent = ExtentOf(large);
-  EXPECT_NEAR(extent.left + extent.right, kMostImageSide - 1, 2);
-  EXPECT_NEAR(extent.top + extent.bottom, kMostImageSide - 1, 2);
+  EXPECT_NEAR(extent.left + extent.right, kMaxImageSide - 1, 2);
+  EXPECT_NEAR(extent.top + extent.bottom, kMaxImageSide - 1, 2);
   // Narrow strips: no tile of the renderer's may leave the image.
-  EXPECT_EQ(MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(3, kMostImageSide)).pixels.size(), 3u * 2048);
-  EXPECT_EQ(MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(kMostImageSide, 5)).pixels.size(), 5u * 2048);
+  EXPECT_EQ(MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(3, kMaxImageSide)).pixels.size(), 3u * 2048);
+  EXPECT_EQ(MustRender(surface, CameraAt({0.2, 0, 0}), WithAll(kMaxImageSide, 5)).pixels.size(), 5u * 2048);
 }
 
 TEST_P(RendererTest, ShowsNothingBesideOrBehind) {

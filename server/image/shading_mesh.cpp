@@ -229,7 +229,7 @@ void ShadingMeshCache::DropSome(const Surface* newest) {
       ++entry;
     }
   }
-  while (entries_.size() > 1 && (entries_.size() > kMostEntries || bytes > kMostBytes)) {
+  while (entries_.size() > 1 && (entries_.size() > kMaxEntries || bytes > kMaxBytes)) {
     auto oldest = entries_.end();
     for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
       if (entry->first == newest) continue;

@@ -34,12 +34,12 @@ struct ShadingMesh {
 ShadingMesh MakeShadingMesh(const Surface& surface);
 
 // Shading meshes of the surfaces that were drawn last, each computed once. An entry goes when its surface has
-// died (seen at the next call), when there are more than kMostEntries, or when together they take more than
-// kMostBytes; whoever still draws keeps his own. Safe to call from several threads.
+// died (seen at the next call), when there are more than kMaxEntries, or when together they take more than
+// kMaxBytes; whoever still draws keeps his own. Safe to call from several threads.
 class ShadingMeshCache {
  public:
-  static constexpr size_t kMostEntries = 64;
-  static constexpr uint64_t kMostBytes = uint64_t{1} << 30;
+  static constexpr size_t kMaxEntries = 64;
+  static constexpr uint64_t kMaxBytes = uint64_t{1} << 30;
 
   std::shared_ptr<const ShadingMesh> Get(const std::shared_ptr<const Surface>& surface);
   size_t size() const;

@@ -110,11 +110,11 @@ TEST(ShadingMeshCache, ComputesOnceForAllThreads) {
 TEST(ShadingMeshCache, ForgetsDeadSurfacesAndTheOldest) {
   ShadingMeshCache cache;
   std::vector<std::shared_ptr<const Surface>> surfaces;
-  for (size_t i = 0; i < ShadingMeshCache::kMostEntries + 3; ++i) {
+  for (size_t i = 0; i < ShadingMeshCache::kMaxEntries + 3; ++i) {
     surfaces.push_back(MakeSurface("cube", CubeMesh()));
     cache.Get(surfaces.back());
   }
-  EXPECT_EQ(cache.size(), ShadingMeshCache::kMostEntries);
+  EXPECT_EQ(cache.size(), ShadingMeshCache::kMaxEntries);
   const std::weak_ptr<const ShadingMesh> kept = cache.Get(surfaces.back());
   EXPECT_FALSE(kept.expired());
   surfaces.resize(1);

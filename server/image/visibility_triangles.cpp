@@ -107,12 +107,12 @@ void DrawTriangles(const CpuFrame& frame, Visibility* visibility) {
     if (area == 0.0f || (frame.outside_only && area > 0.0f)) continue;
 
     // Pixels whose centres may lie inside.
-    const float least_x = std::min(a.x, std::min(b.x, c.x)), most_x = std::max(a.x, std::max(b.x, c.x));
-    const float least_y = std::min(a.y, std::min(b.y, c.y)), most_y = std::max(a.y, std::max(b.y, c.y));
-    const int first_column = std::max(box.first_column, static_cast<int>(std::ceil(least_x - 0.501f)));
-    const int last_column = std::min(box.last_column - 1, static_cast<int>(std::floor(most_x - 0.499f)));
-    const int first_row = std::max(box.first_row, static_cast<int>(std::ceil(least_y - 0.501f)));
-    const int last_row = std::min(box.last_row - 1, static_cast<int>(std::floor(most_y - 0.499f)));
+    const float min_x = std::min(a.x, std::min(b.x, c.x)), max_x = std::max(a.x, std::max(b.x, c.x));
+    const float min_y = std::min(a.y, std::min(b.y, c.y)), max_y = std::max(a.y, std::max(b.y, c.y));
+    const int first_column = std::max(box.first_column, static_cast<int>(std::ceil(min_x - 0.501f)));
+    const int last_column = std::min(box.last_column - 1, static_cast<int>(std::floor(max_x - 0.499f)));
+    const int first_row = std::max(box.first_row, static_cast<int>(std::ceil(min_y - 0.501f)));
+    const int last_row = std::min(box.last_row - 1, static_cast<int>(std::floor(max_y - 0.499f)));
     if (first_column > last_column || first_row > last_row) continue;
 
     const float inside = area < 0.0f ? 1.0f : -1.0f;
@@ -121,8 +121,8 @@ void DrawTriangles(const CpuFrame& frame, Visibility* visibility) {
     const float per_area = 1.0f / std::fabs(area);
     const float b_share = (b.inverse_depth - a.inverse_depth) * per_area;
     const float c_share = (c.inverse_depth - a.inverse_depth) * per_area;
-    const float least_inverse = std::min(a.inverse_depth, std::min(b.inverse_depth, c.inverse_depth));
-    const float most_inverse = std::max(a.inverse_depth, std::max(b.inverse_depth, c.inverse_depth));
+    const float min_inverse = std::min(a.inverse_depth, std::min(b.inverse_depth, c.inverse_depth));
+    const float max_inverse = std::max(a.inverse_depth, std::max(b.inverse_depth, c.inverse_depth));
     const int32_t number = static_cast<int32_t>(t);
 
     for (int row = first_row; row <= last_row; ++row) {
@@ -135,8 +135,8 @@ void DrawTriangles(const CpuFrame& frame, Visibility* visibility) {
         const Floats to_bc = bc.sign * ((x - bc.x) * bc.dy - bc_y);
         const Floats to_ca = ca.sign * ((x - ca.x) * ca.dy - ca_y);
         Floats inverse = a.inverse_depth + to_ca * b_share + to_ab * c_share;
-        inverse = inverse < least_inverse ? Floats{} + least_inverse : inverse;
-        inverse = inverse > most_inverse ? Floats{} + most_inverse : inverse;
+        inverse = inverse < min_inverse ? Floats{} + min_inverse : inverse;
+        inverse = inverse > max_inverse ? Floats{} + max_inverse : inverse;
 
         const size_t at = row_start + (column - box.first_column);
         const Floats before = Load<Floats>(&nearest[at]);

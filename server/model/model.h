@@ -12,7 +12,7 @@
 
 namespace touchstone {
 
-inline constexpr int kMostFingers = 16;
+inline constexpr int kMaxFingers = 16;
 
 // One effect of a model with its values.
 struct EffectInstance {
@@ -27,7 +27,7 @@ struct EffectInstance {
 
 struct Model {
   std::string name;
-  int fingers = 3;           // 1 to kMostFingers
+  int fingers = 3;           // 1 to kMaxFingers
   double spacing_m = 0.030;  // between neighbouring fingers, > 0
   std::vector<EffectInstance> effects;
 

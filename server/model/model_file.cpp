@@ -76,12 +76,12 @@ class ModelReader {
   }
 
   absl::StatusOr<std::string> Text(const YamlNode& node, absl::string_view what) const {
-    constexpr size_t kMostBytes = 200;
+    constexpr size_t kMaxBytes = 200;
     if (node.kind != Kind::kScalar || node.text.empty())
       return Error(node, absl::StrCat(what, " is ", node.KindInWords(), "; it must be a text"));
-    if (node.text.size() > kMostBytes)
+    if (node.text.size() > kMaxBytes)
       return Error(
-          node, absl::StrCat(what, " has ", node.text.size(), " bytes; at most ", kMostBytes, " are taken"));
+          node, absl::StrCat(what, " has ", node.text.size(), " bytes; at most ", kMaxBytes, " are taken"));
     for (const unsigned char c : node.text)
       if (absl::ascii_iscntrl(c)) return Error(node, absl::StrCat(what, " must not have control characters"));
     return node.text;

@@ -128,19 +128,19 @@ std::string EffectTitle(const Effect& effect) {
 }
 
 absl::Status CheckRig(int fingers, double spacing_mm) {
-  if (fingers < 1 || fingers > kMostFingers)
+  if (fingers < 1 || fingers > kMaxFingers)
     return absl::InvalidArgumentError(
-        absl::StrCat("end_effector.fingers is ", fingers, "; it must lie in 1 to ", kMostFingers));
-  if (!(spacing_mm > 0 && spacing_mm <= kMostSpacingMm))
+        absl::StrCat("end_effector.fingers is ", fingers, "; it must lie in 1 to ", kMaxFingers));
+  if (!(spacing_mm > 0 && spacing_mm <= kMaxSpacingMm))
     return absl::InvalidArgumentError(absl::StrCat("end_effector.spacing_mm is ", ShortestNumber(spacing_mm),
-                                                   "; it must be above 0 and at most ", kMostSpacingMm,
+                                                   "; it must be above 0 and at most ", kMaxSpacingMm,
                                                    " mm"));
   return absl::OkStatus();
 }
 
 absl::Status CheckAddition(const Model& model, const Effect& effect) {
-  if (model.effects.size() >= kMostEffects)
-    return absl::InvalidArgumentError(absl::StrCat("a model has at most ", kMostEffects, " effects"));
+  if (model.effects.size() >= kMaxEffects)
+    return absl::InvalidArgumentError(absl::StrCat("a model has at most ", kMaxEffects, " effects"));
   for (const EffectInstance& present : model.effects)
     if (EffectTitle(*present.effect) == EffectTitle(effect))
       return absl::AlreadyExistsError(

@@ -39,7 +39,7 @@ std::string EffectTitle(const Effect& effect);
 absl::Status CheckRig(int fingers, double spacing_mm);
 absl::Status CheckAddition(const Model& model, const Effect& effect);
 
-inline constexpr int kMostEffects = 64;
-inline constexpr double kMostSpacingMm = 1000;
+inline constexpr int kMaxEffects = 64;
+inline constexpr double kMaxSpacingMm = 1000;
 
 }  // namespace touchstone

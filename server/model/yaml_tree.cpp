@@ -65,9 +65,9 @@ class TreeBuilder : public YAML::EventHandler {
       throw Refused{mark, "anchors (&name) are not taken here; write the value out"};
     if (!tag.empty() && tag != "?" && tag != "!")
       throw Refused{mark, absl::StrCat("tags (", tag, ") are not taken here")};
-    if (++nodes_ > kMostYamlNodes)
+    if (++nodes_ > kMaxYamlNodes)
       throw Refused{mark,
-                    absl::StrCat("more than ", kMostYamlNodes, " values and keys; nothing longer is read")};
+                    absl::StrCat("more than ", kMaxYamlNodes, " values and keys; nothing longer is read")};
   }
 
   void Add(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -80,8 +80,8 @@ class TreeBuilder : public YAML::EventHandler {
 
   void Open(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
     Check(mark, tag, anchor);
-    if (levels_.size() >= kMostYamlDepth)
-      throw Refused{mark, absl::StrCat("nested more than ", kMostYamlDepth, " levels deep")};
+    if (levels_.size() >= kMaxYamlDepth)
+      throw Refused{mark, absl::StrCat("nested more than ", kMaxYamlDepth, " levels deep")};
     if (!levels_.empty() && levels_.back().node.kind == YamlNode::Kind::kMap && levels_.back().key_is_next)
       throw Refused{mark, "a key must be a name, not a list or a map"};
     levels_.emplace_back();
@@ -154,9 +154,9 @@ absl::Status ErrorAt(const std::string& origin, const YamlNode& node, absl::stri
 }
 
 absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& origin) {
-  if (text.size() > kMostYamlBytes)
+  if (text.size() > kMaxYamlBytes)
     return absl::InvalidArgumentError(
-        absl::StrCat(origin, ": has ", text.size(), " bytes; at most ", kMostYamlBytes, " are read"));
+        absl::StrCat(origin, ": has ", text.size(), " bytes; at most ", kMaxYamlBytes, " are read"));
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);

@@ -27,9 +27,9 @@ struct YamlNode {
   const char* KindInWords() const;
 };
 
-inline constexpr size_t kMostYamlBytes = 1 << 20;
-inline constexpr int kMostYamlDepth = 16;
-inline constexpr int kMostYamlNodes = 100'000;
+inline constexpr size_t kMaxYamlBytes = 1 << 20;
+inline constexpr int kMaxYamlDepth = 16;
+inline constexpr int kMaxYamlNodes = 100'000;
 
 // Errors begin with "origin:line:column: ".
 absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& origin);

@@ -55,16 +55,16 @@ v1::CommandedTouch ToProto(const CommandedTouch& touch) {
 }
 
 absl::Status CheckTouchIds(const v1::TouchRequest& request) {
-  constexpr size_t kMostIdBytes = 128;
+  constexpr size_t kMaxIdBytes = 128;
   if (request.touch_ids_size() == 0) return absl::OkStatus();
   if (request.touch_ids_size() != request.touches_size())
     return absl::InvalidArgumentError(absl::StrCat("touch_ids has ", request.touch_ids_size(),
                                                    ": give none, or one for each of the ",
                                                    request.touches_size(), " touches"));
   for (int k = 0; k < request.touch_ids_size(); ++k)
-    if (request.touch_ids(k).empty() || request.touch_ids(k).size() > kMostIdBytes)
-      return absl::InvalidArgumentError(absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(),
-                                                     " bytes: 1 to ", kMostIdBytes));
+    if (request.touch_ids(k).empty() || request.touch_ids(k).size() > kMaxIdBytes)
+      return absl::InvalidArgumentError(
+          absl::StrCat("touch_ids[", k, "] has ", request.touch_ids(k).size(), " bytes: 1 to ", kMaxIdBytes));
   return absl::OkStatus();
 }
 
@@ -105,11 +105,11 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
     case v1::Plan::kFaces: {
       plan.kind = Plan::Kind::kFaces;
       const v1::FacesPlan& faces = message.faces();
-      constexpr uint32_t kMost = 1'000'000;  // beyond, the plan's check refuses, whatever the number
+      constexpr uint32_t kMax = 1'000'000;  // beyond, the plan's check refuses, whatever the number
       if (faces.samples_per_face() != 0)
-        plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMost + 1);
-      if (faces.rounds() != 0) plan.faces.rounds = std::min(faces.rounds(), kMost + 1);
-      if (faces.has_most_tilt_rad()) plan.faces.most_tilt_rad = faces.most_tilt_rad();
+        plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMax + 1);
+      if (faces.rounds() != 0) plan.faces.rounds = std::min(faces.rounds(), kMax + 1);
+      if (faces.has_max_tilt_rad()) plan.faces.max_tilt_rad = faces.max_tilt_rad();
       if (faces.has_spread()) plan.faces.spread = faces.spread();
       if (faces.standoff_m() != 0) plan.faces.standoff_m = faces.standoff_m();
       break;
@@ -200,7 +200,7 @@ absl::StatusOr<std::shared_ptr<const DatasetSpecification>> FromProto(const v1::
   if (specification->columns.image) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification->image, FromProto(message.image(), resources));
   }
-  if (message.most_draws() != 0) specification->most_draws = message.most_draws();
+  if (message.max_draws() != 0) specification->max_draws = message.max_draws();
   TOUCHSTONE_RETURN_IF_ERROR(ValidateDataset(specification.get()));
   return specification;
 }

@@ -75,10 +75,10 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
                  Resources* resources, const std::function<bool(const v1::Progress&)>& send,
                  v1::Report* result) {
   const RunningGuard running(&resources->running_diagnoses);
-  if (resources->running_diagnoses > static_cast<uint32_t>(resources->options.most_diagnoses))
+  if (resources->running_diagnoses > static_cast<uint32_t>(resources->options.max_diagnoses))
     return absl::ResourceExhaustedError(
-        absl::StrCat("this server works on ", resources->options.most_diagnoses,
-                     " sets already (most_diagnoses): try again, or at another server"));
+        absl::StrCat("this server works on ", resources->options.max_diagnoses,
+                     " sets already (max_diagnoses): try again, or at another server"));
   const auto begin = std::chrono::steady_clock::now();
   Worker worker(
       [&](const DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
@@ -156,7 +156,7 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
 
 grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::ProposeRequest* request,
                                        grpc::ServerWriter<v1::ProposeResponse>* writer) {
-  const uint32_t most = resources_->options.most_proposed_touches;
+  const uint32_t most = resources_->options.max_proposed_touches;
   if (request->touches() > most)
     return ToGrpc(
         absl::InvalidArgumentError(absl::StrCat("touches = ", request->touches(), ": at most ", most)));

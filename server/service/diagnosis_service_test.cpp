@@ -150,8 +150,8 @@ TEST_F(DiagnosisServiceTest, ShowsProgressAndCanBeCancelled) {
 
 TEST_F(DiagnosisServiceTest, WorksOnAFewSetsAtOnce) {
   ServerOptions options;
-  options.most_diagnoses = 1;
-  options.most_proposed_touches = 10;
+  options.max_diagnoses = 1;
+  options.max_proposed_touches = 10;
   Start(options);
   v1::DiagnoseRequest request;
   request.mutable_evidence()->set_csv(Csv(20'000));
@@ -164,7 +164,7 @@ TEST_F(DiagnosisServiceTest, WorksOnAFewSetsAtOnce) {
     evidence.set_csv(Csv(3));
     const grpc::Status status = Compare(evidence);
     EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-    EXPECT_THAT(status.error_message(), HasSubstr("most_diagnoses"));
+    EXPECT_THAT(status.error_message(), HasSubstr("max_diagnoses"));
   }
   context.TryCancel();
   reader->Finish();

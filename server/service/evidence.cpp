@@ -17,9 +17,9 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostAlso = 64;     // model files
-constexpr size_t kMostNamed = 5;  // objects in a message
-constexpr size_t kMostAlsoBytes = 1 << 20;
+constexpr int kMaxAlso = 64;     // model files
+constexpr size_t kMaxNamed = 5;  // objects in a message
+constexpr size_t kMaxAlsoBytes = 1 << 20;
 
 absl::StatusOr<MeasurementSet> ReadSet(const v1::Evidence& message, const Resources& resources) {
   const std::string origin = message.origin().empty() ? "measurements" : message.origin();
@@ -89,22 +89,22 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
           ? ""
           : absl::StrCat(" (nor have ", missing.size() - 1, " others: ",
                          absl::StrJoin(missing.begin() + 1,
-                                       missing.begin() + std::min(missing.size(), kMostNamed), ", "),
-                         missing.size() > kMostNamed ? ", ..." : "", ")");
+                                       missing.begin() + std::min(missing.size(), kMaxNamed), ", "),
+                         missing.size() > kMaxNamed ? ", ..." : "", ")");
   return absl::NotFoundError(absl::StrCat(set.origin, ":", set.line[row], ": column object: '", missing[0],
                                           "' has no mesh", others, "; give it with --mesh ", missing[0],
                                           "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
 }
 
 absl::Status ReadAlso(const v1::Evidence& message, DiagnosisInput* input) {
-  if (message.also_yaml_size() > kMostAlso)
+  if (message.also_yaml_size() > kMaxAlso)
     return absl::InvalidArgumentError(
-        absl::StrCat("also_yaml has ", message.also_yaml_size(), " files: at most ", kMostAlso));
+        absl::StrCat("also_yaml has ", message.also_yaml_size(), " files: at most ", kMaxAlso));
   for (int k = 0; k < message.also_yaml_size(); ++k) {
     const std::string place = absl::StrCat("also_yaml[", k, "]");
-    if (message.also_yaml(k).size() > kMostAlsoBytes)
+    if (message.also_yaml(k).size() > kMaxAlsoBytes)
       return absl::InvalidArgumentError(
-          absl::StrCat(place, " has ", message.also_yaml(k).size(), " bytes: at most ", kMostAlsoBytes));
+          absl::StrCat(place, " has ", message.also_yaml(k).size(), " bytes: at most ", kMaxAlsoBytes));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Model model,
                                 ParseModel(AsModelFile(message.also_yaml(k)), place, Catalogue()));
     if (model.effects.empty())

@@ -23,8 +23,8 @@ struct Raw {
   double debounce_ms = 5;
   int threshold = 512, hysteresis = 16;
   double vertical_fov_deg = 45;
-  double most_speed_mm_s = 100, transfer_speed_mm_s = 150, acceleration_mm_s2 = 1200;
-  double most_standoff_mm = 150, stroke_beyond_target_mm = 30, most_tilt_deg = 60, clearance_mm = 50;
+  double max_speed_mm_s = 100, transfer_speed_mm_s = 150, acceleration_mm_s2 = 1200;
+  double max_standoff_mm = 150, stroke_beyond_target_mm = 30, max_tilt_deg = 60, clearance_mm = 50;
   std::vector<double> box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
 };
 
@@ -66,8 +66,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"effector.debounce_ms", "Microswitch", &raw->debounce_ms},
       {"effector.threshold", "Resistor: pressed at or above this reading", &raw->threshold},
       {"effector.hysteresis", "Resistor: released so far below", &raw->hysteresis},
-      {"effector.most_press_mm", "How far the first finger may be pushed while the others are on their way",
-       &o.most_press_mm},
+      {"effector.max_press_mm", "How far the first finger may be pushed while the others are on their way",
+       &o.max_press_mm},
       {"effector.reply_timeout_s", "Of one try of a request", &o.effector.reply_timeout_s},
       {"effector.silence_s", "Without a heartbeat for so long the line is lost", &o.effector.silence_s},
       {"effector.clock_query_s", "Between two queries of its clock", &o.effector.clock_query_s},
@@ -78,13 +78,13 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
        &o.camera.intrinsics},
       {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
       {"camera.timeout_s", "", &o.camera.timeout_s},
-      {"limits.most_speed_mm_s", "Limit of an approach's speed", &raw->most_speed_mm_s},
+      {"limits.max_speed_mm_s", "Limit of an approach's speed", &raw->max_speed_mm_s},
       {"limits.transfer_speed_mm_s", "Speed between touches", &raw->transfer_speed_mm_s},
       {"limits.acceleration_mm_s2", "", &raw->acceleration_mm_s2},
-      {"limits.most_standoff_mm", "", &raw->most_standoff_mm},
+      {"limits.max_standoff_mm", "", &raw->max_standoff_mm},
       {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target",
        &raw->stroke_beyond_target_mm},
-      {"limits.most_tilt_deg", "Of an approach, from straight down", &raw->most_tilt_deg},
+      {"limits.max_tilt_deg", "Of an approach, from straight down", &raw->max_tilt_deg},
       {"limits.clearance_mm", "Transfers cross so far above the object", &raw->clearance_mm},
       {"limits.box_min_mm", "Corner of the box that the tip must stay in, base frame", &raw->box_min_mm},
       {"limits.box_max_mm", "Its other corner", &raw->box_max_mm},
@@ -92,11 +92,11 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.joint_max_deg", "Six joints", &raw->joint_max_deg},
       {"limits.home_deg", "Six joints", &raw->home_deg},
       {"limits.payload_kg", "Of the end effector", &o.limits.payload_kg},
-      {"most_batch_size", "Limit: samples a batch", &o.common.most_batch_size},
-      {"most_touches_per_request", "Limit: explicit touches a request", &o.common.most_touches_per_request},
-      {"most_images_per_request", "Limit: photographs a request", &o.common.most_images_per_request},
-      {"most_streams", "Limit: dataset streams at once", &o.common.most_streams},
-      {"most_message_mib", "Limit: size of one message, MiB", &o.common.most_message_mib},
+      {"max_batch_size", "Limit: samples a batch", &o.common.max_batch_size},
+      {"max_touches_per_request", "Limit: explicit touches a request", &o.common.max_touches_per_request},
+      {"max_images_per_request", "Limit: photographs a request", &o.common.max_images_per_request},
+      {"max_streams", "Limit: dataset streams at once", &o.common.max_streams},
+      {"max_message_mib", "Limit: size of one message, MiB", &o.common.max_message_mib},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.common.lease_window_s},
       {"drain_s", "Seconds that running calls get after SIGTERM", &o.common.drain_s},
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
@@ -127,7 +127,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(raw.fingers, 1, 8, "effector.fingers"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.spacing_mm, 1, 1000, "effector.spacing_mm"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.most_press_mm, 0.1, 1000, "effector.most_press_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.max_press_mm, 0.1, 1000, "effector.max_press_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.time_scale, 1e-3, 1e5, "time_scale"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.silence_s, 0.05, 60, "arm.silence_s"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.watchdog_hz, 0.1, 50, "arm.watchdog_hz"));
@@ -147,12 +147,12 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
 
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
   MotionLimits& limits = o.limits;
-  limits.most_speed_m_s = raw.most_speed_mm_s / 1000;
+  limits.max_speed_m_s = raw.max_speed_mm_s / 1000;
   limits.transfer_speed_m_s = raw.transfer_speed_mm_s / 1000;
   limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
-  limits.most_standoff_m = raw.most_standoff_mm / 1000;
+  limits.max_standoff_m = raw.max_standoff_mm / 1000;
   limits.stroke_beyond_target_m = raw.stroke_beyond_target_mm / 1000;
-  limits.most_tilt_rad = raw.most_tilt_deg * kRadiansPerDegree;
+  limits.max_tilt_rad = raw.max_tilt_deg * kRadiansPerDegree;
   limits.clearance_m = raw.clearance_mm / 1000;
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_min_mm, 1e-3, "limits.box_min_mm", &limits.box_min_m));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_max_mm, 1e-3, "limits.box_max_mm", &limits.box_max_m));

@@ -35,7 +35,7 @@ struct GatewayOptions {
   ArmOptions arm;
   EffectorOptions effector;
   double spacing_mm = 30;
-  double most_press_mm = 45;
+  double max_press_mm = 45;
   CameraOptions camera;
   MotionLimits limits;
 

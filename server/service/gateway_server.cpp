@@ -55,7 +55,7 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   rig.fingers = static_cast<int>(options.effector.fingers.size());
   rig.spacing_m = options.spacing_mm / 1000;
   rig.time_scale = options.time_scale;
-  rig.most_press_m = options.most_press_mm / 1000;
+  rig.max_press_m = options.max_press_mm / 1000;
   rig.mount_command = options.mount_command;
   rig.mount_timeout_s = options.mount_timeout_s;
   rig.source_note = options.source_note;

@@ -104,7 +104,7 @@ absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(u
   order.bounds = specification_->objects[which]->bounds();
   if (specification_->plan.kind == Plan::Kind::kFaces)
     order.repeat = number / (6 * specification_->plan.faces.samples_per_face);
-  for (uint32_t attempt = 0; attempt < specification_->most_draws; ++attempt) {
+  for (uint32_t attempt = 0; attempt < specification_->max_draws; ++attempt) {
     order.id = absl::StrCat("dataset-", key_, "-", index, "-", attempt);
     order.touch = TouchOfPlan(specification_->plan, generator, number, attempt);
     order.command = CommandBytes(order.touch);
@@ -115,8 +115,8 @@ absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(u
     if (complete || !generator.CanRedraw()) return std::pair(order, std::move(touch));
   }
   return absl::FailedPreconditionError(
-      absl::StrCat("sample ", index, ": no touch of ", specification_->most_draws,
-                   " draws had all fingers hit; raise most_draws or change the plan"));
+      absl::StrCat("sample ", index, ": no touch of ", specification_->max_draws,
+                   " draws had all fingers hit; raise max_draws or change the plan"));
 }
 
 absl::Status PhysicalDataset::AppendSample(uint64_t index, const Permit& permit, DatasetBatch* batch) const {

@@ -96,13 +96,13 @@ grpc::Status PhysicalSourceService::Describe(grpc::ServerContext*, const v1::Des
   response->set_kind("physical");
   response->set_version(kVersion);
   for (const char* plan : {"faces", "list"}) response->add_plans(plan);
-  response->set_most_touches_per_request(options.most_touches_per_request);
+  response->set_max_touches_per_request(options.max_touches_per_request);
   if (source_->has_camera()) {
-    response->set_most_images_per_request(options.most_images_per_request);
-    response->set_most_image_side(kMostImageSide);
+    response->set_max_images_per_request(options.max_images_per_request);
+    response->set_max_image_side(kMaxImageSide);
   }
-  response->set_most_batch_size(options.most_batch_size);
-  response->set_most_fingers(source_->fingers());
+  response->set_max_batch_size(options.max_batch_size);
+  response->set_max_fingers(source_->fingers());
   response->set_lease_required(source_->moves());
   response->set_touch_duration_s(source_->moves() && facts.touch_duration_s == 0 ? 8
                                                                                  : facts.touch_duration_s);
@@ -123,7 +123,7 @@ absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const 
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string session, SessionName(request.session()));
-  const int most = resources_->options.most_touches_per_request;
+  const int most = resources_->options.max_touches_per_request;
   if (request.touches_size() == 0)
     return absl::InvalidArgumentError("touches is empty: give at least one touch");
   if (request.touches_size() > most)
@@ -166,7 +166,7 @@ absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, cons
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetImage image, FromProto(request.image(), resources_));
-  const int most = resources_->options.most_images_per_request;
+  const int most = resources_->options.max_images_per_request;
   if (request.views_size() == 0) return absl::InvalidArgumentError("views is empty: give at least one view");
   if (request.views_size() > most)
     return absl::InvalidArgumentError(
@@ -211,14 +211,13 @@ absl::Status PhysicalSourceService::DoStream(grpc::ServerContext* context,
                                              grpc::ServerWriter<v1::StreamDatasetResponse>* writer) {
   const RunningGuard running(&resources_->running_streams);
   const ServerOptions& options = resources_->options;
-  if (resources_->running_streams > static_cast<uint32_t>(options.most_streams))
-    return absl::ResourceExhaustedError(
-        absl::StrCat("this source runs ", options.most_streams,
-                     " dataset streams already (most_streams): try again later"));
+  if (resources_->running_streams > static_cast<uint32_t>(options.max_streams))
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "this source runs ", options.max_streams, " dataset streams already (max_streams): try again later"));
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
-  if (request.batch_size() > static_cast<uint32_t>(options.most_batch_size))
+  if (request.batch_size() > static_cast<uint32_t>(options.max_batch_size))
     return absl::InvalidArgumentError(
-        absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.most_batch_size));
+        absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.max_batch_size));
   if (request.spec().plan().has_sphere())
     return absl::InvalidArgumentError(
         "plan.sphere makes no sense at this source: an arm cannot come from everywhere; faces and list would "

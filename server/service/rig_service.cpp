@@ -148,7 +148,7 @@ grpc::Status RigService::CheckTouches(grpc::ServerContext*, const v1::CheckTouch
 absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
-  const int most = resources_->options.most_touches_per_request;
+  const int most = resources_->options.max_touches_per_request;
   if (request.touches_size() > most)
     return absl::InvalidArgumentError(
         absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));

@@ -22,10 +22,10 @@ absl::Status CheckOptions(const ServerOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckServing(options));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.threads, 0, 1024, "threads"));
   // A session goes through a receive buffer and the reader's line numbers, which are ints.
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_session_mib, 1, 4095, "most_session_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_sessions_mib, 1, 1 << 30, "most_sessions_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_diagnoses, 1, 1000, "most_diagnoses"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_proposed_touches, 1, 100'000, "most_proposed_touches"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_session_mib, 1, 4095, "max_session_mib"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_sessions_mib, 1, 1 << 30, "max_sessions_mib"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_diagnoses, 1, 1000, "max_diagnoses"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_proposed_touches, 1, 100'000, "max_proposed_touches"));
   return absl::OkStatus();
 }
 
@@ -97,7 +97,7 @@ int Server::port() const {
 
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(parts_->resources.options.most_message_mib << 20);
+  arguments.SetMaxReceiveMessageSize(parts_->resources.options.max_message_mib << 20);
   return parts_->server->InProcessChannel(arguments);
 }
 

@@ -38,15 +38,15 @@ struct ServerOptions {
   int threads = 0;  // that simulate; 0: one a core
   RendererOptions renderer;
   // Limits: every one in this place.
-  int most_batch_size = 65536;
-  int most_touches_per_request = 100000;
-  int most_images_per_request = 1000;
-  int most_streams = 64;  // dataset streams at once; one more is RESOURCE_EXHAUSTED
-  int most_message_mib = 256;
-  int most_session_mib = 1024;   // one stored session
-  int most_sessions_mib = 4096;  // all stored sessions together, and all that are being sent at once
-  int most_diagnoses = 4;  // compared, diagnosed or proposed for at once; one more is RESOURCE_EXHAUSTED
-  int most_proposed_touches = 1000;
+  int max_batch_size = 65536;
+  int max_touches_per_request = 100000;
+  int max_images_per_request = 1000;
+  int max_streams = 64;  // dataset streams at once; one more is RESOURCE_EXHAUSTED
+  int max_message_mib = 256;
+  int max_session_mib = 1024;   // one stored session
+  int max_sessions_mib = 4096;  // all stored sessions together, and all that are being sent at once
+  int max_diagnoses = 4;        // compared, diagnosed or proposed for at once; one more is RESOURCE_EXHAUSTED
+  int max_proposed_touches = 1000;
   double lease_window_s = 2;
   double drain_s = 10;  // what running calls get after SIGTERM
 };

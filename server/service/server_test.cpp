@@ -99,7 +99,7 @@ TEST(Server, ASlowReaderHoldsBackOnlyItself) {
 
 TEST(Server, MoreStreamsThanTheLimitAreRefusedAndSaySo) {
   ServerOptions options = SmallServer();
-  options.most_streams = 1;
+  options.max_streams = 1;
   const auto server = StartServer(options);
   const auto stub = v1::Source::NewStub(ChannelTo(*server));
   grpc::ClientContext first_context, second_context;
@@ -110,7 +110,7 @@ TEST(Server, MoreStreamsThanTheLimitAreRefusedAndSaySo) {
   EXPECT_FALSE(second->Read(&response));
   const grpc::Status status = second->Finish();
   EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("most_streams"));
+  EXPECT_THAT(status.error_message(), HasSubstr("max_streams"));
   first_context.TryCancel();
   first->Finish();
 }

@@ -25,13 +25,13 @@ void EnablePlugins() {
 }  // namespace
 
 absl::Status CheckServing(const ServerOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_batch_size, 1, 1 << 20, "most_batch_size"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_streams, 1, 100'000, "most_streams"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.most_message_mib, 1, 2047, "most_message_mib"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_batch_size, 1, 1 << 20, "max_batch_size"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_streams, 1, 100'000, "max_streams"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_message_mib, 1, 2047, "max_message_mib"));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRange(options.most_touches_per_request, 1, 10'000'000, "most_touches_per_request"));
+      CheckRange(options.max_touches_per_request, 1, 10'000'000, "max_touches_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRange(options.most_images_per_request, 1, 1'000'000, "most_images_per_request"));
+      CheckRange(options.max_images_per_request, 1, 1'000'000, "max_images_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.lease_window_s, 0.01, 3600, "lease_window_s"));
@@ -44,8 +44,8 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options,
   EnablePlugins();
   Serving serving;
   grpc::ServerBuilder builder;
-  builder.SetMaxReceiveMessageSize(options.most_message_mib << 20);
-  builder.SetMaxSendMessageSize(options.most_message_mib << 20);
+  builder.SetMaxReceiveMessageSize(options.max_message_mib << 20);
+  builder.SetMaxSendMessageSize(options.max_message_mib << 20);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a taken port is an error, not shared
   if (!options.listen.empty())
     builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &serving.port);

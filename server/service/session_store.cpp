@@ -20,7 +20,7 @@ namespace {
 
 constexpr char kExtension[] = ".csv";
 constexpr size_t kPiece = 1 << 20;
-constexpr size_t kMostSessions = 10000;
+constexpr size_t kMaxSessions = 10000;
 
 uint64_t Mebibytes(int count) {
   return static_cast<uint64_t>(count) << 20;
@@ -31,8 +31,8 @@ uint64_t Mebibytes(int count) {
 absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOptions& options) {
   auto store = std::make_unique<SessionStore>();
   store->folder_ = options.sessions_dir;
-  store->most_bytes_ = Mebibytes(options.most_session_mib);
-  store->most_bytes_together_ = Mebibytes(options.most_sessions_mib);
+  store->max_bytes_ = Mebibytes(options.max_session_mib);
+  store->max_bytes_together_ = Mebibytes(options.max_sessions_mib);
   if (store->folder_.empty()) return store;
   std::error_code error;
   std::filesystem::create_directories(store->folder_, error);
@@ -43,17 +43,17 @@ absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOpt
 }
 
 absl::Status SessionStore::Upload::Append(absl::string_view piece) {
-  if (csv_.size() + piece.size() > store_->most_bytes_)
+  if (csv_.size() + piece.size() > store_->max_bytes_)
     return absl::InvalidArgumentError(absl::StrCat("csv: a session may have at most ",
-                                                   store_->most_bytes_ >> 20,
-                                                   " MiB (most_session_mib); divide it by object"));
+                                                   store_->max_bytes_ >> 20,
+                                                   " MiB (max_session_mib); divide it by object"));
   counted_ += piece.size();
   const uint64_t uploading = store_->uploading_ += piece.size();
   csv_.append(piece.data(), piece.size());
-  if (uploading > store_->most_bytes_together_)
+  if (uploading > store_->max_bytes_together_)
     return absl::ResourceExhaustedError(
-        absl::StrCat("more than ", store_->most_bytes_together_ >> 20,
-                     " MiB of sessions are being sent at once (most_sessions_mib): try again"));
+        absl::StrCat("more than ", store_->max_bytes_together_ >> 20,
+                     " MiB of sessions are being sent at once (max_sessions_mib): try again"));
   return absl::OkStatus();
 }
 
@@ -199,13 +199,13 @@ absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::s
     if (const auto found = known_.find(name); found != known_.end()) return same(found->second.session);
   }
   const Usage stored = Stored();
-  if (stored.sessions >= kMostSessions)
+  if (stored.sessions >= kMaxSessions)
     return absl::ResourceExhaustedError(
-        absl::StrCat("the store holds ", kMostSessions, " sessions; delete some"));
-  if (stored.bytes + csv.size() > most_bytes_together_)
+        absl::StrCat("the store holds ", kMaxSessions, " sessions; delete some"));
+  if (stored.bytes + csv.size() > max_bytes_together_)
     return absl::ResourceExhaustedError(absl::StrCat("the store holds ", stored.bytes >> 20, " of ",
-                                                     most_bytes_together_ >> 20,
-                                                     " MiB (most_sessions_mib); delete some sessions"));
+                                                     max_bytes_together_ >> 20,
+                                                     " MiB (max_sessions_mib); delete some sessions"));
   if (folder_.empty()) {
     known_[name] = {session, {}, std::make_shared<const std::string>(std::move(csv))};
     return session;

@@ -84,7 +84,7 @@ class SessionStore {
   absl::Status WriteNew(const std::string& name, const std::string& csv) const;
 
   std::string folder_;
-  uint64_t most_bytes_ = 0, most_bytes_together_ = 0;
+  uint64_t max_bytes_ = 0, max_bytes_together_ = 0;
   std::atomic<uint64_t> uploading_{0};
   mutable std::mutex mutex_;
   std::map<std::string, Known> known_;  // with a folder only a cache

@@ -108,8 +108,8 @@ TEST_P(SessionStoreTest, RefusesNamesFilesAndPlansThatAreNone) {
 }
 
 TEST_P(SessionStoreTest, KeepsItsLimits) {
-  options_.most_session_mib = 1;
-  options_.most_sessions_mib = 1;
+  options_.max_session_mib = 1;
+  options_.max_sessions_mib = 1;
   const auto store = Open();
   std::string large = "object,t_0_us\n";
   while (large.size() < 700'000) absl::StrAppend(&large, "cup,", large.size(), "\n");
@@ -119,7 +119,7 @@ TEST_P(SessionStoreTest, KeepsItsLimits) {
 
   SessionStore::Upload upload(store.get());
   EXPECT_TRUE(upload.Append(large).ok());
-  EXPECT_THAT(std::string(upload.Append(large).message()), HasSubstr("most_session_mib"));
+  EXPECT_THAT(std::string(upload.Append(large).message()), HasSubstr("max_session_mib"));
   SessionStore::Upload beside(store.get());
   EXPECT_TRUE(absl::IsResourceExhausted(beside.Append(large)));
 }

@@ -17,7 +17,7 @@ constexpr int kTouchBlock = 1024;
 void AppendResults(const TouchBatch& batch, v1::TouchResponse* response) {
   for (int touch = 0; touch < batch.size(); ++touch) {
     v1::TouchResult* result = response->add_results();
-    double descriptor_s[kMostFingers];
+    double descriptor_s[kMaxFingers];
     result->set_complete(Descriptor(batch, touch, descriptor_s));
     for (int finger = 0; finger < batch.fingers(); ++finger) {
       const int k = batch.At(finger, touch);
@@ -46,11 +46,11 @@ grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeReq
   if (renderer.ok()) response->set_renderer(RendererKindOf(**renderer));
   response->set_renderer_description(renderer.ok() ? (*renderer)->description()
                                                    : "none: " + std::string(renderer.status().message()));
-  response->set_most_touches_per_request(options.most_touches_per_request);
-  response->set_most_images_per_request(renderer.ok() ? options.most_images_per_request : 0);
-  response->set_most_image_side(renderer.ok() ? kMostImageSide : 0);
-  response->set_most_batch_size(options.most_batch_size);
-  response->set_most_fingers(kMostFingers);
+  response->set_max_touches_per_request(options.max_touches_per_request);
+  response->set_max_images_per_request(renderer.ok() ? options.max_images_per_request : 0);
+  response->set_max_image_side(renderer.ok() ? kMaxImageSide : 0);
+  response->set_max_batch_size(options.max_batch_size);
+  response->set_max_fingers(kMaxFingers);
   return grpc::Status::OK;
 }
 
@@ -89,7 +89,7 @@ grpc::Status SourceService::ExpandPlan(grpc::ServerContext*, const v1::ExpandPla
     const uint64_t left = generator->Count() - request->first_index();
     count = count == 0 ? left : std::min(count, left);
   }
-  const uint64_t most = resources_->options.most_touches_per_request;
+  const uint64_t most = resources_->options.max_touches_per_request;
   if (count > most)
     return ToGrpc(absl::InvalidArgumentError(absl::StrCat(
         "count = ", count, ": at most ", most, " touches a request; ask in parts by first_index")));
@@ -118,7 +118,7 @@ absl::Status SourceService::DoTouch(grpc::ServerContext* context, const v1::Touc
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const Model> model,
                               FromProto(request.model(), *resources_));
-  const int most = resources_->options.most_touches_per_request;
+  const int most = resources_->options.max_touches_per_request;
   if (request.touches_size() == 0)
     return absl::InvalidArgumentError("touches is empty: give at least one touch");
   if (request.touches_size() > most)
@@ -196,7 +196,7 @@ absl::Status SourceService::DoCapture(grpc::ServerContext* context, const v1::Ca
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetImage image, FromProto(request.image(), resources_));
-  const int most = resources_->options.most_images_per_request;
+  const int most = resources_->options.max_images_per_request;
   if (request.views_size() == 0) return absl::InvalidArgumentError("views is empty: give at least one view");
   if (request.views_size() > most)
     return absl::InvalidArgumentError(
@@ -251,13 +251,13 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
                                      grpc::ServerWriter<v1::StreamDatasetResponse>* writer) {
   const RunningGuard running(&resources_->running_streams);
   const ServerOptions& options = resources_->options;
-  if (resources_->running_streams > static_cast<uint32_t>(options.most_streams))
+  if (resources_->running_streams > static_cast<uint32_t>(options.max_streams))
     return absl::ResourceExhaustedError(
-        absl::StrCat("this server runs ", options.most_streams,
-                     " dataset streams already (most_streams): try again, or at another server"));
-  if (request.batch_size() > static_cast<uint32_t>(options.most_batch_size))
+        absl::StrCat("this server runs ", options.max_streams,
+                     " dataset streams already (max_streams): try again, or at another server"));
+  if (request.batch_size() > static_cast<uint32_t>(options.max_batch_size))
     return absl::InvalidArgumentError(
-        absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.most_batch_size));
+        absl::StrCat("batch_size = ", request.batch_size(), ": at most ", options.max_batch_size));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const DatasetSpecification> specification,
                               FromProto(request.spec(), resources_));
   DatasetPart part;

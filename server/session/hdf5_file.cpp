@@ -14,7 +14,7 @@
 namespace touchstone {
 namespace {
 
-constexpr uint64_t kMostValues = uint64_t{1} << 31;  // of a dataset that is read
+constexpr uint64_t kMaxValues = uint64_t{1} << 31;  // of a dataset that is read
 
 Hdf5Handle TextType(size_t bytes) {
   Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
@@ -134,7 +134,7 @@ absl::StatusOr<Hdf5Handle> Hdf5ColumnsReader::Dataset(const std::string& name, u
   if (!dataset.ok()) return Wrong(name, "is missing");
   Hdf5Handle space(H5Dget_space(dataset), H5Sclose);
   const hssize_t values = H5Sget_simple_extent_npoints(space);
-  if (values < 0 || static_cast<uint64_t>(values) > kMostValues)
+  if (values < 0 || static_cast<uint64_t>(values) > kMaxValues)
     return Wrong(name, "is of no size that can be read");
   *count = static_cast<uint64_t>(values);
   return dataset;
@@ -170,7 +170,7 @@ absl::StatusOr<std::vector<std::string>> Hdf5ColumnsReader::Texts(const std::str
   Hdf5Handle type(H5Dget_type(dataset), H5Tclose);
   const size_t bytes = H5Tget_size(type);
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || bytes == 0 ||
-      bytes * count > kMostValues)
+      bytes * count > kMaxValues)
     return Wrong(name, "has no texts of fixed length");
   std::string packed(bytes * count, '\0');
   if (count > 0 && H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, packed.data()) < 0)

@@ -15,7 +15,7 @@ namespace touchstone {
 namespace {
 
 constexpr size_t kLongestName = 200;  // of sessions and ids, bytes
-constexpr int kMostFingers = 16;
+constexpr int kMaxFingers = 16;
 
 const char* StageInWords(TouchStage stage) {
   switch (stage) {
@@ -39,9 +39,9 @@ class JournalFile : public Journal {
   absl::Status EnsureSession(const JournalSession& session) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     TOUCHSTONE_RETURN_IF_ERROR(CheckName("a session's name", session.name));
-    if (session.fingers < 1 || session.fingers > kMostFingers || !(session.spacing_m > 0))
+    if (session.fingers < 1 || session.fingers > kMaxFingers || !(session.spacing_m > 0))
       return Wrong(absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
-                                ShortestNumber(session.spacing_m * 1e3), " mm apart; 1 to ", kMostFingers,
+                                ShortestNumber(session.spacing_m * 1e3), " mm apart; 1 to ", kMaxFingers,
                                 " and more than 0 mm are possible"));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(session.name));
     if (!known) return Write([&] { return InsertSession(file_.get(), session).status(); });

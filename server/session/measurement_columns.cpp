@@ -17,7 +17,7 @@
 namespace touchstone {
 namespace {
 
-constexpr size_t kMostShown = 48;
+constexpr size_t kMaxShown = 48;
 
 // The columns that tell a touch's pose, in the order in which files are written. All or none.
 struct PoseColumn {
@@ -47,7 +47,7 @@ int FingerOfColumn(const std::string& name) {
   int finger = -1;
   const bool plain = digits.find_first_not_of("0123456789") == std::string::npos &&
                      (digits.size() == 1 || digits[0] != '0') && absl::SimpleAtoi(digits, &finger);
-  return plain && finger < kMostFingers ? finger : -1;
+  return plain && finger < kMaxFingers ? finger : -1;
 }
 
 // The column that a name stands for; its index is set later where it is a covariate.
@@ -142,8 +142,8 @@ std::string FingerName(int finger, int fingers) {
 }
 
 std::string Shown(absl::string_view field) {
-  const bool cut = field.size() > kMostShown;
-  return absl::StrCat(absl::CHexEscape(field.substr(0, kMostShown)), cut ? "..." : "");
+  const bool cut = field.size() > kMaxShown;
+  return absl::StrCat(absl::CHexEscape(field.substr(0, kMaxShown)), cut ? "..." : "");
 }
 
 absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const std::string& origin) {

@@ -23,7 +23,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kLongestName = 256;
-constexpr size_t kMostColumns = 4096;
+constexpr size_t kMaxColumns = 4096;
 constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
 
 // Vectors a thousandth away from unit length or from the right angle are made exact, as the simulation does;
@@ -368,9 +368,9 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   if (absl::StripAsciiWhitespace(header).empty())
     return wrong(1, "a header line was expected (touch,object,...)");
   if (absl::Status status = fields.Cut(header); !status.ok()) return wrong(1, status.message());
-  if (fields.all().size() > kMostColumns)
+  if (fields.all().size() > kMaxColumns)
     return wrong(1,
-                 absl::StrCat("has ", fields.all().size(), " columns; at most ", kMostColumns, " are read"));
+                 absl::StrCat("has ", fields.all().size(), " columns; at most ", kMaxColumns, " are read"));
   const std::vector<std::string> names(fields.all().begin(), fields.all().end());
   TOUCHSTONE_ASSIGN_OR_RETURN(const Columns columns, ReadColumns(names, origin));
   set.fingers = columns.fingers;

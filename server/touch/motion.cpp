@@ -13,10 +13,10 @@ void FindFirstFingers(TouchBatch* batch) {
   // Ties go to the lower finger. Comparisons with NaN are false, so a finger without contact is never first.
   for (int touch = 0; touch < batch->size(); ++touch) {
     int first = -1;
-    double least_m = INFINITY;
+    double min_m = INFINITY;
     for (int finger = 0; finger < batch->fingers(); ++finger) {
       const double travel_m = batch->travel_m[batch->At(finger, touch)];
-      if (travel_m < least_m) first = finger, least_m = travel_m;
+      if (travel_m < min_m) first = finger, min_m = travel_m;
     }
     batch->first_finger[touch] = first;
   }

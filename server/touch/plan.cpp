@@ -95,7 +95,7 @@ class FacesGenerator : public PoseGenerator {
       target[v] += plan_.spread * half[v] * random.Uniform(-1, 1);
 
       // The approach within a cone around the inward normal (uniform over its solid angle), any roll.
-      const double cos_tilt = random.Uniform(std::cos(plan_.most_tilt_rad), 1);
+      const double cos_tilt = random.Uniform(std::cos(plan_.max_tilt_rad), 1);
       const double sin_tilt = std::sqrt(std::max(0.0, 1 - cos_tilt * cos_tilt));
       const double around = random.Uniform(0, 2 * kPi), roll = random.Uniform(0, 2 * kPi);
       Eigen::Vector3d inward = Eigen::Vector3d::Zero(), e1 = Eigen::Vector3d::Zero();
@@ -163,7 +163,7 @@ absl::Status ValidatePlan(Plan* plan) {
   const FacesPlan& faces = plan->faces;
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.samples_per_face, 1, 1e6, "faces.samples_per_face"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.rounds, 1, 1e6, "faces.rounds"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.most_tilt_rad, 0, kPi / 3, "faces.most_tilt_rad"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.max_tilt_rad, 0, kPi / 3, "faces.max_tilt_rad"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.spread, 0, 1, "faces.spread"));
   return CheckBetween(faces.standoff_m, 1e-6, 10, "faces.standoff_m");
 }

@@ -28,7 +28,7 @@ struct SpherePlan {
 struct FacesPlan {
   int samples_per_face = 8;
   int rounds = 4;
-  double most_tilt_rad = 20 * 3.14159265358979323846 / 180;  // between approach and the inward face normal
+  double max_tilt_rad = 20 * 3.14159265358979323846 / 180;  // between approach and the inward face normal
   double spread = 0.6;  // targets lie within this share of the face's half sides
   double standoff_m = 0.06;
 };

@@ -32,9 +32,9 @@ TEST_F(SourceConformance, DescribesItsKindVersionPlansAndLimits) {
   EXPECT_THAT(description_.kind(), testing::AnyOf("virtual", "physical"));
   EXPECT_FALSE(description_.version().empty());
   EXPECT_GT(description_.plans_size(), 0);
-  EXPECT_GT(description_.most_touches_per_request(), 0u);
-  EXPECT_GT(description_.most_batch_size(), 0u);
-  EXPECT_GE(description_.most_fingers(), 3u);
+  EXPECT_GT(description_.max_touches_per_request(), 0u);
+  EXPECT_GT(description_.max_batch_size(), 0u);
+  EXPECT_GE(description_.max_fingers(), 3u);
 }
 
 TEST_F(SourceConformance, ObjectsHaveNamesBoundsAndHashes) {
@@ -168,7 +168,7 @@ TEST_F(SourceConformance, PlansExpandToValidTouches) {
 }
 
 TEST_F(SourceConformance, PhotographsHaveTheSizeAskedFor) {
-  if (description_.most_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
+  if (description_.max_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
   v1::CaptureRequest request;
   request.set_lease_token(LeaseToken());
   const v1::Object object = AnObject();
@@ -186,7 +186,7 @@ TEST_F(SourceConformance, PhotographsHaveTheSizeAskedFor) {
 }
 
 TEST_F(SourceConformance, ImageSizesOutOfRangeAreRefused) {
-  if (description_.most_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
+  if (description_.max_images_per_request() == 0) GTEST_SKIP() << "this source has no camera";
   v1::CaptureRequest request;
   request.set_lease_token(LeaseToken());
   const v1::Object object = AnObject();

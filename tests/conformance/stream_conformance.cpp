@@ -110,7 +110,7 @@ TEST_F(StreamConformance, MistakesAreRefusedBeforeAnyBatch) {
   unknown_column.mutable_spec()->add_columns("descripter");
   no_plan.mutable_spec()->clear_plan();
   beyond.set_stop_index(6);
-  huge_batch.set_batch_size(description_.most_batch_size() + 1);
+  huge_batch.set_batch_size(description_.max_batch_size() + 1);
   const std::vector<std::tuple<v1::StreamDatasetRequest, grpc::StatusCode, std::string>> mistakes = {
       {unknown_object, grpc::NOT_FOUND, "lat99"},
       {unknown_column, grpc::INVALID_ARGUMENT, "did you mean 'descriptor'"},

@@ -34,9 +34,9 @@ def test_a_mistake_names_the_argument(arguments, says):
 
 
 def test_units_go_to_the_wire_as_si():
-    spec = specification(["a"], touchstone.faces(2, 3, most_tilt_deg=45, standoff_mm=60), speed_mm_s=20)
+    spec = specification(["a"], touchstone.faces(2, 3, max_tilt_deg=45, standoff_mm=60), speed_mm_s=20)
     assert spec.plan.speed_m_s == 0.02 and spec.plan.faces.standoff_m == 0.06
-    assert spec.plan.faces.most_tilt_rad == pytest.approx(np.pi / 4)
+    assert spec.plan.faces.max_tilt_rad == pytest.approx(np.pi / 4)
     assert spec.samples == 6 * 2 * 3
 
 

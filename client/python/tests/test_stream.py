@@ -23,7 +23,7 @@ def joined(dataset, name):
 def test_a_source_describes_itself(client):
     description = client.describe()
     assert description.kind == "virtual" and "sphere" in description.plans and description.version
-    assert description.most_batch_size >= 4096
+    assert description.max_batch_size >= 4096
 
 
 def test_objects_have_their_size_in_millimetres(client):

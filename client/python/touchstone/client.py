@@ -257,7 +257,7 @@ class Client:
     def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                image: ImageOptions | None = None, most_draws: int = 0, batch_size: int | None = None,
+                image: ImageOptions | None = None, max_draws: int = 0, batch_size: int | None = None,
                 start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab",
                 session: str = "") -> Dataset:
         """A dataset to iterate over; sample i is the same bits whoever asks, however it is cut into batches.
@@ -273,7 +273,7 @@ class Client:
           columns: "index", "object", "descriptor", "contact_time", "pose", "contact", "image"; default
             ("descriptor", "object"), and "image" if `image` is given.
           image: touchstone.image(...).
-          most_draws: draws for one index before the stream fails; 0: the source's own limit.
+          max_draws: draws for one index before the stream fails; 0: the source's own limit.
           batch_size: samples a batch; default 4096, 64 with images.
           start, stop: a part of the dataset, samples start .. stop - 1.
           stride: of every `stride` batches the first is delivered: worker w of W takes
@@ -284,7 +284,7 @@ class Client:
         si = bool(checks.choice("units", units, {"lab": 0, "si": 1}))
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
-            touch_interval_s=touch_interval_s, columns=columns, image=image, most_draws=most_draws,
+            touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
         )
         # A connection of its own: losing one stream must not close another's channel.
         return Dataset(

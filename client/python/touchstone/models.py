@@ -24,11 +24,11 @@ class Description:
     default_model_hash: str
     renderer: str  # "egl", "cpu" or "": no camera
     renderer_description: str
-    most_touches_per_request: int
-    most_images_per_request: int
-    most_image_side: int
-    most_batch_size: int
-    most_fingers: int
+    max_touches_per_request: int
+    max_images_per_request: int
+    max_image_side: int
+    max_batch_size: int
+    max_fingers: int
     lease_required: bool
     touch_duration_s: float
     clock_uncertainty_us: float
@@ -37,8 +37,8 @@ class Description:
     def from_proto(cls, m: source_pb2.DescribeResponse) -> Description:
         return cls(
             m.kind, m.version, tuple(m.plans), m.default_model, m.default_model_hash,
-            images.renderer_name(m.renderer), m.renderer_description, m.most_touches_per_request,
-            m.most_images_per_request, m.most_image_side, m.most_batch_size, m.most_fingers, m.lease_required,
+            images.renderer_name(m.renderer), m.renderer_description, m.max_touches_per_request,
+            m.max_images_per_request, m.max_image_side, m.max_batch_size, m.max_fingers, m.lease_required,
             m.touch_duration_s, units.lab_value("clock_uncertainty_s", m.clock_uncertainty_s),
         )
 

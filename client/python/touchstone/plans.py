@@ -40,7 +40,7 @@ class FacesPlan:
 
     samples_per_face: int
     rounds: int
-    most_tilt_deg: float
+    max_tilt_deg: float
     spread: float
     standoff_mm: float
 
@@ -49,7 +49,7 @@ class FacesPlan:
             faces=source_pb2.FacesPlan(
                 samples_per_face=checks.whole_number("samples_per_face", self.samples_per_face, 1, 1_000_000),
                 rounds=checks.whole_number("rounds", self.rounds, 1, 1_000_000),
-                most_tilt_rad=units.si_value("most_tilt_rad", checks.number("most_tilt_deg", self.most_tilt_deg)),
+                max_tilt_rad=units.si_value("max_tilt_rad", checks.number("max_tilt_deg", self.max_tilt_deg)),
                 spread=checks.number("spread", self.spread),
                 standoff_m=units.si_value("standoff_m", checks.positive("standoff_mm", self.standoff_mm)),
             )
@@ -160,18 +160,18 @@ def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio
     return SpherePlan(step_angle_deg, roll_step_deg, radius_ratio)
 
 
-def faces(samples_per_face: int = 8, rounds: int = 4, most_tilt_deg: float = 20.0, spread: float = 0.6,
+def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0, spread: float = 0.6,
           standoff_mm: float = 60.0) -> FacesPlan:
     """The same random poses on the six faces of the bounding box in every round, so that rounds are repeats.
 
     Args:
       samples_per_face: poses a face.
       rounds: repeats of all poses.
-      most_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.
+      max_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.
       spread: targets lie within this share of a face's half width and height, 0 to 1.
       standoff_mm: distance of the start from the target.
     """
-    return FacesPlan(samples_per_face, rounds, most_tilt_deg, spread, standoff_mm)
+    return FacesPlan(samples_per_face, rounds, max_tilt_deg, spread, standoff_mm)
 
 
 def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> Touches:

@@ -19,7 +19,7 @@ DEFAULT_BATCH_SIZE_WITH_IMAGES = 64
 def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                   seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                   touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                  image: ImageOptions | None = None, most_draws: int = 0) -> source_pb2.DatasetSpec:
+                  image: ImageOptions | None = None, max_draws: int = 0) -> source_pb2.DatasetSpec:
     """The message; arguments as in Client.dataset(). samples is resolved, so that the size is known here."""
     objects = [objects] if isinstance(objects, str) else list(objects)
     if not objects or not checks.is_sequence_of_text(objects):
@@ -59,7 +59,7 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
         seed=checks.uint64("seed", seed),
         samples=checks.whole_number("samples", samples, 1, 2**63 - 1),
         columns=columns,
-        most_draws=checks.whole_number("most_draws", most_draws, 0, 2**32 - 1),
+        max_draws=checks.whole_number("max_draws", max_draws, 0, 2**32 - 1),
     )
     if "image" in columns:
         spec.image.CopyFrom((image or default_image()).to_proto())

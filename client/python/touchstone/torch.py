@@ -79,7 +79,7 @@ class TouchstoneDataset(IterableDataset):
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                 image: ImageOptions | None = None, most_draws: int = 0, batch_size: int | None = None,
+                 image: ImageOptions | None = None, max_draws: int = 0, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
                  ranks: int | None = None, whole_rounds: bool = False, new_samples_each_epoch: bool = False,
                  retry_for_s: float = 60.0):
@@ -100,7 +100,7 @@ class TouchstoneDataset(IterableDataset):
         self._retry_for_s = target.retry_for_s if isinstance(target, Client) else retry_for_s
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
-            touch_interval_s=touch_interval_s, columns=columns, image=image, most_draws=most_draws,
+            touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
         )
         # Bytes travel to spawned workers whatever the protobuf version.
         self._spec = spec.SerializeToString()

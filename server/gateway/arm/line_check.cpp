@@ -19,7 +19,7 @@ constexpr double kJumpRad = 0.35;  // of a joint from sample to sample: another 
 constexpr double kPostureRad = 1;
 constexpr double kBoxToleranceM = 1e-6, kJointToleranceRad = 1e-4;
 constexpr const char* kJointNames[] = {"base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"};
-constexpr double kMostSlowing = 10;
+constexpr double kMaxSlowing = 10;
 
 double Degrees(double angle_rad) {
   return angle_rad / kRadiansPerDegree;
@@ -78,7 +78,7 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   const int steps =
       std::max(1, static_cast<int>(std::ceil(std::max(way_m.norm() / kStepM, turn.angle() / kStepRad))));
   const double step_s =
-      std::max(way_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMostTurnRadS) / steps;
+      std::max(way_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMaxTurnRadS) / steps;
   for (int step = 0; step <= steps; ++step) {
     const double fraction = static_cast<double>(step) / steps;
     Eigen::Isometry3d pose = from;
@@ -97,12 +97,12 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
         return absl::OutOfRangeError(absl::StrFormat(
             "%s passes a singularity at %s m in the base frame: %s would jump by %.0f deg, at most %.0f",
             what, PointText(pose.translation()), kJointNames[i], Degrees(change_rad), Degrees(kJumpRad)));
-      if (step > 0 && change_rad > MostJointSpeeds()[i] * step_s * (may_slow ? kMostSlowing : 1))
+      if (step > 0 && change_rad > MaxJointSpeeds()[i] * step_s * (may_slow ? kMaxSlowing : 1))
         return absl::OutOfRangeError(absl::StrFormat(
             "%s at %.1f mm/s would turn %s at %.0f deg/s near %s m in the base frame; %.0f deg/s is its "
             "limit",
             what, speed_m_s / kMetresPerMillimetre, kJointNames[i], Degrees(change_rad / step_s),
-            PointText(pose.translation()), Degrees(MostJointSpeeds()[i])));
+            PointText(pose.translation()), Degrees(MaxJointSpeeds()[i])));
       const bool above = next[i] > limits_.joint_max_rad[i] + kJointToleranceRad;
       if (!above && next[i] >= limits_.joint_min_rad[i] - kJointToleranceRad) continue;
       if (i == 5) *wrist_3_beyond = above ? 1 : -1;

@@ -14,7 +14,7 @@ constexpr double kShare = 0.8;  // of a joint's speed
 
 }  // namespace
 
-const std::array<double, 6>& MostJointSpeeds() {
+const std::array<double, 6>& MaxJointSpeeds() {
   static constexpr std::array<double, 6> kSpeeds = {kPi, kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
   return kSpeeds;
 }
@@ -27,7 +27,7 @@ double PacedSpeed(const UrKinematics& kinematics, const Eigen::Isometry3d& tip_f
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
   const int steps =
       std::max(1, static_cast<int>(std::ceil(std::max(way_m.norm() / kStepM, turn.angle() / kStepRad))));
-  const double step_s = std::max(way_m.norm() / line_speed_m_s, turn.angle() / kMostTurnRadS) / steps;
+  const double step_s = std::max(way_m.norm() / line_speed_m_s, turn.angle() / kMaxTurnRadS) / steps;
   double slower = 1;
   for (int step = 1; step <= steps; ++step) {
     const double part = static_cast<double>(step) / steps;
@@ -38,7 +38,7 @@ double PacedSpeed(const UrKinematics& kinematics, const Eigen::Isometry3d& tip_f
     if (found.empty()) break;
     for (size_t i = 0; i < 6 && step_s > 0; ++i)
       slower = std::max(slower,
-                        std::abs(found.front()[i] - (*joints)[i]) / (kShare * MostJointSpeeds()[i] * step_s));
+                        std::abs(found.front()[i] - (*joints)[i]) / (kShare * MaxJointSpeeds()[i] * step_s));
     *joints = found.front();
   }
   return line_speed_m_s / slower;

@@ -11,7 +11,7 @@
 namespace touchstone {
 
 // rad/s, base to wrist 3.
-const std::array<double, 6>& MostJointSpeeds();
+const std::array<double, 6>& MaxJointSpeeds();
 
 // LineSpeed, or less where a joint would exceed four fifths of its speed. *joints, those at the beginning,
 // become those at the end; where the arm cannot reach, the line is not followed further.

@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kSettleS = 0.05;         // of the arm at the end of a line, and of the program's start
 constexpr double kWristReserveRad = 0.2;  // that a transfer leaves of wrist 3's range, where it can
-constexpr double kLeastStandoffM = 1e-3;
-constexpr double kMostTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
+constexpr double kMinStandoffM = 1e-3;
+constexpr double kMaxTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
 
 absl::Status Invalid(const std::string& what, double value, const std::string& right) {
   return absl::InvalidArgumentError(
@@ -29,20 +29,20 @@ absl::Status Invalid(const std::string& what, double value, const std::string& r
 }
 
 absl::Status CheckLimits(const MotionLimits& limits) {
-  for (const auto& [what, value] : {std::pair<const char*, double>{"most_speed_m_s", limits.most_speed_m_s},
+  for (const auto& [what, value] : {std::pair<const char*, double>{"max_speed_m_s", limits.max_speed_m_s},
                                     {"transfer_speed_m_s", limits.transfer_speed_m_s},
                                     {"acceleration_m_s2", limits.acceleration_m_s2},
-                                    {"most_standoff_m", limits.most_standoff_m},
+                                    {"max_standoff_m", limits.max_standoff_m},
                                     {"stroke_beyond_target_m", limits.stroke_beyond_target_m},
                                     {"clearance_m", limits.clearance_m}})
     if (!(value > 0) || !(value <= 10)) return Invalid(what, value, "above 0 and at most 10");
-  if (!(limits.most_tilt_rad >= 0) || !(limits.most_tilt_rad <= kMostTiltRad))
-    return Invalid("most_tilt_rad", limits.most_tilt_rad, "from 0 to 1.4");
+  if (!(limits.max_tilt_rad >= 0) || !(limits.max_tilt_rad <= kMaxTiltRad))
+    return Invalid("max_tilt_rad", limits.max_tilt_rad, "from 0 to 1.4");
   if (!(limits.outermost_finger_m >= 0) || !(limits.outermost_finger_m <= 0.5))
     return Invalid("outermost_finger_m", limits.outermost_finger_m, "from 0 to 0.5");
-  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.most_payload_kg))
+  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.max_payload_kg))
     return Invalid("payload_kg", limits.payload_kg,
-                   absl::StrCat("from 0 to most_payload_kg = ", ShortestNumber(limits.most_payload_kg)));
+                   absl::StrCat("from 0 to max_payload_kg = ", ShortestNumber(limits.max_payload_kg)));
   for (int axis = 0; axis < 3; ++axis)
     if (!(limits.box_min_m[axis] < limits.box_max_m[axis]))
       return Invalid(absl::StrCat("box_min_m[", axis, "]"), limits.box_min_m[axis], "below box_max_m");
@@ -102,14 +102,14 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, const std::s
   if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
       !std::isfinite(touch.stroke_m))
     return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
-  if (!(touch.speed_m_s > 0) || touch.speed_m_s > limits_.most_speed_m_s)
+  if (!(touch.speed_m_s > 0) || touch.speed_m_s > limits_.max_speed_m_s)
     return absl::OutOfRangeError(absl::StrFormat("speed %.4g mm/s: must be above 0 and at most %.4g mm/s",
                                                  touch.speed_m_s / kMetresPerMillimetre,
-                                                 limits_.most_speed_m_s / kMetresPerMillimetre));
-  if (!(touch.standoff_m >= kLeastStandoffM) || touch.standoff_m > limits_.most_standoff_m)
+                                                 limits_.max_speed_m_s / kMetresPerMillimetre));
+  if (!(touch.standoff_m >= kMinStandoffM) || touch.standoff_m > limits_.max_standoff_m)
     return absl::OutOfRangeError(absl::StrFormat(
         "standoff %.4g mm: must be from %.4g to %.4g mm", touch.standoff_m / kMetresPerMillimetre,
-        kLeastStandoffM / kMetresPerMillimetre, limits_.most_standoff_m / kMetresPerMillimetre));
+        kMinStandoffM / kMetresPerMillimetre, limits_.max_standoff_m / kMetresPerMillimetre));
   if (!(touch.stroke_m > 0))
     return absl::OutOfRangeError(
         absl::StrFormat("stroke %.4g mm: must be above 0", touch.stroke_m / kMetresPerMillimetre));
@@ -230,10 +230,10 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
     object_from_start.translation() = touch.target_m - touch.standoff_m * z;
     const Eigen::Isometry3d start = base_from_object * object_from_start;
     const double tilt_rad = std::acos(std::clamp(-start.linear()(2, 2), -1.0, 1.0));
-    if (tilt_rad > limits_.most_tilt_rad + 1e-9)
+    if (tilt_rad > limits_.max_tilt_rad + 1e-9)
       return absl::OutOfRangeError(
           absl::StrFormat("the approach is tilted %.1f deg from straight down; at most %.1f deg",
-                          tilt_rad / kRadiansPerDegree, limits_.most_tilt_rad / kRadiansPerDegree));
+                          tilt_rad / kRadiansPerDegree, limits_.max_tilt_rad / kRadiansPerDegree));
     const double stroke_m =
         touch.stroke_m < kNoStrokeLimitM ? touch.stroke_m : touch.standoff_m + limits_.stroke_beyond_target_m;
 
@@ -295,7 +295,7 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const A
   // Back out along the tool's axis as far as the arm can, then straight up to home's height, then across.
   absl::Status why;
   for (const double back_m :
-       {limits_.most_standoff_m, limits_.most_standoff_m / 2, limits_.most_standoff_m / 4, 0.0}) {
+       {limits_.max_standoff_m, limits_.max_standoff_m / 2, limits_.max_standoff_m / 4, 0.0}) {
     const std::vector<Eigen::Isometry3d> out = WayOut(from.base_from_tip, back_m, home.translation().z());
     int beyond = 0;
     const absl::StatusOr<Joints> above = FollowAll(from.base_from_tip, out, here, &beyond);

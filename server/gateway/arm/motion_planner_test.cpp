@@ -61,12 +61,12 @@ CommandedTouch FromAbove() {
 }
 
 // A touch from above, tilted and turned as far as is asked for.
-CommandedTouch RandomTouch(std::mt19937_64* random, double most_tilt_rad) {
+CommandedTouch RandomTouch(std::mt19937_64* random, double max_tilt_rad) {
   std::uniform_real_distribution<double> unit(0, 1);
   CommandedTouch touch;
   touch.target_m = Eigen::Vector3d(0.09 * (unit(*random) - 0.5), 0.09 * (unit(*random) - 0.5), 0.075);
   const double towards = 2 * kPi * unit(*random), roll = 2 * kPi * unit(*random);
-  const Eigen::AngleAxisd tilt(most_tilt_rad * unit(*random),
+  const Eigen::AngleAxisd tilt(max_tilt_rad * unit(*random),
                                Eigen::Vector3d(std::cos(towards), std::sin(towards), 0));
   touch.approach = tilt * -Eigen::Vector3d::UnitZ();
   touch.lateral = tilt * Eigen::Vector3d(std::cos(roll), std::sin(roll), 0);
@@ -176,7 +176,7 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
 
 TEST(MotionPlanner, RefusesTiltBeyondItsLimit) {
   MotionLimits limits;
-  limits.most_tilt_rad = 10 * kRadiansPerDegree;
+  limits.max_tilt_rad = 10 * kRadiansPerDegree;
   CommandedTouch touch = FromAbove();
   touch.approach = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()) * touch.approach;
   ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,

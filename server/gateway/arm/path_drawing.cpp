@@ -14,10 +14,10 @@ namespace {
 
 // Pixels.
 constexpr double kWidth = 1280, kMargin = 48, kHead = 96, kPanelGap = 72, kReasonHeight = 22;
-constexpr double kPanelWidth = (kWidth - 2 * kMargin - kPanelGap) / 2, kMostPanelHeight = 620;
+constexpr double kPanelWidth = (kWidth - 2 * kMargin - kPanelGap) / 2, kMaxPanelHeight = 620;
 constexpr double kEdgeM = 0.03;  // around what is drawn
-constexpr size_t kMostReasons = 8, kMostReasonLetters = 150;
-constexpr size_t kMostNumbers = 40;  // more possible touches than these are not numbered
+constexpr size_t kMaxReasons = 8, kMaxReasonLetters = 150;
+constexpr size_t kMaxNumbers = 40;  // more possible touches than these are not numbered
 
 constexpr char kStyle[] = R"(
   text { font-family: 'Inter', 'Helvetica Neue', 'DejaVu Sans', sans-serif; fill: #334155; }
@@ -70,7 +70,7 @@ class Panel {
   }
 
   std::string Draw(const PathDrawing& drawing) const {
-    const bool numbered = drawing.touches.size() <= kMostNumbers;
+    const bool numbered = drawing.touches.size() <= kMaxNumbers;
     std::string svg = absl::StrFormat(
         "<clipPath id=\"%s\"><rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/></clipPath>\n", id_,
         left_, kHead, kPanelWidth, height_);
@@ -195,12 +195,12 @@ std::string Reasons(const PathDrawing& drawing, double top, size_t impossible) {
   for (const DrawnTouch& touch : drawing.touches) {
     if (touch.possible) continue;
     const double y = top + kReasonHeight * static_cast<double>(told + 1);
-    if (told++ == kMostReasons) {
+    if (told++ == kMaxReasons) {
       absl::StrAppendFormat(&svg, "<text class=\"reason\" x=\"%.1f\" y=\"%.1f\">and %d more</text>\n",
-                            kMargin, y, impossible - kMostReasons);
+                            kMargin, y, impossible - kMaxReasons);
       break;
     }
-    std::string reason = touch.reason.substr(0, kMostReasonLetters);
+    std::string reason = touch.reason.substr(0, kMaxReasonLetters);
     if (reason.size() < touch.reason.size()) reason += " ...";
     absl::StrAppendFormat(
         &svg,
@@ -238,14 +238,14 @@ std::string DrawPaths(const PathDrawing& drawing) {
   const Extent extent = ExtentOf(drawing);
   const Eigen::Vector3d size_m = extent.greatest - extent.least;
   const double tallest_m = std::max(size_m.y(), size_m.z());
-  const double scale = std::min(kPanelWidth / size_m.x(), kMostPanelHeight / tallest_m);
+  const double scale = std::min(kPanelWidth / size_m.x(), kMaxPanelHeight / tallest_m);
   const double panel_height = std::max(240.0, scale * tallest_m);
   const size_t impossible =
       static_cast<size_t>(std::count_if(drawing.touches.begin(), drawing.touches.end(),
                                         [](const DrawnTouch& touch) { return !touch.possible; }));
   const double reasons_top = kHead + panel_height + 44;
   const double height =
-      reasons_top + kReasonHeight * (static_cast<double>(std::min(impossible, kMostReasons + 1)) + 1);
+      reasons_top + kReasonHeight * (static_cast<double>(std::min(impossible, kMaxReasons + 1)) + 1);
 
   std::string svg = absl::StrFormat(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f "

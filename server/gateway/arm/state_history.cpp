@@ -14,7 +14,7 @@ bool Before(const ArmState& state, double controller_s) {
 void StateHistory::Add(const ArmState& state) {
   if (!states_.empty() && state.controller_time_s < states_.back().controller_time_s) states_.clear();
   states_.push_back(state);
-  while (states_.size() > most_ || states_.front().controller_time_s < state.controller_time_s - keep_s_)
+  while (states_.size() > max_ || states_.front().controller_time_s < state.controller_time_s - keep_s_)
     states_.pop_front();
 }
 

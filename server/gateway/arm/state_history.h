@@ -11,7 +11,7 @@ namespace touchstone {
 
 class StateHistory {
  public:
-  StateHistory(double keep_s, size_t most) : keep_s_(keep_s), most_(most) {}
+  StateHistory(double keep_s, size_t most) : keep_s_(keep_s), max_(most) {}
 
   // A state whose time lies before the newest one means that the clock was set back: the history begins anew.
   void Add(const ArmState& state);
@@ -22,7 +22,7 @@ class StateHistory {
 
  private:
   double keep_s_;
-  size_t most_;
+  size_t max_;
   std::deque<ArmState> states_;
 };
 

@@ -44,6 +44,6 @@ double LineSpeed(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, dou
 // Rig seconds that it takes, from rest to rest.
 double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
                     double acceleration_m_s2);
-inline constexpr double kMostTurnRadS = 1.5;  // of the tool on a line
+inline constexpr double kMaxTurnRadS = 1.5;  // of the tool on a line
 
 }  // namespace touchstone

@@ -93,8 +93,8 @@ TEST(LineSpeed, IsSlowerWhereTheToolTurnsMuchOnAShortWay) {
   EXPECT_DOUBLE_EQ(LineSpeed(from, to, 0.25), 0.25);
   to.linear() = to.linear() * Eigen::AngleAxisd(kPi / 2, Eigen::Vector3d::UnitZ());
   const double slow_m_s = LineSpeed(from, to, 0.25);
-  EXPECT_NEAR(0.01 / slow_m_s, (kPi / 2) / kMostTurnRadS, 1e-6);
-  EXPECT_GE(LineDuration(from, to, 0.25, 1.2), (kPi / 2) / kMostTurnRadS - 1e-9);
+  EXPECT_NEAR(0.01 / slow_m_s, (kPi / 2) / kMaxTurnRadS, 1e-6);
+  EXPECT_GE(LineDuration(from, to, 0.25, 1.2), (kPi / 2) / kMaxTurnRadS - 1e-9);
 }
 
 TEST(LineDuration, IsThatOfATrapezoid) {

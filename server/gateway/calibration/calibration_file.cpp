@@ -18,7 +18,7 @@ using Kind = YamlNode::Kind;
 
 constexpr char kFormat[] = "calibration/1";
 constexpr double kFarthestMm = 10'000;
-constexpr double kMostTurnDeg = 360;
+constexpr double kMaxTurnDeg = 360;
 constexpr char kPoseExample[] = "{translation_mm: [0, 0, 120], rotation_deg: [0, 0, 0]}";
 
 class CalibrationReader {
@@ -98,7 +98,7 @@ class CalibrationReader {
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Vector3d translation_mm,
                                 Vector(node, "translation_mm", what, kFarthestMm));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Vector3d rotation_deg,
-                                Vector(node, "rotation_deg", what, kMostTurnDeg));
+                                Vector(node, "rotation_deg", what, kMaxTurnDeg));
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = translation_mm * kMetresPerMillimetre;
     const double angle_rad = rotation_deg.norm() * kRadiansPerDegree;
@@ -197,7 +197,7 @@ absl::StatusOr<Calibration> ParseCalibration(const std::string& text, const std:
 }
 
 absl::StatusOr<Calibration> ReadCalibration(const std::string& path) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMostYamlBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxYamlBytes));
   return ParseCalibration(text, path);
 }
 

@@ -13,11 +13,11 @@
 namespace touchstone {
 namespace {
 
-constexpr double kMostTiltRad = 3 * kRadiansPerDegree;
-constexpr double kLeastReported = 0.8;    // of the touches, by every finger
-constexpr double kSignificant = 4;        // standard errors
-constexpr double kOutlier = 6;            // robust standard deviations
-constexpr size_t kFewestForOutliers = 8;  // below, a spread cannot be told robustly
+constexpr double kMaxTiltRad = 3 * kRadiansPerDegree;
+constexpr double kMinReported = 0.8;   // of the touches, by every finger
+constexpr double kSignificant = 4;     // standard errors
+constexpr double kOutlier = 6;         // robust standard deviations
+constexpr size_t kMinForOutliers = 8;  // below, a spread cannot be told robustly
 
 // A touch's times less their mean: what an unknown start leaves.
 std::vector<double> Centred(const FlatTouch& touch) {
@@ -48,7 +48,7 @@ std::vector<double> Offsets(const std::vector<FlatTouch>& touches, double* weigh
 
 // The touches without those that lie far from the median of all, finger by finger.
 std::vector<FlatTouch> WithoutOutliers(const std::vector<FlatTouch>& touches) {
-  if (touches.size() < kFewestForOutliers) return touches;
+  if (touches.size() < kMinForOutliers) return touches;
   std::vector<bool> keep(touches.size(), true);
   for (size_t i = 0; i < touches[0].contact_time_s.size(); ++i) {
     std::vector<double> distance_m;
@@ -88,7 +88,7 @@ absl::StatusOr<std::vector<FlatTouch>> Whole(const std::vector<FlatTouch>& touch
     if (all) whole.push_back(touch);
   }
   for (size_t i = 0; i < fingers; ++i)
-    if (static_cast<double>(reported[i]) < kLeastReported * static_cast<double>(touches.size()))
+    if (static_cast<double>(reported[i]) < kMinReported * static_cast<double>(touches.size()))
       return absl::InvalidArgumentError(absl::StrCat(
           "finger ", i, " (of 0 to ", fingers - 1, ") reported in ", reported[i], " of ", touches.size(),
           " flat touches; mend its sensor, or place the face so that every finger meets it"));
@@ -98,9 +98,9 @@ absl::StatusOr<std::vector<FlatTouch>> Whole(const std::vector<FlatTouch>& touch
 }  // namespace
 
 absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& given, double spacing_m) {
-  if (given.size() < kFewestFlatTouches)
+  if (given.size() < kMinFlatTouches)
     return absl::InvalidArgumentError(absl::StrCat("the flat calibration has ", given.size(),
-                                                   " touches; at least ", kFewestFlatTouches,
+                                                   " touches; at least ", kMinFlatTouches,
                                                    " are needed, 20 are good"));
   const size_t fingers = given[0].contact_time_s.size();
   if (fingers < 2)
@@ -110,10 +110,10 @@ absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& give
         absl::StrCat("the fingers' spacing is ", spacing_m, " m; one above 0 is needed"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<FlatTouch> whole, Whole(given, fingers));
   const std::vector<FlatTouch> touches = WithoutOutliers(whole);
-  if (touches.size() < kFewestFlatTouches)
+  if (touches.size() < kMinFlatTouches)
     return absl::InvalidArgumentError(absl::StrCat("in ", touches.size(), " of ", given.size(),
                                                    " flat touches every finger reported; at least ",
-                                                   kFewestFlatTouches, " such touches are needed"));
+                                                   kMinFlatTouches, " such touches are needed"));
   FlatCalibration flat;
   flat.fingers = static_cast<int>(fingers);
   flat.spacing_m = spacing_m;
@@ -147,7 +147,7 @@ absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& give
   flat.tilt_rad = std::atan(slope);
   flat.tilt_std_error_rad = flat.sigma_s / std::sqrt(weight * across) / (1 + slope * slope);
   const double tilt_deg = flat.tilt_rad / kRadiansPerDegree;
-  if (std::abs(flat.tilt_rad) > kMostTiltRad)
+  if (std::abs(flat.tilt_rad) > kMaxTiltRad)
     return absl::InvalidArgumentError(
         absl::StrFormat("the face is met at %.1f degrees across the fingers; place it straight on (3 degrees "
                         "at most) and touch again",

@@ -29,7 +29,7 @@ struct FlatCalibration {
   std::string note;               // for people: what these touches cannot tell, what was left out
 };
 
-inline constexpr size_t kFewestFlatTouches = 3;
+inline constexpr size_t kMinFlatTouches = 3;
 
 // INVALID_ARGUMENT: fewer than three whole touches, a finger that reports too rarely (named), a face that is
 // met at more than 3 degrees, touches of another number of fingers. Touches of several speeds may be mixed.

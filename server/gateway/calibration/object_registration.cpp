@@ -26,15 +26,15 @@ constexpr double kReachM = 0.03;  // how far before and behind a contact the sur
 constexpr double kGrazingCosine =
     0.15;                        // of approach and normal; below, the distance along the approach says little
 constexpr double kMissM = 0.01;  // what a contact that meets no surface counts as
-constexpr double kLeastScaleM = 5e-6;   // of the robust weights
+constexpr double kMinScaleM = 5e-6;     // of the robust weights
 constexpr double kOutlier = 5;          // robust standard deviations
 constexpr double kUndetermined = 0.02;  // singular value below which a direction is not told
 constexpr double kWorstRmsM = 0.002;    // above, the contacts are of something else
-constexpr double kMostLeftOut = 0.25;
-constexpr int kMostSteps = 100;
+constexpr double kMaxLeftOut = 0.25;
+constexpr int kMaxSteps = 100;
 constexpr double kStartShiftM = 0.004,
                  kStartTurnRad = 2.5 * kRadiansPerDegree;  // between the starts that are tried
-constexpr double kMostShiftM = 0.02, kMostTurnRad = 15 * kRadiansPerDegree;  // from the start
+constexpr double kMaxShiftM = 0.02, kMaxTurnRad = 15 * kRadiansPerDegree;  // from the start
 
 // Contacts against the surface at one pose.
 struct Fit {
@@ -91,7 +91,7 @@ class Registration {
     double scale_m = kMissM;
     Fit fit = Evaluate(pose, scale_m);
     double damping = 1e-3;
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       const Vector6d change = Step(fit, scale_m, damping);
       const Isometry3d moved = Moved(pose, change);
       Fit next = Evaluate(moved, scale_m);
@@ -99,7 +99,7 @@ class Registration {
         const bool settled = change.norm() < 1e-9 || next.cost > fit.cost * (1 - 1e-9);
         pose = moved;
         damping = std::max(damping / 10, 1e-12);
-        const double narrower_m = std::max(kLeastScaleM, std::min(scale_m, 2 * next.scale_m));
+        const double narrower_m = std::max(kMinScaleM, std::min(scale_m, 2 * next.scale_m));
         const bool narrowed = narrower_m < 0.9 * scale_m;
         if (narrowed) {
           scale_m = narrower_m;
@@ -110,7 +110,7 @@ class Registration {
       } else {
         damping *= 10;
         if (damping > 1e6) {
-          const double narrower_m = std::max(kLeastScaleM, std::min(scale_m, 2 * fit.scale_m));
+          const double narrower_m = std::max(kMinScaleM, std::min(scale_m, 2 * fit.scale_m));
           if (narrower_m > 0.9 * scale_m) break;
           scale_m = narrower_m;
           damping = 1e-3;
@@ -152,7 +152,7 @@ class Registration {
     fit.scale_m = kMissM;
     if (!sizes_m.empty()) {
       std::nth_element(sizes_m.begin(), sizes_m.begin() + sizes_m.size() / 2, sizes_m.end());
-      fit.scale_m = std::max(kLeastScaleM, 1.4826 * sizes_m[sizes_m.size() / 2]);
+      fit.scale_m = std::max(kMinScaleM, 1.4826 * sizes_m[sizes_m.size() / 2]);
     }
     for (size_t i = 0; i < count; ++i) fit.cost += Loss(fit.rest_m[i], scale_m) / static_cast<double>(count);
     return fit;
@@ -191,11 +191,11 @@ class Registration {
   // Plain least squares over the contacts that belong to it, and what they tell.
   absl::StatusOr<ObjectRegistration> Finish(const Isometry3d& start, Isometry3d pose) const {
     std::vector<bool> used;
-    Fit fit = Evaluate(pose, kLeastScaleM);
+    Fit fit = Evaluate(pose, kMinScaleM);
     for (int step = 0; step < 10; ++step) {
       used = fit.met;
       for (size_t i = 0; i < used.size(); ++i)
-        used[i] = used[i] && std::abs(fit.rest_m[i]) <= std::max(kOutlier * fit.scale_m, 10 * kLeastScaleM);
+        used[i] = used[i] && std::abs(fit.rest_m[i]) <= std::max(kOutlier * fit.scale_m, 10 * kMinScaleM);
       const Matrix6d normal = Normal(fit, used);
       if (absl::Status status = CheckDetermined(normal, used); !status.ok()) return status;
       Vector6d right = Vector6d::Zero();
@@ -203,7 +203,7 @@ class Registration {
         if (used[i]) right -= fit.gradient[i] * fit.rest_m[i];
       const Vector6d change = normal.ldlt().solve(right);
       pose = Moved(pose, change);
-      fit = Evaluate(pose, kLeastScaleM);
+      fit = Evaluate(pose, kMinScaleM);
       if (change.norm() < 1e-10) break;
     }
     ObjectRegistration result;
@@ -214,8 +214,8 @@ class Registration {
       squares += fit.rest_m[i] * fit.rest_m[i];
     }
     result.left_out = used.size() - result.contacts;
-    if (result.contacts < kFewestRegistrationContacts ||
-        static_cast<double>(result.left_out) > kMostLeftOut * static_cast<double>(used.size()))
+    if (result.contacts < kMinRegistrationContacts ||
+        static_cast<double>(result.left_out) > kMaxLeftOut * static_cast<double>(used.size()))
       return absl::FailedPreconditionError(
           absl::StrCat(result.left_out, " of ", used.size(),
                        " contacts fit no pose near the start; check that '", surface_.name(),
@@ -225,7 +225,7 @@ class Registration {
     const Isometry3d moved = start.inverse() * pose;
     const double shift_m = (pose * surface_.bounds().Centre() - start * surface_.bounds().Centre()).norm();
     const double turn_rad = std::abs(Eigen::AngleAxisd(moved.linear()).angle());
-    if (result.rms_m > kWorstRmsM || shift_m > kMostShiftM || turn_rad > kMostTurnRad)
+    if (result.rms_m > kWorstRmsM || shift_m > kMaxShiftM || turn_rad > kMaxTurnRad)
       return absl::FailedPreconditionError(
           absl::StrFormat("the contacts fit '%s' badly: %.2f mm are left over, %.1f mm and %.1f degrees from "
                           "the start; check that it is "
@@ -257,7 +257,7 @@ class Registration {
 
   absl::Status CheckDetermined(const Matrix6d& normal, const std::vector<bool>& used) const {
     const auto count = static_cast<double>(std::count(used.begin(), used.end(), true));
-    if (count < kFewestRegistrationContacts)
+    if (count < kMinRegistrationContacts)
       return absl::FailedPreconditionError(absl::StrCat("only ", count, " of ", used.size(),
                                                         " contacts meet '", surface_.name(),
                                                         "' near the start; check the object and the start"));
@@ -294,10 +294,10 @@ class Registration {
 absl::StatusOr<ObjectRegistration> RegisterObject(const Surface& surface,
                                                   const std::vector<RegistrationContact>& contacts,
                                                   const Isometry3d& start) {
-  if (contacts.size() < kFewestRegistrationContacts)
+  if (contacts.size() < kMinRegistrationContacts)
     return absl::InvalidArgumentError(absl::StrCat(
         "the registration of '", surface.name(), "' has ", contacts.size(), " contacts; at least ",
-        kFewestRegistrationContacts, " are needed for six unknowns, 30 on several faces are good"));
+        kMinRegistrationContacts, " are needed for six unknowns, 30 on several faces are good"));
   for (size_t i = 0; i < contacts.size(); ++i)
     if (!contacts[i].base_from_tip.matrix().allFinite() || !std::isfinite(contacts[i].finger_x_m))
       return absl::InvalidArgumentError(

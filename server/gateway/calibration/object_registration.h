@@ -31,7 +31,7 @@ struct ObjectRegistration {
   std::array<double, 6> singular_values{};
 };
 
-inline constexpr size_t kFewestRegistrationContacts = 7;
+inline constexpr size_t kMinRegistrationContacts = 7;
 
 // Gauss-Newton from `start`, which may be 5 mm and 3 degrees off, minimising the distances along the approach
 // between the measured points of contact and the surface; far-off contacts weigh less and at last nothing.

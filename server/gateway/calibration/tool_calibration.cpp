@@ -10,15 +10,15 @@ namespace touchstone {
 namespace {
 
 // A spread of the rotations of about 3 degrees.
-constexpr double kLeastSpread = 0.05;
+constexpr double kMinSpread = 0.05;
 
 }  // namespace
 
 absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3d>& base_from_flange) {
   const size_t poses = base_from_flange.size();
-  if (poses < kFewestToolPoses)
+  if (poses < kMinToolPoses)
     return absl::InvalidArgumentError(
-        absl::StrCat("the tool's calibration has ", poses, " flange poses; at least ", kFewestToolPoses,
+        absl::StrCat("the tool's calibration has ", poses, " flange poses; at least ", kMinToolPoses,
                      " that touch one fixed point, turned about different axes, are needed"));
   // R_k tip + t_k = pivot, for every pose k.
   Eigen::MatrixXd lines(3 * poses, 6);
@@ -32,7 +32,7 @@ absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3
   }
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(lines, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const double spread = svd.singularValues()[5] / std::sqrt(static_cast<double>(poses));
-  if (!(spread >= kLeastSpread)) {
+  if (!(spread >= kMinSpread)) {
     const Eigen::Vector3d unknown = svd.matrixV().col(5).head<3>().normalized();
     return absl::InvalidArgumentError(
         absl::StrFormat("the %d flange poses turn too little to tell where the tip stands along (%.2f, %.2f, "

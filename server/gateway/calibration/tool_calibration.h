@@ -19,7 +19,7 @@ struct ToolCalibration {
   double worst_m = 0;  // how far its tip lies from the fixed point
 };
 
-inline constexpr size_t kFewestToolPoses = 4;
+inline constexpr size_t kMinToolPoses = 4;
 
 // Least squares over flange poses (base_from_flange) whose tips all stand in one point. INVALID_ARGUMENT for
 // fewer than four poses, or poses that turn too little to tell the tip; names the direction on the flange

@@ -11,7 +11,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostSamples = 8;  // a side, of one pixel
+constexpr int kMaxSamples = 8;  // a side, of one pixel
 
 // Radial part of the distortion: distance from the axis on the sensor, of a ray at that distance.
 double Radial(const std::vector<double>& k, double r) {
@@ -55,7 +55,7 @@ std::vector<uint8_t> Rectify(const Frame& frame, const Intrinsics& intrinsics, i
 
   // Where the source is finer, several samples a pixel, or thin lines would flicker.
   const int samples =
-      std::clamp(static_cast<int>(std::ceil(std::max(fx, fy) / focal - 0.05)), 1, kMostSamples);
+      std::clamp(static_cast<int>(std::ceil(std::max(fx, fy) / focal - 0.05)), 1, kMaxSamples);
   const int fine_width = width * samples, fine_height = height * samples;
   const cv::Matx33d from(fx, 0, cx, 0, fy, cy, 0, 0, 1);
   const cv::Matx33d to(focal * samples, 0, 0.5 * (fine_width - 1), 0, focal * samples,

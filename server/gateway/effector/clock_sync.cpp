@@ -10,11 +10,11 @@ namespace {
 constexpr double kKeptS = 240;
 constexpr double kBucketS = 0.25;  // of each bucket the best bounds are kept
 constexpr int kKeptInBucket = 5;
-constexpr double kWander = 2e-8;       // change of rate in a second: 1.2 ppm a minute
-constexpr double kMostRate = 1e-3;     // off the nominal one
-constexpr double kRateSpread = 2e-4;   // standard, before anything is known
-constexpr double kAsymmetry = 0.1;     // standard, of the shortest round trip
-constexpr double kLeastScaleS = 5e-7;  // ticks are whole
+constexpr double kWander = 2e-8;      // change of rate in a second: 1.2 ppm a minute
+constexpr double kMaxRate = 1e-3;     // off the nominal one
+constexpr double kRateSpread = 2e-4;  // standard, before anything is known
+constexpr double kAsymmetry = 0.1;    // standard, of the shortest round trip
+constexpr double kMinScaleS = 5e-7;   // ticks are whole
 constexpr size_t kContradictions = 4;
 constexpr double kSettledS = 0.2;
 
@@ -61,7 +61,7 @@ struct ClockSync::Side {
       for (size_t i = 0; i < kept; ++i) mean += near[i].first / kept;
       scale_s = (mean + 0.5 * shortest_s) / size;
     }
-    scale_s = std::max(scale_s, kLeastScaleS);
+    scale_s = std::max(scale_s, kMinScaleS);
     for (size_t i = 0; i < kept; ++i) *sum += near[i].second;
     *count += static_cast<int>(kept);
   }
@@ -218,7 +218,7 @@ bool ClockSync::Fit(double window_s, ClockEstimate* estimate) const {
     return sum - 0.5 * slope * slope / (kRateSpread * kRateSpread);
   };
   const auto best_slope = [&] {
-    double low = -kMostRate, high = kMostRate;
+    double low = -kMaxRate, high = kMaxRate;
     for (int i = 0; i < 60; ++i) {  // concave: the golden rule's poor cousin is quick enough
       const double a = low + (high - low) * 0.4, b = low + (high - low) * 0.6;
       (likelihood(a) < likelihood(b) ? low : high) = likelihood(a) < likelihood(b) ? a : b;
@@ -246,7 +246,7 @@ bool ClockSync::Fit(double window_s, ClockEstimate* estimate) const {
   const double top = likelihood(slope);
   double reach[2];
   for (int end = 0; end < 2; ++end) {
-    const double limit = end == 0 ? -kMostRate : kMostRate;
+    const double limit = end == 0 ? -kMaxRate : kMaxRate;
     double inside = 0, outside = limit - slope;
     for (int i = 0; i < 40; ++i) {
       const double middle = 0.5 * (inside + outside);
@@ -285,7 +285,7 @@ bool ClockSync::Fit(double window_s, ClockEstimate* estimate) const {
   estimate->remote_at_s = base_remote_s_ + nominal_rate_ * (newest_host_s_ + ahead);
   estimate->rate = nominal_rate_ * (1 + slope + slope_off);
   const double slope_variance = std::max(0.0, slope_squares / weights - slope_off * slope_off);
-  estimate->offset_uncertainty_s = nominal_rate_ * std::sqrt(variance + kLeastScaleS * kLeastScaleS);
+  estimate->offset_uncertainty_s = nominal_rate_ * std::sqrt(variance + kMinScaleS * kMinScaleS);
   // The rate of now is not that of the time over which it was measured.
   estimate->rate_uncertainty = nominal_rate_ * std::sqrt(slope_variance + std::pow(kWander * centre, 2));
   return true;

@@ -32,8 +32,8 @@ struct Line {
     const double drifted = drift_ppm * 1e-6 * t + 0.5 * drift_change_ppm_per_min * 1e-6 / 60 * t * t;
     return start_remote_s + nominal_rate * (t + drifted) + (t >= step_at_s ? step_s : 0);
   }
-  double Delay(double least_s, RandomStream& random) const {
-    double delay_s = least_s + random.Uniform(0, jitter_s);
+  double Delay(double min_s, RandomStream& random) const {
+    double delay_s = min_s + random.Uniform(0, jitter_s);
     if (random.Uniform() < tail_share) delay_s += -tail_s * std::log(1 - random.Uniform());
     return delay_s;
   }

@@ -18,7 +18,7 @@ namespace {
 using firmware::Type;
 
 constexpr int kTries = 8;
-constexpr size_t kMostUnsent = 4096;
+constexpr size_t kMaxUnsent = 4096;
 constexpr double kSlackS = 1;  // of the device's clock, in host seconds
 
 firmware::FingerConfig ConfigOf(const EffectorFinger& finger) {
@@ -56,7 +56,7 @@ template <typename Message>
 absl::Status SerialEffector::Send(const Message& message) {
   uint8_t payload[firmware::kMaxPayload], frame[firmware::kMaxFrame];
   const size_t size = firmware::EncodeFrame(payload, firmware::Encode(message, payload), frame);
-  if (unsent_.size() > kMostUnsent)
+  if (unsent_.size() > kMaxUnsent)
     return absl::UnavailableError(absl::StrCat("serial port ", options_.port, " takes no more bytes"));
   unsent_.insert(unsent_.end(), frame, frame + size);
   return Flush();
@@ -216,11 +216,11 @@ void SerialEffector::HandleStatus(const firmware::Status& status) {
 }
 
 void SerialEffector::HandleEvent(const firmware::Event& event) {
-  const uint64_t most_ticks = MostTicks();
+  const uint64_t max_ticks = MaxTicks();
   TouchRecord::Verdict verdict;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    verdict = record_.Take(event, most_ticks);
+    verdict = record_.Take(event, max_ticks);
     if (verdict == TouchRecord::Verdict::kRepeated) ++state_.repeated_events;
     if (verdict == TouchRecord::Verdict::kNews && event.finger < state_.pressed.size())
       state_.pressed[event.finger] = event.kind == firmware::EventKind::kContact;
@@ -239,7 +239,7 @@ void SerialEffector::HandleEvent(const firmware::Event& event) {
   if (verdict == TouchRecord::Verdict::kNews && news_ != nullptr) news_->Notify();
 }
 
-uint64_t SerialEffector::MostTicks() const {
+uint64_t SerialEffector::MaxTicks() const {
   if (!clock_.valid) return 0;
   const double ticks = (clock_.RemoteOf(HostNowS() + kSlackS)) * state_.tick_hz;
   return ticks > 0 ? static_cast<uint64_t>(ticks) : 0;
@@ -341,9 +341,9 @@ absl::Status SerialEffector::SayHello() {
         absl::StrCat("end effector at ", options_.port, " (", reply.firmware, ") speaks version ",
                      static_cast<int>(reply.version), " of the protocol, this gateway version ",
                      static_cast<int>(firmware::kProtocolVersion), "; flash the firmware of this release"));
-  if (reply.most_fingers < options_.fingers.size())
+  if (reply.max_fingers < options_.fingers.size())
     return absl::FailedPreconditionError(absl::StrCat("end effector at ", options_.port, " (", reply.firmware,
-                                                      ") has at most ", static_cast<int>(reply.most_fingers),
+                                                      ") has at most ", static_cast<int>(reply.max_fingers),
                                                       " fingers; asked for are ", options_.fingers.size()));
   if (reply.tick_hz < 1000) return absl::UnavailableError(absl::StrCat("a clock of ", reply.tick_hz, " Hz"));
 
@@ -410,9 +410,9 @@ absl::Status SerialEffector::ReadRecord(uint32_t touch,
 
 absl::Status SerialEffector::SettleTouch() {
   const absl::Status status = ReadRecord(record_.touch().touch, [this](const firmware::Recalled& recalled) {
-    const uint64_t most_ticks = MostTicks();
+    const uint64_t max_ticks = MaxTicks();
     std::lock_guard<std::mutex> lock(mutex_);
-    return record_.Settle(recalled, most_ticks);
+    return record_.Settle(recalled, max_ticks);
   });
   if (absl::IsFailedPrecondition(status)) {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -428,7 +428,7 @@ absl::StatusOr<EffectorTouch> SerialEffector::RecallTouch(uint32_t touch) {
   EffectorTouch result;
   const absl::Status status = ReadRecord(touch, [&](const firmware::Recalled& recalled) {
     for (int i = 0; i < recalled.fingers; ++i)
-      if ((recalled.contact_mask >> i & 1) != 0 && recalled.ticks[i] > MostTicks()) return false;
+      if ((recalled.contact_mask >> i & 1) != 0 && recalled.ticks[i] > MaxTicks()) return false;
     const bool agreed = has_before && Agree(before, recalled);
     before = recalled;
     has_before = true;
@@ -458,10 +458,10 @@ absl::Status SerialEffector::ArmTouch(uint32_t touch) {
   const absl::Status status = Ask(firmware::Arm{touch}, [&](const uint8_t* payload, size_t size) {
     firmware::Armed armed;
     if (!firmware::Decode(payload, size, &armed)) return Answer::kNo;
-    const uint64_t most_ticks = MostTicks();
+    const uint64_t max_ticks = MaxTicks();
     std::lock_guard<std::mutex> lock(mutex_);
-    return record_.Arm(armed, least > 0 ? static_cast<uint64_t>(least) : 0, most_ticks) ? Answer::kYes
-                                                                                        : Answer::kNo;
+    return record_.Arm(armed, least > 0 ? static_cast<uint64_t>(least) : 0, max_ticks) ? Answer::kYes
+                                                                                       : Answer::kNo;
   });
   if (status.ok()) return status;
   std::string why(status.message());

@@ -30,9 +30,9 @@ absl::Status CheckOptions(const EffectorOptions& options) {
     if (finger.sensor != "optical" && finger.sensor != "microswitch" && finger.sensor != "resistor")
       return wrong(absl::StrCat(name, "unknown sensor '", finger.sensor, "'",
                                 DidYouMean(finger.sensor, {"optical", "microswitch", "resistor"})));
-    if (!(finger.debounce_s >= 0 && finger.debounce_s * 1e6 <= firmware::kMostDebounceUs))
+    if (!(finger.debounce_s >= 0 && finger.debounce_s * 1e6 <= firmware::kMaxDebounceUs))
       return wrong(absl::StrCat(name, "debounce_s is ", finger.debounce_s, "; right is 0 to ",
-                                firmware::kMostDebounceUs * 1e-6));
+                                firmware::kMaxDebounceUs * 1e-6));
     if (finger.hysteresis < 0 || finger.threshold <= finger.hysteresis || finger.threshold > 65535)
       return wrong(absl::StrCat(name, "threshold ", finger.threshold, " and hysteresis ", finger.hysteresis,
                                 "; right is 0 <= hysteresis < threshold <= 65535 counts"));

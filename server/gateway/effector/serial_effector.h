@@ -70,7 +70,7 @@ class SerialEffector : public Effector {
   void HandleStatus(const firmware::Status& status);
   void QueryClock();
   void SetDisconnected(const std::string& why);
-  uint64_t MostTicks() const;  // a second later than now, device clock; 0 while the clock is unknown
+  uint64_t MaxTicks() const;  // a second later than now, device clock; 0 while the clock is unknown
   bool Stopping() const;
   void Wake();
   void WaitAwake(double seconds);

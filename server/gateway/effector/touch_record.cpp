@@ -34,9 +34,9 @@ void TouchRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
   waiting_ = true;
 }
 
-bool TouchRecord::Arm(const firmware::Armed& armed, uint64_t least_ticks, uint64_t most_ticks) {
+bool TouchRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks) {
   if (!waiting_ || armed.touch != touch_.touch) return false;
-  if (armed.ticks < least_ticks || armed.ticks > most_ticks) return false;
+  if (armed.ticks < min_ticks || armed.ticks > max_ticks) return false;
   touch_.armed_ticks = armed.ticks;
   waiting_ = false;
   armed_ = true;
@@ -49,11 +49,11 @@ void TouchRecord::Lose(std::string why) {
   lost_ = std::move(why);
 }
 
-TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t most_ticks) {
+TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t max_ticks) {
   if (event.touch != touch_.touch) return Verdict::kStale;
   // Before Armed came it is not known what is too early; the event will come again.
   if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kUnbelievable;
-  if (event.ticks < touch_.armed_ticks || event.ticks > most_ticks) return Verdict::kUnbelievable;
+  if (event.ticks < touch_.armed_ticks || event.ticks > max_ticks) return Verdict::kUnbelievable;
   if (event.kind == firmware::EventKind::kRelease) return Verdict::kNews;  // nobody asks for it
   std::optional<uint64_t>& contact = touch_.contact_ticks[event.finger];
   if (contact.has_value()) {
@@ -70,11 +70,11 @@ TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t mo
   return Verdict::kNews;
 }
 
-bool TouchRecord::Settle(const firmware::Recalled& recalled, uint64_t most_ticks) {
+bool TouchRecord::Settle(const firmware::Recalled& recalled, uint64_t max_ticks) {
   if (recalled.touch != touch_.touch || recalled.fingers != touch_.contact_ticks.size()) return false;
   for (int i = 0; i < recalled.fingers; ++i) {
     if ((recalled.contact_mask >> i & 1) == 0) continue;
-    if (recalled.ticks[i] < touch_.armed_ticks || recalled.ticks[i] > most_ticks) return false;
+    if (recalled.ticks[i] < touch_.armed_ticks || recalled.ticks[i] > max_ticks) return false;
   }
   const bool agreed = has_reading_ && Agree(reading_, recalled);
   reading_ = recalled;

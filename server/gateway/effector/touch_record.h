@@ -25,12 +25,12 @@ class TouchRecord {
   // Forgets everything and waits for the device's Armed.
   void Begin(uint32_t touch, uint32_t boot_id, int fingers);
   // Whether `armed` may be the answer: this touch, and ticks between these two.
-  bool Arm(const firmware::Armed& armed, uint64_t least_ticks, uint64_t most_ticks);
-  // `most_ticks`: no contact can be later.
-  Verdict Take(const firmware::Event& event, uint64_t most_ticks);
+  bool Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks);
+  // `max_ticks`: no contact can be later.
+  Verdict Take(const firmware::Event& event, uint64_t max_ticks);
   // One reading of the device's record. Once two in succession agree it replaces what was heard; returns
   // whether.
-  bool Settle(const firmware::Recalled& recalled, uint64_t most_ticks);
+  bool Settle(const firmware::Recalled& recalled, uint64_t max_ticks);
   // Nothing more will be heard.
   void Disarm() { armed_ = false; }
   void Lose(std::string why);

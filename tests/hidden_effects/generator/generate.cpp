@@ -17,9 +17,9 @@ using Vec = Eigen::Vector3d;
 
 // Poses as the seed's real protocol has them: round each face of the bounding box, targets on the surface,
 // approaches up to 32 degrees from the face's inward normal, any roll; drawn again until all fingers hit.
-constexpr double kMostTilt = 32 * M_PI / 180;
+constexpr double kMaxTilt = 32 * M_PI / 180;
 constexpr double kSpread = 0.62;
-constexpr double kMostGapMm = 55;
+constexpr double kMaxGapMm = 55;
 
 Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(-1, 1), part(0, 1);
@@ -34,7 +34,7 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
     outside[u] += kSpread * half[u] * unit(random);
     outside[v] += kSpread * half[v] * unit(random);
     const Contact target = solid.FirstContact(outside, inward, 0);
-    const double cosine = 1 - part(random) * (1 - std::cos(kMostTilt));
+    const double cosine = 1 - part(random) * (1 - std::cos(kMaxTilt));
     const double around = 2 * M_PI * part(random), roll = 2 * M_PI * part(random);
     if (!target.hit) continue;
     Vec e = Vec::Zero();
@@ -55,7 +55,7 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
       all = contact.hit;
       least = std::min(least, contact.travel_mm), most = std::max(most, contact.travel_mm);
     }
-    if (all && most - least < kMostGapMm) return command;
+    if (all && most - least < kMaxGapMm) return command;
   }
   throw std::runtime_error("no pose found where all fingers hit " + solid.name());
 }

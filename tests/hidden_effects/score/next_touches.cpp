@@ -51,7 +51,7 @@ absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const
 // Touches that were added until the verdict; `*arrived` false if it was never right and sure.
 absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bool designed, uint64_t seed,
                           bool* arrived, int* proposed_touches) {
-  const std::vector<Command> random = DrawCommands(scenario, kBegin + kMostAdded, seed);
+  const std::vector<Command> random = DrawCommands(scenario, kBegin + kMaxAdded, seed);
   std::vector<Command> commands(random.begin(), random.begin() + kBegin);
   for (;;) {
     const Set set = GenerateFor(scenario, commands, seed);
@@ -59,7 +59,7 @@ absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bo
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Diagnose(input, {}));
     const int added = static_cast<int>(commands.size()) - kBegin;
     *arrived = RightAndSure(report, scenario.hidden.front().effect);
-    if (*arrived || added >= kMostAdded) return added;
+    if (*arrived || added >= kMaxAdded) return added;
     std::vector<Command> next(random.begin() + commands.size(),
                               random.begin() + commands.size() + kAddedAtOnce);
     if (designed) {
@@ -124,7 +124,7 @@ std::string RacesInWords(const Races& races) {
       "random; %.0f %% (target <= 50 %%, %s). No verdict within %d: %d designed, %d random. %d errors.\n",
       races.races, static_cast<double>(races.designed) / races.races,
       static_cast<double>(races.random) / races.races, 100 * share, share <= 0.5 ? "pass" : "**miss**",
-      kMostAdded, races.designed_gave_up, races.random_gave_up, races.errors);
+      kMaxAdded, races.designed_gave_up, races.random_gave_up, races.errors);
   return text;
 }
 

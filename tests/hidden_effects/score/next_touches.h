@@ -13,12 +13,12 @@ struct Race {
   Scenario truth;
   int designed = 0, random = 0;  // touches that were added until the verdict
   int proposed = 0;              // of the designed, those that were proposed; the others are random
-  bool designed_arrived = false, random_arrived = false;  // false: gave up at kMostAdded
+  bool designed_arrived = false, random_arrived = false;  // false: gave up at kMaxAdded
   std::string error;
 };
 
 inline constexpr int kAddedAtOnce = 8;
-inline constexpr int kMostAdded = 96;
+inline constexpr int kMaxAdded = 96;
 
 Race RunRace(const Workshop& workshop, uint64_t seed);
 

@@ -10,7 +10,7 @@ namespace {
 
 using Random = std::mt19937_64;
 
-constexpr double kLeastRealistic = 25;
+constexpr double kMinRealistic = 25;
 
 double Between(double low, double high, Random& random) {
   return std::uniform_real_distribution<double>(low, high)(random);
@@ -109,7 +109,7 @@ Hidden RealisticEffect(const std::string& effect, const Scenario& scenario, uint
   Hidden hidden = Drawn(effect, scenario, random);
   if (IsNoise(effect)) return hidden;
   const Set like = Generate(scenario, seed);
-  while (Signal(hidden, scenario, like, like.exact_time_us, seed) < kLeastRealistic)
+  while (Signal(hidden, scenario, like, like.exact_time_us, seed) < kMinRealistic)
     hidden = Scaled(hidden, 1.5);
   return hidden;
 }

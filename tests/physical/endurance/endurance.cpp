@@ -12,7 +12,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMostAttempts = 40;
+constexpr int kMaxAttempts = 40;
 constexpr uint64_t kCompareEvery = 500;  // the emulator keeps 10,000 touches
 constexpr double kLikenessS = 2e-3;  // as far as a result's differences may lie from those of its own touch
 
@@ -171,7 +171,7 @@ PhysicalTest::Answer Endurance::Broken(const v1::CommandedTouch& command, const 
 void Endurance::MakeTouch(uint64_t k) {
   const v1::CommandedTouch command = Command(k);
   const std::string id = "touch " + std::to_string(k);
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     ++report_.attempts;
     Answer answer;
     if (Uniform(0, 1) < options_.fault_share) {

@@ -24,10 +24,10 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr double kStateEveryS = 0.1;    // primary and secondary, host time
-constexpr double kLeastCycleS = 0.001;  // of the control loop, host time
-constexpr double kMostIdleS = 0.005;    // between two looks at the faults, host time
-constexpr size_t kMostConnections = 64, kMostLine = 65536;
+constexpr double kStateEveryS = 0.1;  // primary and secondary, host time
+constexpr double kMinCycleS = 0.001;  // of the control loop, host time
+constexpr double kMaxIdleS = 0.005;   // between two looks at the faults, host time
+constexpr size_t kMaxConnections = 64, kMaxLine = 65536;
 
 enum Port { kDashboard, kPrimary, kSecondary, kRtde, kPorts };
 
@@ -107,7 +107,7 @@ class EmulatedController : public Controller {
   void Loop() {
     while (!stop_) {
       std::vector<pollfd> polled = Polled();
-      const double wait_s = std::clamp(NextWakeHostS() - HostNowS(), 0.0, kMostIdleS);
+      const double wait_s = std::clamp(NextWakeHostS() - HostNowS(), 0.0, kMaxIdleS);
       const timespec timeout{0, static_cast<long>(wait_s * 1e9)};
       ppoll(polled.data(), polled.size(), &timeout, nullptr);
       std::lock_guard<std::recursive_mutex> lock(mutex_);
@@ -117,7 +117,7 @@ class EmulatedController : public Controller {
 
   std::vector<pollfd> Polled() const {
     std::vector<pollfd> polled = {{wake_, POLLIN, 0}};
-    const bool room = clients_.size() < kMostConnections;
+    const bool room = clients_.size() < kMaxConnections;
     for (const int fd : listeners_)
       if (room) polled.push_back({fd, POLLIN, 0});
     if (frozen_) return polled;
@@ -129,13 +129,13 @@ class EmulatedController : public Controller {
 
   double NextWakeHostS() const {
     const double host_s = HostNowS(), sim_s = clock_->NowS();
-    double next = host_s + kMostIdleS;
+    double next = host_s + kMaxIdleS;
     if (frozen_) return std::min(next, faults_ ? faults_->UntilHostS("freeze") : next);
     next = std::min(next, next_state_s_);
     next = std::min(next, host_s + (machine_.NextEventS() - sim_s) / clock_->speedup());
     if (machine_.NeedsCycles()) {
       next = std::min(
-          next, std::max(last_turn_s_ + kLeastCycleS, host_s + CycleBoundaryIn(sim_s) / clock_->speedup()));
+          next, std::max(last_turn_s_ + kMinCycleS, host_s + CycleBoundaryIn(sim_s) / clock_->speedup()));
       // An input that a program may be waiting for is seen at the very next cycle.
       if (input_came_ && clock_->speedup() > 1)
         next = std::min(next, host_s + (machine_.NextCycleS() - sim_s) / clock_->speedup());
@@ -186,7 +186,7 @@ class EmulatedController : public Controller {
 
   void Accept() {
     for (int port = 0; port < kPorts; ++port) {
-      while (clients_.size() < kMostConnections) {
+      while (clients_.size() < kMaxConnections) {
         const int fd = accept4(listeners_[port], nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd < 0) break;
         Client& client = clients_.emplace_back(static_cast<Port>(port), fd);
@@ -234,7 +234,7 @@ class EmulatedController : public Controller {
         return;
       }
     }
-    if (client->received.size() > kMostLine) client->connection.Close();
+    if (client->received.size() > kMaxLine) client->connection.Close();
   }
 
   // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest once

@@ -26,7 +26,7 @@ double Nearest(double angle_rad, double near_rad) {
 
 bool WithinLimits(const ArmGeometry& arm, const Joints& joints) {
   for (int i = 0; i < 6; ++i)
-    if (std::abs(joints[i]) > arm.most_angle_rad[i] + 1e-9) return false;
+    if (std::abs(joints[i]) > arm.max_angle_rad[i] + 1e-9) return false;
   return true;
 }
 
@@ -44,9 +44,9 @@ ArmGeometry GeometryOf(const std::string& model) {
     throw std::runtime_error("no arm is named '" + model + "'; there are: ur3, ur3e");
   }
   arm.alpha_rad = {kPi / 2, 0, 0, kPi / 2, -kPi / 2, 0};
-  arm.most_angle_rad.fill(2 * kPi);
-  arm.most_angle_rad[5] = std::numeric_limits<double>::infinity();
-  arm.most_speed_rad_s = {kPi, kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
+  arm.max_angle_rad.fill(2 * kPi);
+  arm.max_angle_rad[5] = std::numeric_limits<double>::infinity();
+  arm.max_speed_rad_s = {kPi, kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
   return arm;
 }
 
@@ -74,10 +74,10 @@ Eigen::Matrix<double, 6, 6> Jacobian(const ArmGeometry& arm, const Joints& joint
 
 std::optional<Joints> FollowTo(const ArmGeometry& arm, const Eigen::Isometry3d& base_from_flange,
                                const Joints& near) {
-  constexpr int kMostSteps = 40;
-  constexpr double kDamping = 1e-9, kWithin = 1e-9, kMostTurn = 0.5;
+  constexpr int kMaxSteps = 40;
+  constexpr double kDamping = 1e-9, kWithin = 1e-9, kMaxTurn = 0.5;
   Joints joints = near;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const Eigen::Isometry3d pose = BaseFromFlange(arm, joints);
     Vector6 error;
     error.head<3>() = base_from_flange.translation() - pose.translation();
@@ -89,7 +89,7 @@ std::optional<Joints> FollowTo(const ArmGeometry& arm, const Eigen::Isometry3d& 
     Joints turn = jacobian.transpose() * squared.ldlt().solve(error);
     const double most = turn.lpNorm<Eigen::Infinity>();
     if (!std::isfinite(most)) return std::nullopt;
-    if (most > kMostTurn) turn *= kMostTurn / most;
+    if (most > kMaxTurn) turn *= kMaxTurn / most;
     joints += turn;
   }
   return std::nullopt;
@@ -139,8 +139,8 @@ std::vector<Joints> AllInverse(const ArmGeometry& arm, const Eigen::Isometry3d& 
         for (int i = 0; i < 6; ++i) {
           double& angle = (*exact)[i];
           angle = Nearest(angle, near[i]);
-          while (angle > arm.most_angle_rad[i]) angle -= 2 * kPi;
-          while (angle < -arm.most_angle_rad[i]) angle += 2 * kPi;
+          while (angle > arm.max_angle_rad[i]) angle -= 2 * kPi;
+          while (angle < -arm.max_angle_rad[i]) angle += 2 * kPi;
         }
         if (!WithinLimits(arm, *exact)) continue;
         bool twice = false;

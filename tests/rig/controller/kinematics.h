@@ -17,8 +17,8 @@ using Vector6 =
 // Denavit-Hartenberg rows as the controller publishes them: T = RotZ(theta) TransZ(d) TransX(a) RotX(alpha).
 struct ArmGeometry {
   std::array<double, 6> a_m{}, d_m{}, alpha_rad{}, theta_rad{};  // theta: added to the joint's angle
-  std::array<double, 6> most_angle_rad{};                        // |q|; infinite for wrist 3
-  std::array<double, 6> most_speed_rad_s{};
+  std::array<double, 6> max_angle_rad{};                         // |q|; infinite for wrist 3
+  std::array<double, 6> max_speed_rad_s{};
 };
 
 // "ur3" or "ur3e" without a calibration delta. Throws std::runtime_error for another name.

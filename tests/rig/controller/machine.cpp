@@ -13,9 +13,9 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kPowerOnS = 1.0, kBootS = 1.5, kBrakesS = 1.0, kUnlockS = 0.5;
 constexpr double kUnlockAfterS = 5, kDashboardLagS = 0.6;
 // A late host catches up with that many control cycles of a waiting program at most; the rest are skipped.
-constexpr double kMostCyclesAtOnce = 8;
+constexpr double kMaxCyclesAtOnce = 8;
 constexpr double kProgressEveryM = 0.002;
-constexpr int kMostProgressSteps = 64;
+constexpr int kMaxProgressSteps = 64;
 
 }  // namespace
 
@@ -62,13 +62,13 @@ void Machine::Advance(double now_s, const std::function<void()>& changed) {
       if (script_fresh_) next = now_s_;
       next = std::min(next, script_->NextWakeS());
       const double others_s = std::min(next, now_s);
-      if (others_s - script_->NextCycleS() > kMostCyclesAtOnce * cycle_s_) script_->SkipCyclesTo(others_s);
+      if (others_s - script_->NextCycleS() > kMaxCyclesAtOnce * cycle_s_) script_->SkipCyclesTo(others_s);
       next = std::min(next, script_->NextCycleS());
     }
     if (motion_ && motion_->number) {
       const double speed = std::max(motion_->speed * scaling_ * motion_->line->MetresPerLength(), 1e-9);
       next = std::min(
-          next, last_progress_s_ + std::max(kProgressEveryM / speed, (now_s - now_s_) / kMostProgressSteps));
+          next, last_progress_s_ + std::max(kProgressEveryM / speed, (now_s - now_s_) / kMaxProgressSteps));
     }
     if (next > now_s) break;
     now_s_ = std::max(now_s_, next);
@@ -286,12 +286,12 @@ void Machine::InputWritten(const std::string& name) {
     if (watchdog.variable == name) watchdog.fed_s = now_s_;
 }
 
-void Machine::SetWatchdog(const std::string& variable, double least_hz, const std::string& action) {
+void Machine::SetWatchdog(const std::string& variable, double min_hz, const std::string& action) {
   watchdogs_.erase(std::remove_if(watchdogs_.begin(), watchdogs_.end(),
                                   [&](const Watchdog& watchdog) { return watchdog.variable == variable; }),
                    watchdogs_.end());
   // A trip is a protective stop whether the action is "stop" or "pause"; "ignore" watches without one.
-  if (least_hz > 0) watchdogs_.push_back({variable, 1 / least_hz, action != "ignore", now_s_});
+  if (min_hz > 0) watchdogs_.push_back({variable, 1 / min_hz, action != "ignore", now_s_});
 }
 
 void Machine::WriteOutput(int index, int32_t value) {

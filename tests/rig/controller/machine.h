@@ -114,7 +114,7 @@ class Machine : public ScriptHost {
   Outcome StopMotion(double deceleration);
   void SetTool(const Eigen::Isometry3d& flange_from_tip);
   void SetPayload(double kg, const Eigen::Vector3d& cog_m);
-  void SetWatchdog(const std::string& variable, double least_hz, const std::string& action);
+  void SetWatchdog(const std::string& variable, double min_hz, const std::string& action);
   void WriteOutput(int index, int32_t value);
   void WriteOutput(int index, double value);
   void WriteOutput(int index, bool value);

@@ -7,7 +7,7 @@ namespace touchstone::rig {
 namespace {
 
 constexpr double kKnotEvery = 0.005;  // of length, m
-constexpr int kMostKnots = 4000;
+constexpr int kMaxKnots = 4000;
 
 std::string JointName(int i) {
   return "joint " + std::to_string(i);
@@ -15,14 +15,14 @@ std::string JointName(int i) {
 
 std::optional<std::string> LimitBroken(const ArmGeometry& arm, const Joints& joints) {
   for (int i = 0; i < 6; ++i)
-    if (std::abs(joints[i]) > arm.most_angle_rad[i] + 1e-9)
+    if (std::abs(joints[i]) > arm.max_angle_rad[i] + 1e-9)
       return JointName(i) + " exceeds its position limit";
   return std::nullopt;
 }
 
 std::optional<std::string> TooFast(const ArmGeometry& arm, const Joints& speed_rad_s) {
   for (int i = 0; i < 6; ++i)
-    if (std::abs(speed_rad_s[i]) > arm.most_speed_rad_s[i] * (1 + 1e-6))
+    if (std::abs(speed_rad_s[i]) > arm.max_speed_rad_s[i] * (1 + 1e-6))
       return JointName(i) + " exceeds its speed limit";
   return std::nullopt;
 }
@@ -41,7 +41,7 @@ LinePath::LinePath(const ArmGeometry& arm, const Joints& from, const Eigen::Isom
   length_ = metres_ > kTurnOnly ? metres_ : turned;
   if (length_ < 1e-9) length_ = metres_ = 0;
   const int count =
-      std::clamp(static_cast<int>(std::ceil(std::max(metres_, turned) / kKnotEvery)), 1, kMostKnots);
+      std::clamp(static_cast<int>(std::ceil(std::max(metres_, turned) / kKnotEvery)), 1, kMaxKnots);
   knot_spacing_ = length_ / count;
   knots_ = {from};
   for (int i = 1; i <= count && length_ > 0; ++i) {

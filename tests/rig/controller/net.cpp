@@ -75,7 +75,7 @@ bool Connection::Read(std::string* to) {
 
 void Connection::Send(std::string bytes, double release_host_s) {
   if (bytes.empty()) return;
-  if (queued_bytes_ + bytes.size() > kMostQueued) {  // never reads
+  if (queued_bytes_ + bytes.size() > kMaxQueued) {  // never reads
     open_ = false;
     return;
   }

@@ -29,12 +29,12 @@ class Connection {
   // Sends what may leave now.
   void Flush(double host_s);
   bool Blocked() const { return blocked_; }  // the peer does not read: wants to be told when it does again
-  bool Busy() const { return blocked_ || queued_bytes_ > kMostQueued / 4; }
+  bool Busy() const { return blocked_ || queued_bytes_ > kMaxQueued / 4; }
   double NextReleaseS() const;  // infinite: nothing waits for its time
   void CloseWhenSent() { closing_ = true; }
 
  private:
-  static constexpr size_t kMostQueued = 1 << 20;
+  static constexpr size_t kMaxQueued = 1 << 20;
 
   struct Packet {
     double release_host_s;

@@ -93,8 +93,8 @@ std::string StatePacket(const RobotState& state, const ArmGeometry& arm, const s
   kinematics.Put(uint32_t{0});  // calibrated
 
   WireWriter configuration;
-  for (const double angle : arm.most_angle_rad) configuration.Put(-Finite(angle)).Put(Finite(angle));
-  for (const double speed : arm.most_speed_rad_s) configuration.Put(speed).Put(40.0);
+  for (const double angle : arm.max_angle_rad) configuration.Put(-Finite(angle)).Put(Finite(angle));
+  for (const double speed : arm.max_speed_rad_s) configuration.Put(speed).Put(40.0);
   configuration.Put(1.05).Put(1.4).Put(0.25).Put(1.2).Put(0.1);
   configuration.PutAll(arm.a_m).PutAll(arm.d_m).PutAll(arm.alpha_rad).PutAll(arm.theta_rad);
   configuration.Put(int32_t{e_series ? 5 : 3}).Put(int32_t{e_series ? 2 : 1}).Put(int32_t{3}).Put(int32_t{0});

@@ -5,7 +5,7 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr size_t kMostBytes = 4 << 20;
+constexpr size_t kMaxBytes = 4 << 20;
 
 bool Blank(const std::string& line) {
   const size_t first = line.find_first_not_of(" \t\r");
@@ -19,7 +19,7 @@ std::vector<std::string> ProgramReader::Feed(const std::string& bytes) {
   for (const char c : bytes) {
     if (c != '\n') {
       line_.push_back(c);
-      if (line_.size() + program_.size() > kMostBytes) {  // no program: starts anew
+      if (line_.size() + program_.size() > kMaxBytes) {  // no program: starts anew
         line_.clear();
         program_.clear();
         depth_ = 0;

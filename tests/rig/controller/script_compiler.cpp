@@ -167,7 +167,7 @@ class Compiler {
 
   // Statements.
   void Block(const std::vector<std::string>& ends) {
-    if (++depth_ > kMostDepth) Fail("blocks are nested too deeply");
+    if (++depth_ > kMaxDepth) Fail("blocks are nested too deeply");
     for (;;) {
       SkipLineEnds();
       if (Peek().kind == Kind::kEnd) Fail("a block has no 'end'");
@@ -346,7 +346,7 @@ class Compiler {
 
   // Expressions, the loosest binding first.
   void Expression() {
-    if (++depth_ > kMostDepth) Fail("the expression is nested too deeply");
+    if (++depth_ > kMaxDepth) Fail("the expression is nested too deeply");
     Binary(0);
     --depth_;
   }
@@ -369,7 +369,7 @@ class Compiler {
     if (level == 2) {
       if (!IsWord("not")) return Binary(3);
       const Token word = Next();
-      if (++depth_ > kMostDepth) Fail("the expression is nested too deeply");
+      if (++depth_ > kMaxDepth) Fail("the expression is nested too deeply");
       Binary(2);
       --depth_;
       EmitAt(word, Op::kNot);
@@ -391,7 +391,7 @@ class Compiler {
   void Unary() {
     if (IsSign("-") || IsSign("+")) {
       const Token sign = Next();
-      if (++depth_ > kMostDepth) Fail("the expression is nested too deeply");
+      if (++depth_ > kMaxDepth) Fail("the expression is nested too deeply");
       Unary();
       --depth_;
       if (sign.text == "-") EmitAt(sign, Op::kNegate);
@@ -526,7 +526,7 @@ class Compiler {
     EmitAt(name, Op::kBuiltin, builtin, most);
   }
 
-  static constexpr int kMostDepth = 200;
+  static constexpr int kMaxDepth = 200;
 
   std::vector<Token> tokens_;
   const std::vector<BuiltinSignature>& builtins_;

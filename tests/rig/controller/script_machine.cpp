@@ -6,8 +6,8 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr int kMostInstructions = 200000;  // without waiting, in one go: an endless loop
-constexpr size_t kMostFrames = 200, kMostThreads = 50, kMostItems = 10000;
+constexpr int kMaxInstructions = 200000;  // without waiting, in one go: an endless loop
+constexpr size_t kMaxFrames = 200, kMaxThreads = 50, kMaxItems = 10000;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -112,7 +112,7 @@ void ScriptMachine::Execute(Thread& thread, double now_s) {
       const Instruction code = program_.functions[frame.function].code[frame.at];
       line_ = code.line;
       column_ = code.column;
-      if (count > kMostInstructions)
+      if (count > kMaxInstructions)
         throw ScriptError("infinite loop: the thread does not wait, e.g. with sync()");
       ++frame.at;
       switch (code.op) {
@@ -159,12 +159,12 @@ void ScriptMachine::Execute(Thread& thread, double now_s) {
           std::vector<Value> arguments(code.b);
           for (int i = code.b; i-- > 0;) arguments[i] = Pop(thread);
           if (code.op == Op::kRun) {
-            if (threads_.size() >= kMostThreads) throw ScriptError("too many threads");
+            if (threads_.size() >= kMaxThreads) throw ScriptError("too many threads");
             thread.stack.push_back({Value::Kind::kThread, static_cast<double>(begun_), {}, {}});
             Begin(code.a, std::move(arguments));
             break;
           }
-          if (thread.frames.size() >= kMostFrames) throw ScriptError("calls are nested too deeply");
+          if (thread.frames.size() >= kMaxFrames) throw ScriptError("calls are nested too deeply");
           const size_t locals = program_.functions[code.a].locals.size();
           Frame next{code.a, 0, std::move(arguments), {}, thread.stack.size()};
           next.set.assign(locals, false);
@@ -252,7 +252,7 @@ void ScriptMachine::Execute(Thread& thread, double now_s) {
         default:
           Calculate(thread, code.op);
       }
-      if (thread.stack.size() > kMostItems) throw ScriptError("too many values");
+      if (thread.stack.size() > kMaxItems) throw ScriptError("too many values");
     }
   } catch (const ScriptError& error) {
     failure_ = Failure{error.what(), line_, column_};

@@ -15,14 +15,14 @@ using Vec = Eigen::Vector3d;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoTails = 1000;  // degrees of freedom that are as good as normal
-constexpr double kLeastMotionM = 1e-6;
+constexpr double kMinMotionM = 1e-6;
 constexpr double kAlongAxis = 0.9998;         // cosine of 1 deg
 constexpr double kOffAxisM = 0.005;           // a motion that begins farther aside has left the object
 constexpr double kReleaseHysteresisM = 5e-5;  // an optical interrupter's
 constexpr double kControlCycleS = 0.008;      // contacts become known so late at most
-constexpr double kMostHoldS = 0.25;
-constexpr double kLeastPressS = 0.001;
-constexpr size_t kMostTruths = 10'000;
+constexpr double kMaxHoldS = 0.25;
+constexpr double kMinPressS = 0.001;
+constexpr size_t kMaxTruths = 10'000;
 
 // The moment in (from_s, until_s] at which the arm has come so far.
 double TimeOf(double distance_m, double from_s, double until_s,
@@ -194,7 +194,7 @@ Fingers::Approach Fingers::PlanApproach(const StraightMotion& motion, const Vec&
     if (plan.hit) out.hold_s = std::max(out.hold_s, finger.time_s - ReportedS(out, plan, finger.time_s));
     out.fingers.push_back(plan);
   }
-  out.hold_s = std::min(out.hold_s, kMostHoldS) + kControlCycleS;
+  out.hold_s = std::min(out.hold_s, kMaxHoldS) + kControlCycleS;
   return out;
 }
 
@@ -213,7 +213,7 @@ void Fingers::OnMotionBegan(const StraightMotion& motion) {
   motion_ = motion.number;
   last_progress_s_ = motion.start_s, last_distance_m_ = 0;
   const Vec way = motion.to.translation() - motion.from.translation();
-  const Vec direction = way.norm() > kLeastMotionM ? Vec(way.normalized()) : Vec(Vec::Zero());
+  const Vec direction = way.norm() > kMinMotionM ? Vec(way.normalized()) : Vec(Vec::Zero());
 
   if (approach_) {
     const Vec from = motion.from.translation() - approach_->from;
@@ -254,7 +254,7 @@ void Fingers::Release(int i, double at_s, double now_s) {
   if (!finger.pressed) return;
   finger.pressed = false;
   if (std::isnan(approach_->truth.reported_s[i])) return;
-  const double edge_s = std::max(at_s, finger.edge_s + kLeastPressS);
+  const double edge_s = std::max(at_s, finger.edge_s + kMinPressS);
   sink_({i, false, edge_s, std::max(now_s, edge_s + approach_->hold_s)});
 }
 
@@ -285,7 +285,7 @@ void Fingers::OnMotionEnded(uint64_t number, double now_s) {
   if (!approach.begun || approach.truth.ended) return;
   approach.truth.ended = true;
   truths_.push_back(approach.truth);
-  if (truths_.size() > kMostTruths) truths_.erase(truths_.begin());
+  if (truths_.size() > kMaxTruths) truths_.erase(truths_.begin());
 
   // A finger that the arm did not bring to its contact was not the last one, whatever the oracle foresaw.
   double last_m = 0;

@@ -6,7 +6,7 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr size_t kMostPieces = 64;
+constexpr size_t kMaxPieces = 64;
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void Oscillator::SetDriftPpm(double drift_ppm, double now_s) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (pieces_.back().ticks_per_s == ticks_per_s) return;
   pieces_.push_back({now_s, ticks, ticks_per_s});
-  if (pieces_.size() > kMostPieces) pieces_.erase(pieces_.begin());
+  if (pieces_.size() > kMaxPieces) pieces_.erase(pieces_.begin());
 }
 
 double Oscillator::TicksAt(double sim_s) const {

@@ -14,8 +14,8 @@ constexpr double kFreeCounts = 60, kPressedCounts = 964, kMiddleCounts = 512, kC
 constexpr double kSampleS = 1e-3, kSampleLagS = 0.1, kQuietS = 0.05;
 
 // A switch that bounces: pairs of edges, over well before the usual 5 ms.
-constexpr int kMostBounces = 5;
-constexpr double kLeastBounceS = 5e-5, kMostBounceS = 3.5e-4;
+constexpr int kMaxBounces = 5;
+constexpr double kMinBounceS = 5e-5, kMaxBounceS = 3.5e-4;
 
 }  // namespace
 
@@ -34,9 +34,9 @@ void Pins::Add(const Edge& edge, bool bounce) {
   auto& coming = fingers_.at(edge.finger).coming;
   coming.push_back({edge.at_s, edge.known_s, edge.pressed});
   if (bounce && bounces_) {
-    std::uniform_real_distribution<double> pause(kLeastBounceS, kMostBounceS);
+    std::uniform_real_distribution<double> pause(kMinBounceS, kMaxBounceS);
     double at_s = edge.at_s;
-    for (int k = 1 + static_cast<int>(random_() % kMostBounces); k > 0; --k)
+    for (int k = 1 + static_cast<int>(random_() % kMaxBounces); k > 0; --k)
       for (const bool level : {!edge.pressed, edge.pressed})
         coming.push_back({at_s += pause(random_), edge.known_s, level});
   }

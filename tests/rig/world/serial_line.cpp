@@ -17,7 +17,7 @@ namespace touchstone::rig {
 namespace {
 
 // A driver keeps so much for a program that does not read; older bytes go then.
-constexpr int kMostUnreadBytes = 3000;
+constexpr int kMaxUnreadBytes = 3000;
 
 [[noreturn]] void Fail(const std::string& what) {
   throw std::runtime_error(what + ": " + std::strerror(errno));
@@ -103,7 +103,7 @@ std::vector<uint8_t> SerialLine::Exchange(double now_s) {
   while (!from_device_.chunks.empty() && from_device_.chunks.front().due_s <= now_s) {
     const auto& bytes = from_device_.chunks.front().bytes;
     int unread = 0;
-    if (ioctl(slave_, FIONREAD, &unread) == 0 && unread > kMostUnreadBytes) tcflush(slave_, TCIFLUSH);
+    if (ioctl(slave_, FIONREAD, &unread) == 0 && unread > kMaxUnreadBytes) tcflush(slave_, TCIFLUSH);
     if (write(master_, bytes.data(), bytes.size()) < 0 && errno != EAGAIN && errno != EIO)
       Fail("cannot write to " + link_);
     from_device_.chunks.pop_front();
