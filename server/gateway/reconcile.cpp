@@ -65,7 +65,7 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
     return journal().Failed(
         session, touch.id,
         "interrupted, and the end effector was reset since; it can be made again under the same id");
-  TouchRecord record;
+  TouchRecording record;
   record.motion.program_id = touch.program_id;
   record.motion.transfer = {Eigen::Isometry3d::Identity()};
   record.motion.end = Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1));

@@ -148,7 +148,7 @@ class Rig : public PhysicalSource {
 
 // --- touch_result.cpp: what the recorded states and contacts say of a touch. Pure functions.
 
-struct TouchRecord {
+struct TouchRecording {
   ArmTouch motion;
   double acceleration_m_s2 = 0;
   double time_scale = 1;
@@ -162,7 +162,7 @@ struct TouchRecord {
 // Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds). Session and
 // Unix times stay 0. FAILED_PRECONDITION if the controller scaled the speed during the approach: times would
 // not be comparable.
-absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record);
+absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record);
 
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within 0.1
 // rig s.

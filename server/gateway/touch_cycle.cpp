@@ -69,7 +69,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
 
 absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t program_id,
                                              const TouchOrder& order, const Permit& permit) {
-  TouchRecord record;
+  TouchRecording record;
   record.motion = plan.motion;
   record.motion.program_id = program_id;
   record.acceleration_m_s2 = parts_.planner->limits().acceleration_m_s2;

@@ -64,7 +64,7 @@ std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, dou
   return pose;
 }
 
-absl::StatusOr<JournalResult> ResultOf(const TouchRecord& record) {
+absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
   const ArmTouch& motion = record.motion;
   const Eigen::Vector3d start = motion.transfer.back().translation();
   const Eigen::Vector3d way = motion.end.translation() - start;

@@ -22,7 +22,7 @@ double Distance(double t) {
 // whose clock is 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is 120
 // ppm slow.
 struct Made {
-  TouchRecord record;
+  TouchRecording record;
   double began_controller_s = 100.0013;
 
   explicit Made(std::vector<std::optional<double>> contacts_s, double scale = 1) {

@@ -177,7 +177,7 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   camera_ = std::make_unique<EmulatedCamera>(
       camera, [this] { return Look(); }, &faults_);
   control_ =
-      std::make_unique<TcpServer>(options.address, options.control_port, [this](Connection& connection) {
+      std::make_unique<TcpServer>(options.address, options.control_port, [this](LineConnection& connection) {
         for (std::string line; connection.ReadLine(&line);)
           if (!connection.Send(Tell(line) + "\n")) return;
       });

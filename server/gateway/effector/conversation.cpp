@@ -217,16 +217,16 @@ void SerialEffector::HandleStatus(const firmware::Status& status) {
 
 void SerialEffector::HandleEvent(const firmware::Event& event) {
   const uint64_t max_ticks = MaxTicks();
-  TouchRecord::Verdict verdict;
+  ContactRecord::Verdict verdict;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     verdict = record_.Take(event, max_ticks);
-    if (verdict == TouchRecord::Verdict::kRepeated) ++state_.repeated_events;
-    if (verdict == TouchRecord::Verdict::kNews && event.finger < state_.pressed.size())
+    if (verdict == ContactRecord::Verdict::kRepeated) ++state_.repeated_events;
+    if (verdict == ContactRecord::Verdict::kNews && event.finger < state_.pressed.size())
       state_.pressed[event.finger] = event.kind == firmware::EventKind::kContact;
   }
-  if (verdict == TouchRecord::Verdict::kUnbelievable) return;
-  if (verdict == TouchRecord::Verdict::kStale) {
+  if (verdict == ContactRecord::Verdict::kUnbelievable) return;
+  if (verdict == ContactRecord::Verdict::kStale) {
     // An event whose touch was damaged looks stale: only what comes twice alike is done with.
     const firmware::Event& before = stale_event_;
     const bool twice = before.number == event.number && before.touch == event.touch &&
@@ -236,7 +236,7 @@ void SerialEffector::HandleEvent(const firmware::Event& event) {
     if (!twice) return;
   }
   (void)Send(firmware::Acknowledge{event.number});
-  if (verdict == TouchRecord::Verdict::kNews && news_ != nullptr) news_->Notify();
+  if (verdict == ContactRecord::Verdict::kNews && news_ != nullptr) news_->Notify();
 }
 
 uint64_t SerialEffector::MaxTicks() const {

@@ -19,8 +19,8 @@
 #include "firmware/core/frame.h"
 #include "firmware/core/messages.h"
 #include "server/gateway/effector.h"
+#include "server/gateway/effector/contact_record.h"
 #include "server/gateway/effector/serial_port.h"
-#include "server/gateway/effector/touch_record.h"
 
 namespace touchstone {
 
@@ -111,7 +111,7 @@ class SerialEffector : public Effector {
   absl::Status work_status_;
   EffectorState state_;
   ClockEstimate clock_;
-  TouchRecord record_;
+  ContactRecord record_;
 };
 
 }  // namespace touchstone

@@ -34,7 +34,7 @@ enum Port { kDashboard, kPrimary, kSecondary, kRtde, kPorts };
 struct Client {
   Client(Port the_port, int fd) : port(the_port), connection(fd) {}
   Port port;
-  Connection connection;
+  QueuedConnection connection;
   std::string received;
   ProgramReader programs;
   std::unique_ptr<RtdeSession> rtde;

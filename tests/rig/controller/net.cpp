@@ -44,7 +44,7 @@ int Listen(const std::string& address, int port, int* bound_port) {
   return fd;
 }
 
-Connection::Connection(int fd) : fd_(fd) {
+QueuedConnection::QueuedConnection(int fd) : fd_(fd) {
   const int on = 1;
   setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   // A small buffer: a client that reads slowly gets new packets soon, as behind a real controller's.
@@ -52,11 +52,11 @@ Connection::Connection(int fd) : fd_(fd) {
   setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
 }
 
-Connection::~Connection() {
+QueuedConnection::~QueuedConnection() {
   close(fd_);
 }
 
-bool Connection::Read(std::string* to) {
+bool QueuedConnection::Read(std::string* to) {
   char buffer[16384];
   // Bounded, so that a client that floods does not stop the arm.
   for (int i = 0; i < 16; ++i) {
@@ -73,7 +73,7 @@ bool Connection::Read(std::string* to) {
   return true;
 }
 
-void Connection::Send(std::string bytes, double release_host_s) {
+void QueuedConnection::Send(std::string bytes, double release_host_s) {
   if (bytes.empty()) return;
   if (queued_bytes_ + bytes.size() > kMaxQueued) {  // never reads
     open_ = false;
@@ -84,7 +84,7 @@ void Connection::Send(std::string bytes, double release_host_s) {
   queue_.push_back({release_host_s, std::move(bytes)});
 }
 
-void Connection::Flush(double host_s) {
+void QueuedConnection::Flush(double host_s) {
   blocked_ = false;
   while (open_ && !queue_.empty() && queue_.front().release_host_s <= host_s) {
     std::string& bytes = queue_.front().bytes;
@@ -107,7 +107,7 @@ void Connection::Flush(double host_s) {
   if (closing_ && queue_.empty()) open_ = false;
 }
 
-double Connection::NextReleaseS() const {
+double QueuedConnection::NextReleaseS() const {
   return queue_.empty() || blocked_ ? std::numeric_limits<double>::infinity() : queue_.front().release_host_s;
 }
 

@@ -12,12 +12,12 @@ double HostNowS();  // steady clock
 int Listen(const std::string& address, int port, int* bound_port);
 
 // One accepted connection; closes its descriptor.
-class Connection {
+class QueuedConnection {
  public:
-  explicit Connection(int fd);
-  ~Connection();
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
+  explicit QueuedConnection(int fd);
+  ~QueuedConnection();
+  QueuedConnection(const QueuedConnection&) = delete;
+  QueuedConnection& operator=(const QueuedConnection&) = delete;
 
   int fd() const { return fd_; }
   bool open() const { return open_; }

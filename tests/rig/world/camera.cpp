@@ -25,7 +25,7 @@ EmulatedCamera::EmulatedCamera(const CameraOptions& options, std::function<Camer
   if (!renderer.ok()) throw std::runtime_error(std::string(renderer.status().message()));
   renderer_ = *renderer;
   server_ = std::make_unique<TcpServer>(options.address, options.port,
-                                        [this](Connection& connection) { Serve(connection); });
+                                        [this](LineConnection& connection) { Serve(connection); });
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -98,7 +98,7 @@ std::string EmulatedCamera::Next(uint64_t* number) {
   return stopping_ || faults_->UntilHostS("camera_unplug") > 0 ? std::string() : jpeg_;
 }
 
-void EmulatedCamera::Serve(Connection& connection) {
+void EmulatedCamera::Serve(LineConnection& connection) {
   if (faults_->UntilHostS("camera_unplug") > 0) return;
   std::string request, line;
   if (!connection.ReadLine(&request)) return;

@@ -50,7 +50,7 @@ class EmulatedCamera {
  private:
   void Run();
   std::string Picture();
-  void Serve(Connection& connection);
+  void Serve(LineConnection& connection);
   // The first picture after number *number, which is then its number; empty: it ends, or the camera is
   // unplugged.
   std::string Next(uint64_t* number);

@@ -25,7 +25,7 @@ constexpr int kAcceptTurnMs = 100;
 
 }  // namespace
 
-bool Connection::ReadLine(std::string* line) {
+bool LineConnection::ReadLine(std::string* line) {
   for (;;) {
     const size_t end = buffer_.find('\n');
     if (end != std::string::npos) {
@@ -42,7 +42,7 @@ bool Connection::ReadLine(std::string* line) {
   }
 }
 
-bool Connection::Send(const std::string& bytes) {
+bool LineConnection::Send(const std::string& bytes) {
   for (size_t sent = 0; sent < bytes.size();) {
     const ssize_t wrote = send(fd_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
     if (wrote <= 0) return false;
@@ -51,7 +51,7 @@ bool Connection::Send(const std::string& bytes) {
   return true;
 }
 
-TcpServer::TcpServer(const std::string& address, int port, std::function<void(Connection&)> serve)
+TcpServer::TcpServer(const std::string& address, int port, std::function<void(LineConnection&)> serve)
     : serve_(std::move(serve)) {
   sockaddr_in where{};
   where.sin_family = AF_INET;
@@ -119,7 +119,7 @@ void TcpServer::Accept() {
     Client* self = client.get();
     std::lock_guard<std::mutex> lock(mutex_);
     self->thread = std::thread([this, self] {
-      Connection connection(self->fd);
+      LineConnection connection(self->fd);
       serve_(connection);
       shutdown(self->fd, SHUT_RDWR);
       self->done = true;
@@ -144,7 +144,7 @@ std::string AskOnce(const std::string& host_and_port, const std::string& line, d
   const bool connected = connect(fd, found->ai_addr, found->ai_addrlen) == 0;
   const int error = errno;
   freeaddrinfo(found);
-  Connection connection(fd);
+  LineConnection connection(fd);
   std::string answer;
   const bool answered = connected && connection.Send(line + "\n") && connection.ReadLine(&answer);
   close(fd);

@@ -13,9 +13,9 @@
 namespace touchstone::rig {
 
 // A connected socket.
-class Connection {
+class LineConnection {
  public:
-  explicit Connection(int fd) : fd_(fd) {}
+  explicit LineConnection(int fd) : fd_(fd) {}
   // The next line without its end; false: closed, or longer than 4096 bytes.
   bool ReadLine(std::string* line);
   bool Send(const std::string& bytes);  // false: closed
@@ -30,7 +30,7 @@ class TcpServer {
  public:
   // Listens on `address`; port 0: any free one. `serve` runs in the connection's thread; the connection is
   // closed when it returns. Throws std::runtime_error.
-  TcpServer(const std::string& address, int port, std::function<void(Connection&)> serve);
+  TcpServer(const std::string& address, int port, std::function<void(LineConnection&)> serve);
   ~TcpServer();  // closes every connection and joins
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
@@ -49,7 +49,7 @@ class TcpServer {
   void Reap(bool all);
 
   int listener_ = -1, port_ = 0;
-  std::function<void(Connection&)> serve_;
+  std::function<void(LineConnection&)> serve_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::vector<std::unique_ptr<Client>> clients_;

@@ -1,4 +1,4 @@
-#include "server/gateway/effector/touch_record.h"
+#include "server/gateway/effector/contact_record.h"
 
 #include <algorithm>
 #include <utility>
@@ -26,15 +26,15 @@ bool Agree(const firmware::Recalled& earlier, const firmware::Recalled& later) {
   return true;
 }
 
-void TouchRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
-  *this = TouchRecord();
+void ContactRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
+  *this = ContactRecord();
   touch_.touch = touch;
   touch_.boot_id = boot_id;
   touch_.contact_ticks.resize(fingers);
   waiting_ = true;
 }
 
-bool TouchRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks) {
+bool ContactRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks) {
   if (!waiting_ || armed.touch != touch_.touch) return false;
   if (armed.ticks < min_ticks || armed.ticks > max_ticks) return false;
   touch_.armed_ticks = armed.ticks;
@@ -43,13 +43,13 @@ bool TouchRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t
   return true;
 }
 
-void TouchRecord::Lose(std::string why) {
+void ContactRecord::Lose(std::string why) {
   if (Final()) return;
   armed_ = false;
   lost_ = std::move(why);
 }
 
-TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t max_ticks) {
+ContactRecord::Verdict ContactRecord::Take(const firmware::Event& event, uint64_t max_ticks) {
   if (event.touch != touch_.touch) return Verdict::kStale;
   // Before Armed came it is not known what is too early; the event will come again.
   if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kUnbelievable;
@@ -70,7 +70,7 @@ TouchRecord::Verdict TouchRecord::Take(const firmware::Event& event, uint64_t ma
   return Verdict::kNews;
 }
 
-bool TouchRecord::Settle(const firmware::Recalled& recalled, uint64_t max_ticks) {
+bool ContactRecord::Settle(const firmware::Recalled& recalled, uint64_t max_ticks) {
   if (recalled.touch != touch_.touch || recalled.fingers != touch_.contact_ticks.size()) return false;
   for (int i = 0; i < recalled.fingers; ++i) {
     if ((recalled.contact_mask >> i & 1) == 0) continue;

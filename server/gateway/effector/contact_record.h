@@ -13,7 +13,7 @@
 
 namespace touchstone {
 
-class TouchRecord {
+class ContactRecord {
  public:
   enum class Verdict {
     kNews,         // believed and new
