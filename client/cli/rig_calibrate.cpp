@@ -11,7 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/flat_calibration.h"
 #include "server/gateway/calibration/tool_calibration.h"
 #include "server/model/model.h"

@@ -8,7 +8,7 @@
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/object_registration.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"

@@ -7,9 +7,9 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/camera.h"
-#include "server/gateway/effector.h"
-#include "server/gateway/motion_planner.h"
+#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/camera/camera.h"
+#include "server/gateway/effector/effector.h"
 #include "server/service/server_options.h"
 
 namespace touchstone {

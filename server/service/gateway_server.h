@@ -5,7 +5,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 #include "server/service/gateway_options.h"
 
 namespace touchstone {

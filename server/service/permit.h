@@ -5,7 +5,7 @@
 
 #include <grpcpp/server_context.h>
 
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 #include "server/service/lease_book.h"
 #include "server/service/resources.h"
 

@@ -11,7 +11,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/dataset/stream.h"
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 #include "touchstone/v1/source.pb.h"
 
 namespace touchstone {

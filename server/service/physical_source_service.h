@@ -3,7 +3,7 @@
 #pragma once
 
 #include "server/dataset/specification.h"
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 #include "server/image/image.h"
 #include "server/service/source_service.h"
 

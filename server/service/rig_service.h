@@ -1,7 +1,7 @@
 // touchstone.v1.Control and touchstone.v1.Rig of a rig.
 #pragma once
 
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 #include "server/service/control_service.h"
 #include "touchstone/v1/rig.grpc.pb.h"
 

@@ -7,8 +7,8 @@
 #include <chrono>
 #include <thread>
 
+#include "server/gateway/arm/motion_planner.h"
 #include "server/gateway/arm/ur_arm.h"
-#include "server/gateway/motion_planner.h"
 #include "tests/rig/controller.h"
 
 namespace touchstone {

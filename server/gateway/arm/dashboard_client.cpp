@@ -5,7 +5,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
 
 namespace touchstone {
 namespace {

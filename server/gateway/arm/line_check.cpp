@@ -8,7 +8,7 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/gateway/arm/line_pace.h"
+#include "server/gateway/arm/cartesian_speed.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone {

@@ -1,4 +1,4 @@
-#include "server/gateway/motion_planner.h"
+#include "server/gateway/arm/motion_planner.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -12,7 +12,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/line_check.h"
-#include "server/gateway/arm/transfer.h"
+#include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone {

@@ -1,4 +1,4 @@
-#include "server/gateway/motion_planner.h"
+#include "server/gateway/arm/motion_planner.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/gateway/arm/line_check.h"
-#include "server/gateway/arm/transfer.h"
+#include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/gateway/arm/big_endian.h"
-#include "server/gateway/registers.h"
+#include "server/gateway/arm/registers.h"
 
 namespace touchstone {
 namespace {

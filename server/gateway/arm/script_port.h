@@ -13,7 +13,7 @@
 
 #include "server/gateway/arm/primary_message.h"
 #include "server/gateway/arm/tcp_socket.h"
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
 
 namespace touchstone {
 

@@ -5,7 +5,7 @@
 #include <deque>
 #include <vector>
 
-#include "server/gateway/arm.h"
+#include "server/gateway/arm/arm.h"
 
 namespace touchstone {
 

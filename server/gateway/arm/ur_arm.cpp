@@ -9,13 +9,13 @@
 #include <mutex>
 
 #include "server/base/status.h"
+#include "server/gateway/arm/cartesian_speed.h"
 #include "server/gateway/arm/dashboard_client.h"
-#include "server/gateway/arm/line_pace.h"
+#include "server/gateway/arm/registers.h"
 #include "server/gateway/arm/rtde_client.h"
 #include "server/gateway/arm/script_port.h"
 #include "server/gateway/arm/state_history.h"
 #include "server/gateway/arm/ur_modes.h"
-#include "server/gateway/registers.h"
 
 namespace touchstone {
 namespace {

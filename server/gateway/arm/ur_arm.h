@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/arm.h"
+#include "server/gateway/arm/arm.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone {

@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/gateway/arm.h"
+#include "server/gateway/arm/arm.h"
 
 namespace touchstone {
 

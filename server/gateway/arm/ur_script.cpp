@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/gateway/registers.h"
+#include "server/gateway/arm/registers.h"
 
 namespace touchstone {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <Eigen/Geometry>
 
-#include "server/gateway/arm.h"
+#include "server/gateway/arm/arm.h"
 #include "server/gateway/arm/kinematics.h"
-#include "server/gateway/registers.h"
+#include "server/gateway/arm/registers.h"
 
 namespace touchstone {
 

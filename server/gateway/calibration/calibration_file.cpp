@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 #include "server/model/yaml_tree.h"
 
 namespace touchstone {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 
 namespace touchstone {
 namespace {

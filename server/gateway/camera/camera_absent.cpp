@@ -1,5 +1,5 @@
 // What stands in for the rest of this folder in a build without OpenCV (TOUCHSTONE_CAMERA=OFF).
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 
 namespace touchstone {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 
 namespace cv {
 class Mat;

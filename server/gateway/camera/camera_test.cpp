@@ -1,4 +1,4 @@
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 
 #include <sys/stat.h>
 

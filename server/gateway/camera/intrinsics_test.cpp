@@ -12,7 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 
 namespace touchstone {
 namespace {

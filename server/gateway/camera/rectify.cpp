@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/check.h"
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 
 namespace touchstone {
 namespace {

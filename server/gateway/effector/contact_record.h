@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "firmware/core/messages.h"
-#include "server/gateway/effector.h"
+#include "server/gateway/effector/effector.h"
 
 namespace touchstone {
 

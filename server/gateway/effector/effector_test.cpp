@@ -1,4 +1,4 @@
-#include "server/gateway/effector.h"
+#include "server/gateway/effector/effector.h"
 
 #include <chrono>
 #include <cmath>

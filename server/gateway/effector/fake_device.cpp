@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/check.h"
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
 
 namespace touchstone {
 

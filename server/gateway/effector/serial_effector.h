@@ -18,8 +18,8 @@
 
 #include "firmware/core/frame.h"
 #include "firmware/core/messages.h"
-#include "server/gateway/effector.h"
 #include "server/gateway/effector/contact_record.h"
+#include "server/gateway/effector/effector.h"
 #include "server/gateway/effector/serial_port.h"
 
 namespace touchstone {

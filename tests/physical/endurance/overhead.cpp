@@ -5,7 +5,7 @@
 
 #include "server/base/thread_pool.h"
 #include "server/gateway/arm/ur_arm.h"
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 #include "server/service/convert.h"
 #include "server/service/gateway_options.h"
 #include "server/service/resources.h"

@@ -4,9 +4,9 @@
 #include <memory>
 #include <utility>
 
-#include "server/gateway/arm.h"
-#include "server/gateway/effector.h"
-#include "server/gateway/signal.h"
+#include "server/gateway/arm/arm.h"
+#include "server/gateway/effector/effector.h"
+#include "server/gateway/timing/change_notifier.h"
 #include "server/session/journal.h"
 
 namespace touchstone {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "server/base/text.h"
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 
 namespace touchstone {
 namespace {

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
 
 namespace touchstone {
 

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/gateway/camera.h"
+#include "server/gateway/camera/camera.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
 #include "server/touch/commanded_touch.h"

@@ -1,4 +1,4 @@
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
 
 namespace touchstone {
 

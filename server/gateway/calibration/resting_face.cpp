@@ -2,7 +2,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/check.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 
 namespace touchstone {
 namespace {

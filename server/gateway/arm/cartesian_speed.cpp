@@ -1,4 +1,4 @@
-#include "server/gateway/arm/line_pace.h"
+#include "server/gateway/arm/cartesian_speed.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 
 namespace touchstone {
 namespace {

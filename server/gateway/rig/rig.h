@@ -18,12 +18,12 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include "server/gateway/arm.h"
-#include "server/gateway/audit_log.h"
-#include "server/gateway/camera.h"
-#include "server/gateway/effector.h"
-#include "server/gateway/motion_planner.h"
-#include "server/gateway/physical_source.h"
+#include "server/gateway/arm/arm.h"
+#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/audit/audit_log.h"
+#include "server/gateway/camera/camera.h"
+#include "server/gateway/effector/effector.h"
+#include "server/gateway/rig/physical_source.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
 

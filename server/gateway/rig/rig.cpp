@@ -1,4 +1,4 @@
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -13,7 +13,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
-#include "server/gateway/run_command.h"
+#include "server/gateway/rig/run_command.h"
 #include "server/image/encode.h"
 
 namespace touchstone {

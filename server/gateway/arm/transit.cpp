@@ -1,4 +1,4 @@
-#include "server/gateway/arm/transfer.h"
+#include "server/gateway/arm/transit.h"
 
 #include <algorithm>
 #include <cmath>

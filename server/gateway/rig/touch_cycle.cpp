@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 
 namespace touchstone {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/gateway/clock_sync.h"
+#include "server/gateway/timing/clock_sync.h"
 
 #include <algorithm>
 #include <cmath>

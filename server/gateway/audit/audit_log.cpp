@@ -1,4 +1,4 @@
-#include "server/gateway/audit_log.h"
+#include "server/gateway/audit/audit_log.h"
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-#include "server/gateway/recorded_source.h"
+#include "server/gateway/rig/recorded_source.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 
 #include <absl/strings/str_format.h>
 

@@ -9,8 +9,8 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/gateway/arm.h"
-#include "server/gateway/calibration.h"
+#include "server/gateway/arm/arm.h"
+#include "server/gateway/calibration/calibration.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone {

@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/physical_source.h"
+#include "server/gateway/rig/physical_source.h"
 #include "server/session/recorded_touches.h"
 
 namespace touchstone {

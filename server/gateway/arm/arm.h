@@ -11,8 +11,8 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/gateway/clock_sync.h"
-#include "server/gateway/signal.h"
+#include "server/gateway/timing/change_notifier.h"
+#include "server/gateway/timing/clock_sync.h"
 
 namespace touchstone {
 

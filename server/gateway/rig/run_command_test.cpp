@@ -1,4 +1,4 @@
-#include "server/gateway/run_command.h"
+#include "server/gateway/rig/run_command.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "server/gateway/calibration.h"
+#include "server/gateway/calibration/calibration.h"
 
 namespace touchstone {
 namespace {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "server/base/status.h"
-#include "server/gateway/rig.h"
+#include "server/gateway/rig/rig.h"
 
 namespace touchstone {
 namespace {
