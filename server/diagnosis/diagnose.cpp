@@ -7,12 +7,12 @@
 #include <mutex>
 
 #include "server/base/status.h"
-#include "server/diagnosis/describe_residuals.h"
-#include "server/diagnosis/ladder.h"
-#include "server/diagnosis/propose.h"
-#include "server/diagnosis/summary.h"
-#include "server/diagnosis/unposed.h"
-#include "server/diagnosis/where.h"
+#include "server/diagnosis/design/propose.h"
+#include "server/diagnosis/distributions/unposed.h"
+#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone {
 namespace {

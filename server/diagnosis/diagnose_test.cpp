@@ -3,7 +3,8 @@
 
 #include <cmath>
 
-#include "server/diagnosis/simulated_test_set.h"
+#include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 
 #include "server/base/status.h"
-#include "server/diagnosis/observations.h"
-#include "server/diagnosis/prediction.h"
+#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::hidden {

@@ -6,8 +6,8 @@
 #include <iostream>
 
 #include "server/base/status.h"
-#include "server/diagnosis/observations.h"
-#include "server/diagnosis/prediction.h"
+#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"

@@ -1,0 +1,171 @@
+#include "server/diagnosis/distributions/unposed_case.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/random.h"
+#include "server/base/status.h"
+#include "server/base/units.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone {
+namespace {
+
+constexpr int kMeasuredTouches = 1500;  // at most, all objects together
+// About, all objects together. Distances among an object's own grow with their square.
+constexpr int kReferenceTouches = 1200, kMaxReferenceAnObject = 600;
+constexpr int kQuickTouches = 480, kMaxQuickAnObject = 360;
+constexpr uint64_t kReferenceSeed = 1;  // sets are 2, 3, ...
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<UnposedCase>> UnposedCase::Create(const DiagnosisInput& input,
+                                                                 const DiagnosisContext& context) {
+  std::unique_ptr<UnposedCase> made(new UnposedCase(input, context));
+  TOUCHSTONE_RETURN_IF_ERROR(made->Prepare());
+  return made;
+}
+
+absl::Status UnposedCase::Prepare() {
+  if (set.size() == 0) return absl::InvalidArgumentError(absl::StrCat(set.origin, ": holds no touch"));
+  if (set.fingers != input.model->fingers)
+    return absl::InvalidArgumentError(absl::StrCat(set.origin, ": has times of ", set.fingers,
+                                                   " fingers, the model '", input.model->name, "' has ",
+                                                   input.model->fingers, ": they must agree"));
+  if (set.fingers < 2)
+    return absl::InvalidArgumentError(
+        absl::StrCat(set.origin, ": one finger alone has no relative times, there is nothing to compare"));
+  if (set.speed_m_s.size() == static_cast<size_t>(set.size())) {
+    std::vector<double> speeds = set.speed_m_s;
+    std::nth_element(speeds.begin(), speeds.begin() + speeds.size() / 2, speeds.end());
+    speed_m_s = speeds[speeds.size() / 2];
+  }
+  const int count = static_cast<int>(set.objects.size());
+  for (int o = 0; o < count; ++o) {
+    const auto surface = input.surfaces.find(set.objects[o]);
+    if (surface == input.surfaces.end())
+      return absl::InvalidArgumentError(absl::StrCat(set.origin, ": object '", set.objects[o],
+                                                     "' has no mesh: give --mesh ", set.objects[o], "=FILE"));
+    objects.push_back(
+        SupposePlan(set, o, surface->second, speed_m_s, std::max(24, kMeasuredTouches / count)));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CompareSizes());
+  if (size_ratio == 1) EstimateNoise();
+  for (int o = 0; o < count; ++o)
+    measured.push_back(MakeUnposedSample(MeasuredTimes(o), set.fingers, speed_m_s, model->spacing_m));
+  return absl::OkStatus();
+}
+
+// Times that no speed could give are in another unit than they should be; noise is not to make up for that.
+absl::Status UnposedCase::CompareSizes() {
+  double here = 0, simulated = 0;
+  for (size_t o = 0; o < objects.size(); ++o) {
+    const auto spread = [&](const std::vector<double>& time_s) {
+      return TouchStatistics(time_s, set.fingers, speed_m_s, model->spacing_m)[0].Mean();
+    };
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> time_s,
+                                TimesOfSet(model, static_cast<int>(o), SupposedPoses(), kReferenceSeed));
+    here += spread(MeasuredTimes(static_cast<int>(o)));
+    simulated += spread(time_s);
+  }
+  if (simulated > 0 && (here > 100 * simulated || here < 0.01 * simulated)) size_ratio = here / simulated;
+  return absl::OkStatus();
+}
+
+// What repeats of a pose scatter needs no pose to be known.
+void UnposedCase::EstimateNoise() {
+  scatter_s = ScatterAmongRounds(set, objects, &degrees);
+  if (degrees < kFewDegrees || scatter_s == 0) return;
+  auto noisy = std::make_shared<Model>(*input.model);
+  for (EffectInstance& instance : noisy->effects) {
+    if (instance.effect->name != "gaussian_noise") continue;
+    const double sigma_s = instance.ValuesFor(set.objects[0])[0];
+    // Three standard errors off.
+    if (std::abs(scatter_s - sigma_s) < 3 * scatter_s / std::sqrt(2 * degrees)) return;
+    instance.values[0] = scatter_s;
+    instance.object_values.clear();
+    noise_changed = true;
+    noise_is_new = sigma_s == 0;
+    model = noisy;
+    return;
+  }
+  EffectInstance noise;
+  noise.effect = Catalogue().Find("gaussian_noise");
+  noise.values = {scatter_s};
+  noisy->effects.push_back(std::move(noise));
+  noise_changed = noise_is_new = true;
+  model = noisy;
+}
+
+std::vector<double> UnposedCase::MeasuredTimes(int object) const {
+  std::vector<double> time_s;
+  for (const int row : objects[object].rows)
+    for (int i = 0; i < set.fingers; ++i) time_s.push_back(set.TimeS(row, i));
+  return time_s;
+}
+absl::StatusOr<std::vector<double>> UnposedCase::TimesOfSet(const std::shared_ptr<const Model>& of,
+                                                            int object, const SupposedPoses& poses,
+                                                            uint64_t number) const {
+  const UnposedObject& like = objects[object];
+  // Every object of every set has poses of its own.
+  const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, number, object, 7)[0];
+  return SimulateUnposed(of, like.surface, WithPoses(like.plan, poses), like.number, seed);
+}
+
+// The poses are those that the model as it is reaches, whatever model touches them then: so the distances of
+// two models differ by the models alone.
+absl::StatusOr<std::shared_ptr<const UnposedTouches>> UnposedCase::TouchesOfReference(
+    int object, const SupposedPoses& poses, ReferenceSize size) const {
+  const auto key = std::make_tuple(object, poses.max_tilt_rad, poses.spread, size);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = touches_.find(key);
+    if (found != touches_.end()) return found->second;
+  }
+  const bool quick = size == ReferenceSize::kQuick;
+  const int most = quick ? kMaxQuickAnObject : kMaxReferenceAnObject,
+            together = quick ? kQuickTouches : kReferenceTouches;
+  Plan plan = WithPoses(objects[object].plan, poses);
+  plan.faces.rounds = 1;
+  plan.faces.samples_per_face = std::clamp(together / 6 / static_cast<int>(set.objects.size()), 10, most / 6);
+  std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
+  for (size_t n = 0; n < numbers.size(); ++n) numbers[n] = n;
+  const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, kReferenceSeed, object, 7)[0];
+  TOUCHSTONE_ASSIGN_OR_RETURN(UnposedTouches touches,
+                              DrawUnposed(model, objects[object].surface, plan, numbers, seed));
+  auto shared = std::make_shared<const UnposedTouches>(std::move(touches));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return touches_.emplace(key, shared).first->second;
+}
+
+absl::StatusOr<UnposedSamples> UnposedCase::MakeReference(const std::shared_ptr<const Model>& of,
+                                                          const SupposedPoses& poses,
+                                                          ReferenceSize size) const {
+  UnposedSamples samples;
+  for (size_t o = 0; o < objects.size(); ++o) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches, TouchesOfReference(static_cast<int>(o), poses, size));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> time_s,
+                                PlayUnposed(of, objects[o].surface, *touches));
+    samples.push_back(MakeUnposedSample(time_s, set.fingers, speed_m_s, of->spacing_m));
+  }
+  return samples;
+}
+
+absl::StatusOr<UnposedSamples> UnposedCase::MakeSet(const std::shared_ptr<const Model>& of,
+                                                    const SupposedPoses& poses, uint64_t number) const {
+  UnposedSamples samples;
+  for (size_t o = 0; o < objects.size(); ++o) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> time_s,
+                                TimesOfSet(of, static_cast<int>(o), poses, kReferenceSeed + 1 + number));
+    // A finger that reported nothing in the set does so here.
+    const std::vector<double> reported = MeasuredTimes(static_cast<int>(o));
+    for (size_t t = 0; t < time_s.size(); ++t)
+      if (std::isnan(reported[t])) time_s[t] = NAN;
+    samples.push_back(MakeUnposedSample(time_s, set.fingers, speed_m_s, of->spacing_m));
+  }
+  return samples;
+}
+
+}  // namespace touchstone

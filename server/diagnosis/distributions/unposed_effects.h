@@ -1,0 +1,45 @@
+// Which effects would make the sets of a model like a measured one without poses.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/base/thread_pool.h"
+#include "server/diagnosis/distributions/unposed_case.h"
+#include "server/model/model.h"
+
+namespace touchstone {
+
+struct CompatibleEffect {
+  std::string effect;
+  std::string values;  // for people: "radius_mm = 1.5"
+  double p = 0;
+};
+
+// How far the measured set is from a reference that a model makes, of all measures together, and its p.
+struct UnposedMisfit {
+  double distance = 0;
+  double p = 0;
+};
+using MisfitOfModel = std::function<absl::StatusOr<UnposedMisfit>(const std::shared_ptr<const Model>&,
+                                                                  const SupposedPoses&, ReferenceSize)>;
+
+// Another measure of misfit: against sets that this model makes with these poses.
+using RenewMisfit =
+    std::function<absl::StatusOr<MisfitOfModel>(const std::shared_ptr<const Model>&, const SupposedPoses&)>;
+
+// Every effect of the catalogue and of `also`, one number at a time, with both signs and a few strengths,
+// first at a glance with each of `poses`; then the most promising closely, all entries of a parameter and
+// poses together, in the end by the misfit that `renew` makes of the best so far. Those whose p is above 0.1,
+// most compatible first. `noise_is_known`: no effect that makes noise is tried. `misfit` is called from
+// several threads. Returns CANCELLED if `progress` (0 to 1, one call at a time) returns false.
+absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
+    const Model& model, bool noise_is_known, const std::vector<std::shared_ptr<const Effect>>& also,
+    const std::vector<SupposedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
+    const std::function<bool(double done)>& progress);
+
+}  // namespace touchstone

@@ -1,0 +1,117 @@
+#include "server/diagnosis/distributions/unposed_rank.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/base/units.h"
+
+namespace touchstone {
+namespace {
+
+constexpr int kEnough = 10;     // as large ones: no more sets are needed to know that p is not small
+constexpr int kPortion = 8;     // sets between two looks at progress
+constexpr int kDoubtSets = 39;  // until p is roughly known
+constexpr int kSomeSets = 99;
+constexpr int kSmallPSets = 219;  // the least that show p < 0.005
+constexpr int kAllSets = 499;
+
+}  // namespace
+
+double SequentialP(const std::vector<double>& simulated, double measured, int k) {
+  int as_large = 0;
+  for (size_t n = 0; n < simulated.size(); ++n) {
+    as_large += simulated[n] >= measured - 1e-12;
+    if (as_large == k) return double(k) / (n + 1);
+  }
+  return (1.0 + as_large) / (1.0 + simulated.size());
+}
+
+UnposedNull UnposedRank::Null(size_t object) const {
+  std::vector<std::vector<double>> distances;
+  for (const auto& set : sets_) distances.push_back(set[object]);
+  return UnposedNull(std::move(distances));
+}
+
+absl::StatusOr<UnposedRank> UnposedRank::Make(const UnposedCase& the_case,
+                                              const std::shared_ptr<const Model>& model,
+                                              const SupposedPoses& poses, bool doubt_only, double from,
+                                              double to) {
+  UnposedRank rank;
+  rank.poses_ = poses;
+  TOUCHSTONE_ASSIGN_OR_RETURN(rank.reference_, the_case.MakeReference(model, poses, ReferenceSize::kFull));
+  rank.distances_ = UnposedDistances(the_case.measured, rank.reference_);
+
+  const size_t objects = the_case.objects.size();
+  const int most = doubt_only ? kSomeSets : kAllSets;
+  std::vector<absl::Status> status(most);
+  const auto make = [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) {
+      const auto set = the_case.MakeSet(model, poses, n);
+      if (!set.ok()) {
+        status[n] = set.status();
+        continue;
+      }
+      for (size_t o = 0; o < objects; ++o)
+        rank.sets_[n].push_back(UnposedDistances((*set)[o], rank.reference_[o]));
+      rank.sets_[n].push_back(UnposedDistances(*set, rank.reference_));
+    }
+  };
+  for (const int until : {kDoubtSets, kSomeSets, kSmallPSets, kAllSets}) {
+    if (until > most) break;
+    for (int begin = static_cast<int>(rank.sets_.size()); begin < until; begin += kPortion) {
+      if (!the_case.Progress("simulating sets", from + (to - from) * begin / most))
+        return absl::CancelledError("cancelled");
+      const int end = std::min(until, begin + kPortion);
+      rank.sets_.resize(end);
+      if (the_case.context.pool)
+        the_case.context.pool->ParallelFor(end - begin, 1, [&](int a, int b) { make(begin + a, begin + b); });
+      else
+        make(begin, end);
+      for (int n = begin; n < end; ++n) TOUCHSTONE_RETURN_IF_ERROR(status[n]);
+    }
+    const UnposedNull null = rank.Null(objects);
+    std::vector<double> simulated;
+    for (const auto& set : rank.sets_) simulated.push_back(null.Largest(set[objects]));
+    const double measured = null.Largest(rank.distances_);
+    const auto as_large = std::count_if(simulated.begin(), simulated.end(),
+                                        [&](double value) { return value >= measured - 1e-12; });
+    rank.p_ = SequentialP(simulated, measured, kEnough);
+    if (as_large >= kEnough) break;
+    if (doubt_only && rank.p_ <= 0.1) break;
+    if (until == kSmallPSets && as_large == 0) break;
+  }
+  return rank;
+}
+
+absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const UnposedRank& rank, double from,
+                                       double to) {
+  const UnposedNull null = rank.Null(the_case.objects.size());
+  SupposedPoses best;
+  double least = HUGE_VAL;
+  int tried = 0;
+  const auto attempt = [&](double tilt_deg, double spread, ReferenceSize size) -> absl::Status {
+    if (!the_case.Progress("fitting the poses' spread", from + (to - from) * tried++ / 33))
+      return absl::CancelledError("cancelled");
+    const SupposedPoses poses{tilt_deg * kRadiansPerDegree, spread};
+    TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference,
+                                the_case.MakeReference(the_case.model, poses, size));
+    const double apart = null.Together(UnposedDistances(the_case.measured, reference));
+    if (apart < least) least = apart, best = poses;
+    return absl::OkStatus();
+  };
+  for (const double tilt_deg : {5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0})
+    for (const double spread : {0.4, 0.6, 0.8})
+      TOUCHSTONE_RETURN_IF_ERROR(attempt(tilt_deg, spread, ReferenceSize::kQuick));
+  const SupposedPoses coarse = best;
+  // Never worse than the poses that one supposes without looking.
+  best = rank.poses();
+  least = null.Together(rank.distances());
+  for (const double tilt_deg : {-2.5, 0.0, 2.5})
+    for (const double spread : {-0.1, 0.0, 0.1})
+      TOUCHSTONE_RETURN_IF_ERROR(attempt(coarse.max_tilt_rad / kRadiansPerDegree + tilt_deg,
+                                         coarse.spread + spread, ReferenceSize::kFull));
+  return best;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,222 @@
+#include "server/diagnosis/inference/free_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/model/parameter_values.h"
+#include "server/session/measurement_set.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kNormalQuantile = 1.959964;  // of 97.5 %
+
+// Directions in which the entries of one parameter may move: the unit vectors, or, where the entries sum to
+// zero, an orthonormal basis of that plane (Helmert's).
+std::vector<std::vector<double>> Directions(const ParameterInfo& parameter, int count) {
+  std::vector<std::vector<double>> directions;
+  if (!parameter.sum_zero) {
+    for (int j = 0; j < count; ++j) {
+      directions.emplace_back(count, 0.0);
+      directions.back()[j] = 1;
+    }
+    return directions;
+  }
+  for (int row = 1; row < count; ++row) {
+    directions.emplace_back(count, 0.0);
+    const double norm = std::sqrt(static_cast<double>(row) * (row + 1));
+    for (int j = 0; j < row; ++j) directions.back()[j] = -1 / norm;
+    directions.back()[row] = row / norm;
+  }
+  return directions;
+}
+
+}  // namespace
+
+std::string NameOf(const Effect& effect) {
+  return effect.formula ? "formula " + effect.formula->name : effect.name;
+}
+
+std::string EntryName(const ParameterInfo& parameter, int entry, int fingers) {
+  if (parameter.arity == Arity::kVector3) return std::string(1, "xyz"[entry]);
+  if (parameter.arity == Arity::kPerFinger) return FingerName(entry, fingers);
+  return "";
+}
+
+FreeModel::FreeModel(Model base, std::vector<std::string> objects)
+    : base_(std::move(base)), objects_(std::move(objects)) {
+  for (EffectInstance& instance : base_.effects)
+    if (instance.per_object)
+      for (const std::string& object : objects_) instance.object_values.emplace(object, instance.values);
+}
+
+bool FreeModel::IsFree(int effect) const {
+  return std::any_of(coordinates_.begin(), coordinates_.end(),
+                     [&](const Coordinate& c) { return c.effect == effect; });
+}
+
+void FreeModel::Free(int index, bool refit) {
+  if (IsFree(index)) return;
+  const EffectInstance& instance = base_.effects[index];
+  const Effect& effect = *instance.effect;
+  const int fingers = base_.fingers;
+  for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p) {
+    const ParameterInfo& parameter = effect.parameters[p];
+    const double si = SiFactor(parameter.unit);
+    const int count = parameter.Count(fingers), offset = ValueOffset(effect, p, fingers);
+    for (const std::vector<double>& direction : Directions(parameter, count)) {
+      Coordinate c;
+      c.effect = index;
+      c.parameter = p;
+      c.shape = shapes_++;
+      c.weights.assign(instance.values.size(), 0.0);
+      for (int j = 0; j < count; ++j) c.weights[offset + j] = direction[j];
+      c.scale = parameter.typical * si;
+      c.lower = parameter.lower * si;
+      c.upper = parameter.upper * si;
+      c.neutral = parameter.sum_zero ? 0 : parameter.neutral * si;
+      if (parameter.sum_zero) c.lower = std::min(c.lower, -c.upper);
+      if (effect.name == "acceleration_ramp") {
+        c.inverse = true;
+        c.neutral = 0;
+        c.scale = 1 / (parameter.typical * si);
+        c.lower = 1 / (parameter.upper * si);
+        c.upper = 1 / std::max(parameter.lower * si, 1e-3);
+      }
+      const auto start = [&](const std::vector<double>& values) {
+        double sum = 0;
+        for (size_t j = 0; j < values.size(); ++j) sum += c.weights[j] * values[j];
+        return c.inverse ? 1 / sum : sum;
+      };
+      if (!instance.per_object) {
+        if (refit) c.neutral = start(instance.values);
+        coordinates_.push_back(c);
+        continue;
+      }
+      for (const std::string& object : objects_) {
+        c.object = object;
+        if (refit) c.neutral = start(instance.object_values.at(object));
+        coordinates_.push_back(c);
+      }
+    }
+  }
+}
+
+void FreeModel::Add(std::shared_ptr<const Effect> effect, bool per_object) {
+  EffectInstance instance;
+  instance.values = effect->NeutralValues(base_.fingers);
+  instance.per_object = per_object || effect->always_per_object;
+  instance.effect = std::move(effect);
+  if (instance.per_object)
+    for (const std::string& object : objects_) instance.object_values[object] = instance.values;
+  base_.effects.push_back(std::move(instance));
+  Free(static_cast<int>(base_.effects.size()) - 1, false);
+}
+
+FreeModel FreeModel::Without(int index) const {
+  FreeModel other = *this;
+  other.base_.effects.erase(other.base_.effects.begin() + index);
+  other.coordinates_.clear();
+  for (Coordinate c : coordinates_) {
+    if (c.effect == index) continue;
+    if (c.effect > index) --c.effect;
+    other.coordinates_.push_back(std::move(c));
+  }
+  return other;
+}
+
+Eigen::VectorXd FreeModel::Start() const {
+  Eigen::VectorXd point(size());
+  for (int i = 0; i < size(); ++i) {
+    const Coordinate& c = coordinates_[i];
+    const EffectInstance& instance = base_.effects[c.effect];
+    const std::vector<double>& values =
+        c.object.empty() ? instance.values : instance.object_values.at(c.object);
+    double sum = 0;  // the weights of one parameter's coordinates are orthonormal
+    for (size_t j = 0; j < values.size(); ++j) sum += c.weights[j] * values[j];
+    point[i] = c.inverse ? 1 / sum : sum;
+  }
+  return point;
+}
+
+Eigen::VectorXd FreeModel::Clip(Eigen::VectorXd point) const {
+  for (int i = 0; i < size(); ++i)
+    point[i] = std::clamp(point[i], coordinates_[i].lower, coordinates_[i].upper);
+  return point;
+}
+
+Model FreeModel::At(const Eigen::VectorXd& point) const {
+  Model model = base_;
+  // Free values are the sum of their coordinates.
+  const auto values_of = [&](const Coordinate& c) -> std::vector<double>& {
+    EffectInstance& instance = model.effects[c.effect];
+    return c.object.empty() ? instance.values : instance.object_values.at(c.object);
+  };
+  for (const Coordinate& c : coordinates_)
+    for (size_t j = 0; j < c.weights.size(); ++j)
+      if (c.weights[j] != 0) values_of(c)[j] = 0;
+  for (int i = 0; i < size(); ++i) {
+    const Coordinate& c = coordinates_[i];
+    const double value = c.inverse ? 1 / std::max(point[i], 1e-12) : point[i];
+    std::vector<double>& values = values_of(c);
+    for (size_t j = 0; j < c.weights.size(); ++j) values[j] += c.weights[j] * value;
+  }
+  for (const Coordinate& c : coordinates_) {
+    const Effect& effect = *model.effects[c.effect].effect;
+    const ParameterInfo& parameter = effect.parameters[c.parameter];
+    const int offset = ValueOffset(effect, c.parameter, model.fingers);
+    const double si = SiFactor(parameter.unit);
+    for (int j = 0; j < parameter.Count(model.fingers); ++j) {
+      double& value = values_of(c)[offset + j];
+      value = std::clamp(value, parameter.lower * si, parameter.upper * si);
+    }
+  }
+  return model;
+}
+
+void FreeModel::MoveTo(const Eigen::VectorXd& point) {
+  base_ = At(point);
+}
+
+std::vector<v1::ParameterValue> FreeModel::Describe(int index, const Eigen::VectorXd& point,
+                                                    const Eigen::MatrixXd& covariance) const {
+  std::vector<v1::ParameterValue> described;
+  const Model model = At(point);
+  const EffectInstance& instance = model.effects[index];
+  const Effect& effect = *instance.effect;
+  std::vector<std::string> objects = {""};
+  if (instance.per_object) objects = objects_;
+  for (const std::string& object : objects) {
+    const std::vector<double>& values = object.empty() ? instance.values : instance.object_values.at(object);
+    for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p) {
+      const ParameterInfo& parameter = effect.parameters[p];
+      const int offset = ValueOffset(effect, p, model.fingers);
+      for (int j = 0; j < parameter.Count(model.fingers); ++j) {
+        // The entry's variance through the coordinates that move it.
+        Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size());
+        for (int i = 0; i < size(); ++i) {
+          const Coordinate& c = coordinates_[i];
+          if (c.effect != index || c.object != object) continue;
+          gradient[i] = c.weights[offset + j];
+          if (c.inverse) gradient[i] *= 1 / (point[i] * point[i]);
+        }
+        v1::ParameterValue value;
+        value.set_name(parameter.name);
+        value.set_unit(std::string(UnitSymbol(parameter.unit)));
+        value.set_finger(EntryName(parameter, j, model.fingers));
+        value.set_object(object);
+        const double si = SiFactor(parameter.unit);
+        value.set_value(values[offset + j] / si);
+        const double variance = covariance.size() > 0 ? gradient.dot(covariance * gradient) : 0;
+        value.set_std_error(std::sqrt(std::max(variance, 0.0)) / si);
+        value.set_lower(std::max(value.value() - kNormalQuantile * value.std_error(), parameter.lower));
+        value.set_upper(std::min(value.value() + kNormalQuantile * value.std_error(), parameter.upper));
+        described.push_back(std::move(value));
+      }
+    }
+  }
+  return described;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,108 @@
+#include "server/diagnosis/inference/likelihood.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include <cmath>
+
+#include "server/base/random.h"
+#include "server/diagnosis/touches/predictor.h"
+#include "server/diagnosis/touches/simulated_test_set.h"
+
+namespace touchstone {
+namespace {
+
+HiddenRig SmallRig() {
+  HiddenRig rig;
+  rig.objects = {"lat00", "lat20"};
+  rig.samples_per_face = rig.rounds = 2;
+  return rig;
+}
+
+class LikelihoodTest : public ::testing::Test {
+ protected:
+  LikelihoodTest() : input(MakeTestInput(SmallRig())) {
+    observations = std::make_unique<Observations>(*MakeObservations(input));
+    details = *Predict(*observations, *input.model, true, false, nullptr);
+    contrasts = std::make_unique<Contrasts>(*observations, details.time_s);
+    likelihood = std::make_unique<Likelihood>(*observations, *contrasts, details, true, 0, nullptr);
+  }
+  Eigen::VectorXd Noise(uint64_t seed) const {
+    RandomStream random(seed, RandomDomain::kTest);
+    Eigen::VectorXd noise(likelihood->rows());
+    for (int row = 0; row < noise.size(); ++row) noise[row] = random.Normal();
+    return noise;
+  }
+  DiagnosisInput input;
+  std::unique_ptr<Observations> observations;
+  Prediction details;
+  std::unique_ptr<Contrasts> contrasts;
+  std::unique_ptr<Likelihood> likelihood;
+};
+
+// The covariance of contrasts under a hypothesis, element by element from its definition.
+Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, const Contrasts& c,
+                                const Prediction& d, const Likelihood::Surface& surface) {
+  const int entries = static_cast<int>(o.time_s.size());
+  Eigen::MatrixXd field = Eigen::MatrixXd::Zero(entries, entries);
+  for (int a = 0; a < entries; ++a)
+    for (int b = 0; b < entries; ++b) {
+      if (std::isnan(d.time_s[a]) || std::isnan(d.time_s[b])) continue;
+      if (o.object[a / 3] != o.object[b / 3]) continue;
+      const double x = std::sqrt(5.0) * (d.contact_m[a] - d.contact_m[b]).norm() / surface.length_m;
+      const double gain_a = d.slope_s_m[a] / std::max(d.cos_incidence[a], 0.1);
+      const double gain_b = d.slope_s_m[b] / std::max(d.cos_incidence[b], 0.1);
+      field(a, b) =
+          surface.ratio_m_s * surface.ratio_m_s * gain_a * gain_b * (1 + x + x * x / 3) * std::exp(-x);
+    }
+  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(c.rows(), entries);
+  for (size_t t = 0; t < c.touches().size(); ++t)
+    h.block(c.FirstRow(static_cast<int>(t)), c.touches()[t] * 3, c.MatrixOf(static_cast<int>(t)).rows(), 3) =
+        c.MatrixOf(static_cast<int>(t));
+  return Eigen::MatrixXd::Identity(c.rows(), c.rows()) + h * field * h.transpose();
+}
+
+TEST_F(LikelihoodTest, IsTheGaussianWithTheFieldsCovariance) {
+  for (const int s : {0, 5, 20, 40, 65}) {
+    const Likelihood::Surface& surface = likelihood->surfaces()[s];
+    Eigen::MatrixXd v = Eigen::MatrixXd::Identity(likelihood->rows(), likelihood->rows());
+    if (s > 0) v = DenseCovariance(*this, *observations, *contrasts, details, surface);
+    const Eigen::VectorXd r = Noise(s);
+    const double expected = r.dot(v.ldlt().solve(r));
+    EXPECT_NEAR(likelihood->Gram(likelihood->Prepare(r), s)(0, 0), expected, 2e-3 * expected) << s;
+    const double log_determinant = v.ldlt().vectorD().array().log().sum();
+    EXPECT_NEAR(surface.log_determinant, log_determinant, 0.02 * std::abs(log_determinant) + 0.05) << s;
+  }
+}
+
+TEST_F(LikelihoodTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
+  Eigen::MatrixXd values(likelihood->rows(), 4);
+  for (int c = 0; c < 4; ++c) values.col(c) = Noise(10 + c);
+  const Likelihood::Columns all = likelihood->Prepare(values);
+  const Eigen::MatrixXd whole = likelihood->Gram(all, 30);
+  const Eigen::MatrixXd part = likelihood->Gram(Likelihood::Pick(all, {3, 1}), 30);
+  EXPECT_NEAR(part(0, 1), whole(3, 1), 1e-9);
+  const Likelihood::Columns joined =
+      Likelihood::Join(Likelihood::Pick(all, {0, 1}), likelihood->Prepare(values.rightCols(2)));
+  EXPECT_LT((likelihood->Gram(joined, 30) - whole).norm(), 1e-9);
+  EXPECT_NEAR(likelihood->Norms(all, 30)[2], whole(2, 2), 1e-9);
+}
+
+TEST_F(LikelihoodTest, TheFieldFollowsBumpsAndNotNoise) {
+  // A bump along the normal of one object, 0.3 mm high.
+  std::vector<double> bump(observations->time_s.size());
+  for (size_t e = 0; e < bump.size(); ++e)
+    bump[e] = -0.3e-3 *
+              std::exp(-(details.contact_m[e] - details.contact_m[1]).squaredNorm() / (2 * 0.02 * 0.02)) *
+              details.slope_s_m[e] / details.cos_incidence[e];
+  const Eigen::VectorXd r = contrasts->Apply(bump);
+  const Likelihood::Columns columns = likelihood->Prepare(r);
+  double best = 0;
+  for (int s = 1; s < static_cast<int>(likelihood->surfaces().size()); ++s)
+    best = std::max(best, 1 - (r - likelihood->FieldMean(columns, s)).squaredNorm() / r.squaredNorm());
+  EXPECT_GT(best, 0.97);
+  EXPECT_EQ(likelihood->FieldMean(columns, 0).norm(), 0);
+}
+
+}  // namespace
+}  // namespace touchstone

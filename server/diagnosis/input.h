@@ -1,0 +1,31 @@
+// What a diagnosis is asked: a model, a measurement set and the surfaces that were touched.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/thread_pool.h"
+#include "server/geometry/surface.h"
+#include "server/model/model.h"
+#include "server/session/measurement_set.h"
+
+namespace touchstone {
+
+struct DiagnosisInput {
+  std::shared_ptr<const Model> model;
+  std::shared_ptr<const MeasurementSet> set;
+  std::map<std::string, std::shared_ptr<const Surface>> surfaces;  // by the set's object names
+  std::vector<std::shared_ptr<const Effect>> also;  // formulas of the user that compete with the catalogue
+  uint64_t seed = 0;
+};
+
+struct DiagnosisContext {
+  ThreadPool* pool = nullptr;  // null: this thread alone
+  // Called often, from one thread at a time. Returns false to cancel: the call then ends with CANCELLED soon.
+  std::function<bool(const std::string& stage, double done)> progress;
+};
+
+}  // namespace touchstone

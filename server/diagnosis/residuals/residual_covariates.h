@@ -1,0 +1,41 @@
+// What a residual may hang on, in words and units that people use: one list for slices and for curves.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/touches/prediction.h"
+
+namespace touchstone {
+
+struct ResidualCovariate {
+  std::string name;                 // as formulas and reports name it: "incidence_deg"
+  std::string words;                // as a sentence names it: "incidence"
+  std::string unit;                 // "deg"; empty for a ratio or a category
+  std::vector<std::string> labels;  // of a category; its values are indices into these
+  // Of finger i in touch k; NaN where it is not known.
+  std::function<double(int k, int finger)> value;
+
+  bool is_category() const { return !labels.empty(); }
+};
+
+// Everything that set and prediction know, without what is the same everywhere. Both must outlive the list.
+std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observations,
+                                                      const Prediction& prediction);
+
+// At most `limit` of the touches that take part (used, with a residual), in order: whole poses, the same ones
+// at every call.
+std::vector<int> ThinnedTouches(const Observations& observations, const std::vector<double>& residuals,
+                                int limit);
+
+// How many fingers of touch k have a residual.
+int FingersCompared(const Observations& observations, const std::vector<double>& residuals, int k);
+
+// What noise of sigma adds to the square of one finger's residual, in a touch with that many fingers.
+inline double NoiseShare(double sigma_s, int fingers_compared) {
+  return sigma_s * sigma_s * (1 - 1.0 / fingers_compared);
+}
+
+}  // namespace touchstone

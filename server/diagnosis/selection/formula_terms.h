@@ -1,0 +1,35 @@
+// A dictionary of simple terms that a rest may follow when no effect of the catalogue does: a factor that
+// tells the fingers apart, times a covariate or a function of one, as people would write it in a model file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/diagnosis/inference/fit.h"
+
+namespace touchstone {
+
+struct FormulaTerm {
+  std::string covariate;   // "approach_z"
+  std::string expression;  // with its parameters: "k * (finger == 0) * approach_z"
+  bool adds_time = false;
+  std::vector<ParameterInfo> parameters;  // in the units of files
+  std::vector<double> values;             // where a fit starts
+  double gain_nats = 0;  // evidence over the fit without it, price of the choice not yet paid
+  double log_ratio = 0;  // of the likelihoods
+  int degrees = 1;
+};
+
+// Every term's gain over `fit`, best first. `details` are of the fit's model, with curvature.
+std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit, const Prediction& details);
+
+// The term as an effect of this name.
+absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,
+                                                             const FormulaTerm& term);
+
+// Two terms in one expression: parameters of the second are renamed where they clash.
+FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b);
+
+}  // namespace touchstone

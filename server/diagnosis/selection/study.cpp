@@ -1,0 +1,260 @@
+#include "server/diagnosis/selection/study.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/status.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kMaxMissed = 0.5;  // share of an object's touches
+constexpr double kWarnMissed = 0.05;
+constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther has met nothing at the target
+constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
+constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
+constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
+constexpr int kRepeatsSearched = 4;
+constexpr double kFloorM = 0.3e-6;  // what mesh files and CSV numbers are rounded to, about
+
+// A mesh that most touches miss is not the mesh that was touched.
+absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
+                         std::vector<std::string>* warnings) {
+  std::vector<int> touches(o.objects.size()), missed(o.objects.size());
+  std::vector<double> off_m(o.objects.size());
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    ++touches[o.object[k]];
+    bool misses = false;
+    for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
+      misses |= !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMaxTravel * o.set->standoff_m[o.row[k]]);
+    missed[o.object[k]] += misses;
+    const Bounds& bounds = o.surfaces[o.object[k]]->bounds();
+    const Eigen::Vector3d& target = o.set->target_m[o.row[k]];
+    const Eigen::Vector3d outside = (bounds.min_m - target).cwiseMax(target - bounds.max_m).cwiseMax(0.0);
+    off_m[o.object[k]] = std::max(off_m[o.object[k]], outside.norm());
+  }
+  for (size_t object = 0; object < o.objects.size(); ++object) {
+    if (touches[object] == 0 || missed[object] <= kWarnMissed * touches[object]) continue;
+    const Bounds& bounds = o.surfaces[object]->bounds();
+    const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * 1e3;
+    const std::string text = absl::StrFormat(
+        "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
+        "far behind the target. The mesh "
+        "measures "
+        "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
+        o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
+        off_m[object] * 1e3);
+    if (missed[object] > kMaxMissed * touches[object])
+      return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
+                                                     ". Is it this object's mesh, in mm, with z up? (--mesh ",
+                                                     o.objects[object], "=FILE,unit=mm,up=z)"));
+    warnings->push_back(text + ".");
+  }
+  return absl::OkStatus();
+}
+
+// Times a thousand times too long or too short: no effect does that, a wrong unit does.
+absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
+  std::vector<double> measured, predicted;
+  for (int k = 0; k < o.size(); ++k) {
+    double least = INFINITY, most = -INFINITY, min_p = INFINITY, max_p = -INFINITY;
+    for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e) {
+      if (std::isnan(o.time_s[e]) || std::isnan(nominal.time_s[e])) continue;
+      least = std::min(least, o.time_s[e]), most = std::max(most, o.time_s[e]);
+      min_p = std::min(min_p, nominal.time_s[e]), max_p = std::max(max_p, nominal.time_s[e]);
+    }
+    if (most < least) continue;
+    measured.push_back(most - least);
+    predicted.push_back(max_p - min_p);
+  }
+  if (measured.empty()) return absl::OkStatus();
+  const auto median = [](std::vector<double>* values) {
+    std::nth_element(values->begin(), values->begin() + values->size() / 2, values->end());
+    return (*values)[values->size() / 2];
+  };
+  const double m = median(&measured), p = median(&predicted);
+  if (!(m > 0 && p > 0) || (m < kUnitFactor * p && p < kUnitFactor * m)) return absl::OkStatus();
+  const double speed_mm_s = o.set->speed_m_s[0] * 1e3;
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g "
+      "us: no "
+      "effect makes a factor of %.3g. t_*_us are microseconds, speed_mm_s is mm/s; does the file have %s?",
+      o.set->origin, m * 1e6, speed_mm_s, p * 1e6, m > p ? m / p : p / m,
+      m < p ? "milliseconds (multiply by 1000) or seconds" : "nanoseconds, or speeds in m/s"));
+}
+
+// A part of the observations; `previous` stays within it.
+Observations Thin(const Observations& o, const std::vector<int>& kept) {
+  Observations part;
+  part.set = o.set;
+  part.fingers = o.fingers;
+  part.objects = o.objects;
+  part.surfaces = o.surfaces;
+  std::map<int, int> poses;
+  std::vector<int> now(o.size(), -1);
+  for (const int k : kept) {
+    now[k] = part.size();
+    part.row.push_back(o.row[k]);
+    part.object.push_back(o.object[k]);
+    part.pose.push_back(poses.emplace(o.pose[k], static_cast<int>(poses.size())).first->second);
+    part.used.push_back(o.used[k]);
+    part.previous.push_back(o.previous[k] >= 0 ? now[o.previous[k]] : -1);
+    part.time_s.insert(part.time_s.end(), o.time_s.begin() + static_cast<size_t>(k) * o.fingers,
+                       o.time_s.begin() + static_cast<size_t>(k + 1) * o.fingers);
+  }
+  part.poses = static_cast<int>(poses.size());
+  return part;
+}
+
+}  // namespace
+
+absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* o) {
+  std::vector<std::vector<double>> travels;
+  for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(kEdgeM, 0.0), std::pair(-kEdgeM, 0.0),
+                             std::pair(0.0, kEdgeM), std::pair(0.0, -kEdgeM)}) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> travel, predictor.TravelWhenMoved(model, x, y));
+    travels.push_back(std::move(travel));
+  }
+  int left_out = 0;
+  for (int k = 0; k < o->size(); ++k) {
+    if (!o->used[k]) continue;
+    bool edge = false;
+    for (size_t e = static_cast<size_t>(k) * o->fingers; e < static_cast<size_t>(k + 1) * o->fingers; ++e) {
+      if (std::isnan(o->time_s[e]) || std::isnan(travels[0][e])) continue;
+      for (const int axis : {1, 3}) {
+        const double bend = travels[axis][e] + travels[axis + 1][e] - 2 * travels[0][e];
+        edge |= !(std::abs(bend) < kEdgeJumpM);
+      }
+    }
+    if (!edge) continue;
+    LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
+    ++left_out;
+  }
+  return left_out;
+}
+
+SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& residuals) {
+  // Groups of one pose and one set of reporting fingers: sums of residuals and of squares.
+  struct Group {
+    int touches = 0, members = 0;
+    std::vector<double> sum;
+    double squares = 0;
+  };
+  std::map<std::pair<int, uint32_t>, Group> groups;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    uint32_t mask = 0;
+    int members = 0;
+    const double* r = &residuals[static_cast<size_t>(k) * o.fingers];
+    for (int i = 0; i < o.fingers; ++i)
+      if (!std::isnan(r[i])) mask |= 1u << i, ++members;
+    if (members < 2) continue;
+    Group& group = groups[{o.pose[k], mask}];
+    group.sum.resize(o.fingers);
+    group.members = members;
+    ++group.touches;
+    for (int i = 0; i < o.fingers; ++i)
+      if (!std::isnan(r[i])) group.sum[i] += r[i], group.squares += r[i] * r[i];
+  }
+  SumOfSquares error;
+  for (const auto& [key, group] : groups) {
+    double mean_squares = 0;
+    for (const double sum : group.sum) mean_squares += sum * sum / group.touches;
+    error.sum_of_squares += group.squares - mean_squares;
+    error.degrees += static_cast<double>(group.members - 1) * (group.touches - 1);
+  }
+  return error;
+}
+
+absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_row) {
+  const Observations& o = *study->observations;
+  std::vector<int> kept;
+  study->thinned = o.size() > kMaxSearched;
+  if (!study->thinned) {
+    for (int k = 0; k < o.size(); ++k) kept.push_back(k);
+  } else {
+    // Up to four touches a pose, of poses spread evenly; with the touch before each, which hysteresis feels.
+    std::vector<int> usable(o.poses, 0);
+    for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
+    int total = 0;
+    for (int& count : usable) count = std::min(count, kRepeatsSearched), total += count;
+    const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
+    std::vector<int> quota(o.poses, 0);
+    double credit = 0;
+    for (int pose = 0; pose < o.poses; ++pose) {
+      credit += usable[pose];
+      if (usable[pose] == 0 || credit < stride * usable[pose]) continue;
+      credit -= stride * usable[pose];
+      quota[pose] = usable[pose];
+    }
+    std::vector<char> taken(o.size(), 0), needed(o.size(), 0);
+    for (int k = 0; k < o.size(); ++k) {
+      if (!o.used[k] || quota[o.pose[k]] == 0) continue;
+      --quota[o.pose[k]];
+      taken[k] = 1;
+      if (o.previous[k] >= 0) needed[o.previous[k]] = 1;
+    }
+    for (int k = 0; k < o.size(); ++k)
+      if (taken[k] || needed[k]) kept.push_back(k);
+    study->searched = std::make_unique<Observations>(Thin(o, kept));
+    for (size_t j = 0; j < kept.size(); ++j)
+      if (!taken[kept[j]]) study->searched->used[j] = 0;
+  }
+  if (!study->thinned) study->searched = std::make_unique<Observations>(Thin(o, kept));
+  study->searched_predictor = std::make_unique<Predictor>(*study->searched, nullptr);
+  TOUCHSTONE_ASSIGN_OR_RETURN(study->searched_nominal,
+                              study->searched_predictor->Run(*study->input.model, true, false));
+  const Observations& searched = *study->searched;
+  study->contrasts = std::make_unique<Contrasts>(searched, study->searched_nominal.time_s);
+  if (!weights_by_row.empty()) {
+    std::vector<double> weights;
+    for (const int k : study->contrasts->touches()) weights.push_back(weights_by_row[searched.row[k]]);
+    study->contrasts->SetWeights(weights);
+  }
+  double slope = 0;
+  for (const int k : study->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
+  slope /= std::max<size_t>(study->contrasts->touches().size(), 1);
+  study->likelihood = std::make_unique<Likelihood>(searched, *study->contrasts, study->searched_nominal, true,
+                                                   kFloorM * slope, study->context.pool);
+  Experiment& experiment = study->experiment;
+  experiment.observations = study->searched.get();
+  experiment.predictor = study->searched_predictor.get();
+  experiment.contrasts = study->contrasts.get();
+  experiment.likelihood = study->likelihood.get();
+  experiment.nominal_s = study->searched_nominal.time_s;
+  experiment.pool = study->context.pool;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context) {
+  auto study = std::make_unique<Study>();
+  study->input = input;
+  study->context = context;
+  if (context.progress && !context.progress("reading", 0))
+    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
+  study->observations = std::make_unique<Observations>(std::move(observations));
+  Observations& o = *study->observations;
+  study->predictor = std::make_unique<Predictor>(o, context.pool);
+  if (context.progress && !context.progress("predicting", 0.02))
+    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_ASSIGN_OR_RETURN(study->nominal, study->predictor->Run(*input.model, true, true));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(o, study->nominal, &study->warnings));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckUnits(o, study->nominal));
+  for (int k = 0; k < o.size(); ++k) {
+    int members = 0;
+    for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
+      members += !std::isnan(o.time_s[e]) && !std::isnan(study->nominal.time_s[e]);
+    if (members < 2) LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*study->predictor, *input.model, &o).status());
+  return study;
+}
+
+}  // namespace touchstone

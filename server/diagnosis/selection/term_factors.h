@@ -1,0 +1,37 @@
+// What terms of the formula dictionary are made of: covariates and functions of them, and factors that tell
+// the fingers of a touch apart.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/touches/prediction.h"
+
+namespace touchstone {
+
+using TermValue = std::function<double(int k, int finger)>;
+
+// A covariate or a function of one, in the units of files.
+struct TermFactor {
+  std::string covariate;   // "incidence_deg"
+  std::string expression;  // "tan(incidence_deg*pi/180)"
+  bool differs = false;    // between the fingers of a touch
+  double price = 0;        // nats: what people would try first comes cheaper
+  TermValue value;
+};
+
+struct FingerFactor {
+  std::string expression;  // empty: 1
+  TermValue value;
+};
+
+// What a curved function, and a product of two things that differ, cost.
+inline constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
+
+// Both must outlive the lists.
+std::vector<TermFactor> ListTermFactors(const Observations& observations, const Prediction& details);
+std::vector<FingerFactor> ListFingerFactors(const Observations& observations, const Prediction& details);
+
+}  // namespace touchstone

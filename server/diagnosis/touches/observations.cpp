@@ -1,0 +1,123 @@
+#include "server/diagnosis/touches/observations.h"
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "server/base/status.h"
+
+namespace touchstone {
+namespace {
+
+constexpr size_t kMaxExamples = 5;
+// More backward steps of the session time than this share: the file is not in the order of the session.
+constexpr double kMaxBackward = 0.05;
+
+absl::Status CheckInput(const DiagnosisInput& input) {
+  const MeasurementSet& set = *input.set;
+  if (set.fingers == 0)
+    return absl::InvalidArgumentError(absl::StrCat(
+        set.origin,
+        ": the file has no times: it is a plan; measure it first, which fills t_l_us, t_m_us, ..."));
+  if (set.fingers != input.model->fingers)
+    return absl::InvalidArgumentError(absl::StrCat(
+        set.origin, ": the file has times of ", set.fingers, " fingers, the model '", input.model->name,
+        "' has ", input.model->fingers, "; end_effector.fingers of the model must agree"));
+  if (set.fingers < 2)
+    return absl::InvalidArgumentError(absl::StrCat(
+        set.origin, ": only differences between fingers are compared, and there is but one finger"));
+  if (set.size() == 0)
+    return absl::InvalidArgumentError(absl::StrCat(set.origin, ": the file has a header and no touch"));
+  std::vector<std::string> missing;
+  for (const std::string& object : set.objects)
+    if (input.surfaces.count(object) == 0) missing.push_back(object);
+  if (!missing.empty())
+    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '",
+                                            absl::StrJoin(missing, "', '"), "'; give it with --mesh ",
+                                            missing[0], "=FILE, or all of a folder with --mesh-dir DIR"));
+  return absl::OkStatus();
+}
+
+// The order of the session: the file's, unless its session times are clearly sorted otherwise.
+std::vector<int> SessionOrder(const MeasurementSet& set) {
+  std::vector<int> rows(set.size());
+  std::iota(rows.begin(), rows.end(), 0);
+  if (!set.has_session_time) return rows;
+  int backward = 0;
+  for (int k = 1; k < set.size(); ++k) backward += set.session_time_s[k] < set.session_time_s[k - 1];
+  if (backward > kMaxBackward * set.size())
+    std::stable_sort(rows.begin(), rows.end(),
+                     [&](int a, int b) { return set.session_time_s[a] < set.session_time_s[b]; });
+  return rows;
+}
+
+void FindPoses(Observations* o) {
+  using Key = std::array<double, 12>;
+  absl::flat_hash_map<Key, int> poses;
+  const MeasurementSet& set = *o->set;
+  o->pose.resize(o->size());
+  for (int k = 0; k < o->size(); ++k) {
+    const int row = o->row[k];
+    Key key = {static_cast<double>(set.object[row]), set.standoff_m[row], set.speed_m_s[row]};
+    for (int axis = 0; axis < 3; ++axis) {
+      key[3 + axis] = set.target_m[row][axis];
+      key[6 + axis] = set.approach[row][axis];
+      key[9 + axis] = set.lateral[row][axis];
+    }
+    o->pose[k] = poses.emplace(key, static_cast<int>(poses.size())).first->second;
+  }
+  o->poses = static_cast<int>(poses.size());
+}
+
+}  // namespace
+
+absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInput(input));
+  const MeasurementSet& set = *input.set;
+  Observations o;
+  o.set = input.set;
+  o.fingers = set.fingers;
+  o.objects = set.objects;
+  for (const std::string& object : set.objects) o.surfaces.push_back(input.surfaces.at(object));
+  o.row = SessionOrder(set);
+  o.object.resize(o.size());
+  o.used.assign(o.size(), 1);
+  o.previous.assign(o.size(), -1);
+  o.time_s.resize(static_cast<size_t>(o.size()) * o.fingers);
+  for (int k = 0; k < o.size(); ++k) {
+    const int row = o.row[k];
+    o.object[k] = set.object[row];
+    std::copy_n(&set.time_s[static_cast<size_t>(row) * o.fingers], o.fingers,
+                &o.time_s[static_cast<size_t>(k) * o.fingers]);
+    // Session time that falls begins a new session.
+    if (k > 0 && (!set.has_session_time || set.session_time_s[row] >= set.session_time_s[o.row[k - 1]]))
+      o.previous[k] = k - 1;
+  }
+  if (set.has_poses) FindPoses(&o);
+
+  for (int k = 0; k < o.size(); ++k) {
+    int reporting = 0;
+    for (int i = 0; i < o.fingers; ++i)
+      reporting += !std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
+    if (reporting == 0) LeaveOut(&o, k, "no finger reported");
+    if (reporting == 1) LeaveOut(&o, k, "only one finger reported: there is nothing to compare it with");
+  }
+  return o;
+}
+
+void LeaveOut(Observations* observations, int k, const std::string& reason) {
+  if (!observations->used[k]) return;
+  observations->used[k] = 0;
+  v1::UnusedRows& unused = observations->unused[reason];
+  unused.set_rows(unused.rows() + 1);
+  unused.set_reason(reason);
+  if (static_cast<size_t>(unused.examples_size()) < kMaxExamples)
+    unused.add_examples(observations->set->touch[observations->row[k]]);
+}
+
+}  // namespace touchstone

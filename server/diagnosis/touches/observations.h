@@ -1,0 +1,41 @@
+// What takes part in a diagnosis: the touches of a set that can be compared, grouped by object and pose.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/diagnosis/input.h"
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone {
+
+// Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's
+// order).
+struct Observations {
+  std::shared_ptr<const MeasurementSet> set;
+  int fingers = 0;
+  std::vector<std::string> objects;                      // as in the set
+  std::vector<std::shared_ptr<const Surface>> surfaces;  // one an object
+  std::vector<int> row;                                  // touch -> row of the set
+  std::vector<int> object;                               // touch -> index into objects
+  std::vector<int> pose;  // touch -> group of equal commanded touches, numbered by first appearance
+  int poses = 0;
+  std::vector<double> time_s;  // [k * fingers + finger], NaN: not reported
+  std::vector<char> used;      // 0: left out of every fit and error (edge contacts, outliers, ...)
+  std::vector<int> previous;   // the session's previous touch; -1: none
+  std::map<std::string, v1::UnusedRows> unused;  // by reason
+
+  int size() const { return static_cast<int>(row.size()); }
+};
+
+// Checks that set, model and surfaces belong together. Errors name what is missing.
+absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input);
+
+// Takes touch k out, with the reason in words for people ("a finger within 0.3 mm of an edge").
+void LeaveOut(Observations* observations, int k, const std::string& reason);
+
+}  // namespace touchstone

@@ -1,0 +1,52 @@
+// Predictions of one experiment under many models: what is the same for all is prepared once.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "server/diagnosis/touches/prediction.h"
+#include "server/touch/simulate.h"
+
+namespace touchstone {
+
+// True for effects that change no expectation but the scatter, or that are drawn anew for every object:
+// gaussian_noise, incidence_noise, heavy_tail_noise, poll_interval, missed_contact, surface_error. They are
+// judged by likelihood, not by prediction.
+bool IsRandomEffect(const Effect& effect);
+
+// The model without random effects.
+Model DeterministicPart(const Model& model);
+
+class Predictor {
+ public:
+  // `observations` must outlive it.
+  Predictor(const Observations& observations, ThreadPool* pool);
+
+  // See Predict. Touches of one pose are simulated once, unless the model hangs on the session's course.
+  absl::StatusOr<Prediction> Run(const Model& model, bool details, bool curvature) const;
+
+  // Contact travel of every touch with the whole end effector moved by `along_lateral_m` along the lateral
+  // vector and by `along_binormal_m` along approach x lateral. [k * fingers + finger]
+  absl::StatusOr<std::vector<double>> TravelWhenMoved(const Model& model, double along_lateral_m,
+                                                      double along_binormal_m) const;
+
+  const Observations& observations() const { return observations_; }
+
+ private:
+  // Touches of one object that are simulated together.
+  struct Block {
+    int object = 0;
+    std::vector<int> touches;  // k of each line of the batch
+  };
+  static std::vector<Block> MakeBlocks(const Observations& observations, const std::vector<int>& touches);
+  void Fill(const Block& block, const TouchSimulator& simulator, TouchBatch* batch) const;
+  void ForBlocks(const std::vector<Block>& blocks, const std::function<void(const Block&)>& body) const;
+
+  const Observations& observations_;
+  ThreadPool* pool_;
+  std::vector<int> first_of_pose_;  // pose -> its first touch
+  std::vector<Block> pose_blocks_;
+  std::vector<Block> touch_blocks_;
+};
+
+}  // namespace touchstone

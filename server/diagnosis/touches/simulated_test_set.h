@@ -1,0 +1,103 @@
+// For tests: measurement sets that the simulator itself makes under a model with something hidden. (The
+// independent generator is tests/hidden_effects/.)
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/input.h"
+#include "server/effects/all_effects.h"
+#include "server/geometry/supershape.h"
+#include "server/touch/plan.h"
+#include "server/touch/simulate.h"
+
+namespace touchstone {
+
+struct HiddenRig {
+  std::vector<std::string> objects = {"lat00", "lat10", "lat20"};
+  int samples_per_face = 4;
+  int rounds = 3;
+  double sigma_us = 2000;
+  // Effects of the rig that the model lacks: {"tip_radius", "radius_mm=1.5"}.
+  std::vector<std::pair<std::string, std::vector<std::string>>> hidden;
+  // Effects that the model has, as the model has them.
+  std::vector<std::pair<std::string, std::vector<std::string>>> known;
+  uint64_t seed = 1;
+};
+
+inline Model WithEffects(Model model,
+                         const std::vector<std::pair<std::string, std::vector<std::string>>>& effects) {
+  for (const auto& [name, values] : effects) {
+    absl::StatusOr<Model> more = AddEffect(model, name, values, Catalogue());
+    EXPECT_TRUE(more.ok()) << more.status();
+    model = *std::move(more);
+  }
+  return model;
+}
+
+inline std::shared_ptr<const Surface> TestSurface(const std::string& name) {
+  static std::map<std::string, std::shared_ptr<const Surface>> made;
+  std::shared_ptr<const Surface>& surface = made[name];
+  if (surface == nullptr) surface = *Surface::Create(name, *MakeSupershape(*NamedSupershape(name), 4000));
+  return surface;
+}
+
+inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
+  DiagnosisInput input;
+  auto set = std::make_shared<MeasurementSet>();
+  set->origin = "set.csv";
+  set->fingers = 3;
+  set->has_poses = set->has_session_time = true;
+  const Model nominal =
+      WithEffects(NominalModel(), {{"gaussian_noise", {"sigma_us=" + std::to_string(rig.sigma_us)}}});
+  Model real = WithEffects(nominal, rig.hidden);
+  const TouchSimulator simulator(std::make_shared<const Model>(real));
+  Plan plan;
+  plan.kind = Plan::Kind::kFaces;
+  plan.faces.samples_per_face = rig.samples_per_face;
+  plan.faces.rounds = rig.rounds;
+  plan.touch_interval_s = 9;
+  std::vector<double> previous_press_m(3, 0.0);
+  for (size_t object = 0; object < rig.objects.size(); ++object) {
+    const auto surface = TestSurface(rig.objects[object]);
+    input.surfaces[rig.objects[object]] = surface;
+    set->objects.push_back(rig.objects[object]);
+    const auto generator = MakePoseGenerator(plan, surface->bounds(), rig.seed + 17 * object);
+    TouchWorkspace workspace;
+    for (uint64_t number = 0; number < generator->Count(); ++number) {
+      const CommandedTouch touch = TouchOfPlan(plan, *generator, number, 0);
+      TouchBatch batch;
+      simulator.Prepare(1, &batch);
+      batch.surface = surface;
+      batch.seed = rig.seed;
+      batch.index[0] = set->touch.size();
+      batch.target_m[0] = touch.target_m;
+      batch.approach[0] = touch.approach;
+      batch.lateral[0] = touch.lateral;
+      batch.standoff_m[0] = touch.standoff_m;
+      batch.speed_m_s[0] = touch.speed_m_s;
+      batch.session_time_s[0] = 9.0 * set->touch.size();
+      batch.previous_press_m = previous_press_m;
+      EXPECT_TRUE(simulator.Run(&batch, &workspace).ok());
+      previous_press_m = batch.press_m;
+      set->touch.push_back(set->touch.size());
+      set->object.push_back(static_cast<int>(object));
+      set->target_m.push_back(touch.target_m);
+      set->approach.push_back(touch.approach);
+      set->lateral.push_back(touch.lateral);
+      set->standoff_m.push_back(touch.standoff_m);
+      set->speed_m_s.push_back(touch.speed_m_s);
+      set->session_time_s.push_back(batch.session_time_s[0]);
+      set->line.push_back(static_cast<int>(set->touch.size()) + 1);
+      for (int i = 0; i < 3; ++i) set->time_s.push_back(batch.reported_time_s[batch.At(i, 0)]);
+    }
+  }
+  input.set = set;
+  input.model = std::make_shared<const Model>(WithEffects(nominal, rig.known));
+  return input;
+}
+
+}  // namespace touchstone
