@@ -4,9 +4,9 @@
 
 #include "client/cli/plan_options.h"
 #include "client/cli/rig.h"
+#include "client/report/path_drawing.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
-#include "server/gateway/arm/path_drawing.h"
 
 namespace touchstone::cli {
 namespace {
@@ -35,11 +35,11 @@ Eigen::Vector3d VectorOf(const v1::Vector3& v) {
 
 std::string Drawing(const Options& options, const v1::RigState& state, const std::vector<PlannedRow>& rows,
                     const std::vector<v1::TouchCheck>& checks) {
-  PathDrawing drawing;
+  client::PathDrawing drawing;
   drawing.title =
       absl::StrCat(options.plan, " on ", state.arm().model(), ": ", Counted(rows.size(), "touch", "touches"));
   for (size_t k = 0; k < rows.size(); ++k) {
-    DrawnTouch touch;
+    client::DrawnTouch touch;
     touch.number = static_cast<int>(rows[k].touch.touch);
     touch.possible = rows[k].possible;
     touch.reason = rows[k].reason;
@@ -54,7 +54,7 @@ std::string Drawing(const Options& options, const v1::RigState& state, const std
     }
     drawing.touches.push_back(std::move(touch));
   }
-  return DrawPaths(drawing);
+  return client::DrawPaths(drawing);
 }
 
 absl::Status RunDryRun(const Cli& cli, const Options& options) {

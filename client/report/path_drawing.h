@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-namespace touchstone {
+namespace touchstone::client {
 
 // One touch as it was checked. Base frame, metres.
 struct DrawnTouch {
@@ -30,4 +30,4 @@ struct PathDrawing {
 // An SVG file's text. Impossible touches are red, with their number; the first reasons stand below.
 std::string DrawPaths(const PathDrawing& drawing);
 
-}  // namespace touchstone
+}  // namespace touchstone::client

@@ -1,9 +1,9 @@
-#include "server/gateway/arm/path_drawing.h"
+#include "client/report/path_drawing.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::client {
 namespace {
 
 using ::testing::HasSubstr;
@@ -65,4 +65,4 @@ TEST(DrawPaths, LongListsOfReasonsAreCutWithTheirCount) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::client

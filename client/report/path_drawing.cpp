@@ -1,4 +1,4 @@
-#include "server/gateway/arm/path_drawing.h"
+#include "client/report/path_drawing.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -9,7 +9,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::client {
 namespace {
 
 // Pixels.
@@ -269,4 +269,4 @@ std::string DrawPaths(const PathDrawing& drawing) {
   return absl::StrCat(svg, Reasons(drawing, reasons_top - 6, impossible), "</svg>\n");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::client
