@@ -30,7 +30,7 @@ function(touchstone_library name)
   touchstone_link(touchstone_${name} PUBLIC ${ARG_LINKS})
 endfunction()
 
-# Where the tests find files: macros in a header, not on the command line, so that a test that uses none is found in
+# Where the tests find files: macros in a header, "touchstone_test_paths.h", so that a test that uses none is found in
 # ccache although the clone lies elsewhere.
 set(TOUCHSTONE_TEST_PATHS ${CMAKE_BINARY_DIR}/generated/touchstone_test_paths.h)
 file(CONFIGURE OUTPUT ${TOUCHSTONE_TEST_PATHS} CONTENT [[
@@ -49,13 +49,13 @@ function(touchstone_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name}_test ${ARG_SOURCES})
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
-  target_compile_options(${name}_test PRIVATE -include ${TOUCHSTONE_TEST_PATHS})
   add_test(NAME ${name} COMMAND ${name}_test)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S})
 endfunction()
 
 # touchstone_link(TARGET PUBLIC|PRIVATE links...)
 function(touchstone_link target visibility)
+  set_property(GLOBAL APPEND PROPERTY TOUCHSTONE_TARGETS ${target})
   target_link_libraries(${target} ${visibility} touchstone_flags)
   foreach(link ${ARGN})
     if(link MATCHES "^[a-z_]+$" AND NOT link MATCHES "^touchstone_")

@@ -7,7 +7,9 @@ python=$root/build/venv/bin/python
 cd "$root" || exit
 
 # Object files are found again by ccache although a clone lies elsewhere, and outlive the clone.
-export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
+# The slackness is what ccache asks for to be used with precompiled headers; those are large.
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1 CCACHE_MAXSIZE=${CCACHE_MAXSIZE-12G}
+export CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
 
 # Jobs of a build: one a core, but 1.5 GB of memory each (the protocol's translation units need it).
 jobs_that_fit() {

@@ -1,4 +1,5 @@
 #include "firmware/core/portable_checks.h"
+#include "touchstone_test_paths.h"
 
 #include <fstream>
 #include <sstream>

@@ -7,6 +7,7 @@
 
 #include "server/dataset/test_support.h"
 #include "server/geometry/mesh_file.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

@@ -10,6 +10,7 @@
 #include "server/base/random.h"
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

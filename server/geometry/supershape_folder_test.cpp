@@ -6,6 +6,7 @@
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

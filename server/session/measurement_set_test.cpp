@@ -11,6 +11,7 @@
 #include <random>
 
 #include "server/base/text.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/gateway/camera/camera.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone {
 namespace {

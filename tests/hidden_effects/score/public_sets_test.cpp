@@ -7,6 +7,7 @@
 #include "server/effects/all_effects.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/workshop.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 namespace {

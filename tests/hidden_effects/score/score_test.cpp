@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/hidden_effects/score/trial.h"
+#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 namespace {
