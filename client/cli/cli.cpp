@@ -9,6 +9,7 @@
 #include "client/cli/interrupt.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/version.h"
 
 namespace touchstone::cli {
 namespace {
@@ -117,7 +118,7 @@ Cli::Cli()
                "touchstone diagnose set.csv --model nominal.yaml        where and why a model is wrong\n"
                "touchstone doctor                                       is everything in order here?")));
   app_.set_help_flag("-h,--help", "This text; also touchstone COMMAND --help");
-  app_.set_version_flag("--version", "touchstone " TOUCHSTONE_VERSION, "The version");
+  app_.set_version_flag("--version", absl::StrCat("touchstone ", kVersion), "The version");
   app_.require_subcommand(0, 1);
   app_.footer(
       "Without --server the simulation runs in this process; with --server HOST:PORT a running "
@@ -274,7 +275,7 @@ int Cli::Run(int argc, char** argv) {
     std::printf("%s", app_.help().c_str());
     return kDone;
   } catch (const CLI::CallForVersion&) {
-    std::printf("touchstone %s\n", TOUCHSTONE_VERSION);
+    std::printf("touchstone %s\n", kVersion);
     return kDone;
   } catch (const CLI::ParseError& error) {
     return UsageError(error, argc, argv);

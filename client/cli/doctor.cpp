@@ -9,6 +9,7 @@
 
 #include "client/cli/common.h"
 #include "server/base/status.h"
+#include "server/base/version.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 
@@ -99,7 +100,7 @@ class Doctor {
     const std::vector<std::string> used = FlagsOfBuild();
     if (missing.empty())
       Add("Build", true,
-          absl::StrCat("version " TOUCHSTONE_VERSION ", uses ",
+          absl::StrCat("version ", kVersion, ", uses ",
                        used.empty() ? "the compiler's default instructions" : absl::StrJoin(used, " "),
                        ", all of which this processor has"));
     else
@@ -109,7 +110,7 @@ class Doctor {
     Add("Rays", true, EmbreeDescription());
     json_["processor"] = {{"model", processor.model}, {"threads", cores}};
     json_["build"] = {
-        {"version", TOUCHSTONE_VERSION}, {"instructions", used}, {"instructions_missing", missing}};
+        {"version", kVersion}, {"instructions", used}, {"instructions_missing", missing}};
     json_["embree"] = EmbreeDescription();
   }
 

@@ -62,7 +62,7 @@ v1::Report Base(double initial_us, double floor_us) {
   for (double bias : {2100.0, -3900.0, 1800.0}) report.add_finger_bias_us(bias * initial_us / 41000);
   report.set_model_name("nominal");
   report.set_model_hash("7f1c09e3b2a84d55c0ffee00112233445566778899aabbccddeeff0011223344");
-  report.set_version("0.1.0");
+  report.set_version("0.2.0");
   report.set_duration_s(3.4);
   v1::DataSummary& data = *report.mutable_data();
   data.set_rows(1000);

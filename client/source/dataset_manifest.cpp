@@ -8,6 +8,7 @@
 #include "client/source/npy.h"
 #include "client/source/sample_text.h"
 #include "server/base/status.h"
+#include "server/base/version.h"
 
 namespace touchstone::client {
 namespace {
@@ -132,7 +133,7 @@ Json MakeIdentity(const v1::DatasetSpec& spec, const v1::DatasetHeader& header, 
                                    {"place", PlaceOf(layout, column)}});
   if (header.renderer() != v1::RENDERER_KIND_UNSPECIFIED)
     identity["renderer"] = RendererName(header.renderer());
-  identity["versions"] = {{"source", header.version()}, {"writer", TOUCHSTONE_VERSION}};
+  identity["versions"] = {{"source", header.version()}, {"writer", kVersion}};
   return identity;
 }
 

@@ -83,7 +83,7 @@ TEST_F(DiagnosisServiceTest, ASessionGivesTheReportOfItsBytes) {
   ASSERT_TRUE(Compare(evidence, nullptr, &of_session).ok());
   evidence.set_csv(csv);
   ASSERT_TRUE(Compare(evidence, nullptr, &of_bytes).ok());
-  EXPECT_EQ(of_session.version(), "0.1.0");
+  EXPECT_EQ(of_session.version(), kVersion);
   of_session.clear_duration_s();
   of_bytes.clear_duration_s();
   EXPECT_EQ(of_session.SerializeAsString(), of_bytes.SerializeAsString());

@@ -12,6 +12,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/base/thread_pool.h"
+#include "server/base/version.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "server/model/model.h"
@@ -19,8 +20,6 @@
 #include "server/service/session_store.h"
 
 namespace touchstone {
-
-inline constexpr char kVersion[] = "0.1.0";
 
 // 1 to 64 letters, digits, '_', '-' or '.', not '.' first. `field` is named in the error.
 absl::Status CheckResourceName(const std::string& name, const std::string& field);

@@ -1,3 +1,3 @@
-"""Version of the package; it moves with the server's."""
+"""Version of the package and of the programs: CMake reads it here."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

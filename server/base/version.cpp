@@ -1,0 +1,7 @@
+#include "server/base/version.h"
+
+namespace touchstone {
+
+const char kVersion[] = TOUCHSTONE_VERSION;
+
+}  // namespace touchstone
