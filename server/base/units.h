@@ -39,9 +39,14 @@ absl::string_view UnitSuffix(Unit unit);
 // The unit whose symbol is `symbol` ("" is kNone). Returns false if there is none.
 bool UnitFromSymbol(absl::string_view symbol, Unit* unit);
 
-// Plain shorthands of the same factors for code that handles one known unit.
+// Plain shorthands of the same factors for code that handles one known unit, and their reciprocals (powers of
+// ten below 1 are not exact: dividing by 1e-6 and multiplying by 1e6 differ in the last digit).
 inline constexpr double kMetresPerMillimetre = 1e-3;
+inline constexpr double kMillimetresPerMetre = 1e3;
 inline constexpr double kSecondsPerMicrosecond = 1e-6;
+inline constexpr double kMicrosecondsPerSecond = 1e6;
+inline constexpr double kSecondsPerMillisecond = 1e-3;
+inline constexpr double kMillisecondsPerSecond = 1e3;
 inline constexpr double kRadiansPerDegree = kPi / 180.0;
 
 }  // namespace touchstone
