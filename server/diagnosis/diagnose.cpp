@@ -8,10 +8,10 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/design/propose.h"
-#include "server/diagnosis/distributions/unposed.h"
+#include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/residuals/slices.h"
 #include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <set>
 
-#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/residuals/slices.h"
 
 namespace touchstone {
 namespace {

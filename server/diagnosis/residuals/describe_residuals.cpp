@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "server/diagnosis/residuals/outline.h"
-#include "server/diagnosis/residuals/residual_covariates.h"
+#include "server/diagnosis/residuals/covariates.h"
+#include "server/diagnosis/residuals/outlines.h"
 
 namespace touchstone {
 namespace {

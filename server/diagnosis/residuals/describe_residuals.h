@@ -26,12 +26,12 @@ void DescribeResiduals(const Observations& observations, const Prediction& initi
 
 // Its parts, a file each.
 void DescribeGroups(const Observations& observations, const std::vector<double>& residuals, double sigma_s,
-                    v1::Report* report);  // residual_groups.cpp: also worst touches and bias
+                    v1::Report* report);  // groups.cpp: also worst touches and bias
 void DescribeCurves(const Observations& observations, const Prediction& initial,
                     const std::vector<double>& before, const std::vector<double>& after, uint64_t seed,
-                    v1::Report* report);  // residual_curves.cpp
+                    v1::Report* report);  // curves.cpp
 void DescribeHistograms(const Observations& observations, const Prediction& initial,
                         const Prediction& improved, const ResidualScale& scale,
-                        v1::Report* report);  // residual_histograms.cpp
+                        v1::Report* report);  // histograms.cpp
 
 }  // namespace touchstone

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/residuals/residual_covariates.h"
+#include "server/diagnosis/residuals/covariates.h"
 
 namespace touchstone {
 

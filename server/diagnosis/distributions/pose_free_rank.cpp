@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_rank.h"
+#include "server/diagnosis/distributions/pose_free_rank.h"
 
 #include <algorithm>
 #include <cmath>

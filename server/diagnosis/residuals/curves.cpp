@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "server/base/random.h"
+#include "server/diagnosis/residuals/covariates.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/residuals/permutation.h"
-#include "server/diagnosis/residuals/residual_covariates.h"
 
 namespace touchstone {
 namespace {

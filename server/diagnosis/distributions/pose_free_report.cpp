@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_report.h"
+#include "server/diagnosis/distributions/pose_free_report.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/diagnosis/residuals/histogram.h"
+#include "server/diagnosis/residuals/histogram_bins.h"
 
 namespace touchstone {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_plan.h"
+#include "server/diagnosis/distributions/assumed_plan.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include "server/base/random.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/residuals/histogram.h"
+#include "server/diagnosis/residuals/histogram_bins.h"
 #include "server/diagnosis/residuals/permutation.h"
 
 namespace touchstone {

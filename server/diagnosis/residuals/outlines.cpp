@@ -1,4 +1,4 @@
-#include "server/diagnosis/residuals/outline.h"
+#include "server/diagnosis/residuals/outlines.h"
 
 #include <algorithm>
 #include <set>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed.h"
+#include "server/diagnosis/distributions/pose_free.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -9,9 +9,9 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/diagnosis/distributions/unposed_effects.h"
-#include "server/diagnosis/distributions/unposed_report.h"
-#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/distributions/compatible_effects.h"
+#include "server/diagnosis/distributions/pose_free_report.h"
+#include "server/diagnosis/residuals/slices.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone {

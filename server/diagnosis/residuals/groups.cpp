@@ -6,8 +6,8 @@
 
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/diagnosis/residuals/covariates.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/residuals/residual_covariates.h"
 
 namespace touchstone {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/residuals/slices.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_case.h"
+#include "server/diagnosis/distributions/pose_free_experiment.h"
 
 #include <absl/strings/str_cat.h>
 

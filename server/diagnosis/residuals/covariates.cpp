@@ -1,4 +1,4 @@
-#include "server/diagnosis/residuals/residual_covariates.h"
+#include "server/diagnosis/residuals/covariates.h"
 
 #include <absl/strings/str_cat.h>
 

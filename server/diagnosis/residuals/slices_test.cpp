@@ -1,4 +1,4 @@
-#include "server/diagnosis/residuals/where.h"
+#include "server/diagnosis/residuals/slices.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

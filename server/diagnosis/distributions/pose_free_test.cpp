@@ -1,13 +1,13 @@
-#include "server/diagnosis/distributions/unposed.h"
+#include "server/diagnosis/distributions/pose_free.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/base/random.h"
 #include "server/base/units.h"
-#include "server/diagnosis/distributions/unposed_distances.h"
-#include "server/diagnosis/distributions/unposed_plan.h"
-#include "server/diagnosis/distributions/unposed_rank.h"
+#include "server/diagnosis/distributions/assumed_plan.h"
+#include "server/diagnosis/distributions/pose_free_distances.h"
+#include "server/diagnosis/distributions/pose_free_rank.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_effects.h"
+#include "server/diagnosis/distributions/compatible_effects.h"
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/residuals/histogram.h"
+#include "server/diagnosis/residuals/histogram_bins.h"
 
 #include <algorithm>
 #include <cmath>

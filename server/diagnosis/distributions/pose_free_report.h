@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "server/diagnosis/distributions/unposed_rank.h"
+#include "server/diagnosis/distributions/pose_free_rank.h"
 
 namespace touchstone {
 

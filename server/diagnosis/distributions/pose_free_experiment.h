@@ -7,8 +7,8 @@
 #include <tuple>
 #include <vector>
 
-#include "server/diagnosis/distributions/unposed_distances.h"
-#include "server/diagnosis/distributions/unposed_plan.h"
+#include "server/diagnosis/distributions/assumed_plan.h"
+#include "server/diagnosis/distributions/pose_free_distances.h"
 #include "server/diagnosis/input.h"
 
 namespace touchstone {

@@ -1,7 +1,7 @@
 // How unusual a set without poses is among sets that a model makes, and the poses that suit it best.
 #pragma once
 
-#include "server/diagnosis/distributions/unposed_case.h"
+#include "server/diagnosis/distributions/pose_free_experiment.h"
 
 namespace touchstone {
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/distributions/unposed_distances.h"
+#include "server/diagnosis/distributions/pose_free_distances.h"
 
 #include <algorithm>
 #include <cmath>
