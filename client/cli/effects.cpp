@@ -15,9 +15,38 @@ std::string WithUnit(double value, const std::string& unit) {
 }
 
 std::string ArityInWords(const v1::Parameter& parameter) {
-  if (parameter.arity() == "vector3") return "x,y,z in the object frame";
-  if (parameter.arity() == "finger") return parameter.sum_zero() ? "one a finger, sum 0" : "one a finger";
+  if (parameter.arity() == v1::PARAMETER_ARITY_VECTOR3) return "x,y,z in the object frame";
+  if (parameter.arity() == v1::PARAMETER_ARITY_PER_FINGER)
+    return parameter.sum_zero() ? "one per finger, sum 0" : "one per finger";
   return "one number";
+}
+
+std::string ArityWord(v1::ParameterArity arity) {
+  switch (arity) {
+    case v1::PARAMETER_ARITY_SCALAR:
+      return "scalar";
+    case v1::PARAMETER_ARITY_VECTOR3:
+      return "vector3";
+    case v1::PARAMETER_ARITY_PER_FINGER:
+      return "finger";
+    default:
+      return "unknown";
+  }
+}
+
+std::string StageWord(v1::EffectStage stage) {
+  switch (stage) {
+    case v1::EFFECT_STAGE_POSE:
+      return "pose";
+    case v1::EFFECT_STAGE_CONTACT:
+      return "contact";
+    case v1::EFFECT_STAGE_MOTION:
+      return "motion";
+    case v1::EFFECT_STAGE_SENSOR:
+      return "sensor";
+    default:
+      return "unknown";
+  }
 }
 
 Json EffectJson(const v1::Effect& effect) {
@@ -25,7 +54,7 @@ Json EffectJson(const v1::Effect& effect) {
   for (const v1::Parameter& p : effect.parameters())
     parameters.push_back({{"name", p.name()},
                           {"unit", p.unit()},
-                          {"arity", p.arity()},
+                          {"arity", ArityWord(p.arity())},
                           {"min", p.min()},
                           {"max", p.max()},
                           {"default", p.default_value()},
@@ -33,7 +62,7 @@ Json EffectJson(const v1::Effect& effect) {
                           {"sum_zero", p.sum_zero()},
                           {"meaning", p.meaning()}});
   return {{"name", effect.name()},
-          {"stage", effect.stage()},
+          {"stage", StageWord(effect.stage())},
           {"meaning", effect.meaning()},
           {"signature", effect.signature()},
           {"check_on_rig", effect.check_on_rig()},
@@ -88,7 +117,7 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
     PrintJson(json);
     return absl::OkStatus();
   }
-  std::string text = absl::StrCat(effect.name(), "  (stage: ", effect.stage(), ")\n\n");
+  std::string text = absl::StrCat(effect.name(), "  (stage: ", StageWord(effect.stage()), ")\n\n");
   text += Paragraph("What it is", effect.meaning());
   text += Paragraph("It shows as", effect.signature());
   text += Paragraph("Check", effect.check_on_rig());
@@ -100,9 +129,9 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
                  WithUnit(p.default_value(), p.unit()), WithUnit(p.typical(), p.unit()), p.meaning()});
     absl::StrAppend(&text, "\n", table.Text());
     const v1::Parameter& first = effect.parameters(0);
-    const std::string value = first.arity() == "scalar" ? ShortestNumber(first.typical())
-                              : first.sum_zero()        ? absl::StrCat(ShortestNumber(first.typical()), ",0,",
-                                                                       ShortestNumber(-first.typical()))
+    const std::string value = first.arity() == v1::PARAMETER_ARITY_SCALAR ? ShortestNumber(first.typical())
+                              : first.sum_zero() ? absl::StrCat(ShortestNumber(first.typical()), ",0,",
+                                                                ShortestNumber(-first.typical()))
                                                  : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
     absl::StrAppend(&text, "\nAdd it:  touchstone model add nominal ", effect.name(), " ", first.name(), "=",
                     value, " -o better.yaml\n");
@@ -135,7 +164,7 @@ absl::Status RunEffects(const Cli& cli, const std::string& name) {
     std::string parameters;
     for (const v1::Parameter& p : effect.parameters())
       absl::StrAppend(&parameters, parameters.empty() ? "" : ", ", p.name());
-    table.Add({effect.name(), effect.stage(), parameters, effect.meaning()});
+    table.Add({effect.name(), StageWord(effect.stage()), parameters, effect.meaning()});
   }
   return WriteOutput("", absl::StrCat(table.Text(), "\ntouchstone effects NAME explains one.\n"));
 }

@@ -149,7 +149,7 @@ void AddImageOptions(CLI::App* command, ImageFlags* options) {
   };
   add("--image", options->size, "WxH", "Size of images in pixels, up to 2048x2048, for instance 224x224");
   add("--format", options->format, "FORMAT", "grey or rgb. Default: grey");
-  add("--look", options->look, "LOOK",
+  add("--shading-style", options->shading_style, "STYLE",
       "shaded: lit, on black; dark-on-white: a dark object on white. Default: shaded");
   add("--jpeg-quality", options->jpeg_quality, "1-100", "Of JPEG files. Default: 90");
   add("--fov-deg", options->fov_deg, "DEG", "Vertical field of view. Default: 45");
@@ -174,8 +174,9 @@ absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& o,
   spec.set_height(height);
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--format", o.format, {"grey", "rgb"}).status());
   spec.set_format(o.format == "rgb" ? v1::PIXEL_FORMAT_RGB : v1::PIXEL_FORMAT_GREY);
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--look", o.look, {"shaded", "dark-on-white"}).status());
-  spec.set_look(o.look == "shaded" ? v1::LOOK_SHADED : v1::LOOK_DARK_ON_WHITE);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--shading-style", o.shading_style, {"shaded", "dark-on-white"}).status());
+  spec.set_shading_style(o.shading_style == "shaded" ? v1::SHADING_STYLE_SHADED
+                                                     : v1::SHADING_STYLE_DARK_ON_WHITE);
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--encoding", encoding, {"png", "jpeg", "raw"}).status());
   spec.set_encoding(encoding == "png"    ? v1::IMAGE_ENCODING_PNG
                     : encoding == "jpeg" ? v1::IMAGE_ENCODING_JPEG

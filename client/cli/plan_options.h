@@ -28,7 +28,7 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& options, std::vector<std::s
 struct ImageFlags {
   std::string size;  // "224x224"
   std::string format = "grey";
-  std::string look = "shaded";
+  std::string shading_style = "shaded";
   bool depth = false;
   bool mask = false;
   int jpeg_quality = 90;

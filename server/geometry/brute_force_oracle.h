@@ -89,7 +89,7 @@ inline double BruteForceBall(const TriangleMesh& mesh, const Vector3d& centre, c
                              double radius, double longest) {
   double best = std::numeric_limits<double>::infinity();
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    // Triangles that stay outside a ball round them, grown by the radius, are not worth a search.
+    // Triangles that stay outside a ball round them, inflated by the radius, are not worth a search.
     const Vector3d a = mesh.Corner(t, 0);
     const double size =
         std::max((mesh.Corner(t, 1) - a).norm(), (mesh.Corner(t, 2) - a).norm()) + radius + 1e-6;

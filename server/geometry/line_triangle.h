@@ -26,54 +26,54 @@ struct LineTriangle {
 
 // a, b, c: the corners relative to the line's origin.
 template <typename Number>
-[[gnu::always_inline]] inline LineTriangle<Number> MeetTriangle(const Triple<Number>& direction,
-                                                                const Triple<Number>& a,
-                                                                const Triple<Number>& b,
-                                                                const Triple<Number>& c) {
-  LineTriangle<Number> meet;
-  meet.edge[0] = c - b;
-  meet.edge[1] = a - c;
-  meet.edge[2] = b - a;
-  meet.moment[0] = Dot(direction, Cross(b, meet.edge[0]));
-  meet.moment[1] = Dot(direction, Cross(c, meet.edge[1]));
-  meet.moment[2] = Dot(direction, Cross(a, meet.edge[2]));
-  meet.area_vector = Cross(meet.edge[1], meet.edge[2]);
-  meet.facing = Dot(meet.area_vector, direction);
-  meet.travel_m = Dot(meet.area_vector, a) / meet.facing;
-  return meet;
+[[gnu::always_inline]] inline LineTriangle<Number> IntersectTriangle(const Triple<Number>& direction,
+                                                                     const Triple<Number>& a,
+                                                                     const Triple<Number>& b,
+                                                                     const Triple<Number>& c) {
+  LineTriangle<Number> hit;
+  hit.edge[0] = c - b;
+  hit.edge[1] = a - c;
+  hit.edge[2] = b - a;
+  hit.moment[0] = Dot(direction, Cross(b, hit.edge[0]));
+  hit.moment[1] = Dot(direction, Cross(c, hit.edge[1]));
+  hit.moment[2] = Dot(direction, Cross(a, hit.edge[2]));
+  hit.area_vector = Cross(hit.edge[1], hit.edge[2]);
+  hit.facing = Dot(hit.area_vector, direction);
+  hit.travel_m = Dot(hit.area_vector, a) / hit.facing;
+  return hit;
 }
 
 // Inside or on the border, whichever face is met.
-inline bool MeetsInside(const LineTriangle<double>& meet, const Triple1& direction, const Triple1& a,
-                        const Triple1& b, const Triple1& c) {
+inline bool HitsInside(const LineTriangle<double>& hit, const Triple1& direction, const Triple1& a,
+                       const Triple1& b, const Triple1& c) {
   // Seen edge-on, the plane says nothing: a line along a face does not touch it.
   constexpr double kMinCosine = 1e-8;
-  if (!(meet.facing * meet.facing > kMinCosine * kMinCosine * Dot(meet.area_vector, meet.area_vector)))
+  if (!(hit.facing * hit.facing > kMinCosine * kMinCosine * Dot(hit.area_vector, hit.area_vector)))
     return false;
-  const double side = meet.facing > 0 ? 1 : -1;
+  const double side = hit.facing > 0 ? 1 : -1;
   const Triple1* const start[3] = {&b, &c, &a};
   for (int i = 0; i < 3; ++i) {
-    const double moment = meet.moment[i] * side;
+    const double moment = hit.moment[i] * side;
     if (moment >= 0) continue;
     // The moment is the distance times the edge's length seen along the line.
-    const Triple1 seen = Cross(meet.edge[i], direction);
+    const Triple1 seen = Cross(hit.edge[i], direction);
     const double border2 = kBorderM * kBorderM * Dot(seen, seen);
-    const double rounding2 = 1e-30 * Dot(*start[i], *start[i]) * Dot(meet.edge[i], meet.edge[i]);
+    const double rounding2 = 1e-30 * Dot(*start[i], *start[i]) * Dot(hit.edge[i], hit.edge[i]);
     if (moment * moment > std::max(border2, rounding2)) return false;
   }
   // Seen nearly edge-on, the tolerance reaches far along the plane: the travel must be that of some place on
   // the triangle.
   constexpr double kSlackM = 1e-7;
   const double at_a = Dot(direction, a), at_b = Dot(direction, b), at_c = Dot(direction, c);
-  return meet.travel_m >= std::min(at_a, std::min(at_b, at_c)) - kSlackM &&
-         meet.travel_m <= std::max(at_a, std::max(at_b, at_c)) + kSlackM;
+  return hit.travel_m >= std::min(at_a, std::min(at_b, at_c)) - kSlackM &&
+         hit.travel_m <= std::max(at_a, std::max(at_b, at_c)) + kSlackM;
 }
 
 // The normal that contacts report: unit, against the direction.
 template <typename Number>
-Triple<Number> NormalAgainst(const LineTriangle<Number>& meet) {
-  const Number length = SquareRoot(Dot(meet.area_vector, meet.area_vector));
-  return meet.area_vector * ((meet.facing > 0 ? Number{} - 1.0 : Number{} + 1.0) / length);
+Triple<Number> NormalAgainst(const LineTriangle<Number>& hit) {
+  const Number length = SquareRoot(Dot(hit.area_vector, hit.area_vector));
+  return hit.area_vector * ((hit.facing > 0 ? Number{} - 1.0 : Number{} + 1.0) / length);
 }
 
 }  // namespace touchstone

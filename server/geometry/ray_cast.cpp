@@ -14,7 +14,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // A proposal on a triangle met at a cosine above the first is off in travel by less than the second times the
-// mesh's reach: vertices are grown by at most 5e-5 of it, and 5e-5 / 0.02 is 0.0025.
+// mesh's reach: vertices are inflated by at most 5e-5 of it, and 5e-5 / 0.02 is 0.0025.
 constexpr double kFlatCosine = 0.02;
 constexpr double kSlackOfReach = 0.02;
 
@@ -73,18 +73,17 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
   const double first = std::max({0.0, to_middle - 1.01 * reach_m_, earliest_m});
   const Triple1 origin = ToTriple(line.origin_m), direction = ToTriple(line.direction);
   double best_travel = longest_m;
-  LineTriangle<double> best_meet = {};
+  LineTriangle<double> best_hit = {};
   uint32_t best = kNoTriangle;
   const auto consider = [&](uint32_t triangle) {
     const Triple1 a = ToTriple(mesh_.Corner(triangle, 0)) - origin,
                   b = ToTriple(mesh_.Corner(triangle, 1)) - origin,
                   c = ToTriple(mesh_.Corner(triangle, 2)) - origin;
-    const LineTriangle<double> meet = MeetTriangle(direction, a, b, c);
-    if (!MeetsInside(meet, direction, a, b, c) || !(meet.travel_m > 0) || !(meet.travel_m <= best_travel))
-      return;
-    if (meet.travel_m == best_travel && best != kNoTriangle && triangle > best) return;
-    best_travel = meet.travel_m;
-    best_meet = meet;
+    const LineTriangle<double> hit = IntersectTriangle(direction, a, b, c);
+    if (!HitsInside(hit, direction, a, b, c) || !(hit.travel_m > 0) || !(hit.travel_m <= best_travel)) return;
+    if (hit.travel_m == best_travel && best != kNoTriangle && triangle > best) return;
+    best_travel = hit.travel_m;
+    best_hit = hit;
     best = triangle;
   };
   const Triple<Double4> from = {Double4{} + origin.x, Double4{} + origin.y, Double4{} + origin.z};
@@ -104,17 +103,17 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
                    from;
           };
           const Triple<Double4> a = load(0), b = load(1), c = load(2);
-          const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
-          Mask4 near = (meet.travel_m > 0) & (meet.travel_m <= best_travel);
+          const LineTriangle<Double4> hit = IntersectTriangle(along, a, b, c);
+          Mask4 near = (hit.travel_m > 0) & (hit.travel_m <= best_travel);
           for (int e = 0; e < 3; ++e) {
-            const Double4 inwards = meet.facing > 0 ? meet.moment[e] : -meet.moment[e];
+            const Double4 inwards = hit.facing > 0 ? hit.moment[e] : -hit.moment[e];
             near &= (inwards >= 0) |
-                    (inwards * inwards <= rounding_m_ * rounding_m_ * Dot(meet.edge[e], meet.edge[e]));
+                    (inwards * inwards <= rounding_m_ * rounding_m_ * Dot(hit.edge[e], hit.edge[e]));
           }
           for (uint32_t rest = BitsOf(near); rest; rest &= rest - 1) {
             const int k = i + __builtin_ctz(rest);
-            if (k >= count || meet.travel_m[k - i] > best_travel) continue;
-            if (meet.travel_m[k - i] == best_travel && best != kNoTriangle && ids[k] > best) continue;
+            if (k >= count || hit.travel_m[k - i] > best_travel) continue;
+            if (hit.travel_m[k - i] == best_travel && best != kNoTriangle && ids[k] > best) continue;
             consider(ids[k]);
           }
         }
@@ -122,7 +121,7 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
         if (best != kNoTriangle) *last_m = std::min(*last_m, best_travel - first + 4 * rounding_m_);
       });
   if (best == kNoTriangle) return NoContact();
-  return {best_travel, ToEigen(origin + direction * best_travel), ToEigen(NormalAgainst(best_meet)), best};
+  return {best_travel, ToEigen(origin + direction * best_travel), ToEigen(NormalAgainst(best_hit)), best};
 }
 
 template <int kWidth>
@@ -196,16 +195,16 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     const Triple<Double4> from = load(origin, k), along = load(direction, k);
     const Triple<Double4> a = load(corner, k) - from, b = load(corner + 3, k) - from,
                           c = load(corner + 6, k) - from;
-    const LineTriangle<Double4> meet = MeetTriangle(along, a, b, c);
-    const Double4 side = meet.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
+    const LineTriangle<Double4> hit = IntersectTriangle(along, a, b, c);
+    const Double4 side = hit.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
     const auto clears = [&](int i) {
-      const Double4 inwards = meet.moment[i] * side;
-      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(meet.edge[i], meet.edge[i]));
+      const Double4 inwards = hit.moment[i] * side;
+      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(hit.edge[i], hit.edge[i]));
     };
     const Mask4 certain =
-        clears(0) & clears(1) & clears(2) & (meet.travel_m > clear) & (meet.travel_m <= longest_m);
-    const Triple<Double4> normal = NormalAgainst(meet);
-    const Triple<Double4> point = from + along * meet.travel_m;
+        clears(0) & clears(1) & clears(2) & (hit.travel_m > clear) & (hit.travel_m <= longest_m);
+    const Triple<Double4> normal = NormalAgainst(hit);
+    const Triple<Double4> point = from + along * hit.travel_m;
     const uint32_t certain_bits = BitsOf(certain);
     for (int lane = 0; lane < std::min(4, count - k); ++lane) {
       const uint32_t triangle = rays.hit.primID[k + lane];
@@ -213,13 +212,13 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
       if (valid[k + lane] == 0) {
         Store(NoContact(), to, contacts);
       } else if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID && (certain_bits >> lane & 1) &&
-                 !Crowded(triangle)) {
-        contacts->travel_m[to] = meet.travel_m[lane];
+                 !NearCoincident(triangle)) {
+        contacts->travel_m[to] = hit.travel_m[lane];
         contacts->point_m[to] = {point.x[lane], point.y[lane], point.z[lane]};
         contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
         contacts->triangle[to] = triangle;
       } else {
-        // A proposal bounds the search from below: the grown surface that Embree sees is met no later than
+        // A proposal bounds the search from below: the inflated surface that Embree sees is met no later than
         // the real one, but for a little that matters only at flat angles.
         double earliest_m = 0;
         if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID) {

@@ -33,9 +33,9 @@ RTCDevice NewDevice() {
 
 // The vertices moved so that every face, and every border edge in its plane, comes to lie `distance_m`
 // farther out. Single precision may miss a triangle that a line meets right at its border; where the border
-// is a silhouette, nothing but a surface far behind would be proposed. On the grown mesh the line passes well
+// is a silhouette, nothing but a surface far behind would be proposed. On the inflated mesh the line passes well
 // inside, something near the border is proposed, and the exact search is asked.
-std::vector<Eigen::Vector3f> GrowVertices(const TriangleMesh& mesh, double distance_m) {
+std::vector<Eigen::Vector3f> InflateVertices(const TriangleMesh& mesh, double distance_m) {
   const size_t count = mesh.vertices_m.size();
   const auto corners = [&](const std::array<uint32_t, 3>& triangle, Eigen::Vector3f* corner) {
     for (int c = 0; c < 3; ++c) corner[c] = mesh.vertices_m[triangle[c]];
@@ -70,17 +70,17 @@ std::vector<Eigen::Vector3f> GrowVertices(const TriangleMesh& mesh, double dista
     for (const uint32_t v : triangle) lift[v] = std::min(lift[v], std::max(0.2f, unit.dot(normal[v])));
   }
   const float distance = static_cast<float>(distance_m);
-  std::vector<Eigen::Vector3f> grown;
-  grown.reserve(count + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
+  std::vector<Eigen::Vector3f> inflated;
+  inflated.reserve(count + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
   for (size_t v = 0; v < count; ++v) {
     // A border seen at a flat angle moves less than its plane's distance; fifty times is enough to 1 degree.
     const bool border = loop[v].norm() > 1e-5f * longest_edge;
     const float square = std::max(1e-6f, outwards[v].squaredNorm());
     const float factor = border ? 50 * 2 / square : 1 / lift[v];
     const Eigen::Vector3f move = factor * (border ? outwards[v] : normal[v]);
-    grown.push_back(mesh.vertices_m[v] + distance * move);
+    inflated.push_back(mesh.vertices_m[v] + distance * move);
   }
-  return grown;
+  return inflated;
 }
 
 }  // namespace
@@ -109,11 +109,11 @@ std::string EmbreeDescription() {
 Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
     : mesh_(mesh),
       centre_m_(bounds.Centre()),
-      crowded_(new std::atomic<uint8_t>[mesh.triangles.size() / 4 + 1]()) {
+      near_coincident_(new std::atomic<uint8_t>[mesh.triangles.size() / 4 + 1]()) {
   reach_m_ = 0.5 * bounds.DiagonalM() * 1.0001;
   // Rounding of a coordinate is 6e-8 of it; sums and products of a few of them follow.
   rounding_m_ = 5e-7 * (bounds.min_m.cwiseAbs().cwiseMax(bounds.max_m.cwiseAbs()).maxCoeff() + reach_m_);
-  grown_vertices_m_ = GrowVertices(mesh, rounding_m_);
+  inflated_vertices_m_ = InflateVertices(mesh, rounding_m_);
 
   const std::lock_guard<std::mutex> turn(BuildTurn());
   const int64_t before = embree_bytes;
@@ -122,8 +122,9 @@ Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, grown_vertices_m_.data(),
-                             0, sizeof(Eigen::Vector3f), grown_vertices_m_.size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                             inflated_vertices_m_.data(), 0, sizeof(Eigen::Vector3f),
+                             inflated_vertices_m_.size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(mesh.triangles[0]), mesh.triangles.size());
   rtcCommitGeometry(geometry);
@@ -154,7 +155,7 @@ const TriangleTree& Surface::Search::tree() const {
 }
 
 uint64_t Surface::Search::MemoryBytes() const {
-  return scene_bytes_ + grown_vertices_m_.capacity() * sizeof(grown_vertices_m_[0]) +
+  return scene_bytes_ + inflated_vertices_m_.capacity() * sizeof(inflated_vertices_m_[0]) +
          mesh_.triangles.size() / 4 + 1 + tree_bytes_.load(std::memory_order_acquire) +
          curvature_bytes_.load(std::memory_order_acquire);
 }

@@ -104,19 +104,19 @@ class Surface::Search {
 
   const TriangleTree& tree() const;  // built at the first call
   // Whether another sheet of the surface lies within the reach of rounding, so that Embree may take either.
-  bool Crowded(uint32_t triangle) const;
-  bool ComputeCrowded(uint32_t triangle) const;
+  bool NearCoincident(uint32_t triangle) const;
+  bool ComputeNearCoincident(uint32_t triangle) const;
 
   const TriangleMesh& mesh_;
   const Eigen::Vector3d centre_m_;
-  double reach_m_ = 0;                             // radius of a ball round centre_m_ that holds the mesh
-  double rounding_m_ = 0;                          // what single precision may be off, anywhere near the mesh
-  std::vector<Eigen::Vector3f> grown_vertices_m_;  // what Embree sees: see GrowVertices
+  double reach_m_ = 0;     // radius of a ball round centre_m_ that holds the mesh
+  double rounding_m_ = 0;  // what single precision may be off, anywhere near the mesh
+  std::vector<Eigen::Vector3f> inflated_vertices_m_;  // what Embree sees: see InflateVertices
   RTCScene scene_ = nullptr;
   uint64_t scene_bytes_ = 0;
   mutable std::once_flag tree_once_;
   mutable std::unique_ptr<TriangleTree> tree_;
-  mutable std::unique_ptr<std::atomic<uint8_t>[]> crowded_;  // see Crowded
+  mutable std::unique_ptr<std::atomic<uint8_t>[]> near_coincident_;  // see NearCoincident
   mutable std::once_flag curvature_once_;
   mutable std::vector<float> vertex_curvature_per_m_;
   mutable std::atomic<uint64_t> tree_bytes_{0}, curvature_bytes_{0};

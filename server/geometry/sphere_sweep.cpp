@@ -1,5 +1,5 @@
 // First contacts of balls. The line of the foremost point, cast first, bounds the travel: where it meets the
-// surface the ball has touched. Then every triangle whose box, grown by the radius, lies along the way is a
+// surface the ball has touched. Then every triangle whose box, inflated by the radius, lies along the way is a
 // candidate; eight at a time get a lower bound of their contact in single precision, and the few whose bound
 // is below the best contact so far are computed in double precision.
 #include <cmath>
@@ -113,7 +113,7 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
   const Eigen::Vector3d across_line = line.direction.unitOrthogonal();
   const Lanes3 across = SameInAllLanes(across_line.cast<float>());
   const Lanes3 upwards = SameInAllLanes(line.direction.cross(across_line).cast<float>());
-  const Lanes grown = Lanes{} + static_cast<float>(radius_m + slack);
+  const Lanes inflated = Lanes{} + static_cast<float>(radius_m + slack);
   const Lanes slack_lanes = Lanes{} + static_cast<float>(slack);
 
   const auto consider = [&](uint32_t triangle) {
@@ -162,7 +162,7 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
                       const Lanes3 a = load(0), b = load(1), c = load(2);
                       const float latest = static_cast<float>(last - near_touch + 4 * slack);
                       uint32_t open =
-                          BitsOf(RoughlyReached(direction, across, upwards, grown, latest, a, b, c)) &
+                          BitsOf(RoughlyReached(direction, across, upwards, inflated, latest, a, b, c)) &
                           ((1u << count) - 1);
                       for (int i = 0; i < count; ++i) open &= ~(uint32_t{ids[i] == likely} << i);
                       if (open == 0) return;
@@ -172,7 +172,7 @@ Contact Surface::Search::SweepExactly(const Line& line, double radius_m, double 
                         return;
                       }
                       alignas(32) float bounds[8];
-                      StoreLanes(bounds, EarliestTouch(direction, grown, slack_lanes, a, b, c));
+                      StoreLanes(bounds, EarliestTouch(direction, inflated, slack_lanes, a, b, c));
                       // Soonest first: often it settles the others.
                       while (open) {
                         int soonest = __builtin_ctz(open);

@@ -77,10 +77,10 @@ TEST(CastLines, IsTheFirstContactByDefinitionBitForBit) {
       for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
         const Triple1 a = ToTriple(mesh.Corner(t, 0)) - origin, b = ToTriple(mesh.Corner(t, 1)) - origin,
                       c = ToTriple(mesh.Corner(t, 2)) - origin;
-        const LineTriangle<double> meet = MeetTriangle(direction, a, b, c);
-        if (!MeetsInside(meet, direction, a, b, c)) continue;
-        if (!(meet.travel_m > 0 && meet.travel_m < travel && meet.travel_m <= kLongestM)) continue;
-        travel = meet.travel_m;
+        const LineTriangle<double> hit = IntersectTriangle(direction, a, b, c);
+        if (!HitsInside(hit, direction, a, b, c)) continue;
+        if (!(hit.travel_m > 0 && hit.travel_m < travel && hit.travel_m <= kLongestM)) continue;
+        travel = hit.travel_m;
         first = t;
       }
       const bool same =

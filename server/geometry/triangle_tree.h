@@ -1,4 +1,4 @@
-// An eight-wide tree of boxes over a mesh's triangles: finds every triangle whose box, grown by a radius,
+// An eight-wide tree of boxes over a mesh's triangles: finds every triangle whose box, inflated by a radius,
 // meets a line. It errs only towards too many, so what is tested exactly afterwards does not depend on it. It
 // serves swept spheres of any radius and the few lines that single precision cannot decide. About ten bytes a
 // triangle.
@@ -22,11 +22,11 @@ class TriangleTree {
   // The result hangs on the mesh alone; `threads` shortens the wait.
   TriangleTree(const TriangleMesh& mesh, int threads);
 
-  // Calls visit(ids, count, &last_m) with groups of at most eight triangles whose boxes, grown by grow_m on
+  // Calls visit(ids, count, &last_m) with groups of at most eight triangles whose boxes, inflated by inflate_m on
   // every side, meet the points origin + t * direction with 0 <= t <= last_m; roughly nearest first. visit
-  // may lower last_m. grow_m must cover the rounding of coordinates to single precision.
+  // may lower last_m. inflate_m must cover the rounding of coordinates to single precision.
   template <typename Visit>
-  void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double grow_m,
+  void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double inflate_m,
                   double last_m, Visit visit) const;
 
   // The same for a ball of radius_m, rounding included, that moves along the line: the boxes that it reaches.
@@ -109,7 +109,7 @@ void TriangleTree::VisitReached(Reach reach, double last_m, Visit visit) const {
 
 template <typename Visit>
 void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
-                              double grow_m, double last_m, Visit visit) const {
+                              double inflate_m, double last_m, Visit visit) const {
   // Slabs: a box is met between the largest entry and the smallest exit. A direction along a slab gets a huge
   // inverse instead of infinity, so that no 0 * infinity arises.
   float origin[3], inverse[3], outward[3];
@@ -119,7 +119,7 @@ void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vect
     const float along = static_cast<float>(direction[axis]);
     inverse[axis] = std::fabs(along) > 1e-12f ? 1.0f / along : std::copysign(1e12f, along);
     near_side[axis] = 2 * axis + (inverse[axis] < 0 ? 1 : 0);
-    outward[axis] = static_cast<float>(grow_m) * (inverse[axis] < 0 ? 1.0f : -1.0f);
+    outward[axis] = static_cast<float>(inflate_m) * (inverse[axis] < 0 ? 1.0f : -1.0f);
   }
   const auto reach = [&](const Node& node, float last, Float8* entry) {
     *entry = Float8{};

@@ -19,7 +19,7 @@ CpuFrame MakeCpuFrame(const Surface& surface, const ShadingMesh& mesh, const Cam
   const View view = MakeView(camera, surface.bounds(), options);
   frame.view = view;
   frame.box = ProjectBounds(view, surface.bounds());
-  frame.lighting = MakeLighting(view, surface.bounds(), options.look);
+  frame.lighting = MakeLighting(view, surface.bounds(), options.shading_style);
   frame.outside_only = mesh.outward && SeesOnlyOutside(view, surface.bounds());
 
   frame.sx.resize(view.width);

@@ -25,16 +25,16 @@ Camera CameraOfTouch(const Eigen::Vector3d& target_m, const Eigen::Vector3d& app
                      const Eigen::Vector3d& lateral, double standoff_m);
 
 enum class PixelFormat { kGrey, kRgb };
-enum class Look {
+enum class ShadingStyle {
   kShaded,       // white point lights, no shadows, black background
-  kDarkOnWhite,  // the seed's post-processed look: a dark object on a white background (see shading.h)
+  kDarkOnWhite,  // the shading inverted and compressed: a dark object on white (see shading.h)
 };
 
 struct ImageOptions {
   int width = 224;  // 1 to kMaxImageSide
   int height = 224;
   PixelFormat format = PixelFormat::kGrey;
-  Look look = Look::kShaded;
+  ShadingStyle shading_style = ShadingStyle::kShaded;
   bool depth = false;  // also return depth
   bool mask = false;   // also return the object mask
 };

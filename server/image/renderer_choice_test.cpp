@@ -17,12 +17,12 @@ TEST(Renderers, AgreeWithinOneLevel) {
   std::vector<Scene> scenes = Scenes();
   scenes.push_back({"fine ball", BallMesh(0.07, 100, 100), CameraAt({0.2, 0.1, 0.1})});
   size_t pixels = 0, beyond = 0, off_edge = 0;
-  for (const Look look : {Look::kShaded, Look::kDarkOnWhite}) {
+  for (const ShadingStyle style : {ShadingStyle::kShaded, ShadingStyle::kDarkOnWhite}) {
     for (const Scene& scene : scenes) {
       SCOPED_TRACE(scene.name);
       const auto surface = MakeSurface(scene.name, scene.mesh);
       ImageOptions options = WithAll(224, 224);
-      options.look = look;
+      options.shading_style = style;
       const auto a = cpu->Render(surface, scene.camera, options),
                  b = egl->Render(surface, scene.camera, options);
       ASSERT_TRUE(a.ok() && b.ok());

@@ -18,7 +18,7 @@
 
 #include "server/base/status.h"
 #include "server/image/egl_device.h"
-#include "server/image/gl_painter.h"
+#include "server/image/gl_rasterizer.h"
 #include "server/image/renderer.h"
 #include "server/image/shading_mesh.h"
 
@@ -74,17 +74,17 @@ class EglRenderer final : public Renderer {
   void Run(int device, std::promise<absl::Status> started) {
     absl::StatusOr<std::unique_ptr<EglContext>> context = EglContext::Create(EglDisplays()[device]);
     if (!context.ok()) return started.set_value(context.status());
-    absl::StatusOr<std::unique_ptr<GlPainter>> painter = GlPainter::Create();
-    if (!painter.ok()) return started.set_value(painter.status());
-    gl_renderer_ = (*painter)->gl_renderer();
+    absl::StatusOr<std::unique_ptr<GlRasterizer>> rasterizer = GlRasterizer::Create();
+    if (!rasterizer.ok()) return started.set_value(rasterizer.status());
+    gl_renderer_ = (*rasterizer)->gl_renderer();
     started.set_value(absl::OkStatus());
 
     while (Job* job = NextJob()) {
       // Taken out first: as soon as the value is set, the caller may be gone with his job.
       std::promise<absl::StatusOr<Image>> image = std::move(job->image);
-      image.set_value((*painter)->Paint(job->surface, *job->mesh, job->camera, job->options));
+      image.set_value((*rasterizer)->Draw(job->surface, *job->mesh, job->camera, job->options));
     }
-    painter->reset();  // while its context is still current
+    rasterizer->reset();  // while its context is still current
   }
 
   // Null when the renderer goes.

@@ -145,9 +145,9 @@ TEST_P(RendererTest, GreyOfAFlatFaceFollowsTheDocumentedModel) {
   AddBox({-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}, &mesh);
   const auto surface = MakeSurface("cube", mesh);
   const Camera camera = CameraAt({0, -0.4, 0});
-  for (const Look look : {Look::kShaded, Look::kDarkOnWhite}) {
+  for (const ShadingStyle style : {ShadingStyle::kShaded, ShadingStyle::kDarkOnWhite}) {
     ImageOptions options = WithAll(101, 101);
-    options.look = look;
+    options.shading_style = style;
     const Image image = MustRender(surface, camera, options);
     const View view = MakeView(camera, surface->bounds(), options);
     const double radius_m = 0.05 * std::sqrt(3.0);
@@ -161,17 +161,17 @@ TEST_P(RendererTest, GreyOfAFlatFaceFollowsTheDocumentedModel) {
             point;
         shade += light.strength * std::max(0.0, -to_light.normalized().y());
       }
-      const double scale = look == Look::kShaded ? 1.0 : kDarkScale;
+      const double scale = style == ShadingStyle::kShaded ? 1.0 : kDarkScale;
       EXPECT_NEAR(image.pixels[y * 101 + x], 255 * scale * std::min(1.0, shade), 0.51);
     }
-    EXPECT_EQ(image.pixels[0], look == Look::kShaded ? 0 : 255);
+    EXPECT_EQ(image.pixels[0], style == ShadingStyle::kShaded ? 0 : 255);
   }
 }
 
 TEST_P(RendererTest, DarkLookIsDarkOnWhite) {
   const auto surface = MakeSurface("letter", LetterMesh());
   ImageOptions options = WithAll(120, 90);
-  options.look = Look::kDarkOnWhite;
+  options.shading_style = ShadingStyle::kDarkOnWhite;
   const Image image = MustRender(surface, CameraAt({0.12, -0.26, 0.09}), options);
   int darkest = 255, lightest = 0;
   for (size_t i = 0; i < image.pixels.size(); ++i) {

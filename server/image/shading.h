@@ -49,7 +49,7 @@ struct Lighting {
   uint8_t background = 0;
 };
 
-inline Lighting MakeLighting(const View& view, const Bounds& bounds, Look look) {
+inline Lighting MakeLighting(const View& view, const Bounds& bounds, ShadingStyle style) {
   Lighting lighting;
   const double radius_m = 0.5 * bounds.DiagonalM();
   for (size_t i = 0; i < kLights.size(); ++i) {
@@ -59,7 +59,7 @@ inline Lighting MakeLighting(const View& view, const Bounds& bounds, Look look) 
         radius_m * (place.right * view.right + place.up * view.up - place.towards_eye * view.forward);
     for (int axis = 0; axis < 3; ++axis) lighting.position_m[i][axis] = static_cast<float>(position[axis]);
   }
-  if (look == Look::kDarkOnWhite) {
+  if (style == ShadingStyle::kDarkOnWhite) {
     lighting.scale = kDarkScale;
     lighting.background = 255;
   }

@@ -157,7 +157,9 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* 
   image.options.width = side(message.width());
   image.options.height = side(message.height());
   image.options.format = message.format() == v1::PIXEL_FORMAT_RGB ? PixelFormat::kRgb : PixelFormat::kGrey;
-  image.options.look = message.look() == v1::LOOK_DARK_ON_WHITE ? Look::kDarkOnWhite : Look::kShaded;
+  image.options.shading_style = message.shading_style() == v1::SHADING_STYLE_DARK_ON_WHITE
+                                    ? ShadingStyle::kDarkOnWhite
+                                    : ShadingStyle::kShaded;
   image.options.depth = message.depth();
   image.options.mask = message.mask();
   image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? ImageEncoding::kPng
@@ -170,7 +172,7 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message, Resources* 
        {std::tuple<int, bool, const char*>(message.format(), v1::PixelFormat_IsValid(message.format()),
                                            "format"),
         {message.encoding(), v1::ImageEncoding_IsValid(message.encoding()), "encoding"},
-        {message.look(), v1::Look_IsValid(message.look()), "look"},
+        {message.shading_style(), v1::ShadingStyle_IsValid(message.shading_style()), "shading_style"},
         {message.renderer(), v1::RendererKind_IsValid(message.renderer()), "renderer"}})
     if (!valid)
       return absl::InvalidArgumentError(
@@ -261,10 +263,40 @@ v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns) {
   return message;
 }
 
+namespace {
+
+v1::EffectStage ToProto(Stage stage) {
+  switch (stage) {
+    case Stage::kPose:
+      return v1::EFFECT_STAGE_POSE;
+    case Stage::kContact:
+      return v1::EFFECT_STAGE_CONTACT;
+    case Stage::kMotion:
+      return v1::EFFECT_STAGE_MOTION;
+    case Stage::kSensor:
+      return v1::EFFECT_STAGE_SENSOR;
+  }
+  return v1::EFFECT_STAGE_UNSPECIFIED;
+}
+
+v1::ParameterArity ToProto(Arity arity) {
+  switch (arity) {
+    case Arity::kScalar:
+      return v1::PARAMETER_ARITY_SCALAR;
+    case Arity::kVector3:
+      return v1::PARAMETER_ARITY_VECTOR3;
+    case Arity::kPerFinger:
+      return v1::PARAMETER_ARITY_PER_FINGER;
+  }
+  return v1::PARAMETER_ARITY_UNSPECIFIED;
+}
+
+}  // namespace
+
 v1::Effect ToProto(const Effect& effect) {
   v1::Effect message;
   message.set_name(effect.name);
-  message.set_stage(StageName(effect.stage));
+  message.set_stage(ToProto(effect.stage));
   message.set_meaning(effect.meaning);
   message.set_signature(effect.signature);
   message.set_check_on_rig(effect.check_on_rig);
@@ -273,9 +305,7 @@ v1::Effect ToProto(const Effect& effect) {
     v1::Parameter* parameter = message.add_parameters();
     parameter->set_name(info.name);
     parameter->set_unit(std::string(UnitSymbol(info.unit)));
-    parameter->set_arity(info.arity == Arity::kScalar    ? "scalar"
-                         : info.arity == Arity::kVector3 ? "vector3"
-                                                         : "finger");
+    parameter->set_arity(ToProto(info.arity));
     parameter->set_min(info.lower);
     parameter->set_max(info.upper);
     parameter->set_default_value(info.neutral);

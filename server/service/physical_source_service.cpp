@@ -68,9 +68,9 @@ absl::StatusOr<Image> PictureOf(const Frame& frame, const Intrinsics& intrinsics
   if (options.depth || options.mask)
     return absl::InvalidArgumentError(
         "image.depth, image.mask: this source's camera sees colours only; ask for none");
-  if (options.look != Look::kShaded)
+  if (options.shading_style != ShadingStyle::kShaded)
     return absl::InvalidArgumentError(
-        "image.look: this source's camera shows what it sees; leave it unspecified");
+        "image.shading_style: this source's camera shows what it sees; leave it unspecified");
   Image picture;
   picture.width = options.width;
   picture.height = options.height;

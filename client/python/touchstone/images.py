@@ -16,7 +16,10 @@ _ENCODINGS = {
     "png": types_pb2.IMAGE_ENCODING_PNG,
     "jpeg": types_pb2.IMAGE_ENCODING_JPEG,
 }
-_LOOKS = {"shaded": types_pb2.LOOK_SHADED, "dark_on_white": types_pb2.LOOK_DARK_ON_WHITE}
+_SHADING_STYLES = {
+    "shaded": types_pb2.SHADING_STYLE_SHADED,
+    "dark_on_white": types_pb2.SHADING_STYLE_DARK_ON_WHITE,
+}
 _RENDERERS = {
     "auto": types_pb2.RENDERER_KIND_UNSPECIFIED,
     "egl": types_pb2.RENDERER_KIND_EGL,
@@ -39,7 +42,7 @@ class ImageOptions:
     encoding: str
     depth: bool
     mask: bool
-    look: str
+    shading_style: str
     renderer: str
     jpeg_quality: int
     vertical_fov_deg: float
@@ -51,7 +54,7 @@ class ImageOptions:
             format=checks.choice("image format", self.format, _FORMATS),
             encoding=checks.choice("image encoding", self.encoding, _ENCODINGS),
             jpeg_quality=checks.whole_number("jpeg_quality", self.jpeg_quality, 1, 100),
-            look=checks.choice("image look", self.look, _LOOKS),
+            shading_style=checks.choice("shading style", self.shading_style, _SHADING_STYLES),
             depth=bool(self.depth),
             mask=bool(self.mask),
             renderer=checks.choice("image renderer", self.renderer, _RENDERERS),
@@ -62,7 +65,7 @@ class ImageOptions:
 
 
 def image(width: int = 224, height: int = 224, format: str = "grey", encoding: str = "raw", *, depth: bool = False,
-          mask: bool = False, look: str = "shaded", renderer: str = "auto", jpeg_quality: int = 90,
+          mask: bool = False, shading_style: str = "shaded", renderer: str = "auto", jpeg_quality: int = 90,
           vertical_fov_deg: float = 45.0) -> ImageOptions:
     """How the column "image" is made.
 
@@ -72,10 +75,12 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
       encoding: "raw" gives arrays, "png" and "jpeg" give EncodedImages.
       depth: also "depth_mm", float32 (rows, height, width, 1) along the viewing axis, 0 where no object is.
       mask: also "mask", uint8 (rows, height, width, 1), 255 where the object is.
-      look: "shaded" (white lights, black background) or "dark_on_white".
+      shading_style: "shaded" (white lights, black background) or "dark_on_white".
       renderer: "egl", "cpu", or "auto": the source's choice. Two renderers may differ by 1/255.
     """
-    return ImageOptions(width, height, format, encoding, depth, mask, look, renderer, jpeg_quality, vertical_fov_deg)
+    return ImageOptions(
+        width, height, format, encoding, depth, mask, shading_style, renderer, jpeg_quality, vertical_fov_deg
+    )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -66,13 +66,26 @@ def _corner_mm(v: types_pb2.Vector3) -> tuple[float, float, float]:
     return tuple(units.lab_value("_m", c) for c in (v.x, v.y, v.z))  # type: ignore[return-value]
 
 
+_ARITIES = {
+    types_pb2.PARAMETER_ARITY_SCALAR: "scalar",
+    types_pb2.PARAMETER_ARITY_VECTOR3: "vector3",
+    types_pb2.PARAMETER_ARITY_PER_FINGER: "finger",
+}
+_STAGES = {
+    types_pb2.EFFECT_STAGE_POSE: "pose",
+    types_pb2.EFFECT_STAGE_CONTACT: "contact",
+    types_pb2.EFFECT_STAGE_MOTION: "motion",
+    types_pb2.EFFECT_STAGE_SENSOR: "sensor",
+}
+
+
 @dataclasses.dataclass(frozen=True)
 class Parameter:
     """A parameter of an effect, in the unit of model files."""
 
     name: str
     unit: str
-    arity: str  # "scalar", "vector3" or "finger"
+    arity: str  # "scalar", "vector3" (object frame) or "finger" (one value per finger)
     min: float
     max: float
     default: float
@@ -96,10 +109,14 @@ class Effect:
     @classmethod
     def from_proto(cls, m: types_pb2.Effect) -> Effect:
         parameters = tuple(
-            Parameter(p.name, p.unit, p.arity, p.min, p.max, p.default_value, p.typical, p.sum_zero, p.meaning)
+            Parameter(
+                p.name, p.unit, _ARITIES.get(p.arity, "unknown"), p.min, p.max, p.default_value, p.typical, p.sum_zero,
+                p.meaning,
+            )
             for p in m.parameters
         )
-        return cls(m.name, m.stage, m.meaning, m.signature, m.check_on_rig, m.remedy, parameters)
+        stage = _STAGES.get(m.stage, "unknown")
+        return cls(m.name, stage, m.meaning, m.signature, m.check_on_rig, m.remedy, parameters)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,19 +18,19 @@
 
 namespace touchstone {
 
-class GlPainter {
+class GlRasterizer {
  public:
   // Compiles the shaders. Create, use and destroy it with the same context current.
-  static absl::StatusOr<std::unique_ptr<GlPainter>> Create();
-  ~GlPainter();
-  GlPainter(const GlPainter&) = delete;
-  GlPainter& operator=(const GlPainter&) = delete;
+  static absl::StatusOr<std::unique_ptr<GlRasterizer>> Create();
+  ~GlRasterizer();
+  GlRasterizer(const GlRasterizer&) = delete;
+  GlRasterizer& operator=(const GlRasterizer&) = delete;
 
   const std::string& gl_renderer() const { return gl_renderer_; }
 
   // The request must be valid. `mesh` is the surface's.
-  absl::StatusOr<Image> Paint(const std::shared_ptr<const Surface>& surface, const ShadingMesh& mesh,
-                              const Camera& camera, const ImageOptions& options);
+  absl::StatusOr<Image> Draw(const std::shared_ptr<const Surface>& surface, const ShadingMesh& mesh,
+                             const Camera& camera, const ImageOptions& options);
 
  private:
   // A mesh in the driver's memory, kept while its surface lives, within limits.
@@ -55,7 +55,7 @@ class GlPainter {
     }
   };
 
-  GlPainter() = default;
+  GlRasterizer() = default;
   absl::Status CompileProgram();
   absl::Status PrepareTarget(const Target& target);
   void DeleteTarget();

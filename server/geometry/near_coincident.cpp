@@ -49,16 +49,16 @@ bool Beside(const Corners& base, const Corners& other, const bool* common, doubl
 
 }  // namespace
 
-bool Surface::Search::ComputeCrowded(uint32_t triangle) const {
+bool Surface::Search::ComputeNearCoincident(uint32_t triangle) const {
   const double near_m = 8 * rounding_m_;
   const Corners self = CornersOf(mesh_, triangle);
   const Eigen::Vector3f reach = Eigen::Vector3f::Constant(static_cast<float>(near_m));
   const Eigen::Vector3f a = self.at[0].cast<float>(), b = self.at[1].cast<float>(),
                         c = self.at[2].cast<float>();
-  bool crowded = false;
+  bool near_coincident = false;
   tree().VisitInBox(a.cwiseMin(b).cwiseMin(c) - reach, a.cwiseMax(b).cwiseMax(c) + reach,
                     [&](const uint32_t* ids, int count) {
-                      for (int i = 0; i < count && !crowded; ++i) {
+                      for (int i = 0; i < count && !near_coincident; ++i) {
                         if (ids[i] == triangle) continue;
                         const Corners other = CornersOf(mesh_, ids[i]);
                         bool common_of_other[3] = {}, common_of_self[3] = {};
@@ -67,22 +67,22 @@ bool Surface::Search::ComputeCrowded(uint32_t triangle) const {
                             if (other.at[p] == self.at[q]) common_of_other[p] = common_of_self[q] = true;
                           }
                         }
-                        crowded = !ClearOfPlane(self, other, common_of_other, near_m) &&
-                                  !ClearOfPlane(other, self, common_of_self, near_m) &&
-                                  !Beside(self, other, common_of_other, rounding_m_) &&
-                                  !Beside(other, self, common_of_self, rounding_m_);
+                        near_coincident = !ClearOfPlane(self, other, common_of_other, near_m) &&
+                                          !ClearOfPlane(other, self, common_of_self, near_m) &&
+                                          !Beside(self, other, common_of_other, rounding_m_) &&
+                                          !Beside(other, self, common_of_self, rounding_m_);
                       }
                     });
-  return crowded;
+  return near_coincident;
 }
 
 // Two bits a triangle: 0 not yet known, 1 no, 2 yes. Asked by two threads at once, both find the same.
-bool Surface::Search::Crowded(uint32_t triangle) const {
-  std::atomic<uint8_t>& known = crowded_[triangle / 4];
+bool Surface::Search::NearCoincident(uint32_t triangle) const {
+  std::atomic<uint8_t>& known = near_coincident_[triangle / 4];
   const int shift = 2 * (triangle % 4);
   int state = known.load(std::memory_order_relaxed) >> shift & 3;
   if (state == 0) {
-    state = ComputeCrowded(triangle) ? 2 : 1;
+    state = ComputeNearCoincident(triangle) ? 2 : 1;
     known.fetch_or(static_cast<uint8_t>(state << shift), std::memory_order_relaxed);
   }
   return state == 2;

@@ -1,4 +1,4 @@
-#include "server/image/gl_painter.h"
+#include "server/image/gl_rasterizer.h"
 
 #include <cstddef>
 #include <utility>
@@ -53,11 +53,11 @@ void ClipFromObject(const View& view, float column_major[16]) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GlPainter>> GlPainter::Create() {
-  std::unique_ptr<GlPainter> painter(new GlPainter);
+absl::StatusOr<std::unique_ptr<GlRasterizer>> GlRasterizer::Create() {
+  std::unique_ptr<GlRasterizer> rasterizer(new GlRasterizer);
   const GLubyte* name = glGetString(GL_RENDERER);
-  painter->gl_renderer_ = name == nullptr ? "unnamed OpenGL" : reinterpret_cast<const char*>(name);
-  TOUCHSTONE_RETURN_IF_ERROR(painter->CompileProgram());
+  rasterizer->gl_renderer_ = name == nullptr ? "unnamed OpenGL" : reinterpret_cast<const char*>(name);
+  TOUCHSTONE_RETURN_IF_ERROR(rasterizer->CompileProgram());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
@@ -65,16 +65,16 @@ absl::StatusOr<std::unique_ptr<GlPainter>> GlPainter::Create() {
   glFrontFace(GL_CW);  // counter-clockwise, seen in an image whose y points down
   glCullFace(GL_BACK);
   TOUCHSTONE_RETURN_IF_ERROR(TakeGlError("setting up"));
-  return painter;
+  return rasterizer;
 }
 
-GlPainter::~GlPainter() {
+GlRasterizer::~GlRasterizer() {
   for (const Buffers& buffers : meshes_) Delete(buffers);
   DeleteTarget();
   if (program_ != 0) glDeleteProgram(program_);
 }
 
-absl::Status GlPainter::CompileProgram() {
+absl::Status GlRasterizer::CompileProgram() {
   TOUCHSTONE_ASSIGN_OR_RETURN(const GLuint vertex, CompileShader(GL_VERTEX_SHADER, kVertexShader));
   const absl::StatusOr<GLuint> fragment = CompileShader(GL_FRAGMENT_SHADER, kFragmentShader);
   if (!fragment.ok()) {
@@ -102,7 +102,7 @@ absl::Status GlPainter::CompileProgram() {
   return absl::OkStatus();
 }
 
-void GlPainter::DeleteTarget() {
+void GlRasterizer::DeleteTarget() {
   if (frame_buffer_ != 0) glDeleteFramebuffers(1, &frame_buffer_);
   for (uint32_t* buffer : {&grey_buffer_, &metres_buffer_, &depth_buffer_}) {
     if (*buffer != 0) glDeleteRenderbuffers(1, buffer);
@@ -112,7 +112,7 @@ void GlPainter::DeleteTarget() {
   target_ = Target{};
 }
 
-absl::Status GlPainter::PrepareTarget(const Target& target) {
+absl::Status GlRasterizer::PrepareTarget(const Target& target) {
   if (frame_buffer_ != 0 && target == target_) return absl::OkStatus();
   DeleteTarget();
   glGenFramebuffers(1, &frame_buffer_);
@@ -143,14 +143,14 @@ absl::Status GlPainter::PrepareTarget(const Target& target) {
   return absl::OkStatus();
 }
 
-void GlPainter::Delete(const Buffers& buffers) {
+void GlRasterizer::Delete(const Buffers& buffers) {
   glDeleteVertexArrays(1, &buffers.vertex_array);
   glDeleteBuffers(1, &buffers.vertices);
   glDeleteBuffers(1, &buffers.corners);
 }
 
-absl::StatusOr<uint32_t> GlPainter::VertexArrayOf(const std::shared_ptr<const Surface>& surface,
-                                                  const ShadingMesh& mesh) {
+absl::StatusOr<uint32_t> GlRasterizer::VertexArrayOf(const std::shared_ptr<const Surface>& surface,
+                                                     const ShadingMesh& mesh) {
   // What belongs to dead surfaces goes; what was asked for moves to the front.
   uint64_t bytes = 0;
   bool found = false;
@@ -203,7 +203,7 @@ absl::StatusOr<uint32_t> GlPainter::VertexArrayOf(const std::shared_ptr<const Su
   return buffers.vertex_array;
 }
 
-void GlPainter::ReadBack(const ImageOptions& options, Image* image) {
+void GlRasterizer::ReadBack(const ImageOptions& options, Image* image) {
   const int width = options.width, height = options.height;
   const size_t pixels = static_cast<size_t>(width) * height;
   glReadBuffer(GL_COLOR_ATTACHMENT0);
@@ -234,12 +234,13 @@ void GlPainter::ReadBack(const ImageOptions& options, Image* image) {
   }
 }
 
-absl::StatusOr<Image> GlPainter::Paint(const std::shared_ptr<const Surface>& surface, const ShadingMesh& mesh,
-                                       const Camera& camera, const ImageOptions& options) {
+absl::StatusOr<Image> GlRasterizer::Draw(const std::shared_ptr<const Surface>& surface,
+                                         const ShadingMesh& mesh, const Camera& camera,
+                                         const ImageOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(PrepareTarget({options.width, options.height, options.depth, options.mask}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const GLuint vertex_array, VertexArrayOf(surface, mesh));
   const View view = MakeView(camera, surface->bounds(), options);
-  const Lighting lighting = MakeLighting(view, surface->bounds(), options.look);
+  const Lighting lighting = MakeLighting(view, surface->bounds(), options.shading_style);
 
   const float background[4] = {lighting.background / 255.0f, 0, 0, 0};
   const float nothing[4] = {0, 0, 0, 0};
