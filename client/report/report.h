@@ -10,7 +10,7 @@
 
 namespace touchstone::client {
 
-// What a person reads in the terminal (DESIGN 9): plain ASCII apart from the names in the report, no line
+// What a person reads in the terminal: plain ASCII apart from the names in the report, no line
 // longer than `width` columns (at least 60) unless a single word is. `colour`: ANSI escapes for emphasis,
 // which take no columns.
 std::string TerminalReport(const v1::Report& report, int width, bool colour);

@@ -1,4 +1,4 @@
-// The report in the terminal: how wrong, where, why, ladder, what to do (DESIGN 9).
+// The report in the terminal: how wrong, where, why, ladder, what to do.
 #include <algorithm>
 #include <cmath>
 #include <map>

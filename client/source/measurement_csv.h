@@ -1,5 +1,5 @@
-// The measurement file (DESIGN 7), as server/session has it: clients and servers read and write it with the
-// same code.
+// The measurement file (format: proto/README.md), as server/session has it: clients and servers read and write it with
+// the same code.
 #pragma once
 
 #include "server/session/measurement_csv.h"

@@ -1,4 +1,4 @@
-// The promise of DESIGN 10: sample i is a pure function of (specification, model, seed, i), bit for bit.
+// The promise of a dataset: sample i is a pure function of (specification, model, seed, i), bit for bit.
 #include "server/dataset/stream.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Effects that a user writes in the model file (DESIGN 6), and what an expression may use.
+// Effects that a user writes in the model file (server/model/model_file.md), and what an expression may use.
 #pragma once
 
 #include <memory>

@@ -19,8 +19,8 @@ struct Camera {
   double far_m = 0;                               // the object is enclosed
 };
 
-// The seed's camera of a touch (DESIGN 4): eye = the middle finger's start, at = target, up = lateral x
-// approach.
+// The camera of a touch: eye = the middle finger's start (target - approach * standoff), at = target,
+// up = lateral x approach. Object frame; approach and lateral are unit vectors.
 Camera CameraOfTouch(const Eigen::Vector3d& target_m, const Eigen::Vector3d& approach,
                      const Eigen::Vector3d& lateral, double standoff_m);
 

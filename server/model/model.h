@@ -1,4 +1,4 @@
-// A model: the nominal rig and an ordered stack of effects (DESIGN 6), its file and its content hash.
+// A model: the nominal rig and an ordered stack of effects, its file and its content hash.
 #pragma once
 
 #include <map>

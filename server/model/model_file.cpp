@@ -1,4 +1,4 @@
-// Reads a model file (DESIGN 6).
+// Reads a model file (format: model_file.md).
 #include <absl/strings/ascii.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
