@@ -6,12 +6,12 @@
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/gateway/arm/ur_arm.h"
-#include "server/gateway/rig/recorded_source.h"
 #include "server/gateway/rig/rig.h"
 #include "server/service/journal_sessions_service.h"
 #include "server/service/physical_source_service.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
+#include "server/source/recorded_rig.h"
 
 namespace touchstone {
 namespace {
@@ -64,7 +64,7 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
 }
 
 // Only its fingers count: datasets know the shape of their columns from a model.
-absl::StatusOr<std::shared_ptr<const Model>> ModelOfFingers(const PhysicalSource& source) {
+absl::StatusOr<std::shared_ptr<const Model>> ModelOfFingers(const RigDevice& source) {
   const std::string text =
       absl::StrCat("touchstone: model/1\nname: rig\nend_effector: {fingers: ", source.fingers(),
                    ", spacing_mm: ", ShortestNumber(source.spacing_m() * 1000), "}\neffects: []\n");
@@ -76,7 +76,7 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelOfFingers(const PhysicalSource
 
 struct GatewayServer::Parts {
   Resources resources;
-  std::unique_ptr<PhysicalSource> source;
+  std::unique_ptr<RigDevice> source;
   Rig* rig = nullptr;  // the source, if it is one
   std::unique_ptr<LeaseBook> leases;
   std::unique_ptr<PhysicalSourceService> source_service;
@@ -105,8 +105,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     journal = &rig->journal();
     parts.source = std::move(rig);
   } else {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedSource> recorded,
-                                RecordedSource::Open(options.replay));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedRig> recorded, RecordedRig::Open(options.replay));
     journal = &recorded->journal();
     parts.source = std::move(recorded);
   }
@@ -143,7 +142,7 @@ int GatewayServer::port() const {
   return parts_->port;
 }
 
-PhysicalSource& GatewayServer::source() {
+RigDevice& GatewayServer::source() {
   return *parts_->source;
 }
 

@@ -5,8 +5,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/rig/physical_source.h"
 #include "server/service/gateway_options.h"
+#include "server/source/rig_device.h"
 
 namespace touchstone {
 
@@ -20,7 +20,7 @@ class GatewayServer {
 
   int port() const;
   // For tests: what is served.
-  PhysicalSource& source();
+  RigDevice& source();
   // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s for running
   // calls.
   void Drain();

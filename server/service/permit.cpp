@@ -2,8 +2,8 @@
 
 namespace touchstone {
 
-Permit PermitOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
-                const std::string& lease_token) {
+MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
+                    const std::string& lease_token) {
   return [=]() -> absl::Status {
     if (context->IsCancelled())
       return absl::CancelledError("the client is gone, or the call's deadline has passed");

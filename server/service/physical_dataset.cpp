@@ -52,7 +52,7 @@ std::string CommandBytes(const CommandedTouch& touch) {
 
 absl::StatusOr<PhysicalDataset> PhysicalDataset::Create(
     std::shared_ptr<const DatasetSpecification> specification, std::vector<std::string> names,
-    const DatasetPart& part, std::string session, std::string key, PhysicalSource* source) {
+    const DatasetPart& part, std::string session, std::string key, RigDevice* source) {
   PhysicalDataset dataset;
   dataset.part_ = part;
   if (part.stop_index > specification->samples)
@@ -77,7 +77,7 @@ absl::StatusOr<PhysicalDataset> PhysicalDataset::Create(
   return dataset;
 }
 
-absl::StatusOr<std::optional<DatasetBatch>> PhysicalDataset::Next(const Permit& permit) {
+absl::StatusOr<std::optional<DatasetBatch>> PhysicalDataset::Next(const MotionGuard& guard) {
   if (next_index_ >= part_.stop_index) return std::optional<DatasetBatch>();
   DatasetBatch batch;
   batch.start_index = next_index_;
@@ -85,20 +85,20 @@ absl::StatusOr<std::optional<DatasetBatch>> PhysicalDataset::Next(const Permit& 
   batch.offsets.resize(columns_.size());
   const uint64_t end = std::min<uint64_t>(next_index_ + part_.batch_size, part_.stop_index);
   for (uint64_t index = next_index_; index < end; ++index) {
-    TOUCHSTONE_RETURN_IF_ERROR(permit());
-    TOUCHSTONE_RETURN_IF_ERROR(AppendSample(index, permit, &batch));
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    TOUCHSTONE_RETURN_IF_ERROR(AppendSample(index, guard, &batch));
     ++batch.rows;
   }
   next_index_ += uint64_t{part_.batch_size} * part_.batch_stride;
   return std::optional<DatasetBatch>(std::move(batch));
 }
 
-absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(uint64_t index,
-                                                                               const Permit& permit) const {
+absl::StatusOr<std::pair<TouchCommand, JournalTouch>> PhysicalDataset::MakeTouch(
+    uint64_t index, const MotionGuard& guard) const {
   const size_t which = index % names_.size();
   const PoseGenerator& generator = *generators_[which];
   const uint64_t number = generator.Count() == 0 ? index : index / names_.size();
-  TouchOrder order;
+  TouchCommand order;
   order.session = session_;
   order.object = names_[which];
   order.bounds = specification_->objects[which]->bounds();
@@ -107,8 +107,8 @@ absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(u
   for (uint32_t attempt = 0; attempt < specification_->max_draws; ++attempt) {
     order.id = absl::StrCat("dataset-", key_, "-", index, "-", attempt);
     order.touch = TouchOfPlan(specification_->plan, generator, number, attempt);
-    order.command = CommandBytes(order.touch);
-    TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, source_->Touch(order, permit));
+    order.bytes = CommandBytes(order.touch);
+    TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, source_->Touch(order, guard));
     const bool complete =
         std::none_of(touch.result.fingers.begin(), touch.result.fingers.end(),
                      [](const JournalFinger& finger) { return std::isnan(finger.contact_time_s); });
@@ -119,16 +119,17 @@ absl::StatusOr<std::pair<TouchOrder, JournalTouch>> PhysicalDataset::MakeTouch(u
                    " draws had all fingers hit; raise max_draws or change the plan"));
 }
 
-absl::Status PhysicalDataset::AppendSample(uint64_t index, const Permit& permit, DatasetBatch* batch) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto made, MakeTouch(index, permit));
+absl::Status PhysicalDataset::AppendSample(uint64_t index, const MotionGuard& guard,
+                                           DatasetBatch* batch) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto made, MakeTouch(index, guard));
   const auto& [order, touch] = made;
   const v1::TouchResult result = ToProto(touch, session_);
   std::optional<Image> picture;
   if (specification_->columns.image) {
     const Camera camera = CameraOfTouch(order.touch.target_m, order.touch.approach, order.touch.lateral,
                                         order.touch.standoff_m);
-    const ViewOrder view{session_, order.object, order.bounds, ObjectFromCamera(camera)};
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, source_->Photograph(view, permit));
+    const ViewCommand view{session_, order.object, order.bounds, ObjectFromCamera(camera)};
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, source_->Photograph(view, guard));
     TOUCHSTONE_ASSIGN_OR_RETURN(picture,
                                 PictureOf(frame, source_->IntrinsicsOf(frame), specification_->image));
   }

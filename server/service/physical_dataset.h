@@ -11,7 +11,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/dataset/stream.h"
-#include "server/gateway/rig/physical_source.h"
+#include "server/source/rig_device.h"
 #include "touchstone/v1/source.pb.h"
 
 namespace touchstone {
@@ -29,15 +29,16 @@ class PhysicalDataset {
   // `names` of the objects, as in the specification.
   static absl::StatusOr<PhysicalDataset> Create(std::shared_ptr<const DatasetSpecification> specification,
                                                 std::vector<std::string> names, const DatasetPart& part,
-                                                std::string session, std::string key, PhysicalSource* source);
+                                                std::string session, std::string key, RigDevice* source);
 
   // The next batch; nothing at the end.
-  absl::StatusOr<std::optional<DatasetBatch>> Next(const Permit& permit);
+  absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard);
 
  private:
-  absl::Status AppendSample(uint64_t index, const Permit& permit, DatasetBatch* batch) const;
+  absl::Status AppendSample(uint64_t index, const MotionGuard& guard, DatasetBatch* batch) const;
   // The touch of a sample: drawn again, within bounds, while a finger misses.
-  absl::StatusOr<std::pair<TouchOrder, JournalTouch>> MakeTouch(uint64_t index, const Permit& permit) const;
+  absl::StatusOr<std::pair<TouchCommand, JournalTouch>> MakeTouch(uint64_t index,
+                                                                  const MotionGuard& guard) const;
 
   std::shared_ptr<const DatasetSpecification> specification_;
   std::vector<std::string> names_;
@@ -45,7 +46,7 @@ class PhysicalDataset {
   std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one an object
   DatasetPart part_;
   std::string session_, key_;
-  PhysicalSource* source_ = nullptr;
+  RigDevice* source_ = nullptr;
   uint64_t next_index_ = 0;
 };
 

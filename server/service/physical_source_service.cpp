@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "server/base/status.h"
+#include "server/gateway/camera/camera.h"
 #include "server/service/convert.h"
 #include "server/service/permit.h"
 #include "server/service/physical_dataset.h"
@@ -92,7 +93,7 @@ Eigen::Isometry3d ObjectFromCamera(const Camera& camera) {
 grpc::Status PhysicalSourceService::Describe(grpc::ServerContext*, const v1::DescribeRequest*,
                                              v1::DescribeResponse* response) {
   const ServerOptions& options = resources_->options;
-  const PhysicalFacts facts = source_->Facts();
+  const SourceStatus facts = source_->Status();
   response->set_kind("physical");
   response->set_version(kVersion);
   for (const char* plan : {"faces", "list"}) response->add_plans(plan);
@@ -118,7 +119,7 @@ grpc::Status PhysicalSourceService::Touch(grpc::ServerContext* context, const v1
 absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request,
                                             v1::TouchResponse* response) {
   const RunningGuard running(&resources_->running_requests);
-  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
+  const MotionGuard guard = GuardOf(context, resources_, leases_, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
@@ -132,21 +133,21 @@ absl::Status PhysicalSourceService::DoTouch(grpc::ServerContext* context, const 
   TOUCHSTONE_RETURN_IF_ERROR(CheckTouchIds(request));
 
   // All are checked before the first one moves anything.
-  std::vector<TouchOrder> orders;
+  std::vector<TouchCommand> orders;
   std::map<std::string, uint64_t> repeats;
   for (int k = 0; k < request.touches_size(); ++k) {
-    TouchOrder order;
+    TouchCommand order;
     TOUCHSTONE_ASSIGN_OR_RETURN(order.touch, FromProto(request.touches(k), absl::StrCat("touches[", k, "]")));
     order.session = session;
     order.id = request.touch_ids_size() > 0 ? request.touch_ids(k) : RandomId();
     order.object = request.object();
     order.bounds = object->surface->bounds();
-    order.command = CommandBytes(order.touch);
-    order.repeat = repeats[order.command]++;
+    order.bytes = CommandBytes(order.touch);
+    order.repeat = repeats[order.bytes]++;
     orders.push_back(std::move(order));
   }
-  for (const TouchOrder& order : orders) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const JournalTouch touch, source_->Touch(order, permit));
+  for (const TouchCommand& order : orders) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const JournalTouch touch, source_->Touch(order, guard));
     *response->add_results() = ToProto(touch, session);
     ++resources_->touches;
   }
@@ -161,7 +162,7 @@ grpc::Status PhysicalSourceService::Capture(grpc::ServerContext* context, const 
 absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request,
                                               v1::CaptureResponse* response) {
   const RunningGuard running(&resources_->running_requests);
-  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
+  const MotionGuard guard = GuardOf(context, resources_, leases_, request.lease_token());
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
@@ -189,8 +190,8 @@ absl::Status PhysicalSourceService::DoCapture(grpc::ServerContext* context, cons
       column->add_shape(side);
   std::vector<uint64_t> offsets;
   for (const Camera& camera : cameras) {
-    ViewOrder order{"default", request.object(), object->surface->bounds(), ObjectFromCamera(camera)};
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, source_->Photograph(order, permit));
+    ViewCommand order{"default", request.object(), object->surface->bounds(), ObjectFromCamera(camera)};
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, source_->Photograph(order, guard));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, PictureOf(frame, source_->IntrinsicsOf(frame), image));
     TOUCHSTONE_RETURN_IF_ERROR(AppendPicture(picture, image, "image", column->mutable_data(), &offsets));
     ++resources_->images;
@@ -247,9 +248,9 @@ absl::Status PhysicalSourceService::DoStream(grpc::ServerContext* context,
   response.clear_header();
 
   const std::vector<ColumnInfo> columns = ColumnsOf(*specification);
-  const Permit permit = PermitOf(context, resources_, leases_, request.lease_token());
+  const MotionGuard guard = GuardOf(context, resources_, leases_, request.lease_token());
   for (;;) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch, dataset.Next(permit));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch, dataset.Next(guard));
     if (!batch.has_value()) return absl::OkStatus();
     const uint32_t rows = batch->rows;
     *response.mutable_batch() = ToProto(*std::move(batch), columns);

@@ -3,15 +3,15 @@
 #pragma once
 
 #include "server/dataset/specification.h"
-#include "server/gateway/rig/physical_source.h"
 #include "server/image/image.h"
 #include "server/service/source_service.h"
+#include "server/source/rig_device.h"
 
 namespace touchstone {
 
 class PhysicalSourceService final : public SourceService {
  public:
-  PhysicalSourceService(Resources* resources, LeaseBook* leases, PhysicalSource* source)
+  PhysicalSourceService(Resources* resources, LeaseBook* leases, RigDevice* source)
       : SourceService(resources, leases), source_(source) {}
 
   grpc::Status Describe(grpc::ServerContext*, const v1::DescribeRequest*, v1::DescribeResponse*) override;
@@ -28,7 +28,7 @@ class PhysicalSourceService final : public SourceService {
   absl::Status DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& request,
                         grpc::ServerWriter<v1::StreamDatasetResponse>* writer);
 
-  PhysicalSource* source_;
+  RigDevice* source_;
 };
 
 // A journalled touch as the protocol tells it. Times of fingers that reported nothing are NaN.

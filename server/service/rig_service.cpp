@@ -112,12 +112,12 @@ void RigService::Describe(v1::RigState* state) const {
     v1::CameraStatus* c = state->mutable_camera();
     c->set_connected(true);
     c->set_description(camera->Description());
-    c->set_width(rig_->Facts().image_width);
-    c->set_height(rig_->Facts().image_height);
+    c->set_width(rig_->Status().image_width);
+    c->set_height(rig_->Status().image_height);
     c->set_frames(camera->frames());
     c->set_stale_frames(camera->stale_frames());
   }
-  const PhysicalFacts facts = rig_->Facts();
+  const SourceStatus facts = rig_->Status();
   state->set_object(facts.object);
   state->set_placement(facts.placement);
   state->set_mounts_itself(!rig_->options().mount_command.empty());
@@ -193,13 +193,13 @@ absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountOb
     return absl::InvalidArgumentError(absl::StrCat(
         "placement = '", placement, "': the face that points up, one of ", absl::StrJoin(known, ", ")));
   return rig_->Mount(request.object(), placement,
-                     PermitOf(context, resources_, leases_, request.lease_token()));
+                     GuardOf(context, resources_, leases_, request.lease_token()));
 }
 
 grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request,
                               v1::RigState* response) {
   absl::Status status = leases_->Check(request->lease_token());
-  if (status.ok()) status = rig_->Home(PermitOf(context, resources_, leases_, request->lease_token()));
+  if (status.ok()) status = rig_->Home(GuardOf(context, resources_, leases_, request->lease_token()));
   if (status.ok()) Describe(response);
   return ToGrpc(status);
 }

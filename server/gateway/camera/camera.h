@@ -10,23 +10,10 @@
 #include <Eigen/Geometry>
 
 #include "server/gateway/timing/change_notifier.h"
+#include "server/image/photograph.h"
 
 namespace touchstone {
 
-struct Frame {
-  int width = 0, height = 0;
-  std::vector<uint8_t> rgb;  // height x width x 3
-  double host_time_s = 0;    // when it was taken, as well as is known
-  uint64_t number = 0;
-};
-
-// Pinhole with radial and tangential distortion, as OpenCV writes it (camera_matrix,
-// distortion_coefficients).
-struct Intrinsics {
-  int width = 0, height = 0;
-  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
-  std::vector<double> distortion;  // k1 k2 p1 p2 k3; empty: none
-};
 // OpenCV's YAML or XML file, as its calibration tools write it. Errors name the file and the field.
 absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path);
 

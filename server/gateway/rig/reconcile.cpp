@@ -23,7 +23,7 @@ absl::Status Rig::Reconcile() {
     TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch(session, touch));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> now, journal().Find(session, touch.id));
     const bool recovered = now.has_value() && now->stage == TouchStage::kDone;
-    ++(recovered ? facts_.recovered_touches : facts_.interrupted_touches);
+    ++(recovered ? status_.recovered_touches : status_.interrupted_touches);
     const std::string outcome = recovered         ? "its result was recovered"
                                 : now.has_value() ? now->error
                                                   : "it is gone";

@@ -15,6 +15,7 @@
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/run_command.h"
 #include "server/image/encode.h"
+#include "server/session/command_bytes.h"
 
 namespace touchstone {
 namespace {
@@ -37,8 +38,8 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
     return absl::DataLossError(
         absl::StrCat("the journal's next_program_id is '", next, "': a number was expected"));
   rig->reserved_program_id_ = rig->next_program_id_;
-  TOUCHSTONE_ASSIGN_OR_RETURN(rig->facts_.object, journal.Fact("mounted_object"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(rig->facts_.placement, journal.Fact("mounted_placement"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.object, journal.Fact("mounted_object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.placement, journal.Fact("mounted_placement"));
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
   return rig;
 }
@@ -57,38 +58,38 @@ uint32_t Rig::NextProgramId() {
   return next_program_id_++;
 }
 
-absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const Permit& permit) {
+absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const MotionGuard& guard) {
   const uint64_t stops = stops_;
   for (;;) {
-    TOUCHSTONE_RETURN_IF_ERROR(Allowed(permit, stops));
+    TOUCHSTONE_RETURN_IF_ERROR(Allowed(guard, stops));
     std::unique_lock<std::timed_mutex> lock(moving_, std::chrono::milliseconds(10));
     if (lock.owns_lock()) return lock;
   }
 }
 
-absl::Status Rig::Allowed(const Permit& permit, uint64_t stops) const {
+absl::Status Rig::Allowed(const MotionGuard& guard, uint64_t stops) const {
   if (stops_ != stops || stopped_)
     return absl::AbortedError("stopped: Control.Stop was called; acquire a lease to go on");
-  return permit();
+  return guard();
 }
 
 void Rig::Remember(const absl::Status& status) {
-  std::lock_guard<std::mutex> lock(facts_mutex_);
-  facts_.last_error = std::string(status.message());
+  std::lock_guard<std::mutex> lock(status_mutex_);
+  status_.last_error = std::string(status.message());
 }
 
-PhysicalFacts Rig::Facts() const {
-  PhysicalFacts facts;
+SourceStatus Rig::Status() const {
+  SourceStatus facts;
   {
-    std::lock_guard<std::mutex> lock(facts_mutex_);
-    facts = facts_;
+    std::lock_guard<std::mutex> lock(status_mutex_);
+    facts = status_;
   }
   const ClockEstimate clock = parts_.effector->Clock();
   if (clock.valid) facts.clock_uncertainty_s = clock.offset_uncertainty_s / clock.rate * options_.time_scale;
   return facts;
 }
 
-absl::Status Rig::PowerUp(const Permit& permit) {
+absl::Status Rig::PowerUp(const MotionGuard& guard) {
   constexpr int kRunning = 7;
   constexpr double kPatienceS = 10;
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, parts_.arm->State());
@@ -99,7 +100,7 @@ absl::Status Rig::PowerUp(const Permit& permit) {
   // The states tell it a little later than the dashboard.
   const uint64_t stops = stops_;
   for (const double until_s = HostNowS() + kPatienceS; !parts_.arm->Ready().ok() && HostNowS() < until_s;) {
-    TOUCHSTONE_RETURN_IF_ERROR(Allowed(permit, stops));
+    TOUCHSTONE_RETURN_IF_ERROR(Allowed(guard, stops));
     parts_.news->WaitForNews(parts_.news->count(), 0.01);
   }
   return parts_.arm->Ready();
@@ -127,71 +128,71 @@ std::string Rig::SourceInWords() const {
                       options_.effector_port);
 }
 
-absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchOrder& order) const {
+absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchCommand& command) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> touch,
-                              parts_.journal->Find(order.session, order.id));
+                              parts_.journal->Find(command.session, command.id));
   if (!touch.has_value()) return touch;
-  if (touch->object != order.object || touch->command != order.command)
-    return absl::AlreadyExistsError(absl::StrCat("touch id '", order.id, "' of session '", order.session,
+  if (touch->object != command.object || !SameCommand(touch->command, command.bytes))
+    return absl::AlreadyExistsError(absl::StrCat("touch id '", command.id, "' of session '", command.session,
                                                  "' stands for another touch already: take a new id"));
   if (touch->stage != TouchStage::kDone) return std::optional<JournalTouch>();
   return touch;
 }
 
-absl::StatusOr<JournalTouch> Rig::Touch(const TouchOrder& order, const Permit& permit) {
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(order));
+absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const MotionGuard& guard) {
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(command));
   if (known.has_value()) return *std::move(known);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
-  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(order));  // made while this one waited
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(command));  // made while this one waited
   if (known.has_value()) return *std::move(known);
 
   // Everything that can forbid it, before anything is written or moved.
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   if (const EffectorState effector = parts_.effector->State(); !effector.connected)
     return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
-  const std::string placement = PlacementFor(order.touch.approach);
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(order.object, placement, permit));
+  const std::string placement = PlacementFor(command.touch.approach);
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, placement, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
-  TOUCHSTONE_ASSIGN_OR_RETURN(PlannedTouch plan,
-                              parts_.planner->Plan(from, order.object, order.bounds, placement, order.touch,
-                                                   "touch '" + order.id + "'"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      PlannedTouch plan, parts_.planner->Plan(from, command.object, command.bounds, placement, command.touch,
+                                              "touch '" + command.id + "'"));
 
   const double began_s = HostNowS(), began_unix_s = UnixNowS();
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const JournalTouch intent,
-      journal().Begin(order.session, order.id, order.object, placement, order.command));
+      journal().Begin(command.session, command.id, command.object, placement, command.bytes));
   if (intent.stage == TouchStage::kDone) return intent;
   const uint32_t program_id = NextProgramId();
   TOUCHSTONE_RETURN_IF_ERROR(
-      journal().Executing(order.session, order.id, program_id, parts_.effector->State().boot_id));
+      journal().Executing(command.session, command.id, program_id, parts_.effector->State().boot_id));
   ++motions_;
-  absl::StatusOr<JournalResult> result = MakeTouch(plan, program_id, order, permit);
+  absl::StatusOr<JournalResult> result = MakeTouch(plan, program_id, command, guard);
   --motions_;
   if (!result.ok()) {
     Remember(result.status());
-    spdlog::warn("touch '{}' of session '{}': {}", order.id, order.session,
+    spdlog::warn("touch '{}' of session '{}': {}", command.id, command.session,
                  std::string(result.status().message()));
     TOUCHSTONE_RETURN_IF_ERROR(
-        journal().Failed(order.session, order.id, std::string(result.status().message())));
+        journal().Failed(command.session, command.id, std::string(result.status().message())));
     audit()
-        .Write(
-            "touch_failed",
-            {{"session", order.session}, {"id", order.id}, {"why", std::string(result.status().message())}})
+        .Write("touch_failed", {{"session", command.session},
+                                {"id", command.id},
+                                {"why", std::string(result.status().message())}})
         .IgnoreError();
     return result.status();
   }
 
   result->start_unix_s = began_unix_s;
-  TOUCHSTONE_ASSIGN_OR_RETURN(result->session_time_s, SessionTimeS(order.session, began_unix_s));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().Done(order.session, order.id, *result));
+  TOUCHSTONE_ASSIGN_OR_RETURN(result->session_time_s, SessionTimeS(command.session, began_unix_s));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().Done(command.session, command.id, *result));
   {
-    std::lock_guard<std::mutex> facts_lock(facts_mutex_);
+    std::lock_guard<std::mutex> status_lock(status_mutex_);
     const double took_s = HostNowS() - began_s;
-    facts_.touch_duration_s = facts_.touches == 0 ? took_s : 0.9 * facts_.touch_duration_s + 0.1 * took_s;
-    ++facts_.touches;
+    status_.touch_duration_s = status_.touches == 0 ? took_s : 0.9 * status_.touch_duration_s + 0.1 * took_s;
+    ++status_.touches;
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(order));
+  TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(command));
   if (!known.has_value()) return absl::InternalError("the journal lost a result that it had acknowledged");
   return *std::move(known);
 }
@@ -209,34 +210,34 @@ absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix
   return (unix_s - first_s) * options_.time_scale;
 }
 
-absl::StatusOr<Frame> Rig::Photograph(const ViewOrder& order, const Permit& permit) {
+absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGuard& guard) {
   if (parts_.camera == nullptr)
     return absl::FailedPreconditionError(
         "this rig has no camera: set camera.source in the gateway's configuration");
   if (!parts_.planner->calibration().has_camera)
     return absl::FailedPreconditionError(
         "the calibration file has no flange_from_camera: where the camera sits");
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
-  const std::string placement = PlacementFor(order.object_from_camera.rotation().col(2));
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(order.object, placement, permit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
+  const std::string placement = PlacementFor(command.object_from_camera.rotation().col(2));
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, placement, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
-                              parts_.planner->ObjectPose(order.object, order.bounds, placement));
-  const Eigen::Isometry3d base_from_camera = base_from_object * order.object_from_camera;
+                              parts_.planner->ObjectPose(command.object, command.bounds, placement));
+  const Eigen::Isometry3d base_from_camera = base_from_object * command.object_from_camera;
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const PlannedTouch plan,
-      parts_.planner->PlanView(from, base_from_camera, order.object, order.bounds, placement, "view"));
-  TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transfer, {}, plan.motion.duration_s, permit));
+      parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, placement, "view"));
+  TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transfer, {}, plan.motion.duration_s, guard));
   const absl::StatusOr<Frame> frame = parts_.camera->Take(HostNowS());
   if (!frame.ok()) {
     Remember(frame.status());
     return frame;
   }
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(order.session));
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   JournalImage image;
-  image.id = ViewId(order);
-  image.object = order.object, image.placement = placement;
+  image.id = ViewId(command);
+  image.object = command.object, image.placement = placement;
   const Eigen::AngleAxisd turn(base_from_camera.rotation());
   for (int i = 0; i < 3; ++i) {
     image.base_from_camera[i] = base_from_camera.translation()[i];
@@ -245,10 +246,10 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewOrder& order, const Permit& perm
   image.unix_s = UnixNowS();
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(order.session, image));
-  std::lock_guard<std::mutex> facts_lock(facts_mutex_);
-  ++facts_.images;
-  facts_.image_width = frame->width, facts_.image_height = frame->height;
+  TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(command.session, image));
+  std::lock_guard<std::mutex> status_lock(status_mutex_);
+  ++status_.images;
+  status_.image_width = frame->width, status_.image_height = frame->height;
   return frame;
 }
 
@@ -259,12 +260,12 @@ Intrinsics Rig::IntrinsicsOf(const Frame& frame) const {
 
 absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
-                              const Permit& permit) {
+                              const MotionGuard& guard) {
   const uint32_t program_id = NextProgramId();
   ++motions_;
   absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
   if (status.ok())
-    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", permit,
+    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
                        [](const ArmState& state) -> absl::StatusOr<bool> {
                          return state.phase == static_cast<int>(MotionPhase::kDone);
                        });
@@ -273,21 +274,21 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
   return status;
 }
 
-absl::Status Rig::Home(const Permit& permit) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
-  return MoveHome(permit);
+absl::Status Rig::Home(const MotionGuard& guard) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  return MoveHome(guard);
 }
 
-absl::Status Rig::MoveHome(const Permit& permit) {
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(permit));
+absl::Status Rig::MoveHome(const MotionGuard& guard) {
+  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
-  return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, permit);
+  return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, guard);
 }
 
 absl::Status Rig::EnsureMounted(const std::string& object, const std::string& placement,
-                                const Permit& permit) {
-  const PhysicalFacts now = Facts();
+                                const MotionGuard& guard) {
+  const SourceStatus now = Status();
   if (now.object == object && now.placement == placement) return absl::OkStatus();
   if (options_.mount_command.empty())
     return absl::FailedPreconditionError(absl::StrCat(
@@ -297,27 +298,27 @@ absl::Status Rig::EnsureMounted(const std::string& object, const std::string& pl
         ": put '", object, "' there with its face ", placement, " up, then: touchstone rig mount ", object,
         " ", placement));
   // The tool leaves before anything is moved there.
-  TOUCHSTONE_RETURN_IF_ERROR(MoveHome(permit));
+  TOUCHSTONE_RETURN_IF_ERROR(MoveHome(guard));
   std::vector<std::string> command = options_.mount_command;
   for (std::string& word : command)
     word = absl::StrReplaceAll(word, {{"{object}", object}, {"{placement}", placement}});
-  TOUCHSTONE_RETURN_IF_ERROR(RunCommand(command, options_.mount_timeout_s, permit));
+  TOUCHSTONE_RETURN_IF_ERROR(RunCommand(command, options_.mount_timeout_s, guard));
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
   audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
-  std::lock_guard<std::mutex> lock(facts_mutex_);
-  facts_.object = object, facts_.placement = placement;
+  std::lock_guard<std::mutex> lock(status_mutex_);
+  status_.object = object, status_.placement = placement;
   return absl::OkStatus();
 }
 
-absl::Status Rig::Mount(const std::string& object, const std::string& placement, const Permit& permit) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(permit));
-  if (!options_.mount_command.empty()) return EnsureMounted(object, placement, permit);
+absl::Status Rig::Mount(const std::string& object, const std::string& placement, const MotionGuard& guard) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  if (!options_.mount_command.empty()) return EnsureMounted(object, placement, guard);
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
   audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
-  std::lock_guard<std::mutex> facts_lock(facts_mutex_);
-  facts_.object = object, facts_.placement = placement;
+  std::lock_guard<std::mutex> status_lock(status_mutex_);
+  status_.object = object, status_.placement = placement;
   return absl::OkStatus();
 }
 

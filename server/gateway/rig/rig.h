@@ -23,9 +23,9 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
-#include "server/gateway/rig/physical_source.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
+#include "server/source/rig_device.h"
 
 namespace touchstone {
 
@@ -54,30 +54,30 @@ struct RigParts {
   std::unique_ptr<AuditLog> audit;
 };
 
-class Rig : public PhysicalSource {
+class Rig : public RigDevice {
  public:
   // Reconciles what an interruption left in the journal. The parts may still be connecting.
   static absl::StatusOr<std::unique_ptr<Rig>> Create(RigOptions options, RigParts parts);
   ~Rig() override;
 
   // Makes the touch, or finds it done in the journal. One motion at a time: others wait for it, as long as
-  // their permit holds. UNAVAILABLE: a part failed, and the same order may be given again.
-  absl::StatusOr<JournalTouch> Touch(const TouchOrder& order, const Permit& permit) override;
+  // their guard holds. UNAVAILABLE: a part failed, and the same command may be given again.
+  absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
   // The journalled touch of that id, if it is done.
-  absl::StatusOr<std::optional<JournalTouch>> FindDone(const TouchOrder& order) const;
+  absl::StatusOr<std::optional<JournalTouch>> FindDone(const TouchCommand& command) const;
 
   // Moves the camera there and takes a picture, which is journalled as it came.
-  absl::StatusOr<Frame> Photograph(const ViewOrder& order, const Permit& permit) override;
+  absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) override;
   bool has_camera() const override { return parts_.camera != nullptr; }
   Intrinsics IntrinsicsOf(const Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
   double spacing_m() const override { return options_.spacing_m; }
   bool moves() const override { return true; }
-  PhysicalFacts Facts() const override;
+  SourceStatus Status() const override;
 
   // Puts (mount_command) or notes the object. Home first if the rig does it.
-  absl::Status Mount(const std::string& object, const std::string& placement, const Permit& permit);
-  absl::Status Home(const Permit& permit);
+  absl::Status Mount(const std::string& object, const std::string& placement, const MotionGuard& guard);
+  absl::Status Home(const MotionGuard& guard);
 
   // Every check of a touch without motion, from `from` (null: from where the arm is) and for the placement
   // that it needs.
@@ -107,17 +107,18 @@ class Rig : public PhysicalSource {
   absl::Status Reconcile();
   absl::Status ReconcileTouch(const std::string& session, const JournalTouch& touch);
 
-  // Holds the rig for one motion; CANCELLED or whatever the permit says while it waits for another one.
-  absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const Permit& permit);
-  // The permit, and that nobody has stopped the rig since `stops`.
-  absl::Status Allowed(const Permit& permit, uint64_t stops) const;
+  // Holds the rig for one motion; CANCELLED or whatever the guard says while it waits for another one.
+  absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const MotionGuard& guard);
+  // The guard, and that nobody has stopped the rig since `stops`.
+  absl::Status Allowed(const MotionGuard& guard, uint64_t stops) const;
   // Powers the arm on and releases its brakes if they are not: only ever for somebody who may move it now.
-  absl::Status PowerUp(const Permit& permit);
-  absl::Status EnsureMounted(const std::string& object, const std::string& placement, const Permit& permit);
-  absl::Status MoveHome(const Permit& permit);
+  absl::Status PowerUp(const MotionGuard& guard);
+  absl::Status EnsureMounted(const std::string& object, const std::string& placement,
+                             const MotionGuard& guard);
+  absl::Status MoveHome(const MotionGuard& guard);
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
-                           const Permit& permit);
+                           const MotionGuard& guard);
   uint32_t NextProgramId();
   absl::Status EnsureSession(const std::string& name);
   // Rig seconds since the session's first touch began.
@@ -125,10 +126,10 @@ class Rig : public PhysicalSource {
 
   // touch_cycle.cpp
   absl::StatusOr<JournalResult> MakeTouch(const PlannedTouch& plan, uint32_t program_id,
-                                          const TouchOrder& order, const Permit& permit);
+                                          const TouchCommand& command, const MotionGuard& guard);
   // Beats and watches until `done` says so; stops the arm and tells why on anything else. `limit_s`: host
   // time.
-  absl::Status Supervise(uint32_t program_id, double limit_s, const char* what, const Permit& permit,
+  absl::Status Supervise(uint32_t program_id, double limit_s, const char* what, const MotionGuard& guard,
                          const std::function<absl::StatusOr<bool>(const ArmState&)>& done);
   void Remember(const absl::Status& status);
 
@@ -139,8 +140,8 @@ class Rig : public PhysicalSource {
   std::atomic<uint64_t> stops_{0};
   std::atomic<uint32_t> motions_{0};  // under way
   std::atomic<double> last_beat_s_{0};
-  mutable std::mutex facts_mutex_;
-  PhysicalFacts facts_;
+  mutable std::mutex status_mutex_;
+  SourceStatus status_;
   std::mutex sessions_mutex_;
   std::set<std::string> sessions_;  // known to be in the journal
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;

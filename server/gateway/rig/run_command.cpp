@@ -20,7 +20,7 @@ extern char** environ;
 namespace touchstone {
 
 absl::Status RunCommand(const std::vector<std::string>& arguments, double timeout_s,
-                        const std::function<absl::Status()>& permit) {
+                        const std::function<absl::Status()>& guard) {
   const std::string command = absl::StrJoin(arguments, " ");
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -55,7 +55,7 @@ absl::Status RunCommand(const std::vector<std::string>& arguments, double timeou
           WIFEXITED(status) ? absl::StrCat("'", command, "' ended with exit code ", WEXITSTATUS(status))
                             : absl::StrCat("'", command, "' was ended by signal ", WTERMSIG(status)));
     }
-    absl::Status stop = permit ? permit() : absl::OkStatus();
+    absl::Status stop = guard ? guard() : absl::OkStatus();
     if (stop.ok() && std::chrono::steady_clock::now() > until)
       stop = absl::DeadlineExceededError(
           absl::StrCat("'", command, "' did not end within ", ShortestNumber(timeout_s), " s"));

@@ -18,7 +18,7 @@ constexpr double kProgramStartsS = 2;  // host time that a program may take unti
 
 }  // namespace
 
-absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what, const Permit& permit,
+absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what, const MotionGuard& guard,
                             const std::function<absl::StatusOr<bool>(const ArmState&)>& done) {
   const uint64_t stops = stops_;
   const double began_s = HostNowS();
@@ -38,7 +38,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
       parts_.arm->Beat();
       last_beat_s_ = now_s;
     }
-    if (const absl::Status allowed = Allowed(permit, stops); !allowed.ok()) return give_up(allowed);
+    if (const absl::Status allowed = Allowed(guard, stops); !allowed.ok()) return give_up(allowed);
     const absl::StatusOr<ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
     if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok())
@@ -68,7 +68,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
 }
 
 absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t program_id,
-                                             const TouchOrder& order, const Permit& permit) {
+                                             const TouchCommand& command, const MotionGuard& guard) {
   TouchRecording record;
   record.motion = plan.motion;
   record.motion.program_id = program_id;
@@ -85,7 +85,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   // To the start. The end effector is armed there, at rest and free.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
   TOUCHSTONE_RETURN_IF_ERROR(
-      Supervise(program_id, limit_s, "the way to the start", permit, phase_is(MotionPhase::kReady)));
+      Supervise(program_id, limit_s, "the way to the start", guard, phase_is(MotionPhase::kReady)));
   if (const absl::Status armed = parts_.effector->Arm(program_id); !armed.ok()) {
     parts_.arm->Stop().IgnoreError();
     return armed;
@@ -98,7 +98,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   bool ended = false;
   std::optional<double> pressed_from_m;
   TOUCHSTONE_RETURN_IF_ERROR(Supervise(
-      program_id, limit_s, "the approach", permit, [&](const ArmState& state) -> absl::StatusOr<bool> {
+      program_id, limit_s, "the approach", guard, [&](const ArmState& state) -> absl::StatusOr<bool> {
         if (state.phase == static_cast<int>(MotionPhase::kDone)) return true;
         TOUCHSTONE_ASSIGN_OR_RETURN(const EffectorTouch contacts, parts_.effector->Touch());
         const int count = contacts.Contacts();

@@ -110,14 +110,15 @@ int Overhead::Measure(int touches, double speedup) {
   WaitUntil([this] { return made_rig_->State() == "idle"; }, "the rig is ready");
   std::vector<double> before_s, go_s, retreat_s, after_s, all_s, disk_s, answers_s, wall_s;
   for (int k = -2; k < touches; ++k) {  // the first two mount the object and are not counted
-    const v1::CommandedTouch command = FromAbove(0.02 + 1e-5 * k, k % 4);
-    TouchOrder order;
-    order.session = "overhead", order.id = std::to_string(k), order.object = "lat00", order.bounds = bounds_;
-    order.touch = *FromProto(command, "touch");
-    order.command = CommandBytes(command);
+    const v1::CommandedTouch message = FromAbove(0.02 + 1e-5 * k, k % 4);
+    TouchCommand command;
+    command.session = "overhead", command.id = std::to_string(k), command.object = "lat00",
+    command.bounds = bounds_;
+    command.touch = *FromProto(message, "touch");
+    command.bytes = CommandBytes(message);
     stamps_ = Stamps();
     const double began_s = HostNowS();
-    const auto made = made_rig_->Touch(order, [] { return absl::OkStatus(); });
+    const auto made = made_rig_->Touch(command, [] { return absl::OkStatus(); });
     const double ended_s = HostNowS();
     const auto last = made_rig_->arm().State();
     if (!made.ok() || !last.ok()) {

@@ -1,4 +1,4 @@
-// A journal served again: the third source. It gives what was recorded, and says so where nothing was.
+// A rig's journal served again: it gives what was recorded, and says so where nothing was.
 #pragma once
 
 #include <map>
@@ -7,26 +7,26 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/rig/physical_source.h"
 #include "server/session/recorded_touches.h"
+#include "server/source/rig_device.h"
 
 namespace touchstone {
 
-class RecordedSource : public PhysicalSource {
+class RecordedRig : public RigDevice {
  public:
   // All sessions of the journal; they must have the same fingers.
-  static absl::StatusOr<std::unique_ptr<RecordedSource>> Open(const std::string& path);
+  static absl::StatusOr<std::unique_ptr<RecordedRig>> Open(const std::string& path);
 
   // By its id; else by its command, the repeats of it in the order in which they were made and round again.
   // NOT_FOUND: nothing like it was recorded.
-  absl::StatusOr<JournalTouch> Touch(const TouchOrder& order, const Permit& permit) override;
-  absl::StatusOr<Frame> Photograph(const ViewOrder& order, const Permit& permit) override;
+  absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
+  absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) override;
   bool has_camera() const override { return !images_.empty(); }
   Intrinsics IntrinsicsOf(const Frame& frame) const override;
   int fingers() const override { return touches_->fingers(); }
   double spacing_m() const override { return touches_->spacing_m(); }
   bool moves() const override { return false; }
-  PhysicalFacts Facts() const override;
+  SourceStatus Status() const override;
   std::string State() const override { return "idle"; }
   Journal& journal() { return *journal_; }
 

@@ -1,0 +1,68 @@
+// What makes single touches and photographs for a physical source (physical_source.h), and keeps them in a
+// journal: a rig (gateway/rig/), or the journal of one, served again (recorded_rig.h).
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <absl/status/statusor.h>
+#include <Eigen/Geometry>
+
+#include "server/geometry/mesh.h"
+#include "server/image/photograph.h"
+#include "server/session/journal.h"
+#include "server/source/motion_guard.h"
+#include "server/touch/commanded_touch.h"
+
+namespace touchstone {
+
+struct TouchCommand {
+  std::string session, id;  // the touch is journalled under this id
+  std::string object;
+  Bounds bounds;  // of the object, object frame
+  CommandedTouch touch;
+  std::string bytes;    // the touch as the journal keeps it: command_bytes.h, without the session time
+  uint64_t repeat = 0;  // which repeat of the same touch this is, from 0, as far as the caller knows
+};
+
+struct ViewCommand {
+  std::string session;
+  std::string object;
+  Bounds bounds;                                                         // of the object, object frame
+  Eigen::Isometry3d object_from_camera = Eigen::Isometry3d::Identity();  // z looks ahead, y down
+};
+
+// A view's name in the journal: the object and the pose, to the micrometre.
+std::string ViewId(const ViewCommand& command);
+
+// How a device is doing; times in seconds.
+struct SourceStatus {
+  std::string object, placement;  // on the fixture
+  std::string last_error;
+  uint32_t recovered_touches = 0, interrupted_touches = 0;
+  double touch_duration_s = 0;     // of the last ones, host time; 0: none yet
+  double clock_uncertainty_s = 0;  // of contact times, standard
+  uint64_t touches = 0, images = 0;
+  int image_width = 0, image_height = 0;  // of the last one
+};
+
+// Every function may be called from several threads; touches and photographs take turns.
+class RigDevice {
+ public:
+  virtual ~RigDevice() = default;
+  // The touch as it was made. One whose id is journalled already is answered from there; ALREADY_EXISTS if that
+  // was another touch.
+  virtual absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) = 0;
+  virtual absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) = 0;
+  virtual bool has_camera() const = 0;
+  // Of the camera that took this picture.
+  virtual Intrinsics IntrinsicsOf(const Frame& frame) const = 0;
+  virtual int fingers() const = 0;
+  virtual double spacing_m() const = 0;
+  // True if it moves anything, so that a lease is needed.
+  virtual bool moves() const = 0;
+  virtual SourceStatus Status() const = 0;
+  virtual std::string State() const = 0;  // control.proto
+};
+
+}  // namespace touchstone
