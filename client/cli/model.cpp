@@ -162,7 +162,7 @@ void AddModel(Cli* cli) {
   add->add_option("MODEL", options->model, "A model file, a name or a hash")->type_name("")->required();
   add->add_option("EFFECT", options->effect, "An effect of touchstone effects")->type_name("")->required();
   add->add_option("PARAMETER=VALUE", options->assignments,
-                  "Its parameters, in the units of their names; one value a finger or a vector with commas")
+                  "Its parameters, in the units of their names; one value per finger or a vector with commas")
       ->type_name("");
   add_output(add);
   cli->AddSourceOptions(add);

@@ -3,8 +3,8 @@
 
 namespace touchstone {
 
-// The 97.5 % quantile of the standard normal distribution: a 95 % interval is an estimate plus and minus so many
-// standard errors. normal_test.cpp checks it.
+// The 97.5 % quantile of the standard normal distribution: a 95 % interval is an estimate plus and minus so
+// many standard errors. normal_test.cpp checks it.
 inline constexpr double kNormalQuantile975 = 1.959963984540054;
 
 }  // namespace touchstone

@@ -30,7 +30,7 @@ double UniformFromWord(uint64_t word);
 
 // Fills standard normal deviates for touches: normals[k * width + j], j < width, is the j-th deviate of
 // stream (seed, domain, indices[k], attempt 0). Box-Muller on pairs of words with our own polynomials for
-// log, sin and cos, so that the bits do not hang on the C library. Vectorises.
+// log, sin and cos, so that the bits do not depend on the C library. Vectorises.
 void FillNormals(uint64_t seed, RandomDomain domain, const uint64_t* indices, int count, int width,
                  double* normals);
 

@@ -12,7 +12,7 @@ namespace touchstone {
 
 class ThreadPool {
  public:
-  explicit ThreadPool(int threads);  // 0: one a core
+  explicit ThreadPool(int threads);  // 0: one per core
   ~ThreadPool();                     // runs what was submitted, then joins
 
   int size() const { return static_cast<int>(threads_.size()); }

@@ -32,9 +32,8 @@ Effect AccelerationRamp() {
       .meaning = "The arm starts at rest and needs a distance v^2 / (2 a) to reach its speed.",
       .signature =
           "Time differences are stretched on touches whose contact comes early in the travel; once all "
-          "contacts "
-          "come after the ramp, all fingers are late alike and nothing shows. Look at the error against the "
-          "standoff.",
+          "contacts come after the ramp, all fingers are late alike and nothing shows. Look at the error "
+          "against the standoff.",
       .check_on_rig = "Repeat a touch with a much longer standoff: the error disappears.",
       .remedy = "Start farther away, command a higher acceleration, or keep the effect.",
       .rows = kRows,

@@ -2,9 +2,9 @@
 
 #include "server/effects/formula.h"
 
-// The built-in touch effects by stage, in the order in which a stage applies and the catalogue lists them: one line
-// each, the name of the function that its file exports. Registration by static objects is not used: the linker drops
-// them from a static library.
+// The built-in touch effects by stage, in the order in which a stage applies and the catalogue lists them:
+// one line each, the name of the function that its file exports. Registration by static objects is not used:
+// the linker drops them from a static library.
 #define TOUCHSTONE_TOUCH_EFFECTS(EFFECT) \
   /* pose */                             \
   EFFECT(ToolYaw)                        \

@@ -27,8 +27,8 @@ Effect ClockSkew() {
       .meaning =
           "The clock of the end effector runs fast or slow, so all times are stretched by a constant share.",
       .signature = "The error grows in proportion to the time difference. Relative times cannot tell it from "
-                   "speed_error; "
-                   "crystals err by 1e-4, ceramic resonators by 5e-3, so larger values point at the speed.",
+                   "speed_error; crystals err by 1e-4, ceramic resonators by 5e-3, so "
+                   "larger values point at the speed.",
       .check_on_rig = "Let the controller report its clock for ten minutes against the computer's.",
       .remedy = "Use a crystal, or synchronise the clock over the serial line.",
       .rows = kRows,

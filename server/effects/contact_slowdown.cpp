@@ -27,9 +27,8 @@ Effect ContactSlowdown() {
       .meaning = "The first contact slows the arm down; the other fingers go on at a lower speed.",
       .signature =
           "Delays that grow in proportion to the gap to the first finger. object_push delays by the same "
-          "amount "
-          "however small the gap; speed_error and clock_skew stretch just the same and need an absolute "
-          "clock to be told apart.",
+          "amount however small the gap; speed_error and clock_skew stretch just the same and need an "
+          "absolute clock to be distinguished.",
       .check_on_rig = "Log the arm's encoders during a touch: does the speed drop at the first contact?",
       .remedy = "Softer fingers or springs, a stiffer control mode, a lower speed; or keep the effect.",
       .rows = kRows,

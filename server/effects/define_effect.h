@@ -18,11 +18,11 @@
 
 namespace touchstone {
 
-// A parameter with one value a finger; entries from the batch's number of fingers on are zero.
+// A parameter with one value per finger; entries from the batch's number of fingers on are zero.
 using PerFinger = std::array<double, kMaxFingers>;
 
 // One parameter of an effect whose values live in the struct P. Numbers here are in the unit of files;
-// the field gets SI. The kind of field (one number, a vector, one number a finger) follows from its type.
+// the field gets SI. The kind of field (one number, a vector, one number per finger) follows from its type.
 template <typename P>
 struct ParameterRow {
   std::variant<double P::*, Eigen::Vector3d P::*, PerFinger P::*> field;

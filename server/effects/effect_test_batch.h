@@ -13,7 +13,7 @@ namespace touchstone {
 // A cube with edges of 100 mm about the origin, named "cube"; the same surface at every call.
 std::shared_ptr<const Surface> TestCube();
 
-// Touches with all fields filled, as every stage would find them: random but plausible numbers that hang on
+// Touches with all fields filled, as every stage would find them: random but plausible numbers that depend on
 // `seed` alone, some fingers without contact (travel, times and contact NaN) unless `all_hit`.
 TouchBatch TestBatch(int size, int fingers, uint64_t seed = 1, bool all_hit = true);
 

@@ -32,8 +32,8 @@ Effect FingerLength() {
       .meaning = "The fingers differ in length, so each has its own constant distance to add.",
       .signature =
           "A constant distance per finger on every touch and object: times shift by offset / speed, so twice "
-          "the speed halves the shift. channel_latency looks the same at one speed and does not change with "
-          "it.",
+          "the speed halves the shift. channel_latency looks the same at one speed and "
+          "does not change with it.",
       .check_on_rig =
           "Touch a flat plate square to the approach at two speeds; or lay the tips against a straight edge "
           "and use a feeler gauge.",

@@ -27,8 +27,8 @@ Effect FingerSpacing() {
       .meaning = "The real distance between neighbouring fingers differs from the nominal one.",
       .signature =
           "Grows with the slope and the curvature along the row of fingers: on a slope the outer fingers err "
-          "with opposite signs, on a bulge both are late if they stand too wide. Flat faces met head-on show "
-          "nothing.",
+          "with opposite signs, on a bulge both are late if they stand too wide. Flat "
+          "faces met head-on show nothing.",
       .check_on_rig =
           "Measure the distance of the outer tips with calipers and divide by the number of gaps.",
       .remedy = "Write the measured spacing into end_effector.spacing_mm of the model.",

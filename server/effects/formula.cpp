@@ -26,12 +26,11 @@ Effect Formula() {
   effect.stage = Stage::kMotion;
   effect.meaning =
       "An effect of your own: an expression over the touch that adds travel_mm or time_us to each finger. It "
-      "needs a "
-      "name, an expression and its parameters.";
+      "needs a name, an expression and its parameters.";
   effect.signature =
       "What the expression says. The diagnosis suggests one where no built-in effect explains the error.";
-  effect.check_on_rig = "Change the one quantity that the expression hangs on and hold the rest.";
-  effect.remedy = "Find the cause behind the formula; then give the cause a built-in effect, or mend it.";
+  effect.check_on_rig = "Change the one quantity that the expression depends on and hold the rest.";
+  effect.remedy = "Find the cause behind the formula; then give the cause a built-in effect, or remove it.";
   effect.apply = [](absl::Span<const double>, TouchBatch&) {};
   return effect;
 }

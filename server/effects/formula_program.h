@@ -33,7 +33,7 @@ class FormulaProgram {
     virtual double Value() = 0;
   };
 
-  // Lends an evaluator that nobody else uses; it goes back when the loan ends. Any thread.
+  // Lends an evaluator that no one else uses; it goes back when the loan ends. Any thread.
   class Loan {
    public:
     explicit Loan(const FormulaProgram& program);

@@ -32,9 +32,8 @@ Effect GravitySag() {
       .check_on_rig =
           "Move a tip to a height gauge from the side, with the arm stretched and with it folded: a sag "
           "grows with the reach.",
-      .remedy =
-          "Set the payload and centre of gravity in the arm's installation, stiffen the fingers, or keep the "
-          "effect.",
+      .remedy = "Set the payload and centre of gravity in the arm's installation, stiffen the "
+                "fingers, or keep the effect.",
       .rows = kRows,
       .apply = Apply,
   });

@@ -36,9 +36,8 @@ Effect ObjectPose() {
       .meaning = "The object lies moved or turned against the frame that the touches are commanded in.",
       .signature =
           "A turn tilts every flat face: outer fingers err with opposite signs, and the sign follows the "
-          "face. "
-          "A move shows at edges and on curved faces only. Another error for every object, and after every "
-          "time the object was put down anew: then declare scope: object.",
+          "face. A move shows at edges and on curved faces only. Another error for every object, and after "
+          "every time the object was put down anew: then declare scope: object.",
       .check_on_rig =
           "Probe three flat faces of the object with one finger and compare with the mesh; or put the object "
           "down anew and see whether the error changes.",

@@ -24,9 +24,8 @@ Effect ObjectScale() {
   return DefineEffect<Parameters>({
       .name = "object_scale",
       .stage = Stage::kPose,
-      .meaning =
-          "The object is larger or smaller than its mesh by the same share in every direction (a print that "
-          "shrank).",
+      .meaning = "The object is larger or smaller than its mesh by the same share in every "
+                 "direction (a print that shrank).",
       .signature =
           "Curved places look flatter (larger) or rounder (smaller), and edges stand farther out or in; flat "
           "faces met head-on show nothing, because all fingers meet them alike.",

@@ -1,5 +1,5 @@
 // Poll interval: the controller looks at its inputs in a loop, so a contact is seen at the loop's next tick.
-//   times are rounded up to ticks of the interval; the loop's phase is random, one draw a touch (the stage's)
+//   times are rounded up to ticks of the interval; the loop's phase is random, one draw per touch (the stage's)
 #include "server/effects/define_effect.h"
 
 namespace touchstone {
@@ -26,8 +26,7 @@ Effect PollInterval() {
       .stage = Stage::kSensor,
       .meaning = "Contacts are noticed only at the ticks of a polling loop.",
       .signature = "Time differences are multiples of the interval: a histogram of them is a comb; close "
-                   "contacts come "
-                   "out as exactly equal.",
+                   "contacts come out as exactly equal.",
       .check_on_rig = "Plot a histogram of all time differences with narrow bins, or toggle a pin in the "
                       "loop and measure "
                       "it with an oscilloscope.",

@@ -36,8 +36,8 @@ Effect ReturnHysteresis() {
           "The error follows the touch before, not this one: the finger that touched first then (and was "
           "pressed longest) reports early now. Shuffling the order of the touches moves the error along.",
       .check_on_rig = "Press one finger by hand, then touch a flat plate at once and again after a minute.",
-      .remedy = "Stronger return springs, grease, a pause between touches; or keep the effect and the order "
-                "of touches.",
+      .remedy = "Stronger return springs, grease, a pause between touches; or keep the "
+                "effect and the order of touches.",
       .rows = kRows,
       .needs = {/*previous_press=*/true, /*curvature=*/false, /*covariates=*/{}},
       .apply = Apply,

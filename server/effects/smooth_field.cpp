@@ -40,7 +40,8 @@ double SmoothField::At(const Eigen::Vector3d& point_m) const {
     const Lanes turns = turns_per_m_[0][k] * point_m.x() + turns_per_m_[1][k] * point_m.y() +
                         turns_per_m_[2][k] * point_m.z() + phase_turns_[k];
     // cos(2 pi r) = -sin(2 pi s) with s = |r| - 1/4 in [-1/4, 1/4], r the turns without their whole part:
-    // there the Taylor series to the 17th power is exact to 5e-14, and the bits do not hang on the C library.
+    // there the Taylor series to the 17th power is exact to 5e-14, and the bits do not depend on the C
+    // library.
     const Lanes x = ((turns - (turns + 0.5).floor()).abs() - 0.25) * (2 * kPi);
     const Lanes z = x * x;
     Lanes series = 1.0 - z * (1.0 / 272);

@@ -1,4 +1,4 @@
-// Speed error: the arm moves faster or slower than it was told to.
+// Speed error: the arm moves faster or slower than commanded.
 //   real speed = commanded * (1 + relative)
 #include "server/effects/define_effect.h"
 
@@ -27,8 +27,8 @@ Effect SpeedError() {
       .meaning = "The arm's real speed differs from the commanded one by a constant share.",
       .signature =
           "Every time difference is stretched or shrunk by the same share, so the error grows with the "
-          "difference. Relative times cannot tell it from clock_skew (and contact_slowdown, which only "
-          "stretches).",
+          "difference. Relative times cannot tell it from clock_skew "
+          "(and contact_slowdown, which only stretches).",
       .check_on_rig = "Time 200 mm of travel with the arm's encoders, or film it against a ruler.",
       .remedy = "Correct the commanded speed, check the speed slider of the pendant, or keep the effect.",
       .rows = kRows,

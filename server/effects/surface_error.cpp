@@ -30,8 +30,8 @@ constexpr ParameterRow<Parameters> kRows[] = {
     {&Parameters::rms_m, "rms_mm", Unit::kMillimetre, 0, 5, 0, 0.2,
      "RMS of the bumps over the object's surface."},
     {&Parameters::length_m, "length_mm", Unit::kMillimetre, 1, 500, 20, 20,
-     "Correlation length: how far apart two places must be for their bumps to differ. Changes nothing at "
-     "rms_mm 0."},
+     "Correlation length: how far apart two places must be for their bumps to "
+     "differ. Changes nothing at rms_mm 0."},
 };
 
 // FNV-1a: the object's number in the stream of surface fields.
@@ -118,8 +118,8 @@ Effect SurfaceError() {
       .name = "surface_error",
       .stage = Stage::kContact,
       .always_per_object = true,
-      .meaning = "The real surface departs from its mesh by smooth bumps along the normal: a bad print, a "
-                 "dent, paint.",
+      .meaning = "The real surface departs from its mesh by smooth bumps along the normal: "
+                 "a bad print, a dent, paint.",
       .signature =
           "Errors that hang on the place on the object and on nothing else: neighbouring contacts err alike, "
           "whatever finger, speed or direction, and another object shows another pattern.",

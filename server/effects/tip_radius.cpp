@@ -30,8 +30,7 @@ Effect TipRadius() {
       .meaning = "The finger tips are spheres: contact is when the swept sphere first touches the surface.",
       .signature =
           "Contact comes early on slopes, by radius * (1 / cos(incidence) - 1): little below 10 deg, much "
-          "above "
-          "30 deg, and early beside edges. oblique_slip comes late instead and follows tan(incidence).",
+          "above 30 deg, and early beside edges. oblique_slip comes late instead and follows tan(incidence).",
       .check_on_rig = "Measure the tips, or touch one flat face at 0 and 25 deg: only the second shifts.",
       .remedy = "Keep the measured radius in the model; pointed tips make it small.",
       .rows = kRows,

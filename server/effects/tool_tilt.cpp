@@ -14,8 +14,8 @@ struct Parameters {
 
 constexpr ParameterRow<Parameters> kRows[] = {
     {&Parameters::angle_rad, "angle_deg", Unit::kDegree, -30, 30, 0, 1,
-     "The angle between the row of finger tips and the plane square to the approach; positive: the last "
-     "finger lags."},
+     "The angle between the row of finger tips and the plane square to the "
+     "approach; positive: the last finger lags."},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {
@@ -33,9 +33,8 @@ Effect ToolTilt() {
   return DefineEffect<Parameters>({
       .name = "tool_tilt",
       .stage = Stage::kPose,
-      .meaning =
-          "The row of finger tips is not square to the approach: one outer finger arrives early, the other "
-          "equally late.",
+      .meaning = "The row of finger tips is not square to the approach: one outer finger "
+                 "arrives early, the other equally late.",
       .signature =
           "The same straight line over the fingers on every touch, whatever the object: first finger early, "
           "last late (or the reverse), middle unchanged. finger_length also moves the middle finger.",

@@ -42,8 +42,8 @@ Effect ToolYaw() {
       .check_on_rig =
           "Let the row of fingers touch a straight edge that should be parallel to it: the outer marks "
           "lie on both sides of the edge.",
-      .remedy = "Loosen the flange, turn the tool against a straight edge, tighten; or set the tool frame of "
-                "the arm.",
+      .remedy = "Loosen the flange, turn the tool against a straight edge, tighten; or set "
+                "the tool frame of the arm.",
       .rows = kRows,
       .apply = Apply,
   });

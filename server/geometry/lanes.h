@@ -85,7 +85,7 @@ inline Double4 SquareRoot(Double4 a) {
 #endif
 }
 
-// A point or a vector: of numbers, or one a lane.
+// A point or a vector: of numbers, or one per lane.
 template <typename Number>
 struct Triple {
   Number x, y, z;

@@ -2,7 +2,7 @@
 //
 // A file says neither its unit nor which way is up, so the caller says both; nothing is guessed. Polygons are
 // triangulated, also concave ones; textures, normals and colours are passed over. Memory follows the file's
-// size: a count in a header is believed only as far as the bytes behind it go.
+// size: a count in a header is trusted only as far as the bytes behind it go.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// OBJ, Wavefront's text format: a statement a line, a line that ends in \ goes on in the next.
+// OBJ, Wavefront's text format: one statement per line, a line that ends in \ continues in the next.
 //   v x y z [w | r g b]            a vertex
 //   f v/vt/vn v/vt/vn v/vt/vn ...  a face; numbers count from 1, negative ones backwards from the last vertex
 // Groups, materials, textures and normals shape nothing and are passed over, as are points and lines.

@@ -37,8 +37,7 @@ class TextRows final : public Rows {
     const absl::string_view word = NextWord(&rest_);
     if (word.empty()) return absl::OkStatus();
     return Error(absl::StrCat("found ", Quoted(word),
-                              " where the row should end; it has more numbers than the header "
-                              "describes"));
+                              " where the row should end; it has more numbers than the header describes"));
   }
 
   absl::Status End() override {

@@ -33,8 +33,8 @@ RTCDevice NewDevice() {
 
 // The vertices moved so that every face, and every border edge in its plane, comes to lie `distance_m`
 // farther out. Single precision may miss a triangle that a line meets right at its border; where the border
-// is a silhouette, nothing but a surface far behind would be proposed. On the inflated mesh the line passes well
-// inside, something near the border is proposed, and the exact search is asked.
+// is a silhouette, nothing but a surface far behind would be proposed. On the inflated mesh the line passes
+// well inside, something near the border is proposed, and the exact search is asked.
 std::vector<Eigen::Vector3f> InflateVertices(const TriangleMesh& mesh, double distance_m) {
   const size_t count = mesh.vertices_m.size();
   const auto corners = [&](const std::array<uint32_t, 3>& triangle, Eigen::Vector3f* corner) {

@@ -45,7 +45,7 @@ void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m)
     }
     ++touched;
     const double off = std::fabs(contacts.travel_m[i] - expected);
-    // A ball that first slips by an edge: how far it goes then hangs on the last nanometre of its radius.
+    // A ball that first slips by an edge: how far it goes then depends on the last nanometre of its radius.
     if (off > kUnderMicrometreM) {
       const double larger = BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestM);
       const double smaller = BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestM);

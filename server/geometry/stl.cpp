@@ -1,6 +1,6 @@
 // STL, text and binary: a soup of triangles, each with corners of its own; equal corners become one vertex.
 //   text    solid NAME  { facet normal x y z  outer loop  3 x vertex x y z  endloop  endfacet }  endsolid
-//   binary  80 bytes of anything, a 32-bit count, then 50 bytes a triangle: normal, 3 corners (floats), 2
+//   binary  80 bytes of anything, a 32-bit count, then 50 bytes per triangle: normal, 3 corners (floats), 2
 //   bytes
 // A binary file whose size fits its count is binary even if its 80 bytes begin with "solid", as some do.
 #include <absl/container/flat_hash_map.h>
@@ -69,10 +69,9 @@ absl::Status ReadBinary(MeshReading* reading) {
   const uint64_t count = CountAt80(bytes);
   const uint64_t held = (bytes.size() - kHeaderBytes) / kTriangleBytes;
   if (count > held)
-    return reading->ErrorAtByte(80, absl::StrCat("the header promises ", count,
-                                                 " triangles, but the bytes behind it "
-                                                 "hold ",
-                                                 held, "; the file is cut off, or is no binary STL"));
+    return reading->ErrorAtByte(
+        80, absl::StrCat("the header promises ", count, " triangles, but the bytes behind it hold ", held,
+                         "; the file is cut off, or is no binary STL"));
   TOUCHSTONE_RETURN_IF_ERROR(reading->CheckTriangleCount(0, count));
   const uint64_t behind = bytes.size() - kHeaderBytes - count * kTriangleBytes;
   if (behind > 0) reading->Note(absl::StrCat(behind, " bytes behind the last triangle are passed over"));

@@ -19,12 +19,12 @@ namespace touchstone {
 
 class TriangleTree {
  public:
-  // The result hangs on the mesh alone; `threads` shortens the wait.
+  // The result depends on the mesh alone; `threads` shortens the wait.
   TriangleTree(const TriangleMesh& mesh, int threads);
 
-  // Calls visit(ids, count, &last_m) with groups of at most eight triangles whose boxes, inflated by inflate_m on
-  // every side, meet the points origin + t * direction with 0 <= t <= last_m; roughly nearest first. visit
-  // may lower last_m. inflate_m must cover the rounding of coordinates to single precision.
+  // Calls visit(ids, count, &last_m) with groups of at most eight triangles whose boxes, inflated by
+  // inflate_m on every side, meet the points origin + t * direction with 0 <= t <= last_m; roughly nearest
+  // first. visit may lower last_m. inflate_m must cover the rounding of coordinates to single precision.
   template <typename Visit>
   void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double inflate_m,
                   double last_m, Visit visit) const;

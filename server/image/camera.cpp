@@ -1,4 +1,4 @@
-// The seed's camera of a touch, and what is refused before anything is drawn.
+// The camera of a touch, and what is refused before anything is drawn.
 #include <cmath>
 
 #include <Eigen/Geometry>

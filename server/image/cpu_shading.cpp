@@ -66,7 +66,7 @@ void Shade(const CpuFrame& frame, Hits* hits) {
   const auto& b = hits->corner[1];
   const auto& c = hits->corner[2];
 
-  // Whole vectors: the lanes after the last hit hold old values, and nobody looks at theirs.
+  // Whole vectors: the lanes after the last hit hold old values, and no one looks at theirs.
   const int lanes = (hits->count + 7) / 8 * 8;
 #pragma GCC ivdep
   for (int i = 0; i < lanes; ++i) {

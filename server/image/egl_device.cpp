@@ -85,7 +85,7 @@ std::vector<EglDisplay> OpenDisplays() {
   }
   // llvmpipe: its own threads only get in the way of ours. Read by the driver when its first context is made.
   setenv("LP_NUM_THREADS", "0", /*overwrite=*/0);
-  // Failures are told in `problem`; Mesa would print its own warnings on stderr besides.
+  // Failures are described in `problem`; Mesa would print its own warnings on stderr besides.
   setenv("EGL_LOG_LEVEL", "fatal", /*overwrite=*/0);
 
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);

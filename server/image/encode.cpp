@@ -42,7 +42,7 @@ absl::Status BadPng(const char* what, int code) {
   return absl::InvalidArgumentError(absl::StrCat("PNG: ", what, ": ", spng_strerror(code)));
 }
 
-// A TurboJPEG compressor keeps some hundred kilobytes of tables: one a thread, made at its first image.
+// A TurboJPEG compressor keeps some hundred kilobytes of tables: one per thread, made at its first image.
 tjhandle ThreadCompressor() {
   struct Compressor {
     tjhandle handle = tjInitCompress();

@@ -2,7 +2,8 @@
 //
 // Coarse meshes are drawn triangle by triangle, fine ones and views that need clipping are cast with Embree's
 // ray packets. Neither says more than which triangle is seen; where on it is computed from the triangle, so
-// grey levels and depths are the same either way. Which way is taken hangs on the request and the mesh alone.
+// grey levels and depths are the same either way. Which way is taken depends on the request and the mesh
+// alone.
 //
 // One call runs on the calling thread; callers draw several images at once for more speed.
 #include <absl/strings/str_cat.h>

@@ -48,7 +48,7 @@ class CornerGroups {
     while (parent_[corner] != corner) corner = parent_[corner] = parent_[parent_[corner]];
     return corner;
   }
-  // The smaller corner becomes the root: the result does not hang on the order of joining.
+  // The smaller corner becomes the root: the result does not depend on the order of joining.
   void Join(uint32_t a, uint32_t b) {
     a = Root(a), b = Root(b);
     if (a != b) parent_[std::max(a, b)] = std::min(a, b);

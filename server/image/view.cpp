@@ -63,7 +63,7 @@ PixelBox ProjectBounds(const View& view, const Bounds& bounds) {
     least = least.cwiseMin(pixel);
     most = most.cwiseMax(pixel);
   }
-  // One pixel more on each side: the projection above is rounded, a whole column must not hang on that.
+  // One pixel more on each side: the projection above is rounded, a whole column must not depend on that.
   const auto clip = [](double value, int size) {
     return static_cast<int>(std::min<double>(size, std::max<double>(0.0, value)));
   };

@@ -3,7 +3,7 @@
 // Two triangles that share an edge compute it from the same corner in the same order, so that one's edge
 // function is exactly the other's negative: no pixel falls between them, and one that lies exactly on the
 // edge is in both, where the nearer, then the first, wins. All arithmetic is plain single precision in a
-// fixed order: the result does not hang on the machine.
+// fixed order: the result does not depend on the machine.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

@@ -1,6 +1,6 @@
 // An effect: one named physical cause with parameters that changes a touch in exactly one stage.
 // The catalogue, the command line, the forms of the workbench, the fit's bounds and the documentation all
-// read the same rows. This header is the interface; the physics stands in effects/, one file an effect.
+// read the same rows. This header is the interface; the physics stands in effects/, one file per effect.
 #pragma once
 
 #include <functional>
@@ -24,7 +24,7 @@ const char* StageName(Stage stage);  // "pose", ...
 enum class Arity {
   kScalar,     // one number
   kVector3,    // x, y, z in the object frame
-  kPerFinger,  // one number a finger, first to last
+  kPerFinger,  // one number per finger, first to last
 };
 
 // One parameter. Numbers here are in the unit of files; values inside a model are SI.
@@ -58,19 +58,19 @@ struct FormulaSpec {
   Stage stage = Stage::kMotion;
   std::string expression;  // in the units of files
   std::vector<ParameterInfo> parameters;
-  std::vector<double> values;  // in the unit of files, one a parameter
+  std::vector<double> values;  // in the unit of files, one per parameter
 };
 
 struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
-  bool always_per_object = false;  // scope: object without being told (surface_error)
+  bool always_per_object = false;  // scope is always object (surface_error)
   bool before_cast =
       false;              // contact stage only: sets up the cast instead of changing its result (tip_radius)
   std::string meaning;    // what it is
   std::string signature;  // how it shows in the data, and what is told apart from it
   std::string check_on_rig;  // how to check it
-  std::string remedy;        // how to mend it
+  std::string remedy;        // how to remove it
   std::vector<ParameterInfo> parameters;
   EffectNeeds needs;
   std::shared_ptr<const FormulaSpec> formula;  // set for formulas only

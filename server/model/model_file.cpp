@@ -142,7 +142,7 @@ class ModelReader {
     return absl::OkStatus();
   }
 
-  // The parameters among the keys of `body`; those in `others` are somebody else's.
+  // The parameters among the keys of `body`; those in `others` are someone else's.
   absl::Status ReadValues(const YamlNode& body, const Effect& effect, const std::vector<std::string>& others,
                           std::vector<double>* values) const {
     for (size_t k = 0; k < body.keys.size(); ++k) {

@@ -39,7 +39,7 @@ std::string Scalar(const std::string& text) {
   return word && !special ? text : Quoted(text);
 }
 
-// "radius_mm: 1.5", one a parameter.
+// "radius_mm: 1.5", one per parameter.
 std::vector<std::string> Entries(const Effect& effect, const std::vector<double>& values, int fingers) {
   std::vector<std::string> entries;
   for (size_t i = 0; i < effect.parameters.size(); ++i) {

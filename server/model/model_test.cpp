@@ -100,7 +100,7 @@ TEST(ModelFile, NamesThePlaceTheValueAndWhatWouldBeRight) {
 
 TEST(ModelFile, WantsAValueForEveryFinger) {
   EXPECT_THAT(ErrorOf(File("effects:\n  - finger_length: {offset_mm: [1, -1]}\n")),
-              HasSubstr("finger_length.offset_mm has 2 values; it needs one a finger, 3"));
+              HasSubstr("finger_length.offset_mm has 2 values; it needs one per finger, 3"));
   EXPECT_THAT(ErrorOf(File("effects:\n  - finger_length: {axis: [1, 0]}\n")),
               HasSubstr("finger_length.axis has 2 values; it needs 3, for x, y and z"));
   EXPECT_EQ(ErrorOf(File("end_effector: {fingers: 2}\neffects:\n  - finger_length: {offset_mm: [1, -1]}\n")),

@@ -84,7 +84,7 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
                                                    const std::vector<double>& file_values, int fingers) {
   const size_t count = parameter.Count(fingers);
   if (file_values.size() != count) {
-    const std::string wanted = parameter.arity == Arity::kPerFinger ? absl::StrCat("one a finger, ", count)
+    const std::string wanted = parameter.arity == Arity::kPerFinger ? absl::StrCat("one per finger, ", count)
                                : parameter.arity == Arity::kVector3 ? "3, for x, y and z"
                                                                     : "1";
     return absl::InvalidArgumentError(absl::StrCat(what, " has ", file_values.size(),

@@ -23,8 +23,8 @@ struct Set {
   std::string model_yaml;  // the nominal model, as the lab believes in it
   Scenario truth;          // what was asked for
   int touches = 0;
-  std::vector<Command> commands;                                // one a touch
-  std::vector<double> speed_mm_s, session_time_s, temperature;  // one a touch
+  std::vector<Command> commands;                                // one per touch
+  std::vector<double> speed_mm_s, session_time_s, temperature;  // one per touch
   std::vector<double> exact_time_us;  // [touch * fingers + finger]: everything hidden but chance
   std::vector<double> reported_us;    // the same with noise and all; NaN: nothing reported
 };

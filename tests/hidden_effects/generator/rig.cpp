@@ -18,7 +18,7 @@ constexpr double kNoRamp = 1e6;
 
 struct Known {
   const char* effect;
-  int scalars;  // -1: one a finger
+  int scalars;  // -1: one per finger
   bool noise;
 };
 constexpr Known kKnown[] = {

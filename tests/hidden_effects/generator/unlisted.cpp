@@ -16,7 +16,7 @@ constexpr double kMeanTemperature = 23;
 
 const std::vector<UnlistedKind>& UnlistedKinds() {
   static const auto* kinds = new std::vector<UnlistedKind>{
-      // The middle finger hangs on a soft joint: it gives way with the direction of gravity.
+      // The middle finger is mounted on a soft joint, which yields in the direction of gravity.
       {"soft_middle",
        [](const FingerState& s, double) { return s.finger == 0 ? s.approach.z() : 0; },
        {"approach_z", "contact_z_mm", "normal_z"}},

@@ -8,7 +8,7 @@
 
 namespace touchstone::hidden {
 
-// What an unlisted effect may hang on, for one finger of one touch.
+// What an unlisted effect may depend on, for one finger of one touch.
 struct FingerState {
   double finger = 0;  // -1, 0, 1 for l, m, r
   double travel_mm = 0, standoff_mm = 0;
@@ -21,7 +21,7 @@ struct UnlistedKind {
   const char* name;
   // Travel that is added, mm, for k = 1 mm (its unit as it comes).
   double (*travel)(const FingerState& state, double second);
-  // Names of which any is a right answer to "what does the rest hang on?".
+  // Names of which any is a right answer to "what does the rest depend on?".
   std::vector<std::string> covariates;
 };
 

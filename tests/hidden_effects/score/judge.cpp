@@ -20,7 +20,7 @@ Names EquivalentsOf(const v1::Step& step) {
   return Names(step.equivalent().begin(), step.equivalent().end());
 }
 
-// Whether a step is the truth: by its name, or as one of a class that these data cannot tell apart, if the
+// Whether a step is the truth: by its name, or as one of a class that these data cannot distinguish, if the
 // step says so.
 bool Names_(const v1::Step& step, const Hidden& truth, const Scenario& scenario) {
   if (step.effect() == truth.effect) return true;
