@@ -1,4 +1,4 @@
-// The oracle: a second, independent simulation of the rig, written from the table of DESIGN 5.
+// The oracle: a second, independent simulation of the rig, written from the definitions of the effects alone.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct Command {
 };
 
 struct Set {
-  std::string csv;         // a measurement file (DESIGN 7)
-  std::string model_yaml;  // the nominal model, as the lab believes in it
+  std::string csv;         // a measurement file (proto/README.md)
+  std::string model_yaml;  // the nominal model, as the lab has it
   Scenario truth;          // what was asked for
   int touches = 0;
   std::vector<Command> commands;                                // one per touch

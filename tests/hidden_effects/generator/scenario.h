@@ -9,7 +9,7 @@
 
 namespace touchstone::hidden {
 
-// One hidden effect. `values` are those of the catalogue, flat, in the order of DESIGN 5; object_pose has its
+// One hidden effect. `values` are those of the catalogue, flat, in the order of its parameters there; object_pose has its
 // six numbers once for every object, surface_error (rms_mm, length_mm) draws a field for every object.
 struct Hidden {
   std::string effect;
@@ -28,7 +28,7 @@ struct Scenario {
   int fingers = 3;
   double spacing_mm = 30;
   double standoff_mm = 60;
-  int poses = 48;  // an object, over its six faces
+  int poses = 48;  // per object, over its six faces
   int rounds = 4;
   std::vector<double> speeds_mm_s = {20};
   bool speed_by_round = false;  // else by pose
@@ -44,7 +44,7 @@ struct Scenario {
   bool with_temperature = false;  // a column cov_temperature
 };
 
-// The order of the catalogue's numbers: scalar 1, vectors 3, a finger's `fingers`.
+// The order of the catalogue's numbers: a scalar has 1, a vector 3, a parameter per finger `fingers`.
 int ValueCount(const std::string& effect, int fingers);
 
 // Whether the effect changes times, not only their scatter.

@@ -13,9 +13,9 @@ namespace {
 constexpr double kSpeed = 20;
 
 // 5 objects x 48 poses x 4 rounds.
-Scenario FullSet(const Workshop& workshop) {
+Scenario FullSet(const TestObjects& objects) {
   Scenario scenario;
-  scenario.objects = workshop.solids;
+  scenario.objects = objects.solids;
   return scenario;
 }
 
@@ -28,17 +28,17 @@ T Pick(const std::vector<T>& from, std::mt19937_64& random) {
   return from[random() % from.size()];
 }
 
-Scenario Bumpy(const Workshop& workshop, uint64_t seed, double sigmas) {
+Scenario Bumpy(const TestObjects& objects, uint64_t seed, double sigmas) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   const double sigma_mm = scenario.sigma_us * 1e-6 * kSpeed;
   scenario.hidden.push_back({"surface_error", {sigmas * sigma_mm, 12 + 28 * Part(random)}});
   return scenario;
 }
 
-Scenario Weak(const Workshop& workshop, uint64_t seed) {
+Scenario Weak(const TestObjects& objects, uint64_t seed) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   const std::string effect = Pick(EffectsOfExpectation(), random);
   scenario.hidden = {WeakEffect(effect, scenario, seed, 10 + 5 * Part(random))};
   return scenario;
@@ -73,27 +73,27 @@ Scenario Realistic(Scenario scenario, uint64_t seed, int count) {
   return scenario;
 }
 
-Scenario LatencyOrLength(const Workshop& workshop, uint64_t seed, bool second_speed) {
+Scenario LatencyOrLength(const TestObjects& objects, uint64_t seed, bool second_speed) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   if (second_speed) scenario.speeds_mm_s = {kSpeed, 50}, scenario.speed_by_round = random() % 2;
   const std::string effect = Pick<std::string>({"channel_latency", "finger_length"}, random);
   scenario.hidden = {RealisticEffect(effect, scenario, seed)};
   return scenario;
 }
 
-Scenario StretchedTime(const Workshop& workshop, uint64_t seed) {
+Scenario StretchedTime(const TestObjects& objects, uint64_t seed) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   if (random() % 2) scenario.speeds_mm_s = {kSpeed, 50};
   const std::string effect = Pick<std::string>({"speed_error", "clock_skew", "contact_slowdown"}, random);
   scenario.hidden = {RealisticEffect(effect, scenario, seed)};
   return scenario;
 }
 
-Scenario OffCatalogue(const Workshop& workshop, uint64_t seed) {
+Scenario OffCatalogue(const TestObjects& objects, uint64_t seed) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   const std::string name = UnlistedKinds()[random() % UnlistedKinds().size()].name;
   scenario.with_temperature = name == "warm_bar" || random() % 2;
   scenario.unlisted = {UnlistedEffect(name, scenario, seed, 0.8 + 0.7 * Part(random))};
@@ -106,9 +106,9 @@ Scenario Halves(Scenario scenario, uint64_t seed) {
   return random() % 2 ? Realistic(scenario, seed, 1) : scenario;
 }
 
-Scenario WrongValue(const Workshop& workshop, uint64_t seed) {
+Scenario WrongValue(const TestObjects& objects, uint64_t seed) {
   auto random = Stream(seed, "kind");
-  Scenario scenario = FullSet(workshop);
+  Scenario scenario = FullSet(objects);
   const std::string effect =
       Pick<std::string>({"tip_radius", "oblique_slip", "object_push", "finger_spacing"}, random);
   scenario.hidden = {RealisticEffect(effect, scenario, seed)};
@@ -116,15 +116,15 @@ Scenario WrongValue(const Workshop& workshop, uint64_t seed) {
   return scenario;
 }
 
-Scenario NoiseMissing(const Workshop& workshop) {
-  Scenario scenario = FullSet(workshop);
+Scenario NoiseMissing(const TestObjects& objects) {
+  Scenario scenario = FullSet(objects);
   scenario.sigma_us = 47'790;
   scenario.noise_in_model = false;
   return scenario;
 }
 
 std::vector<Arm> MakeArms() {
-  using W = const Workshop&;
+  using W = const TestObjects&;
   std::vector<Arm> arms = {
       {"nothing", Kind::kNothing, 400, [](W w, uint64_t) { return FullSet(w); }, {}},
       {"bumps of 0.25 sigma",

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/hidden_effects/score/workshop.h"
+#include "tests/hidden_effects/score/test_objects.h"
 
 namespace touchstone::hidden {
 
@@ -24,7 +24,7 @@ struct Arm {
   std::string name;
   Kind kind = Kind::kNothing;
   int sets = 0;  // at --share 1
-  std::function<Scenario(const Workshop&, uint64_t seed)> draw;
+  std::function<Scenario(const TestObjects&, uint64_t seed)> draw;
   // Effects that may be named besides the truth: what the set's own accidents look like.
   std::vector<std::string> tolerated;
 };
@@ -33,9 +33,9 @@ struct Arm {
 const std::vector<Arm>& Arms();
 const Arm* FindArm(const std::string& name);
 
-enum class Seeds { kTuning, kSealed };
+enum class Seeds { kTuning, kHeldOut };
 
-// The seed of set k of an arm: ranges of tuning and sealed seeds share no number.
+// The seed of set k of an arm: ranges of tuning and held-out seeds share no number.
 uint64_t SeedOf(Seeds seeds, const Arm& arm, int k);
 
 // Effects that fit alike whatever is touched at one speed (or at any speed). Of `truth` with these values, in

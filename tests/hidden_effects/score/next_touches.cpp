@@ -49,13 +49,13 @@ absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const
 }
 
 // Touches that were added until the verdict; `*arrived` false if it was never right and sure.
-absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bool designed, uint64_t seed,
+absl::StatusOr<int> Added(const TestObjects& objects, const Scenario& scenario, bool designed, uint64_t seed,
                           bool* arrived, int* proposed_touches) {
   const std::vector<Command> random = DrawCommands(scenario, kBegin + kMaxAdded, seed);
   std::vector<Command> commands(random.begin(), random.begin() + kBegin);
   for (;;) {
     const Set set = GenerateFor(scenario, commands, seed);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set, workshop));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set, objects));
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Diagnose(input, {}));
     const int added = static_cast<int>(commands.size()) - kBegin;
     *arrived = RightAndSure(report, scenario.hidden.front().effect);
@@ -74,24 +74,24 @@ absl::StatusOr<int> Added(const Workshop& workshop, const Scenario& scenario, bo
 
 }  // namespace
 
-Race RunRace(const Workshop& workshop, uint64_t seed) {
+Race RunRace(const TestObjects& objects, uint64_t seed) {
   auto random = Stream(seed, "kind");
   Scenario scenario;
-  scenario.objects = {workshop.solids[0], workshop.solids[4]};
+  scenario.objects = {objects.solids[0], objects.solids[4]};
   scenario.poses = kBegin / 2, scenario.rounds = 1;
   const std::string effect = kEffects[random() % std::size(kEffects)];
   scenario.hidden = {WeakEffect(effect, scenario, seed, 6)};
   Race race;
   race.truth = scenario;
-  const auto designed = Added(workshop, scenario, true, seed, &race.designed_arrived, &race.proposed);
-  const auto others = Added(workshop, scenario, false, seed, &race.random_arrived, nullptr);
+  const auto designed = Added(objects, scenario, true, seed, &race.designed_arrived, &race.proposed);
+  const auto others = Added(objects, scenario, false, seed, &race.random_arrived, nullptr);
   for (const auto* added : {&designed, &others})
     if (!added->ok()) race.error = added->status().ToString();
   if (race.error.empty()) race.designed = *designed, race.random = *others;
   return race;
 }
 
-Races RunRaces(const Workshop& workshop, Seeds seeds, int count, int threads,
+Races RunRaces(const TestObjects& objects, Seeds seeds, int count, int threads,
                const std::function<void(const Race&)>& each) {
   Races sum;
   std::mutex mutex;
@@ -99,7 +99,7 @@ Races RunRaces(const Workshop& workshop, Seeds seeds, int count, int threads,
   const auto work = [&] {
     for (int k = next++; k < count; k = next++) {
       // Behind the seeds of the arms.
-      const Race race = RunRace(workshop, SeedOf(seeds, Arms().back(), 500'000 + k));
+      const Race race = RunRace(objects, SeedOf(seeds, Arms().back(), 500'000 + k));
       const std::lock_guard<std::mutex> lock(mutex);
       ++sum.races;
       sum.errors += !race.error.empty();

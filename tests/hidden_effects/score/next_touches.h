@@ -20,14 +20,14 @@ struct Race {
 inline constexpr int kAddedAtOnce = 8;
 inline constexpr int kMaxAdded = 96;
 
-Race RunRace(const Workshop& workshop, uint64_t seed);
+Race RunRace(const TestObjects& objects, uint64_t seed);
 
 struct Races {
   int races = 0, errors = 0, designed = 0, random = 0;  // sums of added touches
   int designed_gave_up = 0, random_gave_up = 0;
 };
 
-Races RunRaces(const Workshop& workshop, Seeds seeds, int count, int threads,
+Races RunRaces(const TestObjects& objects, Seeds seeds, int count, int threads,
                const std::function<void(const Race&)>& each);
 
 // A line of Markdown for the table.

@@ -6,7 +6,7 @@
 
 #include "server/effects/all_effects.h"
 #include "tests/hidden_effects/score/judge.h"
-#include "tests/hidden_effects/score/workshop.h"
+#include "tests/hidden_effects/score/test_objects.h"
 #include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
@@ -18,8 +18,8 @@ const char kFolder[] = TOUCHSTONE_SHARED_DATA "/measurements/";
 
 class PublicSets : public testing::Test {
  protected:
-  static void SetUpTestSuite() { workshop_ = new Workshop(OpenWorkshop(kFolder)); }
-  static void TearDownTestSuite() { delete workshop_; }
+  static void SetUpTestSuite() { objects_ = new TestObjects(LoadTestObjects(kFolder)); }
+  static void TearDownTestSuite() { delete objects_; }
 
   v1::Report Diagnosed(const std::string& file) {
     auto set = ReadMeasurementSet(kFolder + file);
@@ -32,7 +32,7 @@ class PublicSets : public testing::Test {
     input.set = std::make_shared<const MeasurementSet>(*std::move(set));
     input.model = std::make_shared<const Model>(*std::move(model));
     for (const std::string& object : input.set->objects)
-      input.surfaces[object] = workshop_->surfaces.at(object);
+      input.surfaces[object] = objects_->surfaces.at(object);
     auto report = Diagnose(input, {});
     EXPECT_TRUE(report.ok()) << report.status();
     return report.ok() ? *report : v1::Report();
@@ -45,9 +45,9 @@ class PublicSets : public testing::Test {
     return 0;
   }
 
-  static Workshop* workshop_;
+  static TestObjects* objects_;
 };
-Workshop* PublicSets::workshop_ = nullptr;
+TestObjects* PublicSets::objects_ = nullptr;
 
 #define SKIP_WITHOUT(file)                                     \
   if (!std::filesystem::exists(std::string(kFolder) + (file))) \

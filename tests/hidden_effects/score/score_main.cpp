@@ -15,13 +15,13 @@ int main(int argc, char** argv) {
   bool verbose = false, no_baselines = false;
   int races = -1;
   CLI::App app{"Hides effects in measurement sets, diagnoses them, and prints how often that was right."};
-  app.add_option("--seeds", seeds, "tuning or sealed")->check(CLI::IsMember({"tuning", "sealed"}));
+  app.add_option("--seeds", seeds, "tuning or held-out")->check(CLI::IsMember({"tuning", "held-out"}));
   app.add_option("--share", options.share, "of the number of sets of every arm")->check(CLI::PositiveNumber);
   app.add_option("--arm", options.arms, "only this arm (may be repeated)");
   app.add_option("--threads", options.threads, "sets at once")->check(CLI::Range(1, 64));
   app.add_option("--meshes", meshes, "folder with lat00.off ...; missing ones are made");
   app.add_option("--dump", options.dump_folder, "write sets that were judged wrong there");
-  app.add_flag("--verbose", verbose, "a line a set: truth, verdict, steps, values");
+  app.add_flag("--verbose", verbose, "a line per set: truth, verdict, steps, values");
   app.add_flag("--no-baselines", no_baselines, "only the diagnosis");
   app.add_option("--races", races,
                  "designed against random next touches; default: 20 by share, none with --arm");
@@ -32,12 +32,12 @@ int main(int argc, char** argv) {
     for (const Arm& known : Arms()) fprintf(stderr, "  %s\n", known.name.c_str());
     return 2;
   }
-  options.seeds = seeds == "sealed" ? Seeds::kSealed : Seeds::kTuning;
+  options.seeds = seeds == "held-out" ? Seeds::kHeldOut : Seeds::kTuning;
   options.baselines = !no_baselines;
   if (!options.dump_folder.empty()) std::filesystem::create_directories(options.dump_folder);
 
-  const Workshop workshop = OpenWorkshop(meshes);
-  const TrialResult result = RunTrial(options, workshop, [&](const Outcome& outcome, int done, int of) {
+  const TestObjects objects = LoadTestObjects(meshes);
+  const TrialResult result = RunTrial(options, objects, [&](const Outcome& outcome, int done, int of) {
     if (verbose) {
       printf("%s %s %llu (%.1f s): hidden %s => %s%s\n", AllRight(outcome) ? "ok   " : "WRONG",
              outcome.arm->name.c_str(), static_cast<unsigned long long>(outcome.seed), outcome.seconds,
@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
         result.sets, result.errors, seconds[seconds.size() / 2], seconds.back());
   if (races < 0)
     races = options.arms.empty() ? std::max(1, static_cast<int>(std::lround(20 * options.share))) : 0;
-  const Races raced = RunRaces(workshop, options.seeds, races, options.threads, [&](const Race& race) {
+  const Races raced = RunRaces(objects, options.seeds, races, options.threads, [&](const Race& race) {
     if (verbose)
       printf("race: hidden %s => designed %d (%d proposed)%s, random %d%s %s\n",
              TruthInWords(race.truth).c_str(), race.designed, race.proposed,

@@ -8,9 +8,9 @@
 namespace touchstone::hidden {
 namespace {
 
-const Workshop& TheWorkshop() {
-  static const auto* workshop = new Workshop(OpenWorkshop(TOUCHSTONE_SHARED_DATA "/measurements"));
-  return *workshop;
+const TestObjects& SharedTestObjects() {
+  static const auto* objects = new TestObjects(LoadTestObjects(TOUCHSTONE_SHARED_DATA "/measurements"));
+  return *objects;
 }
 
 // Runs the first `sets` sets of an arm; every answer to `measure` must be `wanted`, but for `exceptions`.
@@ -20,7 +20,7 @@ void ExpectAlways(const char* arm_name, int sets, const char* measure, bool want
   int asked = 0, otherwise = 0;
   std::string wrong;
   for (int k = 0; k < sets; ++k) {
-    const Outcome outcome = RunOne(*arm, SeedOf(Seeds::kTuning, *arm, k), TheWorkshop(), false);
+    const Outcome outcome = RunOne(*arm, SeedOf(Seeds::kTuning, *arm, k), SharedTestObjects(), false);
     ASSERT_EQ(outcome.error, "");
     for (const Mark& mark : outcome.marks) {
       if (mark.measure != measure) continue;

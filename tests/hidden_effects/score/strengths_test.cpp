@@ -76,7 +76,7 @@ TEST(Arms, TuningAndSealedSeedsNeverMeet) {
   uint64_t last_tuning = 0, first_sealed = ~uint64_t{0};
   for (const Arm& arm : Arms()) {
     last_tuning = std::max(last_tuning, SeedOf(Seeds::kTuning, arm, 10 * arm.sets));
-    first_sealed = std::min(first_sealed, SeedOf(Seeds::kSealed, arm, 0));
+    first_sealed = std::min(first_sealed, SeedOf(Seeds::kHeldOut, arm, 0));
     EXPECT_GT(arm.sets, 0);
   }
   EXPECT_LT(last_tuning, first_sealed);

@@ -31,7 +31,7 @@ bool IsBad(const std::string& measure) {
 
 // What the suggested formula leaves of the mean square misfit, on fresh touches without noise, as a share.
 double FormulaCutsTo(const Scenario& truth, uint64_t seed, const v1::Report& report,
-                     const Workshop& workshop) {
+                     const TestObjects& objects) {
   const std::string& formula = report.unexplained().formula_yaml();
   if (formula.empty()) return NAN;
   const Set fresh = Generate(truth, seed + 500'000);
@@ -47,8 +47,8 @@ double FormulaCutsTo(const Scenario& truth, uint64_t seed, const v1::Report& rep
     begin = end + 1;
   }
   yaml += indented;
-  const auto before = ExactRmseUs(fresh, fresh.model_yaml, workshop),
-             after = ExactRmseUs(fresh, yaml, workshop);
+  const auto before = ExactRmseUs(fresh, fresh.model_yaml, objects),
+             after = ExactRmseUs(fresh, yaml, objects);
   if (!before.ok() || !after.ok()) return std::numeric_limits<double>::infinity();
   return *after * *after / (*before * *before);
 }
@@ -74,12 +74,12 @@ void Count(const Arm& arm, const std::vector<Mark>& marks, Rates* rates) {
 
 }  // namespace
 
-Outcome RunOne(const Arm& arm, uint64_t seed, const Workshop& workshop, bool baselines) {
+Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines) {
   Outcome out;
   out.arm = &arm;
   out.seed = seed;
-  out.set = Generate(arm.draw(workshop, seed), seed);
-  const auto input = InputFor(out.set, workshop);
+  out.set = Generate(arm.draw(objects, seed), seed);
+  const auto input = InputFor(out.set, objects);
   if (!input.ok()) return out.error = input.status().ToString(), out;
   const double start_s = ThreadSeconds();
   auto report = Diagnose(*input, {});
@@ -90,7 +90,7 @@ Outcome RunOne(const Arm& arm, uint64_t seed, const Workshop& workshop, bool bas
     out.error = report.status().ToString();
   // Without a report every question is answered wrongly.
   double cuts_to = NAN;
-  if (arm.kind == Kind::kUnlisted) cuts_to = FormulaCutsTo(out.set.truth, seed, out.report, workshop);
+  if (arm.kind == Kind::kUnlisted) cuts_to = FormulaCutsTo(out.set.truth, seed, out.report, objects);
   out.marks = Judge(arm, out.set.truth, out.report, cuts_to);
   if (!out.error.empty())
     for (Mark& mark : out.marks) mark.yes = IsBad(mark.measure);
@@ -112,7 +112,7 @@ bool AllRight(const Outcome& outcome) {
   return true;
 }
 
-TrialResult RunTrial(const TrialOptions& options, const Workshop& workshop,
+TrialResult RunTrial(const TrialOptions& options, const TestObjects& objects,
                      const std::function<void(const Outcome&, int, int)>& each) {
   struct Task {
     const Arm* arm;
@@ -132,8 +132,7 @@ TrialResult RunTrial(const TrialOptions& options, const Workshop& workshop,
   const auto work = [&] {
     for (size_t t = next++; t < tasks.size(); t = next++) {
       const Arm& arm = *tasks[t].arm;
-      const Outcome outcome =
-          RunOne(arm, SeedOf(options.seeds, arm, tasks[t].k), workshop, options.baselines);
+      const Outcome outcome = RunOne(arm, SeedOf(options.seeds, arm, tasks[t].k), objects, options.baselines);
       const std::lock_guard<std::mutex> lock(mutex);
       Count(arm, outcome.marks, &result.results.diagnosis);
       Count(arm, outcome.bic, &result.results.bic);

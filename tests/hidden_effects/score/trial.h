@@ -31,7 +31,7 @@ struct Outcome {
   std::string error;   // why there is no report; empty: there is one
 };
 
-Outcome RunOne(const Arm& arm, uint64_t seed, const Workshop& workshop, bool baselines);
+Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines);
 
 // Whether nothing about it was judged wrong.
 bool AllRight(const Outcome& outcome);
@@ -43,7 +43,7 @@ struct TrialResult {
 };
 
 // `each` is called after every set, from one thread at a time.
-TrialResult RunTrial(const TrialOptions& options, const Workshop& workshop,
+TrialResult RunTrial(const TrialOptions& options, const TestObjects& objects,
                      const std::function<void(const Outcome&, int done, int of)>& each);
 
 }  // namespace touchstone::hidden

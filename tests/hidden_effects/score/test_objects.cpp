@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/workshop.h"
+#include "tests/hidden_effects/score/test_objects.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -16,8 +16,8 @@ namespace touchstone::hidden {
 
 constexpr uint64_t kTriangles = 65'000;
 
-Workshop OpenWorkshop(const std::string& mesh_folder) {
-  Workshop workshop;
+TestObjects LoadTestObjects(const std::string& mesh_folder) {
+  TestObjects objects;
   for (const std::string& name : SupershapeNames()) {
     const std::string path = mesh_folder + "/" + name + ".off";
     const bool on_disk = std::filesystem::exists(path);
@@ -26,30 +26,31 @@ Workshop OpenWorkshop(const std::string& mesh_folder) {
       std::cerr << mesh.status() << '\n';
       std::abort();
     }
-    workshop.solids.push_back(
+    objects.solids.push_back(
         std::make_shared<Solid>(name, on_disk ? ReadTriangles(path) : SupershapeTriangles(name, kTriangles)));
-    workshop.surfaces[name] = Surface::Create(name, *std::move(mesh)).value();
+    objects.surfaces[name] = Surface::Create(name, *std::move(mesh)).value();
   }
-  return workshop;
+  return objects;
 }
 
 absl::StatusOr<DiagnosisInput> InputFor(const std::string& csv, const std::string& model_yaml,
-                                        const Workshop& workshop) {
+                                        const TestObjects& objects) {
   TOUCHSTONE_ASSIGN_OR_RETURN(MeasurementSet set, ParseMeasurementSet(csv, "hidden"));
   TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(model_yaml, "nominal.yaml", Catalogue()));
   DiagnosisInput input;
   input.set = std::make_shared<const MeasurementSet>(std::move(set));
   input.model = std::make_shared<const Model>(std::move(model));
-  for (const std::string& object : input.set->objects) input.surfaces[object] = workshop.surfaces.at(object);
+  for (const std::string& object : input.set->objects) input.surfaces[object] = objects.surfaces.at(object);
   return input;
 }
 
-absl::StatusOr<DiagnosisInput> InputFor(const Set& set, const Workshop& workshop) {
-  return InputFor(set.csv, set.model_yaml, workshop);
+absl::StatusOr<DiagnosisInput> InputFor(const Set& set, const TestObjects& objects) {
+  return InputFor(set.csv, set.model_yaml, objects);
 }
 
-absl::StatusOr<double> ExactRmseUs(const Set& set, const std::string& model_yaml, const Workshop& workshop) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set.csv, model_yaml, workshop));
+absl::StatusOr<double> ExactRmseUs(const Set& set, const std::string& model_yaml,
+                                   const TestObjects& objects) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set.csv, model_yaml, objects));
   TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
   // In the place of what was reported, what is exactly so.
   for (int k = 0; k < observations.size(); ++k)
