@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A plan's touches on a rig, as `touchstone rig run plan.csv -o set.csv`: run again, it goes on where it stopped.
+"""A plan's touches on a rig, as `touchstone rig run plan.csv -o set.csv`: run again, it resumes where it stopped.
 
     python3 rig_run.py 127.0.0.1:50052 plan.csv monday set.csv
 """

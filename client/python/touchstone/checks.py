@@ -45,7 +45,7 @@ def positive(name: str, value: Any) -> float:
 
 
 def choice(name: str, value: str, choices: Mapping[str, Any]) -> Any:
-    """The enum value that a word stands for, or InvalidRequest with the words that there are."""
+    """The enum value of a word; InvalidRequest names the allowed words."""
     if value in choices:
         return choices[value]
     raise InvalidRequest(f'{name} is {value!r}; it must be {_either(choices)}.{_hint(value, choices)}')

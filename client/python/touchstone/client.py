@@ -90,7 +90,7 @@ class Client:
     def lease(self, *, take: bool = False) -> Lease:
         """The right to move the source, for a `with` block; nothing at a source that needs none.
 
-        Touches, pictures and datasets acquire one by themselves for as long as they last. Hold one to keep others out in
+        Touches, images and datasets acquire one by themselves for as long as they last. Hold one to keep others out in
         between.
 
         Args:
@@ -112,7 +112,7 @@ class Client:
         return self._leases[-1].token if self._leases else ""
 
     def session(self, name: str = "default", *, take_lease: bool = False) -> Session:
-        """Touches of one session, under ids that make it possible to go on with it. See Session."""
+        """Touches of one session, under ids, so that it can be resumed. See Session."""
         return Session(self, name, take_lease)
 
     def stop(self, reason: str = "") -> int:
@@ -177,13 +177,13 @@ class Client:
           lease_token: of a lease that is not this client's; by default that of client.lease(), or one for this call
             where the source needs it.
           session: that a physical source journals them in.
-          ids: one a touch. A physical source answers an id that the session has from its journal, without motion, so
+          ids: one per touch. A physical source answers an id that the session has from its journal, without motion, so
             that the call is repeated when the source was lost; without ids it is not.
 
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
           (N, fingers, 3) `contact_point_mm` and `normal`; (N,) `complete`. Its attribute `measured` has what a physical
-          source measured, one message a touch (touchstone.v1.Measured).
+          source measured, one message per touch (touchstone.v1.Measured).
         """
         if ids is not None and len(ids) != len(touches):
             raise InvalidRequest(f"ids has {len(ids)} entries for {len(touches)} touches; give one each.")
@@ -268,7 +268,7 @@ class Client:
           samples: how many; needed for a sphere plan, by default all touches of the others once.
           seed: of poses and noise, 0 to 2**64 - 1.
           model: a name, a hash, a path to a model file, its text, or a Model; default: the source's.
-          speed_mm_s: commanded speed, 20 unless told; explicit touches carry their own.
+          speed_mm_s: commanded speed, default 20; explicit touches carry their own.
           touch_interval_s: time between the starts of neighbouring touches.
           columns: "index", "object", "descriptor", "contact_time", "pose", "contact", "image"; default
             ("descriptor", "object"), and "image" if `image` is given.

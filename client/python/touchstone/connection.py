@@ -1,4 +1,4 @@
-"""A channel to one of several equal sources, made when it is first needed and made anew when it is lost."""
+"""A channel to one of several equal sources, opened when it is first needed and again when it is lost."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OPTIONS = (
     # Retrying is done here, where it is known which index comes next.
     ("grpc.enable_retries", 0),
     # A machine that vanished without a word is noticed within six minutes; servers take pings that come more often
-    # than every five minutes for an attack, unless told otherwise.
+    # than every five minutes for an attack, unless configured otherwise.
     ("grpc.keepalive_time_ms", 310_000),
     ("grpc.keepalive_timeout_ms", 20_000),
 )
@@ -66,7 +66,7 @@ class Retry:
         self.succeeded()
 
     def succeeded(self) -> None:
-        """Something arrived: the patience starts anew."""
+        """Something arrived: the time allowed for retries starts again."""
         self._losses = 0
         self._since: float | None = None
 
@@ -141,7 +141,7 @@ class Connection:
         Args:
           stub: generated stub class, e.g. source_pb2_grpc.SourceStub.
           timeout_s: deadline of each attempt.
-          retry_for_s: how long to go on trying; by default the connection's.
+          retry_for_s: how long to retry; by default the connection's.
         """
         retry = Retry(len(self.targets), self.retry_for_s if retry_for_s is None else retry_for_s)
         while True:

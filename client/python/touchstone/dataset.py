@@ -22,8 +22,8 @@ class Header:
     """What the dataset is, as its source resolved it.
 
     Attributes:
-      samples: in the whole dataset.
-      model_name, model_hash, model_yaml: the model, whole.
+      samples: in the whole dataset, of which this stream may be a part.
+      model_name, model_hash, model_yaml: the model; `model_yaml` is the whole file.
       mesh_hashes: SHA-256 of each object's mesh.
       fingers, spacing_mm: of the end effector.
       columns: {name: shape of one sample}, None for encoded images.
@@ -71,10 +71,10 @@ def fingerprint(header: source_pb2.DatasetHeader) -> str:
 
 
 class Dataset:
-    """Iterating yields Batch objects in order; each iteration starts anew. Made by Client.dataset().
+    """Iterating yields Batch objects in order; each iteration starts from the beginning. Made by Client.dataset().
 
     A source that is lost is replaced, by itself when it is back or by the next of the client's targets, and the
-    stream goes on at the next index, without a gap or a repeat: sample i depends on nothing but the
+    stream resumes at the next index, without a gap or a repeat: sample i depends on nothing but the
     specification and i. What the new source would do differently is found out first (SourceChanged).
 
     len() is the number of batches.
@@ -90,7 +90,7 @@ class Dataset:
                  start: int = 0, stop: int | None = None, stride: int = 1, si: bool = False,
                  hold_lease: Callable[[], ContextManager[str]] = lambda: contextlib.nullcontext(""),
                  session: str = ""):
-        """`hold_lease`: holds what the source wants to be held while it makes samples, and tells the token."""
+        """`hold_lease`: a context that holds the lease while the source makes samples, and gives its token."""
         self.spec = spec
         self.batch_size = resolve_batch_size(spec, batch_size)
         self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
@@ -184,7 +184,7 @@ class Dataset:
         return source_pb2_grpc.SourceStub(self._connection.channel()).StreamDataset(request)
 
     def _lost(self, error: grpc.RpcError, retry: Retry) -> None:
-        """Returns when the stream may be opened anew; raises what the user gets to see otherwise."""
+        """Returns when the stream may be opened again; otherwise raises the error for the user."""
         failure = errors.from_rpc(error, self._connection.target)
         if not errors.is_lost(error):
             raise failure from None

@@ -89,7 +89,7 @@ class Camera:
 
     Attributes:
       eye_mm, at_mm: where it stands and what it looks at.
-      up: upwards in the picture; need not be perpendicular to the viewing axis.
+      up: upwards in the image; need not be perpendicular to the viewing axis.
       near_mm, far_mm: along the viewing axis; both 0: they enclose the object.
     """
 

@@ -1,4 +1,4 @@
-"""The lease of a source that moves something: acquired where it is needed, renewed by a thread, given back at the end."""
+"""The lease of a source that moves something: acquired where it is needed, renewed by a thread, released at the end."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CONTROL = control_pb2_grpc.ControlStub
 _RENEWALS_A_WINDOW = 5
 _ACQUIRE_S = 10.0
 _SHORTEST_ANSWER_S = 0.5
-# A lease that nobody renews, because its holder was killed, is over by then.
+# A lease that is not renewed, because its holder was killed, has expired by then.
 _HOLDER_MAY_BE_GONE_S = 2.5
 _ASK_AGAIN_S = 0.1
 
@@ -90,7 +90,7 @@ class Lease:
             raise self._lost
 
     def follow(self) -> str:
-        """The token, after the source was lost and found again: of this lease if it stands, else of a new one.
+        """The token after a reconnection: of this lease if it is still valid, else of a new one.
 
         Never takes it from somebody else, and not where somebody stopped the source meanwhile (Refused): a new lease
         would end that stop.

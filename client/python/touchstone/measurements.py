@@ -26,8 +26,8 @@ class Row:
       touch: its number in the file.
       object: what is touched.
       command: the touch, as Touches of one row.
-      time_us: contact times, one a finger, NaN where it reported nothing; empty in a plan.
-      session_time_s: when the approach began since the session did; None: not told.
+      time_us: contact times, one per finger, NaN where it reported nothing; empty in a plan.
+      session_time_s: when the approach began since the session did; None: unknown.
       result: what the source said of it, as a Batch of one row; None in a file.
     """
 
@@ -80,7 +80,7 @@ def read_plan(path: str | os.PathLike) -> list[Row]:
 
 
 def write_measurements(path: str | os.PathLike, rows: Sequence[Row]) -> None:
-    """Writes a measurement file, whole or not at all: it is written beside the path and renamed."""
+    """Writes a measurement file atomically: it is written beside the path and renamed."""
     rows = list(rows)
     fingers = len(rows[0].time_us) if rows else 0
     names = ["l", "m", "r"] if fingers == 3 else [str(k) for k in range(fingers)]

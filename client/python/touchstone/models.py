@@ -121,7 +121,7 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """A model of the source's store; `yaml` is the whole model file."""
+    """A model in the source's store; `yaml` is the model file."""
 
     name: str
     hash: str

@@ -59,7 +59,7 @@ class FacesPlan:
         return 6 * self.samples_per_face * self.rounds * objects
 
 
-# One entry a touch; shape of one entry. The first five are needed.
+# Columns with one entry per touch: the shape of one entry. The first five are required.
 _NEEDED = {"target_mm": (3,), "approach": (3,), "lateral": (3,), "standoff_mm": (), "speed_mm_s": ()}
 _OPTIONAL = {"stroke_mm": (), "session_time_s": ()}
 
@@ -175,7 +175,7 @@ def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0
 
 
 def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> Touches:
-    """Explicit touches, either rows (a sequence of mappings) or columns; a single value stands for all rows.
+    """Explicit touches, either rows (a sequence of mappings) or columns; a single value applies to all rows.
 
     touches([{"target_mm": (0, 0, 0), "approach": (0, 0, -1), "lateral": (1, 0, 0), "standoff_mm": 120}])
     touches(target_mm=targets, approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=120, speed_mm_s=20)

@@ -1,4 +1,4 @@
-"""What only a physical source has: an arm, an end effector, a camera, and an object that somebody put down."""
+"""What only a physical source has: an arm, an end effector, a camera, and an object on its fixture."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CHECKS_A_REQUEST = 100
 
 @dataclasses.dataclass(frozen=True)
 class TouchCheck:
-    """Whether a touch is possible; if not, `reason` tells why. `placement` is the face that must point up."""
+    """Whether a touch is possible; if not, `reason` says why. `placement` is the face that must point up."""
 
     possible: bool
     reason: str

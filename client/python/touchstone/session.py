@@ -20,7 +20,7 @@ def check_name(name: str) -> str:
 
 
 def touch_id(session: str, object: str, number: int) -> str:
-    """The id that a physical source journals a touch under: the same as the command line's, so that either goes on."""
+    """The id under which a physical source journals a touch. The command line uses the same, so either can resume."""
     text = f"{session}/{object}/{number}"
     if len(text.encode()) <= 128:
         return text
@@ -55,8 +55,8 @@ class Session:
     def touch(self, row: Row) -> Row:
         """Makes the touch, or gets it from the journal if it was made before; the row with its times.
 
-        A source that is lost in between is asked again, for the same touch, as long as the client's retry_for_s. Where a
-        person must put down or turn the object, Refused tells how; Client.rig.mount() tells the source that it is done.
+        A source that is lost in between is asked again, for the same touch, as long as the client's retry_for_s. Where
+        a person must put down or turn the object, Refused says how; Client.rig.mount() reports that it is done.
         """
         if self._lease is None:
             raise Refused(f'Session {self.name} is not open; use it as "with client.session({self.name!r}) as session".')

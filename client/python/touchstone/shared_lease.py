@@ -20,7 +20,7 @@ _RETRY_S = 0.05
 class LeaseSlot:
     """Memory that all workers see, also spawned ones: the token of the lease, and which workers use it.
 
-    A `lent` token is that of a lease which somebody else holds and gives back.
+    A `lent` token is that of a lease which another object holds and releases.
     """
 
     def __init__(self, lent: str = "") -> None:
@@ -34,7 +34,7 @@ class LeaseSlot:
         self._users[worker % _MOST_WORKERS] = 1
 
     def leave(self, worker: int) -> bool:
-        """True if the lease is to be given back: nobody uses it any more."""
+        """True if the lease is to be released: its last user has gone."""
         self._users[worker % _MOST_WORKERS] = 0
         return not self._lent and not bool(self._users.any())
 
@@ -48,7 +48,7 @@ class LeaseSlot:
         assert len(data) <= _MOST_TOKEN_BYTES, token
         self._token[0] = 0
         self._token[1:1 + len(data)] = torch.tensor(list(data), dtype=torch.uint8)
-        # Last: before that nobody reads the bytes.
+        # Last: the bytes are not read before.
         self._token[0] = len(data)
 
 
@@ -71,7 +71,7 @@ class SharedLease(Lease):
                 self._slot.token = self.token
                 return
             except Refused as error:
-                # Another worker may have acquired it just now, and not told yet.
+                # Another worker may have acquired it just now without having published it yet.
                 if error.code != "FAILED_PRECONDITION" or time.monotonic() > until:
                     raise
             time.sleep(_RETRY_S)

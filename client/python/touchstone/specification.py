@@ -11,7 +11,7 @@ from .models import ModelLike, model_ref
 from .plans import PlanLike, SpherePlan, Touches, sphere
 from .v1 import source_pb2
 
-# Samples a batch unless told otherwise: enough to make a message's overhead small, and a few MB with images.
+# Default samples per batch: enough to make a message's overhead small, and a few MB with images.
 DEFAULT_BATCH_SIZE = 4096
 DEFAULT_BATCH_SIZE_WITH_IMAGES = 64
 

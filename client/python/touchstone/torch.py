@@ -11,7 +11,7 @@ Order. Batch k holds samples k * batch_size and following. With R ranks, rank r 
 DataLoader workers take them in turn, and the DataLoader takes from its workers in turn: so what a rank sees does
 not depend on the number of workers, nothing is left out and nothing comes twice.
 
-Resumption. `loader.state_dict()` counts the batches that were handed out, not those prefetched, and stands for
+Resumption. `loader.state_dict()` counts the batches that were returned, not those prefetched, and stands for
 the rest of the epoch and all later ones. After the last batch of an epoch but before the loop has ended it
 stands for an empty rest; after that for the next epoch.
 
@@ -150,7 +150,7 @@ class TouchstoneDataset(IterableDataset):
             for batch in self._batches(worker, workers):
                 yield from [batch] if self.batched else _samples(batch)
             return
-        # In the only process: count here. Whatever was handed out is counted before it is.
+        # In the only process: count here, before the batch is returned.
         if self._all_delivered():
             self._end_epoch()
         self._delivered = self._skipped = 0
@@ -178,7 +178,7 @@ class TouchstoneDataset(IterableDataset):
         return TouchstoneLoader(self, num_workers, options)
 
     def state_dict(self) -> Dict[str, Any]:
-        """Where the next batch stands; plain numbers and text. With workers, use the loader's."""
+        """The position of the next batch; plain numbers and text. With workers, use the loader's."""
         known = [row for row in self._fingerprints.numpy() if row.any()]
         return {
             "version": 1,
@@ -209,7 +209,7 @@ class TouchstoneDataset(IterableDataset):
         self._delivered = self._skipped = 0
 
     def _all_delivered(self) -> bool:
-        """True if the last batch was handed out but nobody asked for one more, as zip() and islice() do not."""
+        """True if the last batch was returned but no further one was requested, as with zip() and islice()."""
         return 0 < self._delivered == self._rank_batches(int(self._begin[1]))
 
     def _end_epoch(self) -> None:
@@ -271,10 +271,10 @@ class TouchstoneDataset(IterableDataset):
 
 
 class TouchstoneLoader:
-    """A DataLoader that knows how many batches it has handed out. Made by TouchstoneDataset.loader().
+    """A DataLoader that counts the batches it has returned. Made by TouchstoneDataset.loader().
 
     Each `for` goes through one epoch, or through the rest of one after load_state_dict(). A loop that was broken
-    off begins its epoch anew, unless a state is loaded.
+    off begins its epoch again, unless a state is loaded.
     """
 
     def __init__(self, dataset: TouchstoneDataset, num_workers: int, options: Dict[str, Any]):
@@ -282,7 +282,7 @@ class TouchstoneLoader:
             if name in options:
                 raise InvalidRequest(f"{name} is the dataset's; leave it out here.")
         if not options.get("in_order", True):
-            raise InvalidRequest("in_order=False gives up the order that a state stands for.")
+            raise InvalidRequest("in_order=False gives up the order that a state refers to.")
         self.dataset = dataset
         self._num_workers = num_workers
         self._options = options
@@ -324,7 +324,7 @@ class TouchstoneLoader:
         if not self._fresh:
             dataset.set_epoch(dataset.epoch + dataset._all_delivered())
         self._fresh = False
-        # Workers that live on belong to one DataLoader; others are made anew, by fork only as long as that works.
+        # Persistent workers belong to one DataLoader; others are started for each, by fork only while that is safe.
         if self._loader is None or not self._options.get("persistent_workers"):
             self._loader = self._make()
         dataset._delivered = dataset._skipped = 0
@@ -340,7 +340,7 @@ class TouchstoneLoader:
 
 
 def _tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
-    """The batch as tensors, without its first `skip` samples; pictures with the channels first."""
+    """The batch as tensors, without its first `skip` samples; images with the channels first."""
     result: Dict[str, Any] = {}
     for name, values in batch.items():
         if isinstance(values, EncodedImages):

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-# End of the SI name, end of the lab name, factor. The first match counts, so "_m_s" stands before "_s".
+# End of the SI name, end of the lab name, factor. The first match counts, so "_m_s" comes before "_s".
 _RULES = (
     ("_m_s", "_mm_s", 1e3),
     ("_rad", "_deg", 180 / math.pi),
