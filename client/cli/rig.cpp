@@ -34,13 +34,13 @@ absl::StatusOr<v1::RigState> GetRig(client::Connection* connection) {
 }
 
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
-                             const std::string& object, const std::string& placement) {
-  if (state.object() == object && state.placement() == placement) return absl::OkStatus();
+                             const std::string& object, const std::string& up_face) {
+  if (state.object() == object && client::UpFaceWord(state.up_face()) == up_face) return absl::OkStatus();
   if (!state.mounts_itself())
-    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(PlacementRequest(object, placement, state.object())));
+    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(RestingFaceRequest(object, up_face, state.object())));
   else
-    cli.Log(absl::StrCat("the rig puts ", object, " on the fixture with its face ", placement, " up"));
-  return source->Mount(object, placement).status();
+    cli.Log(absl::StrCat("the rig puts ", object, " on the fixture with its face ", up_face, " up"));
+  return source->Mount(object, client::UpFaceOf(up_face)).status();
 }
 
 absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>& wanted,
@@ -64,7 +64,7 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
       PlannedRow& row = (*rows)[wanted[k]];
       row.possible = check.possible();
       row.reason = check.reason();
-      row.placement = check.placement();
+      row.up_face = client::UpFaceWord(check.up_face());
       row.duration_s = check.duration_s();
       if (checks != nullptr) checks->push_back(std::move(check));
     }
@@ -84,7 +84,7 @@ std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_line
       continue;
     }
     ++lines;
-    table.Add({std::to_string(row.touch.touch), row.touch.object, row.placement, row.reason});
+    table.Add({std::to_string(row.touch.touch), row.touch.object, row.up_face, row.reason});
   }
   if (lines == 0) return "";
   return table.Text() + (more > 0 ? absl::StrCat("and ", more, " more\n") : "");
@@ -96,6 +96,7 @@ void AddRig(Cli* cli) {
       "Works a rig through its touchstone-gateway: state, motions, calibration, whole sessions of touches.",
       "touchstone rig status --server 127.0.0.1:50052\n"
       "touchstone rig stop --server 127.0.0.1:50052\n"
+      "touchstone rig reset --reason 'cable freed' --server 127.0.0.1:50052\n"
       "touchstone rig dry-run plan.csv -o way.svg --server 127.0.0.1:50052\n"
       "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052");
   AddRigStatus(cli, group);

@@ -8,6 +8,7 @@
 #include "client/cli/common.h"
 #include "client/cli/motion_options.h"
 #include "client/cli/rig_plan.h"
+#include "client/source/rig_words.h"
 
 namespace touchstone::cli {
 
@@ -23,7 +24,7 @@ absl::StatusOr<v1::RigState> GetRig(client::Connection* connection);
 // Says that the object lies on the fixture as it must. Where the rig changes it by itself it does; else a
 // person is asked, unless it lies there already.
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
-                             const std::string& object, const std::string& placement);
+                             const std::string& object, const std::string& up_face);
 
 // Checks the rows that `wanted` names (indices), in parts, and fills in what the source says. `path` of each
 // row's check goes to `paths` (may be null).
@@ -35,7 +36,7 @@ std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_line
 
 // One file a command.
 void AddRigStatus(Cli* cli, CLI::App* group);
-void AddRigMotions(Cli* cli, CLI::App* group);  // home, mount, stop
+void AddRigMotions(Cli* cli, CLI::App* group);  // stop, reset, power-on, home, mount
 void AddRigDryRun(Cli* cli, CLI::App* group);
 void AddRigRun(Cli* cli, CLI::App* group);
 void AddRigPhotos(Cli* cli, CLI::App* group);

@@ -121,7 +121,7 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
   TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig.connection.get(), all, &rows, nullptr));
   const std::string impossible = ImpossibleTable(rows, kMaxLines);
   if (!impossible.empty()) cli.Log(impossible + "these are left out");
-  const auto makes = [](const PlannedRow& row) { return row.possible && row.placement == "+z"; };
+  const auto makes = [](const PlannedRow& row) { return row.possible && row.up_face == "+z"; };
   if (std::count_if(rows.begin(), rows.end(), makes) < static_cast<int>(kMinTouches))
     return absl::FailedPreconditionError(absl::StrCat(
         "the rig can make only ", std::count_if(rows.begin(), rows.end(), makes), " of ", rows.size(),

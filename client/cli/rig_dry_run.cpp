@@ -24,7 +24,7 @@ Json RowsJson(const std::vector<PlannedRow>& rows) {
                     {"object", row.touch.object},
                     {"possible", row.possible},
                     {"reason", row.reason},
-                    {"placement", row.placement},
+                    {"up_face", row.up_face},
                     {"duration_s", row.duration_s}});
   return list;
 }
@@ -43,10 +43,10 @@ std::string Drawing(const Options& options, const v1::RigState& state, const std
     touch.number = static_cast<int>(rows[k].touch.touch);
     touch.possible = rows[k].possible;
     touch.reason = rows[k].reason;
-    touch.transfer_poses = checks[k].transfer_poses();
+    touch.transit_poses = checks[k].transit_poses();
     for (const v1::BasePose& pose : checks[k].path()) touch.path.push_back(VectorOf(pose.position_m()));
     // The target lies on the approach, a standoff from its start.
-    const size_t start = touch.transfer_poses;
+    const size_t start = touch.transit_poses;
     if (start > 0 && start < touch.path.size()) {
       const Eigen::Vector3d way = touch.path.back() - touch.path[start - 1];
       if (way.norm() > 0)
@@ -76,14 +76,15 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
   const size_t possible =
       std::count_if(rows.begin(), rows.end(), [](const PlannedRow& row) { return row.possible; });
   const std::vector<RigGroup> groups = GroupRows(
-      rows, [&](size_t row) { return rows[row].possible; }, state.object(), state.placement());
+      rows, [&](size_t row) { return rows[row].possible; }, state.object(),
+      client::UpFaceWord(state.up_face()));
   double duration_s = 0;
   for (const RigGroup& group : groups) duration_s += group.duration_s;
   if (cli.output().json) {
     Json list = Json::array();
     for (const RigGroup& group : groups)
       list.push_back({{"object", group.object},
-                      {"placement", group.placement},
+                      {"up_face", group.up_face},
                       {"touches", group.rows.size()},
                       {"duration_s", group.duration_s}});
     PrintJson({{"touches", rows.size()},
@@ -96,7 +97,7 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
     if (!text.empty()) text += "\n";
     Table table({"OBJECT", "FACE UP", "TOUCHES", "TIME"});
     for (const RigGroup& group : groups)
-      table.Add({group.object, group.placement, std::to_string(group.rows.size()),
+      table.Add({group.object, group.up_face, std::to_string(group.rows.size()),
                  DurationInWords(group.duration_s)});
     if (!groups.empty()) text += table.Text() + "\n";
     absl::StrAppend(&text, possible, " of ", Counted(rows.size(), "touch", "touches"), " possible, ",

@@ -1,4 +1,4 @@
-// touchstone rig stop|home|mount.
+// touchstone rig stop|reset|power-on|home|mount.
 #include "client/cli/rig.h"
 #include "server/base/status.h"
 
@@ -9,10 +9,10 @@ constexpr std::chrono::seconds kStopAnswer{5};
 
 struct Options {
   MotionFlags motion;
-  std::string reason, object, placement = "+z";
+  std::string reason, object, up_face = "+z";
 };
 
-const std::vector<std::string>& PlacementNames() {
+const std::vector<std::string>& UpFaceNames() {
   static const std::vector<std::string> names = {"+x", "-x", "+y", "-y", "+z", "-z"};
   return names;
 }
@@ -34,16 +34,42 @@ absl::Status RunStop(const Cli& cli, const Options& options) {
     return absl::Status(status.code(), absl::StrCat("THE STOP WAS NOT CONFIRMED: ", status.message(),
                                                     "; use the emergency stop if anything moves"));
   if (cli.output().json) PrintJson({{"aborted_touches", response.aborted_touches()}});
-  cli.Log(absl::StrCat(
-      "stopped; ", Counted(response.aborted_touches(), "touch was", "touches were"),
-      " under way. This is a software stop and not safety-rated. Whoever acquires the lease next "
-      "(any command that moves) ends it"));
+  cli.Log(absl::StrCat("stopped; ", Counted(response.aborted_touches(), "touch was", "touches were"),
+                       " under way. This is a software stop and not safety-rated. It holds until somebody "
+                       "releases it: touchstone "
+                       "rig reset --reason TEXT"));
+  return absl::OkStatus();
+}
+
+absl::Status RunReset(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  v1::ResetRequest request;
+  request.set_holder(client::LeaseHolder());
+  request.set_reason(options.reason);
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::State state,
+      client::Connection::Call(&v1::Control::Stub::Reset, rig.connection->control(), request));
+  const std::string word = client::SourceStateWord(state.state());
+  if (cli.output().json) PrintJson({{"state", word}});
+  cli.Log(absl::StrCat("no stop holds; the rig is ", word, ". Whoever moves it next acquires a new lease"));
   return absl::OkStatus();
 }
 
 void Report(const Cli& cli, const std::string& what, const v1::RigState& state) {
-  if (cli.output().json) PrintJson({{"object", state.object()}, {"placement", state.placement()}});
+  if (cli.output().json)
+    PrintJson({{"object", state.object()}, {"up_face", client::UpFaceWord(state.up_face())}});
   cli.Log(what);
+}
+
+absl::Status RunPowerOn(const Cli& cli, const Options& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
+  const StopOnInterrupt stop_on_interrupt(source.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, source->PowerOn());
+  const std::string mode = client::RobotModeWord(state.arm().robot_mode());
+  if (cli.output().json) PrintJson({{"robot_mode", mode}});
+  cli.Log(absl::StrCat("the arm is powered on and its brakes are released: ", mode));
+  return absl::OkStatus();
 }
 
 absl::Status RunHome(const Cli& cli, const Options& options) {
@@ -56,15 +82,16 @@ absl::Status RunHome(const Cli& cli, const Options& options) {
 }
 
 absl::Status RunMount(const Cli& cli, const Options& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("PLACEMENT", options.placement, PlacementNames()).status());
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("FACE", options.up_face, UpFaceNames()).status());
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
   const StopOnInterrupt stop_on_interrupt(source.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, source->Mount(options.object, options.placement));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state,
+                              source->Mount(options.object, client::UpFaceOf(options.up_face)));
   Report(cli,
          absl::StrCat(state.mounts_itself() ? "the rig has put " : "noted: ", state.object(),
                       state.mounts_itself() ? " on the fixture" : " lies on the fixture", " with its face ",
-                      state.placement(), " up"),
+                      client::UpFaceWord(state.up_face()), " up"),
          state);
   return absl::OkStatus();
 }
@@ -81,6 +108,23 @@ void AddRigMotions(Cli* cli, CLI::App* group) {
       [cli, options] { return RunStop(*cli, *options); });
   stop->add_option("--reason", options->reason, "For the log")->type_name("TEXT");
   cli->AddSourceOptions(stop);
+
+  CLI::App* reset = cli->AddCommand(
+      group, "reset",
+      "Releases a stop, once you have made sure that the rig may move. Moves nothing and needs no lease, but "
+      "ends the one that stands.",
+      "touchstone rig reset --reason 'cable freed'" + server,
+      [cli, options] { return RunReset(*cli, *options); });
+  reset->add_option("--reason", options->reason, "Why it may move again, for the log")
+      ->type_name("TEXT")
+      ->required();
+  cli->AddSourceOptions(reset);
+
+  CLI::App* power_on = cli->AddCommand(
+      group, "power-on", "Powers the arm on and releases its brakes. Never unlocks a protective stop.",
+      "touchstone rig power-on" + server, [cli, options] { return RunPowerOn(*cli, *options); });
+  AddMotionOptions(power_on, &options->motion, false);
+  cli->AddSourceOptions(power_on);
 
   CLI::App* home =
       cli->AddCommand(group, "home", "Backs the tool out along its own axis and goes to the home joints.",
@@ -99,12 +143,12 @@ void AddRigMotions(Cli* cli, CLI::App* group) {
       ->required();
   mount
       ->add_option(
-          "PLACEMENT", options->placement,
+          "FACE", options->up_face,
           "The face of its box that points up: +x, -x, +y, -y, +z (as in the mesh file) or -z. Default: +z")
       ->type_name("");
   // "-x" reads like an option; here it is a face.
   for (const char* face : {"-x", "-y", "-z"})
-    mount->add_flag_callback(face, [options, face] { options->placement = face; })->group("");
+    mount->add_flag_callback(face, [options, face] { options->up_face = face; })->group("");
   AddMotionOptions(mount, &options->motion, false);
   cli->AddSourceOptions(mount);
 }

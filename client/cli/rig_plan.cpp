@@ -12,7 +12,7 @@
 namespace touchstone::cli {
 
 std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::function<bool(size_t)>& take,
-                                const std::string& mounted_object, const std::string& mounted_placement) {
+                                const std::string& mounted_object, const std::string& mounted_up_face) {
   std::vector<std::string> objects;
   std::vector<RigGroup> groups;
   for (size_t row = 0; row < rows.size(); ++row) {
@@ -20,19 +20,19 @@ std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::
     const std::string& object = rows[row].touch.object;
     if (std::find(objects.begin(), objects.end(), object) == objects.end()) objects.push_back(object);
     auto group = std::find_if(groups.begin(), groups.end(), [&](const RigGroup& g) {
-      return g.object == object && g.placement == rows[row].placement;
+      return g.object == object && g.up_face == rows[row].up_face;
     });
     if (group == groups.end()) {
-      groups.push_back({object, rows[row].placement, {}, 0});
+      groups.push_back({object, rows[row].up_face, {}, 0});
       group = groups.end() - 1;
     }
     group->rows.push_back(row);
     group->duration_s += rows[row].duration_s;
   }
-  // An object stays on the fixture until all of its placements are done.
+  // An object stays on the fixture until every face of it that is needed was up.
   const auto rank = [&](const RigGroup& group) {
     const bool on_fixture = group.object == mounted_object;
-    const bool lies_so = on_fixture && group.placement == mounted_placement;
+    const bool lies_so = on_fixture && group.up_face == mounted_up_face;
     return std::make_tuple(
         !on_fixture, std::find(objects.begin(), objects.end(), group.object) - objects.begin(), !lies_so);
   };
@@ -58,11 +58,11 @@ absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::Measure
   return rows;
 }
 
-std::string PlacementRequest(const std::string& object, const std::string& placement,
-                             const std::string& mounted_object) {
+std::string RestingFaceRequest(const std::string& object, const std::string& up_face,
+                               const std::string& mounted_object) {
   if (object == mounted_object)
-    return absl::StrCat("Turn ", object, " so that its face ", placement, " points up");
-  return absl::StrCat("Put ", object, " on the fixture with its face ", placement, " up");
+    return absl::StrCat("Turn ", object, " so that its face ", up_face, " points up");
+  return absl::StrCat("Put ", object, " on the fixture with its face ", up_face, " up");
 }
 
 double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {

@@ -18,22 +18,22 @@ struct PlannedRow {
   client::MeasuredTouch touch;
   std::string id;
   bool possible = true;
-  std::string reason;     // why not
-  std::string placement;  // of the object, that it needs
+  std::string reason;   // why not
+  std::string up_face;  // of the object, that it needs
   double duration_s = 0;
 };
 
 // Rows (by index) that need the same object lying the same way.
 struct RigGroup {
-  std::string object, placement;
+  std::string object, up_face;
   std::vector<size_t> rows;  // in the order of the plan
   double duration_s = 0;
 };
 
-// Rows that `take` wants, by object and then by placement, each in the order of its first row; what lies on
+// Rows that `take` wants, by object and then by resting face, each in the order of its first row; what lies on
 // the fixture already (may be empty) comes first.
 std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::function<bool(size_t)>& take,
-                                const std::string& mounted_object, const std::string& mounted_placement);
+                                const std::string& mounted_object, const std::string& mounted_up_face);
 
 // The rows of a plan with their ids; INVALID_ARGUMENT if two have one number for the same object.
 absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::MeasuredTouch>& plan,
@@ -41,8 +41,8 @@ absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::Measure
 
 // "Put lat20 on the fixture with its face -x up", or where it lies there already, "Turn lat20 so that its
 // face -x points up".
-std::string PlacementRequest(const std::string& object, const std::string& placement,
-                             const std::string& mounted_object);
+std::string RestingFaceRequest(const std::string& object, const std::string& up_face,
+                               const std::string& mounted_object);
 
 // The standard deviation of one finger's contact time among repeats of the same touch, seconds: what no pose
 // explains. Only whole touches count. NaN without repeats.

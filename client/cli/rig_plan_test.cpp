@@ -30,10 +30,10 @@ client::MeasuredTouch Touch(uint64_t number, const std::string& object, double x
   return touch;
 }
 
-PlannedRow Row(uint64_t number, const std::string& object, const std::string& placement) {
+PlannedRow Row(uint64_t number, const std::string& object, const std::string& up_face) {
   PlannedRow row;
   row.touch = Touch(number, object);
-  row.placement = placement;
+  row.up_face = up_face;
   row.duration_s = 2;
   return row;
 }
@@ -54,10 +54,10 @@ std::vector<PlannedRow> TwoRounds() {
 TEST(RigPlan, PutsEveryObjectDownOnceForEachOfItsFaces) {
   const std::vector<RigGroup> groups = GroupRows(TwoRounds(), All, "", "");
   ASSERT_EQ(groups.size(), 4u);
-  EXPECT_EQ(groups[0].object + groups[0].placement, "a+x");
-  EXPECT_EQ(groups[1].object + groups[1].placement, "a+z");
-  EXPECT_EQ(groups[2].object + groups[2].placement, "b+x");
-  EXPECT_EQ(groups[3].object + groups[3].placement, "b+z");
+  EXPECT_EQ(groups[0].object + groups[0].up_face, "a+x");
+  EXPECT_EQ(groups[1].object + groups[1].up_face, "a+z");
+  EXPECT_EQ(groups[2].object + groups[2].up_face, "b+x");
+  EXPECT_EQ(groups[3].object + groups[3].up_face, "b+z");
   EXPECT_THAT(groups[0].rows, ElementsAre(0, 4)) << "rounds keep the plan's order";
   EXPECT_THAT(groups[3].rows, ElementsAre(3, 7));
   EXPECT_DOUBLE_EQ(groups[0].duration_s, 4);
@@ -66,9 +66,9 @@ TEST(RigPlan, PutsEveryObjectDownOnceForEachOfItsFaces) {
 TEST(RigPlan, BeginsWithWhatLiesOnTheFixture) {
   const std::vector<RigGroup> groups = GroupRows(TwoRounds(), All, "b", "+z");
   ASSERT_EQ(groups.size(), 4u);
-  EXPECT_EQ(groups[0].object + groups[0].placement, "b+z");
-  EXPECT_EQ(groups[1].object + groups[1].placement, "b+x") << "it is turned before it is taken away";
-  EXPECT_EQ(groups[2].object + groups[2].placement, "a+x");
+  EXPECT_EQ(groups[0].object + groups[0].up_face, "b+z");
+  EXPECT_EQ(groups[1].object + groups[1].up_face, "b+x") << "it is turned before it is taken away";
+  EXPECT_EQ(groups[2].object + groups[2].up_face, "a+x");
 }
 
 TEST(RigPlan, LeavesOutWhatIsDone) {
@@ -86,9 +86,9 @@ TEST(RigPlan, NumbersAreUniqueForAnObject) {
 }
 
 TEST(RigPlan, TellsAPersonWhatToDo) {
-  EXPECT_EQ(PlacementRequest("lat20", "-x", ""), "Put lat20 on the fixture with its face -x up");
-  EXPECT_EQ(PlacementRequest("lat20", "-x", "lat00"), "Put lat20 on the fixture with its face -x up");
-  EXPECT_EQ(PlacementRequest("lat20", "-x", "lat20"), "Turn lat20 so that its face -x points up");
+  EXPECT_EQ(RestingFaceRequest("lat20", "-x", ""), "Put lat20 on the fixture with its face -x up");
+  EXPECT_EQ(RestingFaceRequest("lat20", "-x", "lat00"), "Put lat20 on the fixture with its face -x up");
+  EXPECT_EQ(RestingFaceRequest("lat20", "-x", "lat20"), "Turn lat20 so that its face -x points up");
 }
 
 TEST(NoiseOfRepeats, IsThatOfOneFinger) {

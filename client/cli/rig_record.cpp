@@ -62,7 +62,7 @@ absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& pa
   head.name = session;
   head.created_unix_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  head.source = rig.source();
+  head.source = rig.provenance();
   head.calibration = rig.calibration();
   if (rig.fingers() > 0) head.fingers = static_cast<int>(rig.fingers());
   if (rig.spacing_m() > 0) head.spacing_m = rig.spacing_m();
@@ -81,7 +81,7 @@ absl::StatusOr<bool> RigRecord::Has(const std::string& id, const client::Measure
 }
 
 absl::Status RigRecord::Begin(const std::string& id, const client::MeasuredTouch& touch,
-                              const std::string& placement) {
+                              const std::string& up_face) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> found, journal_->Find(session_, id));
   // This process was killed while it waited for the result; the source knows what became of it and answers
   // under the id.
@@ -89,7 +89,7 @@ absl::Status RigRecord::Begin(const std::string& id, const client::MeasuredTouch
     TOUCHSTONE_RETURN_IF_ERROR(
         journal_->Failed(session_, id, "the command was interrupted; the source is asked again"));
   TOUCHSTONE_RETURN_IF_ERROR(
-      journal_->Begin(session_, id, touch.object, placement, CommandBytes(touch.commanded)).status());
+      journal_->Begin(session_, id, touch.object, up_face, CommandBytes(touch.commanded)).status());
   return journal_->Executing(session_, id, 0, 0);
 }
 

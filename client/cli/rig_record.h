@@ -25,7 +25,7 @@ class RigRecord {
   // Whether the touch is recorded already; ALREADY_EXISTS if its id stands for another one there.
   absl::StatusOr<bool> Has(const std::string& id, const client::MeasuredTouch& touch) const;
   // Before the touch is asked for.
-  absl::Status Begin(const std::string& id, const client::MeasuredTouch& touch, const std::string& placement);
+  absl::Status Begin(const std::string& id, const client::MeasuredTouch& touch, const std::string& up_face);
   // Its result; on the disk when this returns.
   absl::Status Done(const std::string& id, const v1::TouchResult& result);
   absl::Status Failed(const std::string& id, const absl::Status& why);

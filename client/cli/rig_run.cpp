@@ -83,7 +83,7 @@ class Run {
     std::vector<bool> take(rows_.size());
     for (const size_t row : wanted) take[row] = rows_[row].possible;
     const std::vector<RigGroup> groups = GroupRows(
-        rows_, [&](size_t row) { return take[row]; }, state.object(), state.placement());
+        rows_, [&](size_t row) { return take[row]; }, state.object(), client::UpFaceWord(state.up_face()));
     for (const RigGroup& group : groups) {
       left_s_ += group.duration_s;
       left_ += group.rows.size();
@@ -91,7 +91,7 @@ class Run {
     for (const RigGroup& group : groups) {
       bar_.Clear();
       TOUCHSTONE_RETURN_IF_ERROR(Mount(group));
-      cli_.Log(absl::StrCat(group.object, ", face ", group.placement,
+      cli_.Log(absl::StrCat(group.object, ", face ", group.up_face,
                             " up: ", Counted(group.rows.size(), "touch", "touches"), ", about ",
                             DurationInWords(group.duration_s)));
       for (const size_t row : group.rows) TOUCHSTONE_RETURN_IF_ERROR(TouchOne(group, rows_[row]));
@@ -101,14 +101,14 @@ class Run {
 
   absl::Status Mount(const RigGroup& group) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig_.connection.get()));
-    return MountForTouches(cli_, source_.get(), state, group.object, group.placement);
+    return MountForTouches(cli_, source_.get(), state, group.object, group.up_face);
   }
 
   absl::Status TouchOne(const RigGroup& group, const PlannedRow& row) {
     bar_.ShowStage(absl::StrCat("touch ", row.touch.touch, " of ", row.touch.object, ", ", left_, " left, ",
                                 DurationInWords(left_s_ * pace_)),
                    1 - static_cast<double>(left_) / rows_.size());
-    TOUCHSTONE_RETURN_IF_ERROR(record_->Begin(row.id, row.touch, group.placement));
+    TOUCHSTONE_RETURN_IF_ERROR(record_->Begin(row.id, row.touch, group.up_face));
     v1::TouchRequest request;
     request.set_object(row.touch.object);
     request.set_session(session_);
@@ -119,10 +119,11 @@ class Run {
     // Somebody took the object away or told of another one: a person can mend that, once.
     if (absl::IsFailedPrecondition(response.status())) {
       const absl::StatusOr<v1::RigState> now = GetRig(rig_.connection.get());
-      if (now.ok() && (now->object() != group.object || now->placement() != group.placement)) {
+      if (now.ok() &&
+          (now->object() != group.object || client::UpFaceWord(now->up_face()) != group.up_face)) {
         bar_.Clear();
         cli_.Log(std::string(response.status().message()));
-        absl::Status mounted = MountForTouches(cli_, source_.get(), *now, group.object, group.placement);
+        absl::Status mounted = MountForTouches(cli_, source_.get(), *now, group.object, group.up_face);
         if (mounted.ok())
           response = source_->Touch(request);
         else

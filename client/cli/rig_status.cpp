@@ -43,10 +43,12 @@ std::string ArmText(const v1::ArmStatus& arm) {
                                   arm.connected() ? "" : ": NOT CONNECTED", "\n");
   if (!arm.connected()) return text;
   text += Line("Software", arm.version());
-  text += Line("Mode", absl::StrCat(arm.robot_mode(), ", safety ", arm.safety_mode(), ", speed ",
+  text += Line("Mode", absl::StrCat(client::RobotModeWord(arm.robot_mode()), ", safety ",
+                                    client::SafetyModeWord(arm.safety_mode()), ", speed ",
                                     Rounded(100 * arm.speed_scaling()), " %"));
-  text += Line("Program",
-               arm.program_id() == 0 ? "none yet" : absl::StrCat(arm.program_id(), ", phase ", arm.phase()));
+  text += Line("Program", arm.program_id() == 0 ? "none yet"
+                                                : absl::StrCat(arm.program_id(), ", phase ",
+                                                               client::MotionPhaseWord(arm.phase())));
   text += Line("States", absl::StrCat(Rounded(arm.rate_hz()), " Hz, the newest is ",
                                       Rounded(kMilli * arm.state_age_s()), " ms old"));
   text += Line("Tip", Pose(arm.base_from_tip()));
@@ -75,22 +77,23 @@ std::string EffectorText(const v1::EffectorStatus& effector) {
                                     Counted(effector.repeated_events(), "repeated event", "repeated events"),
                                     ", ", Counted(effector.reconnections(), "reconnection", "reconnections"),
                                     effector.bad_frames() + effector.repeated_events() > 0
-                                        ? "; all were noticed and mended"
+                                        ? "; all were detected and repeated"
                                         : ""));
   return text;
 }
 
 std::string StateText(const v1::RigState& rig, const v1::State& state) {
   std::string text = absl::StrCat(
-      "State         ", state.state(), ", ",
+      "State         ", client::SourceStateWord(state.state()), ", ",
       state.lease_holder().empty() ? "nobody holds the lease" : state.lease_holder() + " holds the lease",
       "; ", Counted(state.touches(), "touch", "touches"), ", ",
       Counted(state.images(), "picture", "pictures"), " in ", DurationInWords(state.uptime_s()), "\n");
-  if (state.state() == "stopped") text += Line("", "stopped; whoever acquires the lease next ends that");
+  if (!state.stop_reason().empty())
+    text += Line("", absl::StrCat("stopped ", state.stop_reason(), "; touchstone rig reset releases it"));
   text += absl::StrCat("Object        ",
-                       rig.object().empty()
-                           ? "nobody has told what lies on the fixture (touchstone rig mount)"
-                           : absl::StrCat(rig.object(), " with its face ", rig.placement(), " up"),
+                       rig.object().empty() ? "what lies on the fixture is unknown (touchstone rig mount)"
+                                            : absl::StrCat(rig.object(), " with its face ",
+                                                           client::UpFaceWord(rig.up_face()), " up"),
                        rig.mounts_itself() ? "; the rig changes it by itself" : "", "\n");
   text += ArmText(rig.arm()) + EffectorText(rig.effector());
   const v1::CameraStatus& camera = rig.camera();
@@ -131,6 +134,15 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
     if (!google::protobuf::util::MessageToJsonString(*message, &text, print).ok())
       return absl::InternalError("the rig's state cannot be written as JSON");
     json[name] = Json::parse(text);
+  }
+  // The words that people read elsewhere, instead of the enums' names.
+  json["state"]["state"] = client::SourceStateWord(state.state());
+  json["rig"]["up_face"] = client::UpFaceWord(rig.up_face());
+  if (rig.has_arm()) {
+    Json& arm = json["rig"]["arm"];
+    arm["robot_mode"] = client::RobotModeWord(rig.arm().robot_mode());
+    arm["safety_mode"] = client::SafetyModeWord(rig.arm().safety_mode());
+    arm["phase"] = client::MotionPhaseWord(rig.arm().phase());
   }
   PrintJson(json);
   return absl::OkStatus();

@@ -26,7 +26,7 @@ constexpr char kStyle[] = R"(
   .view { font-size: 14px; font-weight: 600; }
   .object { fill: #fef3c7; stroke: #d97706; stroke-width: 1.4; }
   .limits { fill: none; stroke: #64748b; stroke-width: 1.4; stroke-dasharray: 7 5; }
-  .transfer { fill: none; stroke: #94a3b8; stroke-width: 1; stroke-opacity: .55; }
+  .transit { fill: none; stroke: #94a3b8; stroke-width: 1; stroke-opacity: .55; }
   .approach { stroke: #0f766e; stroke-width: 1.7; stroke-opacity: .8; } .start { fill: #0f766e; }
   .beyond { stroke: #0f766e; stroke-width: 1; stroke-opacity: .35; stroke-dasharray: 2 2; }
   .many .approach { stroke-width: 1; stroke-opacity: .5; } .many .beyond { stroke-opacity: .15; }
@@ -80,7 +80,7 @@ class Panel {
     if (drawing.object.has_value()) absl::StrAppend(&svg, Box("object", *drawing.object));
     if (drawing.limits.has_value()) absl::StrAppend(&svg, Box("limits", *drawing.limits));
     // What is wrong is drawn last, over everything.
-    for (const DrawnTouch& touch : drawing.touches) absl::StrAppend(&svg, Transfer(touch));
+    for (const DrawnTouch& touch : drawing.touches) absl::StrAppend(&svg, Transit(touch));
     for (const DrawnTouch& touch : drawing.touches)
       if (touch.possible) absl::StrAppend(&svg, Approach(touch, numbered));
     for (const DrawnTouch& touch : drawing.touches)
@@ -151,17 +151,17 @@ class Panel {
     return svg;
   }
 
-  std::string Transfer(const DrawnTouch& touch) const {
-    if (!touch.possible || touch.transfer_poses < 2 || touch.path.size() < touch.transfer_poses) return "";
+  std::string Transit(const DrawnTouch& touch) const {
+    if (!touch.possible || touch.transit_poses < 2 || touch.path.size() < touch.transit_poses) return "";
     std::string points;
-    for (size_t i = 0; i < touch.transfer_poses; ++i)
+    for (size_t i = 0; i < touch.transit_poses; ++i)
       absl::StrAppend(&points, i == 0 ? "" : " ", Point(touch.path[i]));
-    return absl::StrCat("<polyline class=\"transfer\" points=\"", points, "\"/>\n");
+    return absl::StrCat("<polyline class=\"transit\" points=\"", points, "\"/>\n");
   }
   std::string Approach(const DrawnTouch& touch, bool numbered) const {
-    if (touch.transfer_poses < 1 || touch.path.size() <= touch.transfer_poses) return "";
+    if (touch.transit_poses < 1 || touch.path.size() <= touch.transit_poses) return "";
     // To the target, where a contact is expected; beyond it the arm only goes if there is none.
-    const Eigen::Vector3d &start = touch.path[touch.transfer_poses - 1], &end = touch.path.back();
+    const Eigen::Vector3d &start = touch.path[touch.transit_poses - 1], &end = touch.path.back();
     const Eigen::Vector3d target = touch.target_m.value_or(end);
     std::string svg = absl::StrFormat(
         "<path class=\"beyond\" d=\"M%s L%s\"/><path class=\"approach\" marker-end=\"url(#arrow)\" d=\"M%s "
@@ -217,9 +217,8 @@ std::string Legend() {
   absl::StrAppendFormat(&svg, "<path class=\"approach\" marker-end=\"url(#arrow)\" d=\"M%.1f %.1fh26\"/>", x,
                         y);
   absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">approach</text>", x + 36, y + 5);
-  absl::StrAppendFormat(&svg, "<path class=\"transfer\" d=\"M%.1f %.1fh26\"/>", x + 120, y);
-  absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">transfer</text>", x + 154,
-                        y + 5);
+  absl::StrAppendFormat(&svg, "<path class=\"transit\" d=\"M%.1f %.1fh26\"/>", x + 120, y);
+  absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">transit</text>", x + 154, y + 5);
   absl::StrAppendFormat(&svg, "<rect class=\"object\" x=\"%.1f\" y=\"%.1f\" width=\"22\" height=\"13\"/>",
                         x + 232, y - 6);
   absl::StrAppendFormat(&svg, "<text class=\"summary\" x=\"%.1f\" y=\"%.1f\">object's box</text>", x + 262,

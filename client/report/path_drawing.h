@@ -15,8 +15,8 @@ struct DrawnTouch {
   int number = 0;  // in its plan, as messages have it
   bool possible = true;
   std::string reason;                 // what forbids it
-  std::vector<Eigen::Vector3d> path;  // of the tip: transfer, start, end of the stroke; empty: unknown
-  size_t transfer_poses = 0;          // how many of the path are the transfer; the last of them is the start
+  std::vector<Eigen::Vector3d> path;  // of the tip: transit, start, end of the stroke; empty: unknown
+  size_t transit_poses = 0;           // how many of the path are the transit; the last of them is the start
   std::optional<Eigen::Vector3d> target_m;  // where a contact is expected
 };
 

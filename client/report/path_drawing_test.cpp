@@ -19,7 +19,7 @@ DrawnTouch Possible(int number) {
   DrawnTouch touch;
   touch.number = number;
   touch.path = {{0.25, 0, 0.3}, {0.3, 0.01 * number, 0.25}, {0.3, 0.01 * number, 0.15}};
-  touch.transfer_poses = 2;
+  touch.transit_poses = 2;
   return touch;
 }
 
@@ -37,7 +37,7 @@ TEST(DrawPaths, ShowsEveryTouchInBothViews) {
   drawing.touches.push_back(impossible);
   const std::string svg = DrawPaths(drawing);
   EXPECT_EQ(Times(svg, "<circle class=\"start\""), 10u);
-  EXPECT_EQ(Times(svg, "<polyline class=\"transfer\""), 10u);
+  EXPECT_EQ(Times(svg, "<polyline class=\"transit\""), 10u);
   EXPECT_EQ(Times(svg, "class=\"badnumber\" x"), 2u);
   EXPECT_THAT(svg, HasSubstr("plan &lt;1&gt; &amp; more"));
   EXPECT_THAT(svg, HasSubstr("out of reach &gt; far"));

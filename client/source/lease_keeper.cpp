@@ -132,11 +132,11 @@ absl::Status LeaseKeeper::Follow(Connection* connection) {
     if (!absl::IsAborted(renewed.status())) return renewed.status();
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state, CallWithin(kAcquireS, &v1::Control::Stub::GetState,
                                                                   control.get(), v1::GetStateRequest()));
-    if (state.state() == "stopped")
-      return absl::FailedPreconditionError(
-          "somebody stopped the source while the lease was lost: make sure that it may move, then run the "
-          "same "
-          "command again");
+    if (state.state() == v1::SOURCE_STATE_STOPPED)
+      return absl::FailedPreconditionError(absl::StrCat(
+          "the source was stopped ", state.stop_reason(),
+          " while the lease was lost: make sure that it may move, then release the stop with 'touchstone rig "
+          "reset' and run the same command again"));
     TOUCHSTONE_RETURN_IF_ERROR(AcquireNow(control.get(), false));
   }
   {

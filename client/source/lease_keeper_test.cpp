@@ -175,7 +175,7 @@ class FakeRig : public v1::Control::Service {
     return grpc::Status::OK;
   }
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State* state) override {
-    state->set_state(stopped ? "stopped" : "idle");
+    state->set_state(stopped ? v1::SOURCE_STATE_STOPPED : v1::SOURCE_STATE_IDLE);
     return grpc::Status::OK;
   }
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest* request, v1::StopResponse*) override {

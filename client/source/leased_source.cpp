@@ -92,11 +92,16 @@ absl::StatusOr<v1::CaptureResponse> LeasedSource::Capture(v1::CaptureRequest req
   return Call(connection_->source(), &v1::Source::Stub::Capture, &request);
 }
 
-absl::StatusOr<v1::RigState> LeasedSource::Mount(const std::string& object, const std::string& placement) {
+absl::StatusOr<v1::RigState> LeasedSource::Mount(const std::string& object, v1::UpFace up_face) {
   v1::MountObjectRequest request;
   request.set_object(object);
-  request.set_placement(placement);
+  request.set_up_face(up_face);
   return Call(connection_->rig(), &v1::Rig::Stub::MountObject, &request);
+}
+
+absl::StatusOr<v1::RigState> LeasedSource::PowerOn() {
+  v1::PowerOnRequest request;
+  return Call(connection_->rig(), &v1::Rig::Stub::PowerOn, &request);
 }
 
 absl::StatusOr<v1::RigState> LeasedSource::Home() {
@@ -116,9 +121,11 @@ absl::Status LeasedSource::FindAgain() {
     std::lock_guard<std::mutex> lock(mutex_);
     channel_ = connection_->channel();
   }
-  if (there && state.state() == "stopped")
-    return absl::FailedPreconditionError(
-        "somebody stopped the source: make sure that it may move, then run the same command again");
+  if (there && state.state() == v1::SOURCE_STATE_STOPPED)
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the source was stopped ", state.stop_reason(),
+        ": make sure that it may move, then release the stop with 'touchstone rig reset' and run the "
+        "same command again"));
   return lease_->Follow(connection_);
 }
 
@@ -152,6 +159,8 @@ void LeasedSource::Interrupt(const std::string& reason) {
     if (!stopped.ok() && options_.log)
       options_.log(absl::StrCat("STOP DID NOT REACH THE SOURCE: ", stopped.error_message(),
                                 "; use the emergency stop if anything moves"));
+    if (stopped.ok() && description_.lease_required() && options_.log)
+      options_.log("the rig is stopped, until 'touchstone rig reset' releases it");
   }
   std::lock_guard<std::mutex> lock(mutex_);
   if (running_ != nullptr) running_->TryCancel();

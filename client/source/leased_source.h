@@ -37,7 +37,8 @@ class LeasedSource {
   // reconnect_s; one without is not, since nobody knows which touches were made.
   absl::StatusOr<v1::TouchResponse> Touch(v1::TouchRequest request);
   absl::StatusOr<v1::CaptureResponse> Capture(v1::CaptureRequest request);
-  absl::StatusOr<v1::RigState> Mount(const std::string& object, const std::string& placement);
+  absl::StatusOr<v1::RigState> Mount(const std::string& object, v1::UpFace up_face);
+  absl::StatusOr<v1::RigState> PowerOn();
   absl::StatusOr<v1::RigState> Home();
   LeaseKeeper* lease() { return lease_.get(); }
 

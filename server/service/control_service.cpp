@@ -38,9 +38,27 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
   return grpc::Status::OK;
 }
 
+absl::Status CheckReset(const v1::ResetRequest& request) {
+  if (request.holder().empty() || request.holder().size() > 256)
+    return absl::InvalidArgumentError(
+        "holder: say who releases the stop, in 1 to 256 characters, for instance 'ana@bench2'");
+  if (request.reason().empty() || request.reason().size() > 1000)
+    return absl::InvalidArgumentError(
+        "reason: say why the source may move again, in 1 to 1000 characters, for instance 'cable freed'");
+  return absl::OkStatus();
+}
+
+grpc::Status ControlService::Reset(grpc::ServerContext* context, const v1::ResetRequest* request,
+                                   v1::State* response) {
+  if (const absl::Status valid = CheckReset(*request); !valid.ok()) return ToGrpc(valid);
+  return GetState(context, nullptr, response);
+}
+
 grpc::Status ControlService::GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State* response) {
   const uint32_t requests = resources_->running_requests, streams = resources_->running_streams;
-  response->set_state(resources_->draining ? "draining" : requests + streams > 0 ? "busy" : "idle");
+  response->set_state(resources_->draining     ? v1::SOURCE_STATE_DRAINING
+                      : requests + streams > 0 ? v1::SOURCE_STATE_BUSY
+                                               : v1::SOURCE_STATE_IDLE);
   response->set_lease_holder(leases_->Holder());
   response->set_lease_epoch(leases_->epoch());
   response->set_running_requests(requests);

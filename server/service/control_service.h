@@ -7,6 +7,9 @@
 
 namespace touchstone {
 
+// INVALID_ARGUMENT unless it says who and why.
+absl::Status CheckReset(const v1::ResetRequest& request);
+
 class ControlService : public v1::Control::Service {
  public:
   ControlService(Resources* resources, LeaseBook* leases) : resources_(resources), leases_(leases) {}
@@ -16,6 +19,8 @@ class ControlService : public v1::Control::Service {
   grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*,
                             v1::ReleaseLeaseResponse*) override;
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest*, v1::StopResponse*) override;
+  // A virtual source moves nothing, so no stop holds and there is nothing to release.
+  grpc::Status Reset(grpc::ServerContext*, const v1::ResetRequest*, v1::State*) override;
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
 
  protected:

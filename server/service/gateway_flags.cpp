@@ -39,7 +39,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"source_note", "Kept with every session; an emulator says here that it is one", &o.source_note},
       {"time_scale", "Rig seconds in one second: 1, but with an emulator on a faster clock", &o.time_scale},
       {"mount_command",
-       "Program and arguments that put {object} down with its face {placement} up; none: a person does",
+       "Program and arguments that put {object} down with its face {up_face} up; none: a person does",
        &o.mount_command},
       {"mount_timeout_s", "Seconds that it may take", &o.mount_timeout_s},
       {"mesh", "An object that can be touched, NAME=FILE[,unit=..][,up=..][,scale=..]; may be repeated",
@@ -85,7 +85,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target",
        &raw->stroke_beyond_target_mm},
       {"limits.max_tilt_deg", "Of an approach, from straight down", &raw->max_tilt_deg},
-      {"limits.clearance_mm", "Transfers cross so far above the object", &raw->clearance_mm},
+      {"limits.clearance_mm", "Transits cross so far above the object", &raw->clearance_mm},
       {"limits.box_min_mm", "Corner of the box that the tip must stay in, base frame", &raw->box_min_mm},
       {"limits.box_max_mm", "Its other corner", &raw->box_max_mm},
       {"limits.joint_min_deg", "Six joints", &raw->joint_min_deg},
@@ -148,7 +148,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
   MotionLimits& limits = o.limits;
   limits.max_speed_m_s = raw.max_speed_mm_s / 1000;
-  limits.transfer_speed_m_s = raw.transfer_speed_mm_s / 1000;
+  limits.transit_speed_m_s = raw.transfer_speed_mm_s / 1000;
   limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
   limits.max_standoff_m = raw.max_standoff_mm / 1000;
   limits.stroke_beyond_target_m = raw.stroke_beyond_target_mm / 1000;

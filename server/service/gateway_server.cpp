@@ -18,7 +18,7 @@ namespace {
 
 absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   RigParts parts;
-  parts.news = std::make_unique<Signal>();
+  parts.changes = std::make_unique<ChangeNotifier>();
   TOUCHSTONE_ASSIGN_OR_RETURN(const Calibration calibration, ReadCalibration(options.calibration));
   MotionLimits limits = options.limits;
   limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
@@ -37,12 +37,12 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   arm.frozen_after_s = options.arm.silence_s;
   arm.script.flange_from_tip = calibration.flange_from_tip;
   arm.script.payload_kg = options.limits.payload_kg;
-  arm.script.transfer_speed_m_s = options.limits.transfer_speed_m_s;
+  arm.script.transit_speed_m_s = options.limits.transit_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
   arm.script.watchdog_hz = options.arm.watchdog_hz;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.news.get()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector, Effector::Open(options.effector, parts.news.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.changes.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector, Effector::Open(options.effector, parts.changes.get()));
   if (!options.camera.source.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(parts.camera, CameraDevice::Open(options.camera));
     parts.vertical_fov_rad = options.camera.vertical_fov_rad;
@@ -55,10 +55,10 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   rig.fingers = static_cast<int>(options.effector.fingers.size());
   rig.spacing_m = options.spacing_mm / 1000;
   rig.time_scale = options.time_scale;
-  rig.max_press_m = options.max_press_mm / 1000;
+  rig.max_overtravel_m = options.max_press_mm / 1000;
   rig.mount_command = options.mount_command;
   rig.mount_timeout_s = options.mount_timeout_s;
-  rig.source_note = options.source_note;
+  rig.provenance_note = options.source_note;
   rig.effector_port = options.effector.port;
   return Rig::Create(std::move(rig), std::move(parts));
 }

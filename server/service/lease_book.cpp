@@ -52,7 +52,8 @@ absl::Status LeaseBook::CheckToken(const std::string& token, Clock::time_point n
   if (Held(now) && token == token_) return absl::OkStatus();
   return absl::AbortedError(
       Held(now) ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
-                : std::string("this lease is stale: it ran out or was released; acquire a new one"));
+                : std::string("this lease is stale: it ran out, was released, or ended with the reset of a "
+                              "stop; acquire a new one"));
 }
 
 absl::StatusOr<v1::Lease> LeaseBook::Renew(const std::string& token, Clock::time_point now) {
@@ -68,6 +69,12 @@ absl::Status LeaseBook::Release(const std::string& token, Clock::time_point now)
   token_.clear();
   holder_.clear();
   return absl::OkStatus();
+}
+
+void LeaseBook::Revoke() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  token_.clear();
+  holder_.clear();
 }
 
 absl::Status LeaseBook::Check(const std::string& token, Clock::time_point now) const {

@@ -20,6 +20,8 @@ class LeaseBook {
   absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take,
                                     Clock::time_point now = Clock::now());
   absl::StatusOr<v1::Lease> Renew(const std::string& token, Clock::time_point now = Clock::now());
+  // Ends whatever lease stands: its token is stale from now on.
+  void Revoke();
   absl::Status Release(const std::string& token, Clock::time_point now = Clock::now());
   // Whether a request that carries `token` may act. A stale one is refused. None is right at a virtual
   // source, which needs no lease; at a physical one that is refused too.

@@ -1,14 +1,12 @@
 #include "server/service/rig_service.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/gateway/arm/ur_modes.h"
 #include "server/service/convert.h"
 #include "server/service/permit.h"
 
@@ -28,15 +26,13 @@ v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
 grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
                                              const v1::AcquireLeaseRequest* request, v1::Lease* response) {
   const grpc::Status status = ControlService::AcquireLease(context, request, response);
-  if (status.ok()) {
-    rig_->Resume();
+  if (status.ok())
     rig_->audit()
         .Write("lease_acquired", {{"holder", request->holder()},
                                   {"epoch", absl::StrCat(response->epoch())},
                                   {"taken", request->take() ? "yes" : "no"},
                                   {"peer", context->peer()}})
         .IgnoreError();
-  }
   return status;
 }
 
@@ -58,10 +54,26 @@ grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::Sto
   return grpc::Status::OK;
 }
 
+grpc::Status RigControlService::Reset(grpc::ServerContext* context, const v1::ResetRequest* request,
+                                      v1::State* response) {
+  absl::Status status = CheckReset(*request);
+  const bool stopped = !rig_->StopReason().empty();
+  if (status.ok() && stopped) {
+    // Whoever moves next acquires a lease after this moment: nothing that was retried moves because of it.
+    leases_->Revoke();
+    status = rig_->Reset(request->reason(), request->holder());
+    spdlog::warn("reset by {} ({}) from {}: {}", request->holder(), request->reason(), context->peer(),
+                 status.ok() ? "released" : std::string(status.message()));
+  }
+  if (!status.ok()) return ToGrpc(status);
+  return GetState(context, nullptr, response);
+}
+
 grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1::GetStateRequest* request,
                                          v1::State* response) {
   const grpc::Status status = ControlService::GetState(context, request, response);
-  if (!resources_->draining) response->set_state(rig_->State());
+  if (!resources_->draining) response->set_state(static_cast<v1::SourceState>(rig_->State()));
+  response->set_stop_reason(rig_->StopReason());
   return status;
 }
 
@@ -75,13 +87,13 @@ void RigService::Describe(v1::RigState* state) const {
   const absl::StatusOr<ArmState> now = arm.State();
   a->set_connected(now.ok());
   if (now.ok()) {
-    a->set_robot_mode(RobotModeName(now->robot_mode));
-    a->set_safety_mode(SafetyModeName(now->safety_mode));
+    a->set_robot_mode(static_cast<v1::RobotMode>(now->robot_mode));
+    a->set_safety_mode(static_cast<v1::SafetyMode>(now->safety_mode));
     a->set_state_age_s(HostNowS() - now->host_time_s);
     *a->mutable_base_from_tip() = PoseToProto(now->base_from_tip);
     for (const double q : now->joints_rad) a->add_joints_rad(q);
     a->set_program_id(now->program_id);
-    a->set_phase(PhaseName(now->phase));
+    a->set_phase(static_cast<v1::MotionPhase>(now->phase));
     a->set_speed_scaling(now->speed_scaling);
   }
   const double scale = rig_->options().time_scale;
@@ -117,19 +129,20 @@ void RigService::Describe(v1::RigState* state) const {
     c->set_frames(camera->frames());
     c->set_stale_frames(camera->stale_frames());
   }
-  const SourceStatus facts = rig_->Status();
-  state->set_object(facts.object);
-  state->set_placement(facts.placement);
+  const SourceStatus status = rig_->Status();
+  state->set_object(status.object);
+  if (const std::optional<UpFace> up_face = rig_->MountedUpFace(); up_face.has_value())
+    state->set_up_face(static_cast<v1::UpFace>(*up_face));
   state->set_mounts_itself(!rig_->options().mount_command.empty());
-  state->set_recovered_touches(facts.recovered_touches);
-  state->set_interrupted_touches(facts.interrupted_touches);
+  state->set_recovered_touches(status.recovered_touches);
+  state->set_interrupted_touches(status.interrupted_touches);
   state->set_last_error(!now.ok()             ? std::string(now.status().message())
                         : !effector.connected ? effector.why
-                                              : facts.last_error);
+                                              : status.last_error);
   state->set_time_scale(scale);
   state->set_fingers(rig_->fingers());
   state->set_spacing_m(rig_->spacing_m());
-  state->set_source(rig_->SourceInWords());
+  state->set_provenance(rig_->Provenance());
   state->set_calibration(FormatCalibration(rig_->planner().calibration()));
   state->set_safety_notice(
       "Stop is a software stop: it is not safety-rated. Keep the emergency stop within reach.");
@@ -158,7 +171,7 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     const std::string where = absl::StrCat("touches[", k, "]");
     TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(request.touches(k), where));
     v1::TouchCheck* check = response->add_checks();
-    check->set_placement(PlacementFor(touch.approach));
+    check->set_up_face(static_cast<v1::UpFace>(UpFaceFor(touch.approach)));
     const absl::StatusOr<PlannedTouch> plan = rig_->Check(request.object(), bounds, touch, &from, where);
     check->set_possible(plan.ok());
     if (!plan.ok()) {
@@ -167,12 +180,12 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     }
     check->set_duration_s(plan->motion.duration_s);
     // The next one begins where this one ends: at its start.
-    from.base_from_tip = plan->motion.transfer.back();
+    from.base_from_tip = plan->motion.transit.back();
     from.joints_rad = plan->start_joints_rad;
     if (!request.path()) continue;
-    for (const Eigen::Isometry3d& pose : plan->motion.transfer) *check->add_path() = PoseToProto(pose);
+    for (const Eigen::Isometry3d& pose : plan->motion.transit) *check->add_path() = PoseToProto(pose);
     *check->add_path() = PoseToProto(plan->motion.end);
-    check->set_transfer_poses(plan->motion.transfer.size());
+    check->set_transit_poses(plan->motion.transit.size());
   }
   return absl::OkStatus();
 }
@@ -187,13 +200,20 @@ grpc::Status RigService::MountObject(grpc::ServerContext* context, const v1::Mou
 absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountObjectRequest& request) {
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(request.lease_token()));
   TOUCHSTONE_RETURN_IF_ERROR(resources_->objects.Find(request.object(), "object").status());
-  const std::string placement = request.placement().empty() ? "+z" : request.placement();
-  const std::vector<std::string>& known = Placements();
-  if (std::find(known.begin(), known.end(), placement) == known.end())
-    return absl::InvalidArgumentError(absl::StrCat(
-        "placement = '", placement, "': the face that points up, one of ", absl::StrJoin(known, ", ")));
-  return rig_->Mount(request.object(), placement,
-                     GuardOf(context, resources_, leases_, request.lease_token()));
+  if (request.up_face() < v1::UP_FACE_UNSPECIFIED || request.up_face() > v1::UP_FACE_MINUS_Z)
+    return absl::InvalidArgumentError(absl::StrCat("up_face = ", static_cast<int>(request.up_face()),
+                                                   ": the face that points up, 1 (+x) to 6 (-z)"));
+  const UpFace up_face =
+      request.up_face() == v1::UP_FACE_UNSPECIFIED ? UpFace::kPlusZ : static_cast<UpFace>(request.up_face());
+  return rig_->Mount(request.object(), up_face, GuardOf(context, resources_, leases_, request.lease_token()));
+}
+
+grpc::Status RigService::PowerOn(grpc::ServerContext* context, const v1::PowerOnRequest* request,
+                                 v1::RigState* response) {
+  absl::Status status = leases_->Check(request->lease_token());
+  if (status.ok()) status = rig_->PowerOn(GuardOf(context, resources_, leases_, request->lease_token()));
+  if (status.ok()) Describe(response);
+  return ToGrpc(status);
 }
 
 grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeRequest* request,

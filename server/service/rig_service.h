@@ -13,11 +13,12 @@ class RigControlService final : public ControlService {
   RigControlService(Resources* resources, LeaseBook* leases, Rig* rig)
       : ControlService(resources, leases), rig_(rig) {}
 
-  // Also ends a stop.
   grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest*, v1::Lease*) override;
   grpc::Status ReleaseLease(grpc::ServerContext*, const v1::ReleaseLeaseRequest*,
                             v1::ReleaseLeaseResponse*) override;
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest*, v1::StopResponse*) override;
+  // Also ends the lease that stands.
+  grpc::Status Reset(grpc::ServerContext*, const v1::ResetRequest*, v1::State*) override;
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
 
  private:
@@ -33,6 +34,7 @@ class RigService final : public v1::Rig::Service {
   grpc::Status CheckTouches(grpc::ServerContext*, const v1::CheckTouchesRequest*,
                             v1::CheckTouchesResponse*) override;
   grpc::Status MountObject(grpc::ServerContext*, const v1::MountObjectRequest*, v1::RigState*) override;
+  grpc::Status PowerOn(grpc::ServerContext*, const v1::PowerOnRequest*, v1::RigState*) override;
   grpc::Status Home(grpc::ServerContext*, const v1::HomeRequest*, v1::RigState*) override;
 
  private:

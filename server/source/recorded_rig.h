@@ -27,7 +27,7 @@ class RecordedRig : public RigDevice {
   double spacing_m() const override { return touches_->spacing_m(); }
   bool moves() const override { return false; }
   SourceStatus Status() const override;
-  std::string State() const override { return "idle"; }
+  SourceState State() const override { return SourceState::kIdle; }
   Journal& journal() { return *journal_; }
 
  private:

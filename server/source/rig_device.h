@@ -12,6 +12,7 @@
 #include "server/image/photograph.h"
 #include "server/session/journal.h"
 #include "server/source/motion_guard.h"
+#include "server/source/source_state.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone {
@@ -37,7 +38,7 @@ std::string ViewId(const ViewCommand& command);
 
 // How a device is doing; times in seconds.
 struct SourceStatus {
-  std::string object, placement;  // on the fixture
+  std::string object;  // on the fixture; empty: unknown
   std::string last_error;
   uint32_t recovered_touches = 0, interrupted_touches = 0;
   double touch_duration_s = 0;     // of the last ones, host time; 0: none yet
@@ -62,7 +63,7 @@ class RigDevice {
   // True if it moves anything, so that a lease is needed.
   virtual bool moves() const = 0;
   virtual SourceStatus Status() const = 0;
-  virtual std::string State() const = 0;  // control.proto
+  virtual SourceState State() const = 0;
 };
 
 }  // namespace touchstone

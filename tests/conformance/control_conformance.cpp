@@ -83,6 +83,17 @@ TEST_F(ControlConformance, StopNeedsNoLease) {
   v1::StopResponse response;
   grpc::ClientContext context;
   EXPECT_TRUE(control_->Stop(&context, request, &response).ok());
+  // It is released only by somebody who says who and why.
+  v1::State state;
+  v1::ResetRequest reset;
+  grpc::ClientContext unnamed, named;
+  EXPECT_EQ(control_->Reset(&unnamed, reset, &state).error_code(), grpc::INVALID_ARGUMENT);
+  reset.set_holder("ana@bench2");
+  reset.set_reason("conformance test");
+  const grpc::Status released = control_->Reset(&named, reset, &state);
+  EXPECT_TRUE(released.ok()) << released.error_message();
+  EXPECT_NE(state.state(), v1::SOURCE_STATE_STOPPED);
+  EXPECT_EQ(state.stop_reason(), "");
 }
 
 TEST_F(ControlConformance, StateTellsWhoHoldsTheLease) {
@@ -92,7 +103,7 @@ TEST_F(ControlConformance, StateTellsWhoHoldsTheLease) {
   grpc::ClientContext context;
   ASSERT_TRUE(control_->GetState(&context, {}, &state).ok());
   EXPECT_EQ(state.lease_holder(), "ana@bench2");
-  EXPECT_FALSE(state.state().empty());
+  EXPECT_NE(state.state(), v1::SOURCE_STATE_UNSPECIFIED);
   Release(lease);
 }
 

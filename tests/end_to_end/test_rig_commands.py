@@ -89,8 +89,10 @@ def journal_of_gateway(rig):
 
 
 def test_status_tells_every_part_and_that_it_is_emulated(rig):
-    # Looking powers nothing on; moving does.
+    # Looking powers nothing on.
     assert "POWER_OFF" in touchstone("rig", "status", server=rig)
+    touchstone("rig", "power-on", server=rig)
+    assert "RUNNING" in touchstone("rig", "status", server=rig)
     touchstone("rig", "home", server=rig)
     text = touchstone("rig", "status", server=rig)
     assert "emulator" in text and "not safety-rated" in text and "RUNNING" in text
@@ -108,7 +110,11 @@ def test_mount_stop_and_home(rig):
     touchstone("rig", "stop", "--reason", "a test", server=rig)
     state = json.loads(touchstone("rig", "status", "--json", server=rig))
     assert state["state"]["state"] == "stopped"
-    assert (state["rig"]["object"], state["rig"]["placement"]) == ("lat20", "-x")
+    assert (state["rig"]["object"], state["rig"]["up_face"]) == ("lat20", "-x")
+    # The stop holds until somebody releases it.
+    assert "touchstone rig reset" in touchstone("rig", "home", server=rig, code=4)
+    assert json.loads(touchstone("rig", "status", "--json", server=rig))["state"]["state"] == "stopped"
+    touchstone("rig", "reset", "--reason", "a test", server=rig)
     touchstone("rig", "home", server=rig)
     assert json.loads(touchstone("rig", "status", "--json", server=rig))["state"]["state"] == "idle"
     assert "lat21" in touchstone("rig", "mount", "lat21", server=rig, code=2)
@@ -118,7 +124,7 @@ def test_a_dry_run_checks_and_draws_and_moves_nothing(rig, plan, tmp_path):
     before = json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]["arm"]["program_id"]
     checked = json.loads(touchstone("rig", "dry-run", plan, "-o", tmp_path / "way.svg", "--json", server=rig))
     assert checked["touches"] == checked["possible"] == 25
-    assert {group["placement"]: group["touches"] for group in checked["groups"]}["+z"] == 24
+    assert {group["up_face"]: group["touches"] for group in checked["groups"]}["+z"] == 24
     assert (tmp_path / "way.svg").read_text().startswith("<svg")
     assert json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]["arm"]["program_id"] == before
 
@@ -139,6 +145,8 @@ def session(rig, plan, tmp_path_factory):
             time.sleep(0.01)
         process.communicate(timeout=PATIENCE_S)
         assert process.returncode != 0, "it was done before it could be interrupted"
+        if signal_number == signal.SIGINT:  # Ctrl-C stops the rig, which holds
+            touchstone("rig", "reset", "--reason", "a test", server=rig)
     result = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL)
     assert result.returncode == 0, result.stderr
     return journal

@@ -147,7 +147,14 @@ void PhysicalTest::Connect(int port) {
   control_ = v1::Control::NewStub(channel_);
   rig_ = v1::Rig::NewStub(channel_);
   // The rig is there once arm and end effector answer.
-  WaitUntil([this] { return State() != "disconnected" && State() != "powered_off"; }, "the rig is ready");
+  WaitUntil(
+      [this] {
+        v1::RigState state;
+        grpc::ClientContext context;
+        return rig_->GetRig(&context, {}, &state).ok() && state.arm().connected() &&
+               state.effector().connected();
+      },
+      "the rig is ready");
 }
 
 v1::CommandedTouch PhysicalTest::FromAbove(double speed_m_s, double which) const {
@@ -191,7 +198,7 @@ void PhysicalTest::WaitUntil(const std::function<bool()>& done, const char* what
 }
 
 void PhysicalTest::WaitUntilApproaching() {
-  WaitUntil([this] { return RigState().arm().phase() == "approach"; }, "the arm approaches");
+  WaitUntil([this] { return RigState().arm().phase() == v1::MOTION_PHASE_APPROACH; }, "the arm approaches");
 }
 
 void PhysicalTest::UnlockByHand() {
@@ -206,16 +213,25 @@ void PhysicalTest::UnlockByHand() {
       [&] {
         EXPECT_EQ(send(fd, line.data(), line.size(), MSG_NOSIGNAL), static_cast<ssize_t>(line.size()));
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        return State() != "protective_stop";
+        return State() != v1::SOURCE_STATE_PROTECTIVE_STOP;
       },
       "the protective stop is unlocked by hand");
   close(fd);
 }
 
-std::string PhysicalTest::State() {
+v1::SourceState PhysicalTest::State() {
   v1::State state;
   grpc::ClientContext context;
-  return control_->GetState(&context, {}, &state).ok() ? state.state() : "disconnected";
+  return control_->GetState(&context, {}, &state).ok() ? state.state() : v1::SOURCE_STATE_DISCONNECTED;
+}
+
+grpc::Status PhysicalTest::Reset() {
+  v1::ResetRequest request;
+  request.set_holder("a person");
+  request.set_reason("a test");
+  v1::State state;
+  grpc::ClientContext context;
+  return control_->Reset(&context, request, &state);
 }
 
 v1::RigState PhysicalTest::RigState() {

@@ -72,7 +72,9 @@ class PhysicalTest : public testing::Test {
   void WaitUntilApproaching();
   // What a person does at the teach pendant after a protective stop.
   void UnlockByHand();
-  std::string State();
+  v1::SourceState State();
+  // A person releases the stop.
+  grpc::Status Reset();
   v1::RigState RigState();
   std::shared_ptr<v1::Control::Stub> control() { return control_; }
 

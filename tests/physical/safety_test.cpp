@@ -17,6 +17,21 @@ class Safety : public PhysicalTest {
   // Slow enough to be interrupted in mid-approach: 50 mm in about 1 s of the host's.
   static constexpr double kSlow = 0.0025;
 
+  void Stop(const std::string& reason) {
+    v1::StopRequest request;
+    request.set_reason(reason);
+    v1::StopResponse response;
+    grpc::ClientContext context;
+    ASSERT_TRUE(control_->Stop(&context, request, &response).ok());
+  }
+  grpc::Status PowerOn(const std::string& token) {
+    v1::PowerOnRequest request;
+    request.set_lease_token(token);
+    v1::RigState state;
+    grpc::ClientContext context;
+    return rig_->PowerOn(&context, request, &state);
+  }
+
   // The touch that was interrupted can be made under its id; and then is answered without motion.
   void ExpectTheTouchCanBeMade(const v1::CommandedTouch& touch, const std::string& id) {
     KeptLease lease(control_.get(), "afterwards", true);
@@ -129,7 +144,7 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   // A trip is a protective stop: a person looks, and unlocks it at the pendant.
   StartGatewayProcess();
   EXPECT_EQ(RigState().interrupted_touches(), 1u);
-  EXPECT_EQ(State(), "protective_stop");
+  EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   UnlockByHand();
   ExpectTheTouchCanBeMade(FromAbove(0.0005), "killed");
   KillGatewayProcess();
@@ -147,8 +162,8 @@ TEST_F(Safety, AFrozenControllerIsNoticed) {
   emulator_->faults().Set("freeze", 4);
   const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::UNAVAILABLE) << answer.status.error_message();
-  WaitUntil([&] { return State() != "disconnected"; }, "the controller is back");
-  if (State() == "protective_stop")  // it thawed with its watchdog overdue
+  WaitUntil([&] { return State() != v1::SOURCE_STATE_DISCONNECTED; }, "the controller is back");
+  if (State() == v1::SOURCE_STATE_PROTECTIVE_STOP)  // it thawed with its watchdog overdue
     UnlockByHand();
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "frozen");
   ExpectEveryResultIsItsOwnTouch();
@@ -180,9 +195,9 @@ TEST_F(Safety, AProtectiveStopIsNeverUnlockedByItself) {
   const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::FAILED_PRECONDITION) << answer.status.error_message();
   EXPECT_THAT(answer.status.error_message(), HasSubstr("PROTECTIVE_STOP"));
-  EXPECT_EQ(State(), "protective_stop");
+  EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   for (int k = 0; k < 3; ++k) EXPECT_FALSE(Touch(lease.token(), FromAbove(), "more").status.ok());
-  EXPECT_EQ(State(), "protective_stop");
+  EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   UnlockByHand();
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
   ExpectEveryResultIsItsOwnTouch();
@@ -223,7 +238,7 @@ TEST_F(Safety, MotionsBeyondTheLimitsAreRefusedWithValueAndLimitAndNothingMoves)
   ASSERT_TRUE(rig_->CheckTouches(&context, request, &response).ok());
   EXPECT_TRUE(response.checks(0).possible());
   EXPECT_FALSE(response.checks(1).possible());
-  EXPECT_EQ(response.checks(2).placement(), "+x");
+  EXPECT_EQ(response.checks(2).up_face(), v1::UP_FACE_PLUS_X);
   EXPECT_EQ(emulator_->controller().Count("programs"), programs);
   StopGateway();
   EXPECT_EQ(Journalled().size(), 1u) << "what was refused is no touch";
@@ -247,14 +262,108 @@ TEST_F(Safety, StopDuringMotionNeedsNoLeaseAndHolds) {
   EXPECT_EQ(touch.get().status.error_code(), grpc::ABORTED);
   EXPECT_EQ(waiting.get().status.error_code(), grpc::ABORTED) << "what waits does not begin after a stop";
   WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
-  EXPECT_EQ(State(), "stopped");
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
   EXPECT_EQ(Touch(lease.token(), FromAbove(), "after the stop").status.error_code(), grpc::ABORTED);
-  EXPECT_EQ(State(), "stopped");
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
+  EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
   ExpectEveryResultIsItsOwnTouch();
   std::ifstream audit(folder_ / "rig" / "audit.jsonl");
   const std::string log((std::istreambuf_iterator<char>(audit)), {});
   EXPECT_THAT(log, testing::AllOf(HasSubstr("\"stop\""), HasSubstr("a test")));
+}
+
+TEST_F(Safety, AClientThatRetriesDoesNotReleaseAStop) {
+  StartRig();
+  StartGateway();
+  KeptLease first(control_.get(), "first", true);
+  ASSERT_TRUE(Touch(first.token(), FromAbove(), "before").status.ok());
+  Stop("cable caught");
+  const uint64_t programs = emulator_->controller().Count("programs");
+  std::string stale;
+  for (int k = 0; k < 50; ++k) {
+    KeptLease lease(control_.get(), "retries", true);
+    ASSERT_TRUE(lease.status().ok()) << lease.status().error_message();
+    const Answer answer = Touch(lease.token(), FromAbove(), "retried");
+    ASSERT_EQ(answer.status.error_code(), grpc::ABORTED) << "try " << k;
+    EXPECT_THAT(answer.status.error_message(),
+                testing::AllOf(HasSubstr("cable caught"), HasSubstr("rig reset")));
+    stale = lease.token();
+  }
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
+  EXPECT_EQ(emulator_->controller().Count("programs"), programs) << "the arm moved after a stop";
+
+  // Resetting moves nothing: whoever moves next asks for a lease after it.
+  KeptLease held(control_.get(), "holds on", true);
+  EXPECT_TRUE(Reset().ok());
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE);
+  EXPECT_EQ(Touch(held.token(), FromAbove(), "retried").status.error_code(), grpc::ABORTED);
+  EXPECT_EQ(Touch(stale, FromAbove(), "retried").status.error_code(), grpc::ABORTED);
+  EXPECT_EQ(emulator_->controller().Count("programs"), programs) << "the reset moved the arm";
+  ExpectTheTouchCanBeMade(FromAbove(), "retried");
+  ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Safety, AStopOutlivesTheGateway) {
+  StartRig();
+  StartGatewayProcess();
+  Stop("cable caught");
+  KillGatewayProcess();
+  StartGatewayProcess();
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
+  {
+    KeptLease lease(control_.get(), "after the restart", true);
+    EXPECT_EQ(Touch(lease.token(), FromAbove(), "touch").status.error_code(), grpc::ABORTED);
+  }
+  EXPECT_TRUE(Reset().ok());
+  KillGatewayProcess();
+  StartGatewayProcess();
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE) << "a reset outlives the gateway too";
+  KillGatewayProcess();
+}
+
+TEST_F(Safety, AStopHoldsWhileTheControllerItselfForbidsMotion) {
+  StartRig();
+  StartGateway();
+  Stop("cable caught");
+  emulator_->faults().Set("protective_stop", 1);
+  WaitUntil([&] { return State() == v1::SOURCE_STATE_PROTECTIVE_STOP; },
+            "the controller is in a protective stop");
+  const grpc::Status refused = Reset();
+  EXPECT_EQ(refused.error_code(), grpc::FAILED_PRECONDITION) << refused.error_message();
+  EXPECT_THAT(refused.error_message(), HasSubstr("PROTECTIVE_STOP"));
+  UnlockByHand();
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED) << "unlocking the controller is no reset";
+  EXPECT_TRUE(Reset().ok());
+  ExpectTheTouchCanBeMade(FromAbove(), "afterwards");
+}
+
+// --- Power
+
+TEST_F(Safety, PowerOnNeedsALeaseAndNoStopAndReleasesTheBrakes) {
+  StartRig([](rig::EmulatorOptions* options) { options->powered = false; });
+  StartGateway();
+  EXPECT_EQ(State(), v1::SOURCE_STATE_POWERED_OFF);
+  EXPECT_EQ(PowerOn("").error_code(), grpc::FAILED_PRECONDITION);
+  Stop("cable caught");
+  {
+    KeptLease lease(control_.get(), "client", true);
+    const grpc::Status stopped = PowerOn(lease.token());
+    EXPECT_EQ(stopped.error_code(), grpc::ABORTED) << stopped.error_message();
+  }
+  EXPECT_EQ(RigState().arm().robot_mode(), v1::ROBOT_MODE_POWER_OFF) << "a stop was overridden";
+  EXPECT_TRUE(Reset().ok());
+  KeptLease lease(control_.get(), "client", true);
+  const grpc::Status powered = PowerOn(lease.token());
+  EXPECT_TRUE(powered.ok()) << powered.error_message();
+  EXPECT_EQ(RigState().arm().robot_mode(), v1::ROBOT_MODE_RUNNING);
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE);
+
+  emulator_->faults().Set("emergency_stop", 1);
+  WaitUntil([&] { return State() == v1::SOURCE_STATE_EMERGENCY_STOP; }, "the emergency stop is pressed");
+  const grpc::Status pressed = PowerOn(lease.token());
+  EXPECT_EQ(pressed.error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(pressed.error_message(), HasSubstr("release the emergency stop"));
 }
 
 TEST_F(Safety, AProgramThatWasJustSentDoesNotBeginAfterAStop) {
@@ -271,6 +380,7 @@ TEST_F(Safety, AProgramThatWasJustSentDoesNotBeginAfterAStop) {
     WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     EXPECT_FALSE(emulator_->controller().Moving()) << "it began after the stop, try " << k;
+    ASSERT_TRUE(Reset().ok());
   }
   ExpectEveryResultIsItsOwnTouch();
 }
@@ -299,7 +409,7 @@ TEST_F(Safety, AFingerThatStaysSilentEndsTheApproachBeforeTheOthersArePushedTooF
   const Answer answer = Touch(lease.token(), FromAbove(), "silent");
   ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
   EXPECT_FALSE(answer.response.results(0).complete());
-  EXPECT_EQ(State(), "idle") << "the arm is in no protective stop";
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE) << "the arm is in no protective stop";
   emulator_->faults().Set("missing_finger", -1);
   ExpectTheTouchCanBeMade(FromAbove(0.02, 1), "afterwards");
 }

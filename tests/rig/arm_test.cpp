@@ -18,13 +18,13 @@ using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;  // host time; the machine may be busy
 
-// A beat as the gateway gives it while something moves.
+// A heartbeat as the gateway gives it while something moves.
 class Heart {
  public:
   explicit Heart(Arm* arm)
       : thread_([this, arm] {
           while (beating_) {
-            arm->Beat();
+            arm->SendHeartbeat();
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
           }
         }) {}
@@ -61,7 +61,7 @@ class EmulatedArm : public testing::Test {
     arm.program_start_s = 10;
     arm.connect_wait_s = kPatienceS;
     arm_options_ = arm;
-    arm_ = ConnectUrArm(arm, &news_).value();
+    arm_ = ConnectUrArm(arm, &changes_).value();
   }
 
   template <typename Done>
@@ -69,7 +69,7 @@ class EmulatedArm : public testing::Test {
     const double until_s = HostNowS() + kPatienceS;
     while (!done()) {
       if (HostNowS() > until_s) return false;
-      news_.WaitForNews(news_.count(), 0.01);
+      changes_.WaitForChange(changes_.count(), 0.01);
     }
     return true;
   }
@@ -82,7 +82,7 @@ class EmulatedArm : public testing::Test {
   bool WaitForPhase(uint32_t program_id, MotionPhase phase) {
     return Wait([&] {
       const auto state = arm_->State();
-      return state.ok() && state->program_id == program_id && state->phase == static_cast<int>(phase);
+      return state.ok() && state->program_id == program_id && state->phase == phase;
     });
   }
   // A few steps straight down from above where the arm is.
@@ -92,9 +92,9 @@ class EmulatedArm : public testing::Test {
     touch.program_id = program_id;
     Eigen::Isometry3d pose = arm_->State()->base_from_tip;
     pose.translation().z() += 0.03;
-    touch.transfer.push_back(pose);
+    touch.transit.push_back(pose);
     pose.translation().y() += 0.02;
-    touch.transfer.push_back(pose);
+    touch.transit.push_back(pose);
     touch.end = pose;
     touch.end.translation().z() -= 0.08;
     touch.speed_m_s = speed_m_s;
@@ -112,7 +112,7 @@ class EmulatedArm : public testing::Test {
   rig::ControllerOptions options_;
   UrArmOptions arm_options_;
   std::unique_ptr<rig::Controller> controller_;
-  Signal news_;
+  ChangeNotifier changes_;
   std::unique_ptr<UrArm> arm_;
 };
 
@@ -121,7 +121,7 @@ TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
   ASSERT_TRUE(state.ok()) << state.status();
   const Eigen::Isometry3d truth = controller_->BaseFromFlange() * arm_options_.script.flange_from_tip;
   EXPECT_LT((state->base_from_tip.translation() - truth.translation()).norm(), 2e-4);
-  EXPECT_EQ(state->robot_mode, 7);
+  EXPECT_EQ(state->robot_mode, RobotMode::kRunning);
   EXPECT_TRUE(arm_->Ready().ok()) << arm_->Ready();
   EXPECT_FALSE(arm_->Version().empty());
 }
@@ -131,16 +131,16 @@ TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
   const ArmTouch touch = SomeTouch(7);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
   ASSERT_TRUE(WaitForPhase(7, MotionPhase::kReady));
-  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transfer.back().translation()).norm(), 1e-4);
+  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transit.back().translation()).norm(), 1e-4);
   ASSERT_TRUE(arm_->BeginApproach(7).ok());
   ASSERT_TRUE(WaitForPhase(7, MotionPhase::kDone));
-  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transfer.back().translation()).norm(), 1e-4);
+  EXPECT_LT((controller_->BaseFromTip().translation() - touch.transit.back().translation()).norm(), 1e-4);
 
   // The history shows the approach: at its speed, down to its end.
   const double now_s = arm_->State()->controller_time_s;
   double lowest_m = 1, fastest_m_s = 0;
   for (const ArmState& state : arm_->History(now_s - 30, now_s)) {
-    if (state.phase != static_cast<int>(MotionPhase::kApproach)) continue;
+    if (state.phase != MotionPhase::kApproach) continue;
     lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
     fastest_m_s = std::max(fastest_m_s, state.tip_velocity_m_s.norm());
   }
@@ -160,7 +160,7 @@ TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
   const double now_s = arm_->State()->controller_time_s;
   double lowest_m = 1;
   for (const ArmState& state : arm_->History(now_s - 30, now_s))
-    if (state.phase == static_cast<int>(MotionPhase::kApproach))
+    if (state.phase == MotionPhase::kApproach)
       lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
   EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01) << "it would have taken 40 s to the end";
 }
@@ -170,7 +170,7 @@ TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
   const ArmTouch touch = SomeTouch(9);
   Joints joints = options_.joints_rad;
   joints[0] += 0.2;
-  ASSERT_TRUE(arm_->MoveThrough(9, touch.transfer, {joints}).ok());
+  ASSERT_TRUE(arm_->MoveThrough(9, touch.transit, {joints}).ok());
   ASSERT_TRUE(WaitForPhase(9, MotionPhase::kDone));
   EXPECT_LT(Farthest(arm_->State()->joints_rad, joints), 1e-3);
 }
@@ -184,7 +184,7 @@ TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
   ASSERT_TRUE(WaitForPhase(10, MotionPhase::kApproach));
   ASSERT_TRUE(arm_->Stop().ok());
   ExpectAtRestSoon();
-  EXPECT_EQ(arm_->State()->phase, static_cast<int>(MotionPhase::kApproach)) << "it tells how far it came";
+  EXPECT_EQ(arm_->State()->phase, MotionPhase::kApproach) << "it tells how far it came";
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(11)).ok());
   EXPECT_TRUE(WaitForPhase(11, MotionPhase::kReady));
 }
@@ -234,13 +234,14 @@ TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
   Heart heart(arm_.get());
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(14)).ok());
   faults_.Set("protective_stop", 1);
-  ASSERT_TRUE(Wait([&] { return arm_->State().ok() && arm_->State()->safety_mode == 3; }));
+  ASSERT_TRUE(
+      Wait([&] { return arm_->State().ok() && arm_->State()->safety_mode == SafetyMode::kProtectiveStop; }));
   EXPECT_EQ(arm_->Ready().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(arm_->Ready().message()), HasSubstr("PROTECTIVE_STOP"));
   EXPECT_EQ(arm_->StartTouch(SomeTouch(15)).code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(arm_->PowerOn().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(arm_->PowerOn([] { return absl::OkStatus(); }).code(), absl::StatusCode::kFailedPrecondition);
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  EXPECT_EQ(arm_->State()->safety_mode, 3);
+  EXPECT_EQ(arm_->State()->safety_mode, SafetyMode::kProtectiveStop);
 }
 
 TEST_F(EmulatedArm, FrozenControllerIsToldAsSuchAndComesBack) {
@@ -288,11 +289,11 @@ TEST(UrArm, PowersOnAndReleasesTheBrakes) {
   arm_options.rtde_port = controller->ports().rtde;
   arm_options.script.time_scale = 20;
   arm_options.connect_wait_s = kPatienceS;
-  Signal news;
-  const auto arm = ConnectUrArm(arm_options, &news).value();
+  ChangeNotifier changes;
+  const auto arm = ConnectUrArm(arm_options, &changes).value();
   EXPECT_EQ(arm->Ready().code(), absl::StatusCode::kFailedPrecondition) << arm->Ready();
   EXPECT_THAT(std::string(arm->Ready().message()), HasSubstr("POWER_OFF"));
-  const absl::Status powered = arm->PowerOn();
+  const absl::Status powered = arm->PowerOn([] { return absl::OkStatus(); });
   EXPECT_TRUE(powered.ok()) << powered;
   EXPECT_TRUE(arm->Ready().ok()) << arm->Ready();
 }

@@ -33,8 +33,8 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
 
     def __init__(self):
         self.window_s, self.holder, self.epoch, self.renewals, self.released = 30.0, "", 0, 0, 0
-        self.failures, self.stale, self.state = [], False, "idle"
-        self.touches, self.mounted, self.stopped = [], ("", ""), []
+        self.failures, self.stale, self.state = [], False, control_pb2.SOURCE_STATE_IDLE
+        self.touches, self.mounted, self.stopped, self.resets = [], ("", 0), [], []
         self.server = grpc.server(concurrent.futures.ThreadPoolExecutor(8))
         for add in (source_pb2_grpc.add_SourceServicer_to_server, control_pb2_grpc.add_ControlServicer_to_server,
                     rig_pb2_grpc.add_RigServicer_to_server):
@@ -71,6 +71,15 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
         self.stopped.append(request.reason)
         return control_pb2.StopResponse(aborted_touches=1)
 
+    def Reset(self, request, context):
+        self.resets.append((request.holder, request.reason))
+        self.state = control_pb2.SOURCE_STATE_IDLE
+        return control_pb2.State(state=self.state)
+
+    def PowerOn(self, request, context):
+        self.powered_with = request.lease_token
+        return self.GetRig(request, context)
+
     def Touch(self, request, context):
         self.touches.append((request.session, list(request.touch_ids), request.lease_token))
         if self.failures:
@@ -84,15 +93,15 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
         return source_pb2.TouchResponse(results=results)
 
     def GetRig(self, request, context):
-        return rig_pb2.RigState(object=self.mounted[0], placement=self.mounted[1])
+        return rig_pb2.RigState(object=self.mounted[0], up_face=self.mounted[1])
 
     def MountObject(self, request, context):
-        self.mounted = (request.object, request.placement)
+        self.mounted = (request.object, request.up_face)
         return self.GetRig(request, context)
 
     def CheckTouches(self, request, context):
         checks = [rig_pb2.TouchCheck(possible=t.target_m.x == 0 or t.approach.x != 0,
-                                     placement="+z" if t.approach.z else "+x") for t in request.touches]
+                                     up_face=rig_pb2.UP_FACE_PLUS_Z if t.approach.z else rig_pb2.UP_FACE_PLUS_X) for t in request.touches]
         return rig_pb2.CheckTouchesResponse(checks=checks)
 
 
@@ -214,11 +223,22 @@ def test_a_restarted_source_is_asked_with_a_new_lease(rig, rig_client, plan):
 
 def test_a_stop_of_somebody_else_is_not_ended(rig, rig_client, plan):
     rig.failures = [grpc.StatusCode.UNAVAILABLE]
-    rig.state = "stopped"
+    rig.state = control_pb2.SOURCE_STATE_STOPPED
     with rig_client.session() as session:
         with pytest.raises(touchstone.Refused, match="Somebody stopped the source"):
             session.touch(touchstone.read_plan(plan)[0])
     assert rig.epoch == 1
+
+
+def test_a_person_releases_the_stop(rig, rig_client):
+    rig.state = control_pb2.SOURCE_STATE_STOPPED
+    assert rig_client.rig.reset("cable freed").state == control_pb2.SOURCE_STATE_IDLE
+    assert [reason for _, reason in rig.resets] == ["cable freed"] and rig.resets[0][0]
+
+
+def test_power_on_carries_a_lease(rig, rig_client):
+    rig_client.rig.power_on()
+    assert rig.powered_with == "token1"
 
 
 def test_a_touch_without_an_id_is_not_repeated(rig, rig_client, plan):
@@ -235,10 +255,10 @@ def test_an_interrupted_session_stops_the_motion(rig, rig_client):
     assert len(rig.stopped) == 1 and "monday" in rig.stopped[0]
 
 
-def test_rows_are_grouped_by_object_and_placement(rig, rig_client, plan):
+def test_rows_are_grouped_by_object_and_up_face(rig, rig_client, plan):
     groups = rig_client.rig.groups(touchstone.read_plan(plan))
     assert list(groups) == [("lat20", "+z"), ("lat20", "+x"), ("lat00", "+z")]
-    rig.mounted = ("lat00", "+z")
+    rig.mounted = ("lat00", rig_pb2.UP_FACE_PLUS_Z)
     assert list(rig_client.rig.groups(touchstone.read_plan(plan)))[0] == ("lat00", "+z")
 
 
@@ -247,8 +267,8 @@ def test_a_person_is_asked_only_for_what_does_not_lie_so(rig, rig_client):
     for _ in range(2):
         rig_client.rig.prepare("lat20", "-x", lambda *what: asked.append(what))
     assert asked == [("lat20", "-x")]
-    assert rig.mounted == ("lat20", "-x")
-    with pytest.raises(touchstone.InvalidRequest, match="placement"):
+    assert rig.mounted == ("lat20", rig_pb2.UP_FACE_MINUS_X)
+    with pytest.raises(touchstone.InvalidRequest, match="up_face"):
         rig_client.rig.mount("lat20", "up")
 
 

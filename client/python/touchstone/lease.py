@@ -92,15 +92,15 @@ class Lease:
     def follow(self) -> str:
         """The token after a reconnection: of this lease if it is still valid, else of a new one.
 
-        Never takes it from somebody else, and not where somebody stopped the source meanwhile (Refused): a new lease
-        would end that stop.
+        Never takes it from somebody else, and not where somebody stopped the source meanwhile (Refused).
         """
         if self._thread is None:
             return self.token
         state = self._connection.call(_CONTROL, "GetState", control_pb2.GetStateRequest())
-        if state.state == "stopped":
+        if state.state == control_pb2.SOURCE_STATE_STOPPED:
             raise errors.Refused(
-                "Somebody stopped the source: make sure that it may move, then run the same again.",
+                "Somebody stopped the source: make sure that it may move, release the stop with "
+                "client.rig.reset(reason) or 'touchstone rig reset', then run the same again.",
                 "FAILED_PRECONDITION", self._connection.target,
             )
         try:

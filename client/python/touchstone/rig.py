@@ -6,30 +6,36 @@ import dataclasses
 from typing import TYPE_CHECKING, Callable, Sequence
 
 from . import checks
+from .lease import holder
 from .measurements import Row
 from .plans import Touches
-from .v1 import rig_pb2, rig_pb2_grpc
+from .v1 import control_pb2, control_pb2_grpc, rig_pb2, rig_pb2_grpc
 
 if TYPE_CHECKING:
     from .client import Client
 
 _RIG = rig_pb2_grpc.RigStub
-_FACES = {face: face for face in ("+x", "-x", "+y", "-y", "+z", "-z")}
+_CONTROL = control_pb2_grpc.ControlStub
+_FACES = {
+    "+x": rig_pb2.UP_FACE_PLUS_X, "-x": rig_pb2.UP_FACE_MINUS_X, "+y": rig_pb2.UP_FACE_PLUS_Y,
+    "-y": rig_pb2.UP_FACE_MINUS_Y, "+z": rig_pb2.UP_FACE_PLUS_Z, "-z": rig_pb2.UP_FACE_MINUS_Z,
+}
+_FACE_NAMES = {number: name for name, number in _FACES.items()}
 _CHECKS_A_REQUEST = 100
 
 
 @dataclasses.dataclass(frozen=True)
 class TouchCheck:
-    """Whether a touch is possible; if not, `reason` says why. `placement` is the face that must point up."""
+    """Whether a touch is possible; if not, `reason` says why. `up_face` ("+z") is the face that must point up."""
 
     possible: bool
     reason: str
-    placement: str
+    up_face: str
     duration_s: float
 
 
-def _ask(object: str, placement: str) -> None:
-    input(f"Put {object} on the fixture with its face {placement} up, then press Enter. ")
+def _ask(object: str, up_face: str) -> None:
+    input(f"Put {object} on the fixture with its face {up_face} up, then press Enter. ")
 
 
 class Rig:
@@ -43,29 +49,42 @@ class Rig:
         return self._client.call(_RIG, "GetRig", rig_pb2.GetRigRequest())
 
     def stop(self, reason: str = "") -> int:
-        """Stops every motion now; needs no lease. A software stop: not safety-rated. Returns the touches aborted."""
+        """Stops every motion now, until reset(); needs no lease. A software stop: not safety-rated.
+
+        Returns the touches aborted.
+        """
         return self._client.stop(reason)
+
+    def reset(self, reason: str) -> control_pb2.State:
+        """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease."""
+        request = control_pb2.ResetRequest(holder=holder(), reason=reason)
+        return self._client.call(_CONTROL, "Reset", request, repeat=False)
+
+    def power_on(self) -> rig_pb2.RigState:
+        """Powers the arm on and releases its brakes; never unlocks a protective stop."""
+        with self._client.holding_lease() as token:
+            return self._client.call(_RIG, "PowerOn", rig_pb2.PowerOnRequest(lease_token=token), repeat=False)
 
     def home(self) -> rig_pb2.RigState:
         """Backs the tool out along its own axis and goes to the home joints."""
         with self._client.holding_lease() as token:
             return self._client.call(_RIG, "Home", rig_pb2.HomeRequest(lease_token=token), repeat=False)
 
-    def mount(self, object: str, placement: str = "+z") -> rig_pb2.RigState:
+    def mount(self, object: str, up_face: str = "+z") -> rig_pb2.RigState:
         """Says which object lies on the fixture with which face up; where the rig changes it by itself, it does."""
-        checks.choice("placement", placement, _FACES)
+        checks.choice("up_face", up_face, _FACES)
         with self._client.holding_lease() as token:
-            request = rig_pb2.MountObjectRequest(object=object, placement=placement, lease_token=token)
+            request = rig_pb2.MountObjectRequest(object=object, up_face=_FACES[up_face], lease_token=token)
             return self._client.call(_RIG, "MountObject", request, repeat=False)
 
-    def prepare(self, object: str, placement: str, ask: Callable[[str, str], None] = _ask) -> None:
-        """mount(), if it does not lie so; where a person must put it down, ask(object, placement) first."""
+    def prepare(self, object: str, up_face: str, ask: Callable[[str, str], None] = _ask) -> None:
+        """mount(), if it does not lie so; where a person must put it down, ask(object, up_face) first."""
         state = self.status()
-        if (state.object, state.placement) == (object, placement):
+        if (state.object, _FACE_NAMES.get(state.up_face, "")) == (object, up_face):
             return
         if not state.mounts_itself:
-            ask(object, placement)
-        self.mount(object, placement)
+            ask(object, up_face)
+        self.mount(object, up_face)
 
     def check(self, object: str, touches: Touches) -> list[TouchCheck]:
         """Every check that these touches pass before anything moves, without motion."""
@@ -73,17 +92,18 @@ class Rig:
         for first in range(0, len(messages), _CHECKS_A_REQUEST):
             request = rig_pb2.CheckTouchesRequest(object=object, touches=messages[first:first + _CHECKS_A_REQUEST])
             reply = self._client.call(_RIG, "CheckTouches", request)
-            result += [TouchCheck(c.possible, c.reason, c.placement, c.duration_s) for c in reply.checks]
+            result += [TouchCheck(c.possible, c.reason, _FACE_NAMES.get(c.up_face, ""), c.duration_s) for c in reply.checks]
         return result
 
     def groups(self, rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
-        """The rows that are possible, by (object, placement), in the order of the plan; what lies there comes first."""
+        """The rows that are possible, by (object, up_face), in the order of the plan; what lies there comes first."""
         groups: dict[tuple[str, str], list[Row]] = {}
         for row in rows:
             [check] = self.check(row.object, row.command)
             if check.possible:
-                groups.setdefault((row.object, check.placement), []).append(row)
+                groups.setdefault((row.object, check.up_face), []).append(row)
         state = self.status()
         objects = list(dict.fromkeys(row.object for row in rows))
-        rank = lambda key: (key[0] != state.object, objects.index(key[0]), key != (state.object, state.placement))
+        mounted = (state.object, _FACE_NAMES.get(state.up_face, ""))
+        rank = lambda key: (key[0] != state.object, objects.index(key[0]), key != mounted)
         return {key: groups[key] for key in sorted(groups, key=rank)}

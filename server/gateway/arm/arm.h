@@ -1,8 +1,9 @@
-// The arm, whatever its make: what it tells of itself, and the few motions that a touch needs.
+// The arm, whatever its make: its states, and the few motions that a touch needs.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +17,54 @@
 
 namespace touchstone {
 
+// Universal Robots' names and numbers, as RTDE sends them (output robot_mode). Another number may come.
+enum class RobotMode : int {
+  kNoController = -1,
+  kDisconnected = 0,
+  kConfirmSafety = 1,
+  kBooting = 2,
+  kPowerOff = 3,
+  kPowerOn = 4,
+  kIdle = 5,  // powered, brakes on
+  kBackdrive = 6,
+  kRunning = 7,
+  kUpdatingFirmware = 8,
+};
+
+// Likewise (output safety_mode).
+enum class SafetyMode : int {
+  kUnspecified = 0,
+  kNormal = 1,
+  kReduced = 2,
+  kProtectiveStop = 3,
+  kRecovery = 4,
+  kSafeguardStop = 5,
+  kSystemEmergencyStop = 6,
+  kRobotEmergencyStop = 7,
+  kViolation = 8,
+  kFault = 9,
+};
+
+// Of the program on the controller, likewise (output runtime_state).
+enum class RuntimeState : int {
+  kStopping = 0,
+  kStopped = 1,
+  kPlaying = 2,
+  kPausing = 3,
+  kPaused = 4,
+  kResuming = 5,
+};
+
+// What a program of this gateway is doing; the numbers stand in a register of the controller.
+enum class MotionPhase : int {
+  kNone = 0,
+  kTransit = 1,  // to the start
+  kReady = 2,    // at the start and at rest; waits for BeginApproach
+  kApproach = 3,
+  kRetract = 4,  // back to the start
+  kDone = 5,     // back at the start, at rest
+};
+
 // One state, as the controller sent it. Base frame, SI.
 struct ArmState {
   double host_time_s = 0;        // when it arrived (HostNowS)
@@ -23,30 +72,19 @@ struct ArmState {
   Eigen::Isometry3d base_from_tip = Eigen::Isometry3d::Identity();  // with the tool's offset
   Eigen::Vector3d tip_velocity_m_s = Eigen::Vector3d::Zero();
   std::array<double, 6> joints_rad{};
-  int robot_mode = -1;    // RIG.md: 7 running
-  int safety_mode = 0;    // 1 normal, 3 protective stop ...
-  int runtime_state = 0;  // 1 stopped, 2 playing
+  RobotMode robot_mode = RobotMode::kNoController;
+  SafetyMode safety_mode = SafetyMode::kUnspecified;
+  RuntimeState runtime_state = RuntimeState::kStopping;
   uint32_t robot_status_bits = 0, safety_status_bits = 0;
   double speed_scaling = 0;
-  uint32_t program_id = 0;  // of this gateway's program that runs or ran last
-  int phase = 0;            // MotionPhase of it
+  uint32_t program_id = 0;                 // of this gateway's program that runs or ran last
+  MotionPhase phase = MotionPhase::kNone;  // of that program
 };
-
-// What a program of ours is doing; the numbers stand in a register of the controller.
-enum class MotionPhase : int {
-  kNone = 0,
-  kTransfer = 1,  // to the start
-  kReady = 2,     // at the start and at rest; waits for BeginApproach
-  kApproach = 3,
-  kRetreat = 4,
-  kDone = 5,  // back at the start, at rest
-};
-const char* PhaseName(int phase);  // "transfer"; "unknown" for another number
 
 // A touch as the arm makes it. Poses are base_from_tip.
 struct ArmTouch {
-  uint32_t program_id = 0;                  // above 0; another one for every touch
-  std::vector<Eigen::Isometry3d> transfer;  // straight lines through these; the last is the start
+  uint32_t program_id = 0;                 // above 0; another one for every touch
+  std::vector<Eigen::Isometry3d> transit;  // straight lines through these; the last is the start
   Eigen::Isometry3d end = Eigen::Isometry3d::Identity();  // where the approach gives up
   double speed_m_s = 0;
   double duration_s = 0;  // expected, in all, rig seconds
@@ -69,19 +107,20 @@ class Arm {
   virtual absl::Status StartTouch(const ArmTouch& touch) = 0;
   // At kReady: begins the approach.
   virtual absl::Status BeginApproach(uint32_t program_id) = 0;
-  // Every finger has reported: the approach stops and the tool retreats to the start (kRetreat, kDone).
+  // Every finger has reported: the approach stops and the tool retracts to the start (kRetract, kDone).
   virtual absl::Status EndApproach(uint32_t program_id) = 0;
   // Straight lines through these poses, then to these joints if any; kDone at the end.
   virtual absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                                    const std::vector<std::array<double, 6>>& joints) = 0;
   // Stops whatever moves, now, from any thread: on the wire before it returns, never queued behind anything.
   virtual absl::Status Stop() = 0;
-  // Powers on and releases the brakes if they are not; never unlocks a protective stop.
-  virtual absl::Status PowerOn() = 0;
+  // Powers on and releases the brakes if they are not; never unlocks a protective stop. `guard` is asked before
+  // each step and while the controller works on it; its error ends the wait and is returned.
+  virtual absl::Status PowerOn(const std::function<absl::Status()>& guard) = 0;
 
-  // The gateway lives: written to the controller's watchdog register until this is no longer called. The
-  // watchdog of a running program stops the arm then.
-  virtual void Beat() = 0;
+  // Writes the next heartbeat to the register that the running program's watchdog on the controller observes.
+  // Without heartbeats that watchdog stops the arm.
+  virtual void SendHeartbeat() = 0;
 
   virtual ClockEstimate ControllerClock() const = 0;  // controller seconds on host seconds
   virtual double StateRateHz() const = 0;

@@ -19,9 +19,9 @@ const std::array<double, 6>& MaxJointSpeeds() {
   return kSpeeds;
 }
 
-double PacedSpeed(const UrKinematics& kinematics, const Eigen::Isometry3d& tip_from_flange,
-                  const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
-                  Joints* joints) {
+double LimitedCartesianSpeed(const UrKinematics& kinematics, const Eigen::Isometry3d& tip_from_flange,
+                             const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
+                             Joints* joints) {
   const double line_speed_m_s = LineSpeed(from, to, speed_m_s);
   const Eigen::Vector3d way_m = to.translation() - from.translation();
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());

@@ -71,9 +71,9 @@ struct Listening {
             [this](const RtdeSample& sample, double) {
               std::lock_guard<std::mutex> lock(mutex);
               newest = sample;
-              news.Notify();
+              changes.Notify();
             },
-            [this] { news.Notify(); }) {}
+            [this] { changes.Notify(); }) {}
   bool Hears(double timestamp_s) {
     return Wait([&] {
       std::lock_guard<std::mutex> lock(mutex);
@@ -84,13 +84,13 @@ struct Listening {
   bool Wait(Done done) {
     for (const double until_s = HostNowS() + kPatienceS; HostNowS() < until_s;) {
       if (done()) return true;
-      news.WaitForNews(news.count(), 0.01);
+      changes.WaitForChange(changes.count(), 0.01);
     }
     return false;
   }
   std::mutex mutex;
   std::optional<RtdeSample> newest;
-  Signal news;
+  ChangeNotifier changes;
   RtdeClient client;
 };
 
@@ -180,8 +180,8 @@ UrArmOptions Nowhere() {
 }
 
 TEST(UrArm, WithoutAControllerEverythingSaysSo) {
-  Signal news;
-  const auto arm = ConnectUrArm(Nowhere(), &news);
+  ChangeNotifier changes;
+  const auto arm = ConnectUrArm(Nowhere(), &changes);
   ASSERT_TRUE(arm.ok()) << "it goes on trying";
   EXPECT_EQ((*arm)->State().status().code(), absl::StatusCode::kUnavailable);
   EXPECT_FALSE((*arm)->Ready().ok());
@@ -199,8 +199,8 @@ TEST(UrArm, StopGoesOverTheDashboardWhereNoProgramCanBeSent) {
   });
   UrArmOptions options = Nowhere();
   options.dashboard_port = dashboard.port();
-  Signal news;
-  const auto arm = ConnectUrArm(options, &news);
+  ChangeNotifier changes;
+  const auto arm = ConnectUrArm(options, &changes);
   ASSERT_TRUE(arm.ok());
   EXPECT_TRUE((*arm)->Stop().ok());
   EXPECT_TRUE(stopped);
@@ -218,8 +218,8 @@ TEST(UrArm, StopIsSentOverTheProgramPortAlone) {
   });
   UrArmOptions options = Nowhere();
   options.secondary_port = secondary.port();
-  Signal news;
-  const auto arm = ConnectUrArm(options, &news);
+  ChangeNotifier changes;
+  const auto arm = ConnectUrArm(options, &changes);
   ASSERT_TRUE(arm.ok());
   EXPECT_TRUE((*arm)->Stop().ok());
   for (const double until_s = HostNowS() + kPatienceS; HostNowS() < until_s;) {
@@ -231,13 +231,13 @@ TEST(UrArm, StopIsSentOverTheProgramPortAlone) {
 }
 
 TEST(UrArm, OptionsThatMakeNoSenseAreRefused) {
-  Signal news;
+  ChangeNotifier changes;
   UrArmOptions options = Nowhere();
   options.model = "ur10";
-  EXPECT_EQ(ConnectUrArm(options, &news).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ConnectUrArm(options, &changes).status().code(), absl::StatusCode::kInvalidArgument);
   options = Nowhere();
   options.rtde_port = 70000;
-  EXPECT_EQ(ConnectUrArm(options, &news).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ConnectUrArm(options, &changes).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ namespace touchstone {
 namespace {
 
 constexpr double kSettleS = 0.05;         // of the arm at the end of a line, and of the program's start
-constexpr double kWristReserveRad = 0.2;  // that a transfer leaves of wrist 3's range, where it can
+constexpr double kWristReserveRad = 0.2;  // that a transit leaves of wrist 3's range, where it can
 constexpr double kMinStandoffM = 1e-3;
 constexpr double kMaxTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
 
@@ -30,7 +30,7 @@ absl::Status Invalid(const std::string& what, double value, const std::string& r
 
 absl::Status CheckLimits(const MotionLimits& limits) {
   for (const auto& [what, value] : {std::pair<const char*, double>{"max_speed_m_s", limits.max_speed_m_s},
-                                    {"transfer_speed_m_s", limits.transfer_speed_m_s},
+                                    {"transit_speed_m_s", limits.transit_speed_m_s},
                                     {"acceleration_m_s2", limits.acceleration_m_s2},
                                     {"max_standoff_m", limits.max_standoff_m},
                                     {"stroke_beyond_target_m", limits.stroke_beyond_target_m},
@@ -64,21 +64,19 @@ class UrMotionPlanner final : public MotionPlanner {
         check_(arm_model, kinematics, limits, calibration.flange_from_tip) {}
 
   absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object, const Bounds& bounds,
-                                    const std::string& placement, const CommandedTouch& touch,
+                                    UpFace up_face, const CommandedTouch& touch,
                                     const std::string& where) const override;
   absl::StatusOr<PlannedTouch> PlanView(const ArmState& from, const Eigen::Isometry3d& base_from_camera,
-                                        const std::string& object, const Bounds& bounds,
-                                        const std::string& placement,
+                                        const std::string& object, const Bounds& bounds, UpFace up_face,
                                         const std::string& where) const override;
   absl::StatusOr<std::vector<Eigen::Isometry3d>> PlanHome(const ArmState& from) const override;
   absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const Bounds& bounds,
-                                               const std::string& placement) const override;
+                                               UpFace up_face) const override;
   const MotionLimits& limits() const override { return limits_; }
   const Calibration& calibration() const override { return calibration_; }
 
  private:
-  absl::Status CheckTouch(const std::string& object, const std::string& placement,
-                          const CommandedTouch& touch) const;
+  absl::Status CheckTouch(const std::string& object, UpFace up_face, const CommandedTouch& touch) const;
   // The height of the clearance plane over an object, base frame.
   double ClearanceHeight(const Eigen::Isometry3d& base_from_object, const Bounds& bounds) const;
   // Joints where the arm is, as the planner's own kinematics has them.
@@ -87,17 +85,16 @@ class UrMotionPlanner final : public MotionPlanner {
   absl::StatusOr<Joints> FollowAll(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses,
                                    Joints joints, int* wrist_3_beyond) const;
   // A checked way from where the arm is to a pose, over the clearance plane; *joints become those of its end.
-  absl::StatusOr<std::vector<Eigen::Isometry3d>> Transfer(const ArmState& from,
-                                                          const Eigen::Isometry3d& start,
-                                                          double clearance_height_m, Joints* joints) const;
-  double TransferDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
+  absl::StatusOr<std::vector<Eigen::Isometry3d>> Transit(const ArmState& from, const Eigen::Isometry3d& start,
+                                                         double clearance_height_m, Joints* joints) const;
+  double TransitDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
 
   const MotionLimits limits_;
   const Calibration calibration_;
   const LineCheck check_;
 };
 
-absl::Status UrMotionPlanner::CheckTouch(const std::string& object, const std::string& placement,
+absl::Status UrMotionPlanner::CheckTouch(const std::string& object, UpFace up_face,
                                          const CommandedTouch& touch) const {
   if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
       !std::isfinite(touch.stroke_m))
@@ -113,16 +110,16 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, const std::s
   if (!(touch.stroke_m > 0))
     return absl::OutOfRangeError(
         absl::StrFormat("stroke %.4g mm: must be above 0", touch.stroke_m / kMetresPerMillimetre));
-  const std::string needed = PlacementFor(touch.approach);
-  if (placement != needed)
-    return absl::FailedPreconditionError(absl::StrCat("object '", object, "' must lie with its face ", needed,
-                                                      " up for an approach along ", PointText(touch.approach),
-                                                      "; it lies with ", placement, " up"));
+  const UpFace needed = UpFaceFor(touch.approach);
+  if (up_face != needed)
+    return absl::FailedPreconditionError(absl::StrCat(
+        "object '", object, "' must lie with its face ", UpFaceName(needed), " up for an approach along ",
+        PointText(touch.approach), "; it lies with ", UpFaceName(up_face), " up"));
   return absl::OkStatus();
 }
 
 absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string& object, const Bounds& bounds,
-                                                              const std::string& placement) const {
+                                                              UpFace up_face) const {
   const auto found = calibration_.base_from_object.find(object);
   if (found == calibration_.base_from_object.end()) {
     std::vector<std::string> known;
@@ -131,10 +128,7 @@ absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string&
                                                       "'", DidYouMean(object, known),
                                                       "; 'touchstone rig calibrate' finds it"));
   }
-  if (const auto& all = Placements(); std::find(all.begin(), all.end(), placement) == all.end())
-    return absl::InvalidArgumentError(
-        absl::StrCat("placement '", placement, "' is not known", DidYouMean(placement, all)));
-  return BaseFromObject(found->second, bounds, placement);
+  return BaseFromObject(found->second, bounds, up_face);
 }
 
 double UrMotionPlanner::ClearanceHeight(const Eigen::Isometry3d& base_from_object,
@@ -170,20 +164,20 @@ absl::StatusOr<Joints> UrMotionPlanner::FollowAll(Eigen::Isometry3d from,
                                                   int* wrist_3_beyond) const {
   *wrist_3_beyond = 0;
   for (size_t i = 0; i < poses.size(); ++i) {
-    const std::string what = i + 1 == poses.size() ? "the way to the start" : "the transfer";
+    const std::string what = i + 1 == poses.size() ? "the way to the start" : "the transit";
     TOUCHSTONE_RETURN_IF_ERROR(
-        check_.Follow(from, poses[i], limits_.transfer_speed_m_s, true, what, &joints, wrist_3_beyond));
+        check_.Follow(from, poses[i], limits_.transit_speed_m_s, true, what, &joints, wrist_3_beyond));
     from = poses[i];
   }
   return joints;
 }
 
-absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transfer(const ArmState& from,
-                                                                         const Eigen::Isometry3d& start,
-                                                                         double clearance_height_m,
-                                                                         Joints* joints) const {
+absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transit(const ArmState& from,
+                                                                        const Eigen::Isometry3d& start,
+                                                                        double clearance_height_m,
+                                                                        Joints* joints) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
-  const TransferWay way{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
+  const TransitPath way{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
   std::vector<Eigen::Isometry3d> poses = way.Poses(0);
   int beyond = 0;
   absl::StatusOr<Joints> end = FollowAll(from.base_from_tip, poses, here, &beyond);
@@ -201,24 +195,24 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transfer(const A
   return poses;
 }
 
-double UrMotionPlanner::TransferDuration(Eigen::Isometry3d from,
-                                         const std::vector<Eigen::Isometry3d>& poses) const {
+double UrMotionPlanner::TransitDuration(Eigen::Isometry3d from,
+                                        const std::vector<Eigen::Isometry3d>& poses) const {
   double duration_s = kSettleS;
   for (const Eigen::Isometry3d& pose : poses) {
-    duration_s += LineDuration(from, pose, limits_.transfer_speed_m_s, limits_.acceleration_m_s2);
+    duration_s += LineDuration(from, pose, limits_.transit_speed_m_s, limits_.acceleration_m_s2);
     from = pose;
   }
   return duration_s;
 }
 
 absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const std::string& object,
-                                                   const Bounds& bounds, const std::string& placement,
+                                                   const Bounds& bounds, UpFace up_face,
                                                    const CommandedTouch& touch,
                                                    const std::string& where) const {
   const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
-    TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(object, placement, touch));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(object, up_face, touch));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
-                                ObjectPose(object, bounds, placement));
+                                ObjectPose(object, bounds, up_face));
 
     // The tip's frame: z along the approach, x along the fingers.
     Eigen::Isometry3d object_from_start = Eigen::Isometry3d::Identity();
@@ -238,12 +232,12 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
         touch.stroke_m < kNoStrokeLimitM ? touch.stroke_m : touch.standoff_m + limits_.stroke_beyond_target_m;
 
     PlannedTouch planned;
-    planned.placement = placement;
+    planned.up_face = up_face;
     planned.motion.speed_m_s = touch.speed_m_s;
     planned.motion.end = start * Eigen::Translation3d(0, 0, stroke_m);
     Joints joints;
-    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
-                                Transfer(from, start, ClearanceHeight(base_from_object, bounds), &joints));
+    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transit,
+                                Transit(from, start, ClearanceHeight(base_from_object, bounds), &joints));
     planned.start_joints_rad = joints;
     int beyond = 0;
     TOUCHSTONE_RETURN_IF_ERROR(
@@ -251,9 +245,9 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
 
     // Contacts are expected at the target.
     const Eigen::Isometry3d target = start * Eigen::Translation3d(0, 0, std::min(stroke_m, touch.standoff_m));
-    planned.motion.duration_s = TransferDuration(from.base_from_tip, planned.motion.transfer) +
+    planned.motion.duration_s = TransitDuration(from.base_from_tip, planned.motion.transit) +
                                 LineDuration(start, target, touch.speed_m_s, limits_.acceleration_m_s2) +
-                                TransferDuration(target, {start});
+                                TransitDuration(target, {start});
     return planned;
   }();
   if (plan.ok()) return plan;
@@ -263,26 +257,25 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
 absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(const ArmState& from,
                                                        const Eigen::Isometry3d& base_from_camera,
                                                        const std::string& object, const Bounds& bounds,
-                                                       const std::string& placement,
-                                                       const std::string& where) const {
+                                                       UpFace up_face, const std::string& where) const {
   const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
     if (!calibration_.has_camera)
       return absl::FailedPreconditionError("the calibration has no flange_from_camera");
     if (!base_from_camera.matrix().allFinite())
       return absl::InvalidArgumentError("the camera's pose must be finite numbers");
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
-                                ObjectPose(object, bounds, placement));
+                                ObjectPose(object, bounds, up_face));
     const Eigen::Isometry3d tip =
         base_from_camera * calibration_.flange_from_camera.inverse() * calibration_.flange_from_tip;
     PlannedTouch planned;
-    planned.placement = placement;
-    planned.motion.speed_m_s = limits_.transfer_speed_m_s;
+    planned.up_face = up_face;
+    planned.motion.speed_m_s = limits_.transit_speed_m_s;
     planned.motion.end = tip;
     Joints joints;
-    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transfer,
-                                Transfer(from, tip, ClearanceHeight(base_from_object, bounds), &joints));
+    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transit,
+                                Transit(from, tip, ClearanceHeight(base_from_object, bounds), &joints));
     planned.start_joints_rad = joints;
-    planned.motion.duration_s = TransferDuration(from.base_from_tip, planned.motion.transfer);
+    planned.motion.duration_s = TransitDuration(from.base_from_tip, planned.motion.transit);
     return planned;
   }();
   if (plan.ok()) return plan;
@@ -296,7 +289,8 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const A
   absl::Status why;
   for (const double back_m :
        {limits_.max_standoff_m, limits_.max_standoff_m / 2, limits_.max_standoff_m / 4, 0.0}) {
-    const std::vector<Eigen::Isometry3d> out = WayOut(from.base_from_tip, back_m, home.translation().z());
+    const std::vector<Eigen::Isometry3d> out =
+        RetractPath(from.base_from_tip, back_m, home.translation().z());
     int beyond = 0;
     const absl::StatusOr<Joints> above = FollowAll(from.base_from_tip, out, here, &beyond);
     if (!above.ok()) {

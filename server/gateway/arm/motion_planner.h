@@ -11,6 +11,7 @@
 
 #include "server/gateway/arm/arm.h"
 #include "server/gateway/calibration/calibration.h"
+#include "server/gateway/calibration/resting_face.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone {
@@ -18,13 +19,13 @@ namespace touchstone {
 // What a rig permits; each is a key of the gateway's configuration.
 struct MotionLimits {
   double max_speed_m_s = 0.1;  // of an approach
-  double transfer_speed_m_s = 0.15;
-  double acceleration_m_s2 = 1.2;  // of approaches and transfers
+  double transit_speed_m_s = 0.15;
+  double acceleration_m_s2 = 1.2;  // of approaches and transits
   double max_standoff_m = 0.15;
   double stroke_beyond_target_m =
       0.03;                      // an approach without a stroke of its own ends so far behind its target
   double max_tilt_rad = 1.0472;  // of an approach from straight down, base frame
-  double clearance_m = 0.05;     // transfers cross so far above the object's box and every start
+  double clearance_m = 0.05;     // transits cross so far above the object's box and every start
   // The box, base frame, that the tip must stay in, and the joints that the arm must stay between.
   Eigen::Vector3d box_min_m{-0.5, -0.5, 0.0}, box_max_m{0.5, 0.5, 0.7};
   std::array<double, 6> joint_min_rad{{-6.2832, -6.2832, -6.2832, -6.2832, -6.2832, -6.2832}};
@@ -38,7 +39,7 @@ struct MotionLimits {
 
 struct PlannedTouch {
   ArmTouch motion;                           // program_id is still 0
-  std::string placement;                     // that it was planned for
+  UpFace up_face = UpFace::kPlusZ;           // that it was planned for
   std::array<double, 6> start_joints_rad{};  // at the start, where the touch ends too
 };
 
@@ -52,23 +53,22 @@ class MotionPlanner {
   virtual ~MotionPlanner() = default;
 
   // Plans from `from` (base_from_tip and joints) to the touch. FAILED_PRECONDITION if the object must lie
-  // otherwise (names the placement that it needs); OUT_OF_RANGE for a pose outside the box, out of reach,
+  // otherwise (names the face that must point up); OUT_OF_RANGE for a pose outside the box, out of reach,
   // joints beyond their limits, too fast, with value and limit. `where` begins every message.
   virtual absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object,
-                                            const Bounds& bounds, const std::string& placement,
-                                            const CommandedTouch& touch, const std::string& where) const = 0;
+                                            const Bounds& bounds, UpFace up_face, const CommandedTouch& touch,
+                                            const std::string& where) const = 0;
   // To a camera pose: `base_from_camera` looks along its z, y down. Same checks; motion.end is its start.
   virtual absl::StatusOr<PlannedTouch> PlanView(const ArmState& from,
                                                 const Eigen::Isometry3d& base_from_camera,
                                                 const std::string& object, const Bounds& bounds,
-                                                const std::string& placement,
-                                                const std::string& where) const = 0;
+                                                UpFace up_face, const std::string& where) const = 0;
   // Home: out along the tool's own axis to the clearance height; joints then.
   virtual absl::StatusOr<std::vector<Eigen::Isometry3d>> PlanHome(const ArmState& from) const = 0;
 
-  // base_from_object of a placement, and the touch's start (base_from_tip).
+  // base_from_object with this face up, and the touch's start (base_from_tip).
   virtual absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const Bounds& bounds,
-                                                       const std::string& placement) const = 0;
+                                                       UpFace up_face) const = 0;
   virtual const MotionLimits& limits() const = 0;
   virtual const Calibration& calibration() const = 0;
 };

@@ -34,14 +34,14 @@ struct Rig {
     at.joints_rad = with.home_rad;
     at.base_from_tip = check.TipAt(with.home_rad);
   }
-  absl::StatusOr<PlannedTouch> Plan(const CommandedTouch& touch, const std::string& placement = "+z") const {
-    return planner->Plan(at, "cube", kCube, placement, touch, "touches[3]");
+  absl::StatusOr<PlannedTouch> Plan(const CommandedTouch& touch, UpFace up_face = UpFace::kPlusZ) const {
+    return planner->Plan(at, "cube", kCube, up_face, touch, "touches[3]");
   }
   // As if the arm had made the touch and were back at its start.
   void Make(const PlannedTouch& plan) {
     Eigen::Isometry3d from = at.base_from_tip;
     int beyond = 0;
-    for (const Eigen::Isometry3d& pose : plan.motion.transfer) {
+    for (const Eigen::Isometry3d& pose : plan.motion.transit) {
       ASSERT_TRUE(check.Follow(from, pose, 0.25, true, "it", &at.joints_rad, &beyond).ok());
       from = pose;
     }
@@ -91,7 +91,7 @@ TEST(MotionPlanner, TipFrameHasItsZAlongTheApproachAndItsXAlongTheFingers) {
   const CommandedTouch touch = RandomTouch(&random, 0.3);
   const auto plan = rig.Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
-  const Eigen::Isometry3d start = plan->motion.transfer.back();
+  const Eigen::Isometry3d start = plan->motion.transit.back();
   EXPECT_LT((start.linear().col(2) - touch.approach).norm(), 1e-9);
   EXPECT_LT((start.linear().col(0) - touch.lateral).norm(), 1e-9);
   EXPECT_NEAR(start.linear().determinant(), 1, 1e-9);
@@ -107,13 +107,13 @@ TEST(MotionPlanner, StrokeOfATouchIsItsOwn) {
   touch.stroke_m = 0.065;
   const auto plan = Rig("ur3e").Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
-  EXPECT_NEAR((plan->motion.end.translation() - plan->motion.transfer.back().translation()).norm(), 0.065,
+  EXPECT_NEAR((plan->motion.end.translation() - plan->motion.transit.back().translation()).norm(), 0.065,
               1e-9);
 }
 
 // Between two starts no fingertip comes lower than the object's top and the clearance, but on the lines of
 // approach.
-TEST(MotionPlanner, TransfersCrossAboveTheObject) {
+TEST(MotionPlanner, TransitsCrossAboveTheObject) {
   Rig rig("ur3e");
   std::mt19937_64 random(3);
   for (int i = 0; i < 50; ++i) {
@@ -122,7 +122,7 @@ TEST(MotionPlanner, TransfersCrossAboveTheObject) {
     const auto plan = rig.Plan(touch);
     ASSERT_TRUE(plan.ok()) << plan.status();
     std::vector<Eigen::Isometry3d> way = {rig.at.base_from_tip};
-    way.insert(way.end(), plan->motion.transfer.begin(), plan->motion.transfer.end());
+    way.insert(way.end(), plan->motion.transit.begin(), plan->motion.transit.end());
     for (size_t line = 0; line + 1 < way.size(); ++line) {
       const Eigen::Vector3d along = way[line + 1].translation() - way[line].translation();
       const bool by_its_axis = along.normalized().cross(way[line + 1].linear().col(2)).norm() < 1e-6 &&
@@ -135,14 +135,14 @@ TEST(MotionPlanner, TransfersCrossAboveTheObject) {
   }
 }
 
-TEST(MotionPlanner, RepeatedTouchNeedsNoTransfer) {
+TEST(MotionPlanner, RepeatedTouchNeedsNoTransit) {
   Rig rig("ur3");
   const auto first = rig.Plan(FromAbove());
   ASSERT_TRUE(first.ok()) << first.status();
   rig.Make(*first);
   const auto second = rig.Plan(FromAbove());
   ASSERT_TRUE(second.ok()) << second.status();
-  EXPECT_EQ(second->motion.transfer.size(), 1u);
+  EXPECT_EQ(second->motion.transit.size(), 1u);
   EXPECT_LT(second->motion.duration_s, first->motion.duration_s);
 }
 
@@ -168,7 +168,8 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
   touch = FromAbove();
   touch.target_m.x() = 0.2;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"x = 530.0 mm", "500.0 mm"});
-  ExpectRefused(rig.Plan(FromAbove(), "+x"), absl::StatusCode::kFailedPrecondition, {"face +z up", "+x up"});
+  ExpectRefused(rig.Plan(FromAbove(), UpFace::kPlusX), absl::StatusCode::kFailedPrecondition,
+                {"face +z up", "+x up"});
   touch = FromAbove();
   touch.stroke_m = 0.3;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"the approach", "z = ", "0.0"});
@@ -202,7 +203,7 @@ TEST(MotionPlanner, RefusesJointsBeyondTheirLimits) {
 
 TEST(MotionPlanner, RefusesUnknownObjectAndNamesTheKnownOnes) {
   const Rig rig("ur3e");
-  const auto plan = rig.planner->Plan(rig.at, "cub", kCube, "+z", FromAbove(), "touches[3]");
+  const auto plan = rig.planner->Plan(rig.at, "cub", kCube, UpFace::kPlusZ, FromAbove(), "touches[3]");
   ExpectRefused(plan, absl::StatusCode::kFailedPrecondition, {"'cub'", "'cube'"});
 }
 
@@ -259,13 +260,14 @@ TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();
   base_from_camera.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;
   base_from_camera.translation() = Eigen::Vector3d(0.30, 0, 0.40);
-  const auto plan = (*planner)->PlanView(rig.at, base_from_camera, "cube", kCube, "+z", "view");
+  const auto plan = (*planner)->PlanView(rig.at, base_from_camera, "cube", kCube, UpFace::kPlusZ, "view");
   ASSERT_TRUE(plan.ok()) << plan.status();
   const Eigen::Isometry3d camera =
-      plan->motion.transfer.back() * calibration.flange_from_tip.inverse() * calibration.flange_from_camera;
+      plan->motion.transit.back() * calibration.flange_from_tip.inverse() * calibration.flange_from_camera;
   EXPECT_TRUE(camera.isApprox(base_from_camera, 1e-9));
-  EXPECT_EQ(rig.planner->PlanView(rig.at, base_from_camera, "cube", kCube, "+z", "view").status().code(),
-            absl::StatusCode::kFailedPrecondition)
+  EXPECT_EQ(
+      rig.planner->PlanView(rig.at, base_from_camera, "cube", kCube, UpFace::kPlusZ, "view").status().code(),
+      absl::StatusCode::kFailedPrecondition)
       << "without flange_from_camera";
 }
 

@@ -32,7 +32,7 @@ absl::StatusOr<DhTable> ParseKinematics(BigEndianReader reader) {
   return table;
 }
 
-absl::Status ParseState(BigEndianReader reader, PrimaryNews* news) {
+absl::Status ParseState(BigEndianReader reader, PrimaryUpdate* update) {
   while (!reader.AtEnd()) {
     const uint32_t size = reader.U32();
     const uint8_t type = reader.U8();
@@ -41,13 +41,13 @@ absl::Status ParseState(BigEndianReader reader, PrimaryNews* news) {
     const absl::string_view body = reader.Bytes(size - kHeaderBytes);
     if (!reader.ok()) return absl::DataLossError("the primary interface sends a state that ends too early");
     if (type == kKinematics) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(news->kinematics, ParseKinematics(BigEndianReader(body)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(update->kinematics, ParseKinematics(BigEndianReader(body)));
     }
   }
   return absl::OkStatus();
 }
 
-void ParseMessage(BigEndianReader reader, PrimaryNews* news) {
+void ParseMessage(BigEndianReader reader, PrimaryUpdate* update) {
   reader.U64();  // its time
   reader.U8();   // and where it comes from
   const uint8_t kind = reader.U8();
@@ -56,41 +56,41 @@ void ParseMessage(BigEndianReader reader, PrimaryNews* news) {
     const std::string title = Printable(reader.Bytes(reader.U8()));
     const std::string text = Printable(reader.Rest());
     if (!reader.ok()) return;
-    news->message = absl::StrCat(title, " ", text);
-    if (title == "PROGRAM_XXX_STARTED") news->started = text;
-    if (title == "PROGRAM_XXX_STOPPED") news->stopped = text;
+    update->message = absl::StrCat(title, " ", text);
+    if (title == "PROGRAM_XXX_STARTED") update->started = text;
+    if (title == "PROGRAM_XXX_STOPPED") update->stopped = text;
   } else if (kind == kError) {
     const int32_t code = reader.I32(), argument = reader.I32(), level = reader.I32();
     reader.U32(), reader.U32();
     const std::string text = Printable(reader.Rest());
     if (!reader.ok() || level < 2) return;  // below a warning
-    news->is_error = true;
-    news->message = absl::StrCat("C", code, "A", argument, " ", text);
+    update->is_error = true;
+    update->message = absl::StrCat("C", code, "A", argument, " ", text);
   } else if (kind == kException) {
     const int32_t line = reader.I32(), column = reader.I32();
     const std::string text = Printable(reader.Rest());
     if (!reader.ok()) return;
-    news->is_error = news->is_exception = true;
-    news->message = absl::StrCat("line ", line, ", column ", column, ": ", text);
+    update->is_error = update->is_exception = true;
+    update->message = absl::StrCat("line ", line, ", column ", column, ": ", text);
   }
 }
 
 }  // namespace
 
-absl::StatusOr<std::optional<PrimaryNews>> PrimaryStream::Next() {
+absl::StatusOr<std::optional<PrimaryUpdate>> PrimaryStream::Next() {
   BigEndianReader reader(bytes_);
-  if (bytes_.size() < kHeaderBytes) return std::optional<PrimaryNews>();
+  if (bytes_.size() < kHeaderBytes) return std::optional<PrimaryUpdate>();
   const uint32_t size = reader.U32();
   if (size < kHeaderBytes || size > kLargestBytes)
     return absl::DataLossError(absl::StrCat("the primary interface sends a package of ", size, " bytes"));
-  if (bytes_.size() < size) return std::optional<PrimaryNews>();
+  if (bytes_.size() < size) return std::optional<PrimaryUpdate>();
   const uint8_t type = reader.U8();
-  PrimaryNews news;
+  PrimaryUpdate update;
   const BigEndianReader body(reader.Bytes(size - kHeaderBytes));
-  if (type == kState) TOUCHSTONE_RETURN_IF_ERROR(ParseState(body, &news));
-  if (type == kMessage) ParseMessage(body, &news);
+  if (type == kState) TOUCHSTONE_RETURN_IF_ERROR(ParseState(body, &update));
+  if (type == kMessage) ParseMessage(body, &update);
   bytes_.erase(0, size);
-  return std::optional<PrimaryNews>(std::move(news));
+  return std::optional<PrimaryUpdate>(std::move(update));
 }
 
 }  // namespace touchstone

@@ -14,7 +14,7 @@
 namespace touchstone {
 
 // What one package told. Everything else in it is skipped.
-struct PrimaryNews {
+struct PrimaryUpdate {
   // "PROGRAM_XXX_STARTED" with the program's name, an error or a runtime exception with its place, in words.
   std::string message;
   bool is_error = false;         // of any kind
@@ -28,7 +28,7 @@ struct PrimaryNews {
 class PrimaryStream {
  public:
   void Append(absl::string_view bytes) { bytes_.append(bytes.data(), bytes.size()); }
-  absl::StatusOr<std::optional<PrimaryNews>> Next();
+  absl::StatusOr<std::optional<PrimaryUpdate>> Next();
 
  private:
   std::string bytes_;

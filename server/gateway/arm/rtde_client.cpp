@@ -82,7 +82,7 @@ void RtdeClient::Run() {
                          absl::StrCat("the link to the controller at ", options_.address,
                                       " is down: ", status.message(), "; trying again")));
     const uint64_t seen = end_.count();
-    if (!ending_) end_.WaitForNews(seen, pause_s);
+    if (!ending_) end_.WaitForChange(seen, pause_s);
     pause_s = std::min(2 * pause_s, kLongestPauseS);
   }
 }
@@ -174,10 +174,10 @@ absl::Status RtdeClient::Receive(TcpSocket* socket) {
   return absl::OkStatus();
 }
 
-absl::Status RtdeClient::WriteInputs(int32_t beat, int32_t command) {
+absl::Status RtdeClient::WriteInputs(int32_t heartbeat, int32_t command) {
   std::lock_guard<std::mutex> lock(write_mutex_);
   if (writer_ == nullptr) return Link();
-  return writer_->Send(EncodeInputs(input_recipe_, beat, command), kSendS);
+  return writer_->Send(EncodeInputs(input_recipe_, heartbeat, command), kSendS);
 }
 
 }  // namespace touchstone

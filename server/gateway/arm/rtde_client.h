@@ -38,7 +38,7 @@ class RtdeClient {
 
   // Both registers in one package, on the wire before it returns. Any thread; never waits for the receiving
   // one.
-  absl::Status WriteInputs(int32_t beat, int32_t command);
+  absl::Status WriteInputs(int32_t heartbeat, int32_t command);
 
  private:
   void Run();
@@ -64,7 +64,7 @@ class RtdeClient {
   uint8_t input_recipe_ = 0;
 
   std::atomic<bool> ending_{false};
-  Signal end_;
+  ChangeNotifier end_;
   std::thread thread_;
 };
 

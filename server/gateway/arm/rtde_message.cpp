@@ -32,16 +32,16 @@ std::vector<Field> OutputFields(bool with_tcp_offset) {
                                {"speed_scaling", "DOUBLE"},
                                {absl::StrCat("output_int_register_", kProgramRegister), "INT32"},
                                {absl::StrCat("output_int_register_", kPhaseRegister), "INT32"}};
-  // Newer controllers tell these too: the tool, and our own beat as it has arrived.
+  // Newer controllers tell these too: the tool, and our own heartbeat as it has arrived.
   if (with_tcp_offset) {
     fields.push_back({"tcp_offset", "VECTOR6D"});
-    fields.push_back({absl::StrCat("input_int_register_", kBeatRegister), "INT32"});
+    fields.push_back({absl::StrCat("input_int_register_", kHeartbeatRegister), "INT32"});
   }
   return fields;
 }
 
 std::vector<Field> InputFields() {
-  return {{absl::StrCat("input_int_register_", kBeatRegister), "INT32"},
+  return {{absl::StrCat("input_int_register_", kHeartbeatRegister), "INT32"},
           {absl::StrCat("input_int_register_", kCommandRegister), "INT32"}};
 }
 
@@ -149,7 +149,7 @@ absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe
   sample.has_tcp_offset = with_tcp_offset;
   if (with_tcp_offset) {
     sample.tcp_offset = Vector6(&reader);
-    sample.beat_echo = reader.I32();
+    sample.heartbeat_echo = reader.I32();
   }
   if (!reader.ok() || !reader.AtEnd())
     return absl::DataLossError(
@@ -163,8 +163,8 @@ absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe
   return sample;
 }
 
-std::string EncodeInputs(uint8_t recipe, int32_t beat, int32_t command) {
-  return EncodeRtde(RtdeType::kData, BigEndianWriter().U8(recipe).I32(beat).I32(command).bytes());
+std::string EncodeInputs(uint8_t recipe, int32_t heartbeat, int32_t command) {
+  return EncodeRtde(RtdeType::kData, BigEndianWriter().U8(recipe).I32(heartbeat).I32(command).bytes());
 }
 
 absl::StatusOr<bool> ParseAccepted(absl::string_view payload) {

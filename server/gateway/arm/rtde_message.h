@@ -56,13 +56,13 @@ struct RtdeSample {
   double speed_scaling = 0;
   int32_t program_register = 0, phase_register = 0;
   std::array<double, 6> tcp_offset{};  // of the tool that actual_tcp_pose is of
-  int32_t beat_echo = 0;               // the newest beat that the controller has got
-  bool has_tcp_offset = false;         // and the beat; old controllers do not tell them
+  int32_t heartbeat_echo = 0;          // the newest heartbeat that the controller has got
+  bool has_tcp_offset = false;         // and the heartbeat; old controllers do not tell them
 };
 
 // "timestamp,actual_q,...": the names of a sample's fields.
 std::string RtdeOutputNames(bool with_tcp_offset);
-std::string RtdeInputNames();  // the beat and the command
+std::string RtdeInputNames();  // the heartbeat and the command
 
 // The reply to a recipe: its id, or an error that names the fields that are NOT_FOUND, IN_USE or of another
 // type.
@@ -70,7 +70,7 @@ absl::StatusOr<uint8_t> ParseOutputRecipe(absl::string_view payload, bool with_t
 absl::StatusOr<uint8_t> ParseInputRecipe(absl::string_view payload);
 
 absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe, bool with_tcp_offset);
-std::string EncodeInputs(uint8_t recipe, int32_t beat, int32_t command);  // header included
+std::string EncodeInputs(uint8_t recipe, int32_t heartbeat, int32_t command);  // header included
 
 absl::StatusOr<bool> ParseAccepted(absl::string_view payload);                  // of V, S, P
 absl::StatusOr<std::string> ParseControllerVersion(absl::string_view payload);  // "5.12.4.1101661"

@@ -41,7 +41,7 @@ TEST(RtdeMessage, SampleIsReadInTheOrderOfItsNames) {
   EXPECT_EQ(sample->program_register, 17);
   EXPECT_EQ(sample->phase_register, -1);
   EXPECT_EQ(sample->tcp_offset[5], 2.5);
-  EXPECT_EQ(sample->beat_echo, 123);
+  EXPECT_EQ(sample->heartbeat_echo, 123);
 }
 
 TEST(RtdeMessage, SampleThatIsCutOrOfAnotherRecipeIsRefused) {
@@ -94,7 +94,7 @@ TEST(RtdeMessage, GarbageNeverBreaksAParser) {
     ParseControllerVersion(bytes).status().IgnoreError();
     PrimaryStream stream;
     stream.Append(bytes);
-    for (auto news = stream.Next(); news.ok() && news->has_value(); news = stream.Next()) {
+    for (auto update = stream.Next(); update.ok() && update->has_value(); update = stream.Next()) {
     }
   }
 }
@@ -130,12 +130,12 @@ TEST(PrimaryStream, ReadsTheArmsOwnKinematics) {
   const std::string part = Package(5, body.bytes());
   EXPECT_EQ(part.size(), 225u);
   stream.Append(Package(16, Package(0, std::string(42, '\0')) + part));
-  const auto news = stream.Next();
-  ASSERT_TRUE(news.ok() && news->has_value() && (*news)->kinematics.has_value());
-  EXPECT_EQ((*(*news)->kinematics)[1].theta_rad, 1);
-  EXPECT_EQ((*(*news)->kinematics)[1].a_m, 7);
-  EXPECT_EQ((*(*news)->kinematics)[1].d_m, 13);
-  EXPECT_EQ((*(*news)->kinematics)[5].alpha_rad, 23);
+  const auto update = stream.Next();
+  ASSERT_TRUE(update.ok() && update->has_value() && (*update)->kinematics.has_value());
+  EXPECT_EQ((*(*update)->kinematics)[1].theta_rad, 1);
+  EXPECT_EQ((*(*update)->kinematics)[1].a_m, 7);
+  EXPECT_EQ((*(*update)->kinematics)[1].d_m, 13);
+  EXPECT_EQ((*(*update)->kinematics)[5].alpha_rad, 23);
 }
 
 TEST(PrimaryStream, PackageOfImpossibleSizeIsAnError) {

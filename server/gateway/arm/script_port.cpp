@@ -16,8 +16,8 @@ constexpr double kFirstPauseS = 0.05, kLongestPauseS = 1;
 
 }  // namespace
 
-ScriptPort::ScriptPort(std::string address, int port, std::function<void(const PrimaryNews&)> on_news)
-    : address_(std::move(address)), port_(port), on_news_(std::move(on_news)) {
+ScriptPort::ScriptPort(std::string address, int port, std::function<void(const PrimaryUpdate&)> on_update)
+    : address_(std::move(address)), port_(port), on_update_(std::move(on_update)) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -70,7 +70,7 @@ void ScriptPort::Run() {
       writer_.reset();
     }
     const uint64_t seen = end_.count();
-    if (!ending_) end_.WaitForNews(seen, pause_s);
+    if (!ending_) end_.WaitForChange(seen, pause_s);
     pause_s = std::min(2 * pause_s, kLongestPauseS);
   }
 }
@@ -82,9 +82,9 @@ absl::Status ScriptPort::Receive(TcpSocket* socket) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count, socket->Receive(buffer, sizeof(buffer), kSliceS));
     stream.Append(absl::string_view(buffer, count));
     while (true) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PrimaryNews> news, stream.Next());
-      if (!news.has_value()) break;
-      if (on_news_ != nullptr) on_news_(*news);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PrimaryUpdate> update, stream.Next());
+      if (!update.has_value()) break;
+      if (on_update_ != nullptr) on_update_(*update);
     }
     if (!Connected()) return absl::UnavailableError("a program could not be sent");
   }

@@ -19,8 +19,8 @@ namespace touchstone {
 
 class ScriptPort {
  public:
-  // `on_news` is called from a thread of this object's own.
-  ScriptPort(std::string address, int port, std::function<void(const PrimaryNews&)> on_news);
+  // `on_update` is called from a thread of this object's own.
+  ScriptPort(std::string address, int port, std::function<void(const PrimaryUpdate&)> on_update);
   ~ScriptPort();
 
   // The program's text, on the wire before it returns; two sends are never mixed, and arrive in their order.
@@ -38,11 +38,11 @@ class ScriptPort {
 
   const std::string address_;
   const int port_;
-  const std::function<void(const PrimaryNews&)> on_news_;
+  const std::function<void(const PrimaryUpdate&)> on_update_;
   mutable std::timed_mutex mutex_;  // of writer_
   std::shared_ptr<TcpSocket> writer_;
   std::atomic<bool> ending_{false};
-  Signal end_;
+  ChangeNotifier end_;
   std::thread thread_;
 };
 

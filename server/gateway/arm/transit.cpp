@@ -30,7 +30,7 @@ Eigen::Isometry3d Lifted(Eigen::Isometry3d pose, double plane_m) {
 
 }  // namespace
 
-std::vector<Eigen::Isometry3d> TransferWay::Poses(int turn) const {
+std::vector<Eigen::Isometry3d> TransitPath::Poses(int turn) const {
   if (turn == 0 && SamePose(from, to)) return {to};
   // Tilted, a finger hangs lower than the middle one. No start is crossed below its own height.
   const double hang_m =
@@ -69,7 +69,7 @@ std::vector<Eigen::Isometry3d> TransferWay::Poses(int turn) const {
   return kept;
 }
 
-std::vector<Eigen::Isometry3d> WayOut(const Eigen::Isometry3d& from, double back_m, double height_m) {
+std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double back_m, double height_m) {
   std::vector<Eigen::Isometry3d> poses;
   const double rise_m = height_m - from.translation().z();
   if (rise_m <= kSamePlaceM) return poses;

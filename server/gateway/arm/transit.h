@@ -8,7 +8,7 @@
 
 namespace touchstone {
 
-struct TransferWay {
+struct TransitPath {
   Eigen::Isometry3d from, to;     // base_from_tip
   double plane_m = 0;             // height, base frame, that every fingertip crosses at, at least
   double outermost_finger_m = 0;  // from the middle one
@@ -20,6 +20,6 @@ struct TransferWay {
 
 // Back along the tool's axis by `back_m` (less if it reaches the height before), then straight up to the
 // height.
-std::vector<Eigen::Isometry3d> WayOut(const Eigen::Isometry3d& from, double back_m, double height_m);
+std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double back_m, double height_m);
 
 }  // namespace touchstone

@@ -37,50 +37,51 @@ Eigen::Isometry3d PoseOf(const std::array<double, 6>& vector) {
   return pose;
 }
 
-// When the last beats were sent, host time.
-class SentBeats {
+// When the last heartbeats were sent, host time.
+class SentHeartbeats {
  public:
-  void Sent(int32_t beat, double host_s) {
+  void Sent(int32_t heartbeat, double host_s) {
     std::lock_guard<std::mutex> lock(mutex_);
-    sent_[beat % kKept] = {beat, host_s};
+    sent_[heartbeat % kKept] = {heartbeat, host_s};
   }
-  // When that beat was sent, the first time that it is asked for; 0 afterwards, and if it is not known.
-  double TakeSendingOf(int32_t beat) {
+  // When that heartbeat was sent, the first time that it is asked for; 0 afterwards, and if it is not known.
+  double TakeSendingOf(int32_t heartbeat) {
     std::lock_guard<std::mutex> lock(mutex_);
-    Beat& kept = sent_[static_cast<uint32_t>(beat) % kKept];
-    if (kept.beat != beat || beat == last_) return 0;
-    last_ = beat;
+    Heartbeat& kept = sent_[static_cast<uint32_t>(heartbeat) % kKept];
+    if (kept.heartbeat != heartbeat || heartbeat == last_) return 0;
+    last_ = heartbeat;
     return kept.host_s;
   }
 
  private:
-  struct Beat {
-    int32_t beat = 0;
+  struct Heartbeat {
+    int32_t heartbeat = 0;
     double host_s = 0;
   };
   static constexpr int kKept = 256;
   std::mutex mutex_;
-  std::array<Beat, kKept> sent_{};
+  std::array<Heartbeat, kKept> sent_{};
   int32_t last_ = 0;
 };
 
 class UrArmOnTcp final : public UrArm {
  public:
-  UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, Signal* news)
+  UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, ChangeNotifier* changes)
       : options_(options),
-        news_(news),
+        changes_(changes),
         nominal_(nominal),
         tip_from_flange_(options.script.flange_from_tip.inverse()),
         history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * RateOf(options.model))),
         clock_(options.script.time_scale),
         dashboard_(options.address, options.dashboard_port),
-        primary_(options.address, options.primary_port, [this](const PrimaryNews& told) { OnPrimary(told); }),
+        primary_(options.address, options.primary_port,
+                 [this](const PrimaryUpdate& told) { OnPrimary(told); }),
         programs_(options.address, options.secondary_port, nullptr),
         stops_(options.address, options.secondary_port, nullptr),
         rtde_(
             {options.address, options.rtde_port, RateOf(options.model), 4 * options.frozen_after_s + 1},
             [this](const RtdeSample& sample, double host_s) { OnSample(sample, host_s); },
-            [this] { news_->Notify(); }) {}
+            [this] { changes_->Notify(); }) {}
 
   absl::StatusOr<ArmState> State() const override;
   std::vector<ArmState> History(double from_controller_s, double to_controller_s) const override {
@@ -92,11 +93,11 @@ class UrArmOnTcp final : public UrArm {
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints) override;
   absl::Status BeginApproach(uint32_t program_id) override { return Command(program_id, kCommandGo); }
-  absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetreat); }
+  absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetract); }
   absl::Status Stop() override;
-  absl::Status PowerOn() override;
-  void Beat() override;
-  absl::Status WriteBeat();  // inputs_mutex_ is held
+  absl::Status PowerOn(const std::function<absl::Status()>& guard) override;
+  void SendHeartbeat() override;
+  absl::Status WriteHeartbeat();  // inputs_mutex_ is held
 
   ClockEstimate ControllerClock() const override {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -124,7 +125,7 @@ class UrArmOnTcp final : public UrArm {
   };
 
   void OnSample(const RtdeSample& sample, double host_s);
-  void OnPrimary(const PrimaryNews& told);
+  void OnPrimary(const PrimaryUpdate& told);
   absl::Status Begin(uint32_t program_id, const std::string& program);
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
@@ -134,7 +135,7 @@ class UrArmOnTcp final : public UrArm {
   absl::Status StartFailure() const;
 
   const UrArmOptions options_;
-  Signal* const news_;
+  ChangeNotifier* const changes_;
   const UrKinematics nominal_;
   const Eigen::Isometry3d tip_from_flange_;
 
@@ -146,10 +147,10 @@ class UrArmOnTcp final : public UrArm {
 
   mutable std::atomic<bool> suspect_{false};  // a program did not begin
   std::mutex inputs_mutex_;                   // of the registers
-  int32_t beat_ = 0, command_ = 0;
-  SentBeats sent_beats_;
+  int32_t heartbeat_ = 0, command_ = 0;
+  SentHeartbeats sent_heartbeats_;
   std::atomic<uint64_t> stop_count_{0};
-  std::atomic<bool> withhold_beats_{false};
+  std::atomic<bool> withhold_heartbeats_{false};
 
   mutable DashboardClient dashboard_;
   // Last: their threads use what stands above.
@@ -162,14 +163,14 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   state.host_time_s = host_s;
   state.controller_time_s = sample.timestamp_s;
   state.joints_rad = sample.actual_q_rad;
-  state.robot_mode = sample.robot_mode;
-  state.safety_mode = sample.safety_mode;
-  state.runtime_state = static_cast<int>(sample.runtime_state);
+  state.robot_mode = static_cast<RobotMode>(sample.robot_mode);
+  state.safety_mode = static_cast<SafetyMode>(sample.safety_mode);
+  state.runtime_state = static_cast<RuntimeState>(sample.runtime_state);
   state.robot_status_bits = sample.robot_status_bits;
   state.safety_status_bits = sample.safety_status_bits;
   state.speed_scaling = sample.speed_scaling;
   state.program_id = static_cast<uint32_t>(sample.program_register);
-  state.phase = sample.phase_register;
+  state.phase = static_cast<MotionPhase>(sample.phase_register);
 
   // The controller tells the pose of whatever tool was set last; ours may not have been set yet.
   const Eigen::Isometry3d base_from_tcp = PoseOf(sample.actual_tcp_pose);
@@ -186,25 +187,25 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     history_.Add(state);
-    // A state that tells a new beat was made between the beat's sending and its own arrival; without beats,
+    // A state that tells a new heartbeat was made between the heartbeat's sending and its own arrival; without heartbeats,
     // only the later of the two is known.
-    const double sent_s = sample.has_tcp_offset ? sent_beats_.TakeSendingOf(sample.beat_echo) : 0;
+    const double sent_s = sample.has_tcp_offset ? sent_heartbeats_.TakeSendingOf(sample.heartbeat_echo) : 0;
     if (sent_s > 0)
       clock_.AddRoundTrip(sent_s, state.controller_time_s, state.controller_time_s, host_s);
     else
       clock_.AddOneWay(state.controller_time_s, host_s, options_.assumed_delay_s);
     if (start_.program_id == state.program_id) start_ = Start();
   }
-  news_->Notify();
+  changes_->Notify();
 }
 
-void UrArmOnTcp::OnPrimary(const PrimaryNews& told) {
+void UrArmOnTcp::OnPrimary(const PrimaryUpdate& told) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (told.kinematics.has_value()) kinematics_ = told.kinematics;
   if (start_.program_id == 0 || !told.is_error) return;
   start_.complaint = told.message;
   start_.refused = start_.refused || told.is_exception;
-  if (start_.refused) news_->Notify();
+  if (start_.refused) changes_->Notify();
 }
 
 absl::Status UrArmOnTcp::StartFailure() const {
@@ -258,12 +259,12 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program) 
     return absl::InvalidArgumentError(
         absl::StrCat("program id ", program_id, ": must be from 1 to ", (1u << 28) - 1));
   const uint64_t stops = stop_count_;
-  withhold_beats_ = false;
+  withhold_heartbeats_ = false;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     start_ = Start{program_id, HostNowS(), "", false};
   }
-  Beat();
+  SendHeartbeat();
   // A stop that comes while the program goes out must reach the controller behind it.
   const auto stop_behind = [&] { return stop_count_ != stops ? StopProgram() : std::string(); };
   const absl::Status sent = programs_.Send(program, stop_behind);
@@ -284,19 +285,19 @@ std::vector<double> UrArmOnTcp::Speeds(const ArmState& from,
   Joints joints = from.joints_rad;
   Eigen::Isometry3d at = from.base_from_tip;
   for (const Eigen::Isometry3d& pose : way) {
-    speeds_m_s.push_back(
-        PacedSpeed(nominal_, tip_from_flange_, at, pose, options_.script.transfer_speed_m_s, &joints));
+    speeds_m_s.push_back(LimitedCartesianSpeed(nominal_, tip_from_flange_, at, pose,
+                                               options_.script.transit_speed_m_s, &joints));
     at = pose;
   }
   return speeds_m_s;
 }
 
 absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
-  if (touch.transfer.empty()) return absl::InvalidArgumentError("a touch needs a start");
+  if (touch.transit.empty()) return absl::InvalidArgumentError("a touch needs a start");
   if (!(touch.speed_m_s > 0)) return absl::InvalidArgumentError("a touch needs a speed above 0");
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
-  std::vector<Eigen::Isometry3d> way = touch.transfer;
+  std::vector<Eigen::Isometry3d> way = touch.transit;
   way.push_back(touch.end);  // as fast as it could be gone down, it can be gone up
   return Begin(touch.program_id, TouchProgram(touch, Speeds(now, way), options_.script));
 }
@@ -311,19 +312,19 @@ absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eige
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
   std::lock_guard<std::mutex> lock(inputs_mutex_);
   command_ = CommandWord(program_id, command);
-  return WriteBeat();
+  return WriteHeartbeat();
 }
 
-void UrArmOnTcp::Beat() {
-  if (withhold_beats_) return;
+void UrArmOnTcp::SendHeartbeat() {
+  if (withhold_heartbeats_) return;
   std::lock_guard<std::mutex> lock(inputs_mutex_);
-  WriteBeat().IgnoreError();  // a lost link is told by State()
+  WriteHeartbeat().IgnoreError();  // a lost link is told by State()
 }
 
-absl::Status UrArmOnTcp::WriteBeat() {
-  beat_ = (beat_ + 1) & 0x7fffffff;
-  sent_beats_.Sent(beat_, HostNowS());
-  return rtde_.WriteInputs(beat_, command_);
+absl::Status UrArmOnTcp::WriteHeartbeat() {
+  heartbeat_ = (heartbeat_ + 1) & 0x7fffffff;
+  sent_heartbeats_.Sent(heartbeat_, HostNowS());
+  return rtde_.WriteInputs(heartbeat_, command_);
 }
 
 absl::Status UrArmOnTcp::SendStop() {
@@ -348,26 +349,27 @@ absl::Status UrArmOnTcp::Stop() {
     std::lock_guard<std::mutex> lock(mutex_);
     start_ = Start();
   }
-  news_->Notify();
+  changes_->Notify();
   if (status.ok()) return status;
-  withhold_beats_ = true;
+  withhold_heartbeats_ = true;
   return absl::UnavailableError(absl::StrCat(
       "the stop could not be sent to the controller at ", options_.address, " (", status.message(),
       "): its watchdog stops a running program soon; press the emergency stop if anything moves"));
 }
 
-absl::Status UrArmOnTcp::PowerOn() {
+absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
   const double until_s = HostNowS() + kPowerOnHostS + kPowerOnRigS / options_.script.time_scale;
   bool powered = false, released = false;
   while (true) {
-    const uint64_t seen = news_->count();
+    const uint64_t seen = changes_->count();
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
     TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, State());
-    if (state.robot_mode == 7) return SafetyPermitsMotion(state.safety_mode);
+    if (state.robot_mode == RobotMode::kRunning) return SafetyPermitsMotion(state.safety_mode);
     TOUCHSTONE_RETURN_IF_ERROR(SafetyPermitsMotion(state.safety_mode));
-    if (!powered && state.robot_mode < 5) {
+    if (!powered && state.robot_mode < RobotMode::kIdle) {
       TOUCHSTONE_RETURN_IF_ERROR(dashboard_.Demand("power on", "Powering on", kDashboardS));
       powered = true;
-    } else if (!released && state.robot_mode == 5) {
+    } else if (!released && state.robot_mode == RobotMode::kIdle) {
       TOUCHSTONE_RETURN_IF_ERROR(dashboard_.Demand("brake release", "Brake releasing", kDashboardS));
       released = true;
     }
@@ -375,13 +377,13 @@ absl::Status UrArmOnTcp::PowerOn() {
       return absl::UnavailableError(absl::StrCat("the arm was powered on but its mode is still ",
                                                  RobotModeName(state.robot_mode),
                                                  ": look at the teach pendant"));
-    news_->WaitForNews(seen, 0.1);
+    changes_->WaitForChange(seen, 0.1);
   }
 }
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, Signal* news) {
+absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, ChangeNotifier* changes) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics nominal, UrKinematics::ForModel(options.model));
   if (options.address.empty()) return absl::InvalidArgumentError("arm: the controller's address is missing");
   for (const int port :
@@ -391,11 +393,11 @@ absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options,
   }
   if (!(options.script.time_scale > 0) || !(options.frozen_after_s > 0))
     return absl::InvalidArgumentError("arm: time_scale and frozen_after_s must be above 0");
-  auto arm = std::make_unique<UrArmOnTcp>(options, nominal, news);
+  auto arm = std::make_unique<UrArmOnTcp>(options, nominal, changes);
   const double until_s = HostNowS() + options.connect_wait_s;
   while ((!arm->State().ok() || !arm->ProgramPortsConnected()) && HostNowS() < until_s) {
-    const uint64_t seen = news->count();
-    news->WaitForNews(seen, 0.01);
+    const uint64_t seen = changes->count();
+    changes->WaitForChange(seen, 0.01);
   }
   return std::unique_ptr<UrArm>(std::move(arm));
 }

@@ -30,14 +30,14 @@ class UrArm : public Arm {
 };
 
 // Begins to connect, and goes on trying as long as the object lives: State() tells. INVALID_ARGUMENT: the
-// options make no sense. `news` is notified of every state and every change of the link; it must outlive the
+// options make no sense. `changes` is notified of every state and every change of the link; it must outlive the
 // arm.
 //
 // StartTouch and MoveThrough return when the program is on the wire. If the controller does not begin it,
 // State() becomes UNAVAILABLE with what the controller said, until the next program or stop. Stop() is not
 // queued behind anything: it has a connection of its own, goes a second way behind a program that is just
-// being sent, and falls back on the dashboard; if all fail, beats are withheld so that the watchdog stops the
+// being sent, and falls back on the dashboard; if all fail, heartbeats are withheld so that the watchdog stops the
 // program.
-absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, Signal* news);
+absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, ChangeNotifier* changes);
 
 }  // namespace touchstone

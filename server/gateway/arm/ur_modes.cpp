@@ -2,19 +2,19 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/gateway/arm/arm.h"
-
 namespace touchstone {
 
-std::string RobotModeName(int robot_mode) {
+std::string RobotModeName(RobotMode mode) {
   static constexpr const char* kNames[] = {"NO_CONTROLLER", "DISCONNECTED",     "CONFIRM_SAFETY", "BOOTING",
                                            "POWER_OFF",     "POWER_ON",         "IDLE",           "BACKDRIVE",
                                            "RUNNING",       "UPDATING_FIRMWARE"};
-  if (robot_mode < -1 || robot_mode > 8) return absl::StrCat("UNKNOWN (", robot_mode, ")");
-  return kNames[robot_mode + 1];
+  const int number = static_cast<int>(mode);
+  if (mode < RobotMode::kNoController || mode > RobotMode::kUpdatingFirmware)
+    return absl::StrCat("UNKNOWN (", number, ")");
+  return kNames[number - static_cast<int>(RobotMode::kNoController)];
 }
 
-std::string SafetyModeName(int safety_mode) {
+std::string SafetyModeName(SafetyMode mode) {
   static constexpr const char* kNames[] = {"NORMAL",
                                            "REDUCED",
                                            "PROTECTIVE_STOP",
@@ -24,33 +24,53 @@ std::string SafetyModeName(int safety_mode) {
                                            "ROBOT_EMERGENCY_STOP",
                                            "VIOLATION",
                                            "FAULT"};
-  if (safety_mode < 1 || safety_mode > 9) return absl::StrCat("UNKNOWN (", safety_mode, ")");
-  return kNames[safety_mode - 1];
+  const int number = static_cast<int>(mode);
+  if (mode < SafetyMode::kNormal || mode > SafetyMode::kFault) return absl::StrCat("UNKNOWN (", number, ")");
+  return kNames[number - static_cast<int>(SafetyMode::kNormal)];
 }
 
-absl::Status SafetyPermitsMotion(int safety_mode) {
+const char* PhaseName(MotionPhase phase) {
+  static constexpr const char* kNames[] = {"none", "transit", "ready", "approach", "retract", "done"};
+  if (phase < MotionPhase::kNone || phase > MotionPhase::kDone) return "unknown";
+  return kNames[static_cast<int>(phase)];
+}
+
+absl::Status SafetyPermitsMotion(SafetyMode safety_mode) {
   const char* what_to_do = "look at the teach pendant";
-  if (safety_mode == 1 || safety_mode == 2) return absl::OkStatus();  // reduced: slower, and measured so
-  if (safety_mode == 3)
-    what_to_do = "find out why, clear the way, then unlock it at the teach pendant; this program never does";
-  if (safety_mode == 5) what_to_do = "somebody is inside the safeguard; close it";
-  if (safety_mode == 6 || safety_mode == 7) what_to_do = "release the emergency stop, then power the arm on";
+  switch (safety_mode) {
+    case SafetyMode::kNormal:
+    case SafetyMode::kReduced:  // slower, and a touch whose speed was scaled is refused
+      return absl::OkStatus();
+    case SafetyMode::kProtectiveStop:
+      what_to_do =
+          "find out why, clear the way, then unlock it at the teach pendant; this program never does";
+      break;
+    case SafetyMode::kRecovery:
+      what_to_do = "the arm is outside its safety limits: move it back by hand at the teach pendant";
+      break;
+    case SafetyMode::kSafeguardStop:
+      what_to_do = "somebody is inside the safeguard; close it";
+      break;
+    case SafetyMode::kSystemEmergencyStop:
+    case SafetyMode::kRobotEmergencyStop:
+      what_to_do = "release the emergency stop, then power the arm on";
+      break;
+    case SafetyMode::kUnspecified:
+    case SafetyMode::kViolation:
+    case SafetyMode::kFault:
+      break;
+  }
   return absl::FailedPreconditionError(absl::StrCat("the arm's safety mode is ", SafetyModeName(safety_mode),
                                                     ", NORMAL is needed: ", what_to_do));
 }
 
-absl::Status ModesPermitMotion(int robot_mode, int safety_mode) {
+absl::Status ModesPermitMotion(RobotMode robot_mode, SafetyMode safety_mode) {
   if (absl::Status safety = SafetyPermitsMotion(safety_mode); !safety.ok()) return safety;
-  if (robot_mode == 7) return absl::OkStatus();
+  if (robot_mode == RobotMode::kRunning) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("the arm's mode is ", RobotModeName(robot_mode),
                    ", RUNNING is needed: power it on and release its brakes, at the teach pendant or with "
                    "'touchstone rig power-on'"));
-}
-
-const char* PhaseName(int phase) {
-  static constexpr const char* kNames[] = {"none", "transfer", "ready", "approach", "retreat", "done"};
-  return phase < 0 || phase > 5 ? "unknown" : kNames[phase];
 }
 
 }  // namespace touchstone

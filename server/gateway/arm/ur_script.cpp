@@ -29,14 +29,14 @@ std::string Phase(MotionPhase phase) {
 // What every program begins with. The phase is told before the id, so that nobody sees this id with an old
 // phase.
 std::string Head(uint32_t program_id, const ScriptOptions& options) {
-  std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kBeatRegister, "\", ",
+  std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kHeartbeatRegister, "\", ",
                                   Number(options.watchdog_hz / options.time_scale), ", \"stop\")\n");
   absl::StrAppend(&text, "  set_tcp(", PoseText(options.flange_from_tip), ")\n  set_payload(",
                   Number(options.payload_kg), ")\n");
   if (!options.gravity_m_s2.isApprox(ScriptOptions().gravity_m_s2))
     absl::StrAppend(&text, "  set_gravity([", Number(options.gravity_m_s2.x()), ",",
                     Number(options.gravity_m_s2.y()), ",", Number(options.gravity_m_s2.z()), "])\n");
-  absl::StrAppend(&text, Phase(MotionPhase::kTransfer), "  write_output_integer_register(", kProgramRegister,
+  absl::StrAppend(&text, Phase(MotionPhase::kTransit), "  write_output_integer_register(", kProgramRegister,
                   ", ", program_id, ")\n");
   return text;
 }
@@ -83,11 +83,11 @@ double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, 
 
 std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options) {
-  const Eigen::Isometry3d& start = touch.transfer.back();
+  const Eigen::Isometry3d& start = touch.transit.back();
   const std::string command = absl::StrCat("read_input_integer_register(", kCommandRegister, ")");
   const std::string acceleration = Number(options.acceleration_m_s2);
   std::string text = absl::StrCat("def touch_", touch.program_id, "():\n", Head(touch.program_id, options));
-  absl::StrAppend(&text, Lines(touch.transfer, speeds_m_s, options), Phase(MotionPhase::kReady));
+  absl::StrAppend(&text, Lines(touch.transit, speeds_m_s, options), Phase(MotionPhase::kReady));
 
   // Waits for the command; the approach runs in a thread, so that the end can be commanded at any moment of
   // it.
@@ -98,9 +98,9 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
                   "    approaching = False\n  end\n", Phase(MotionPhase::kApproach),
                   "  handle = run approach()\n");
   absl::StrAppend(&text, "  while approaching and ", command,
-                  " != ", CommandWord(touch.program_id, kCommandRetreat),
+                  " != ", CommandWord(touch.program_id, kCommandRetract),
                   ":\n    sync()\n  end\n  kill handle\n  stopl(", acceleration, ")\n");
-  absl::StrAppend(&text, Phase(MotionPhase::kRetreat), "  ",
+  absl::StrAppend(&text, Phase(MotionPhase::kRetract), "  ",
                   MoveLine(start, options.acceleration_m_s2, speeds_m_s.back()), Phase(MotionPhase::kDone),
                   "end\n");
   return text;

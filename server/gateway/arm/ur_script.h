@@ -15,18 +15,18 @@ namespace touchstone {
 struct ScriptOptions {
   Eigen::Isometry3d flange_from_tip = Eigen::Isometry3d::Identity();
   double payload_kg = 0.5;
-  double transfer_speed_m_s = 0.25;
+  double transit_speed_m_s = 0.25;
   double acceleration_m_s2 = 1.2;
   double joint_speed_rad_s = 1.05, joint_acceleration_rad_s2 = 1.4;
   double time_scale = 1;                     // rig seconds in one host second
-  double watchdog_hz = kWatchdogHz;          // of beats, host time
+  double watchdog_hz = kWatchdogHz;          // of heartbeats, host time
   Eigen::Vector3d gravity_m_s2{0, 0, 9.82};  // as set_gravity takes it; this one (a table) is not sent
 };
 
 // "p[0.3,0,0.1,3.14159,0,0]": position in m, rotation vector in rad.
 std::string PoseText(const Eigen::Isometry3d& pose);
 
-// `speeds_m_s` has one speed for every line of the transfer, and one for the retreat.
+// `speeds_m_s` has one speed for every line of the transit, and one for the retreat.
 std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options);
 // One speed for every pose.

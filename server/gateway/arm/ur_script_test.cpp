@@ -20,7 +20,7 @@ Eigen::Isometry3d Down(double x_m, double z_m) {
 ArmTouch SomeTouch() {
   ArmTouch touch;
   touch.program_id = 17;
-  touch.transfer = {Down(0.3, 0.3), Down(0.3, 0.2)};
+  touch.transit = {Down(0.3, 0.3), Down(0.3, 0.2)};
   touch.end = Down(0.3, 0.1);
   touch.speed_m_s = 0.02;
   return touch;

@@ -194,7 +194,7 @@ void SerialEffector::HandleClock(const firmware::ClockReply& reply, size_t paylo
 }
 
 void SerialEffector::HandleStatus(const firmware::Status& status) {
-  bool news = false;
+  bool changes = false;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     // One message may be damaged; two that tell the same are not.
@@ -208,11 +208,11 @@ void SerialEffector::HandleStatus(const firmware::Status& status) {
     if (other_boot) return;
     for (size_t i = 0; i < state_.pressed.size(); ++i) {
       const bool pressed = (status.pressed_mask >> i & 1) != 0;
-      news |= pressed != state_.pressed[i];
+      changes |= pressed != state_.pressed[i];
       state_.pressed[i] = pressed;
     }
   }
-  if (news && news_ != nullptr) news_->Notify();
+  if (changes && changes_ != nullptr) changes_->Notify();
 }
 
 void SerialEffector::HandleEvent(const firmware::Event& event) {
@@ -236,7 +236,7 @@ void SerialEffector::HandleEvent(const firmware::Event& event) {
     if (!twice) return;
   }
   (void)Send(firmware::Acknowledge{event.number});
-  if (verdict == ContactRecord::Verdict::kNews && news_ != nullptr) news_->Notify();
+  if (verdict == ContactRecord::Verdict::kNews && changes_ != nullptr) changes_->Notify();
 }
 
 uint64_t SerialEffector::MaxTicks() const {
@@ -259,7 +259,7 @@ absl::Status SerialEffector::Converse() {
     first_try_over_ = true;
   }
   changed_.notify_all();
-  if (news_ != nullptr) news_->Notify();
+  if (changes_ != nullptr) changes_->Notify();
 
   while (!Stopping()) {
     std::function<absl::Status()> work;
@@ -418,7 +418,7 @@ absl::Status SerialEffector::SettleTouch() {
     std::lock_guard<std::mutex> lock(mutex_);
     record_.Lose(absl::StrCat("the device has no record of touch ", record_.touch().touch, " any more"));
   }
-  if (news_ != nullptr) news_->Notify();
+  if (changes_ != nullptr) changes_->Notify();
   return absl::IsFailedPrecondition(status) ? absl::OkStatus() : status;
 }
 

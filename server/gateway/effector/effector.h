@@ -57,14 +57,14 @@ struct EffectorState {
 class Effector {
  public:
   // Opens the port and agrees on version and fingers; goes on trying in the background if nothing answers.
-  static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, Signal* news);
+  static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, ChangeNotifier* changes);
   virtual ~Effector() = default;
 
   // Begins a touch (id above 0) and returns once the device has said so. FAILED_PRECONDITION names the
   // fingers that are pressed already; UNAVAILABLE: the line is lost.
   virtual absl::Status Arm(uint32_t touch) = 0;
   virtual absl::Status Disarm() = 0;
-  // What was heard of the armed or last touch; news->Notify() after every change. UNAVAILABLE if the line was
+  // What was heard of the armed or last touch; changes->Notify() after every change. UNAVAILABLE if the line was
   // lost since, or the device was reset, in which case its record is gone.
   virtual absl::StatusOr<EffectorTouch> Touch() const = 0;
   // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has

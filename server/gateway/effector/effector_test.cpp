@@ -34,16 +34,16 @@ class EffectorTest : public testing::Test {
     device_ = std::make_unique<FakeDevice>(device);
   }
   void Open(const EffectorOptions& options) {
-    absl::StatusOr<std::unique_ptr<Effector>> effector = Effector::Open(options, &news_);
+    absl::StatusOr<std::unique_ptr<Effector>> effector = Effector::Open(options, &changes_);
     ASSERT_TRUE(effector.ok()) << effector.status();
     effector_ = *std::move(effector);
   }
   bool WaitFor(const std::function<bool()>& done) {
     const double until_s = HostNowS() + kLongS;
     while (HostNowS() < until_s) {
-      const uint64_t seen = news_.count();
+      const uint64_t seen = changes_.count();
       if (done()) return true;
-      news_.WaitForNews(seen, 0.02);  // not every change that tests look at is news
+      changes_.WaitForChange(seen, 0.02);  // not every change that tests look at is changes
     }
     return false;
   }
@@ -66,7 +66,7 @@ class EffectorTest : public testing::Test {
     return status;
   }
 
-  Signal news_;
+  ChangeNotifier changes_;
   std::unique_ptr<FakeDevice> device_;
   std::unique_ptr<Effector> effector_;
 };
@@ -237,7 +237,7 @@ TEST_F(EffectorTest, RefusesAFirmwareOfAnotherVersion) {
   FakeDevice::Options device;
   device.answers_with_version = 2;
   Start(device);
-  const absl::Status status = Effector::Open(Options(), &news_).status();
+  const absl::Status status = Effector::Open(Options(), &changes_).status();
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr("version 2 of the protocol, this gateway version 1"));
 }
@@ -245,7 +245,7 @@ TEST_F(EffectorTest, RefusesAFirmwareOfAnotherVersion) {
 TEST_F(EffectorTest, RefusesOptionsThatMakeNoSense) {
   Start();
   const auto error = [&](const EffectorOptions& options) {
-    return std::string(Effector::Open(options, &news_).status().message());
+    return std::string(Effector::Open(options, &changes_).status().message());
   };
   EXPECT_THAT(error(Options(0)), HasSubstr("0 fingers; right is 1 to 8"));
   EXPECT_THAT(error(Options(9)), HasSubstr("9 fingers; right is 1 to 8"));
@@ -266,7 +266,7 @@ TEST_F(EffectorTest, RefusesOptionsThatMakeNoSense) {
 TEST_F(EffectorTest, RefusesAPortThatAnotherProcessHas) {
   Start();
   Open(Options());
-  EXPECT_THAT(std::string(Effector::Open(Options(), &news_).status().message()),
+  EXPECT_THAT(std::string(Effector::Open(Options(), &changes_).status().message()),
               HasSubstr("used by another process"));
 }
 

@@ -49,15 +49,15 @@ absl::Status CheckOptions(const EffectorOptions& options) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Effector>> Effector::Open(EffectorOptions options, Signal* news) {
+absl::StatusOr<std::unique_ptr<Effector>> Effector::Open(EffectorOptions options, ChangeNotifier* changes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckOptions(options));
-  auto effector = std::make_unique<SerialEffector>(std::move(options), news);
+  auto effector = std::make_unique<SerialEffector>(std::move(options), changes);
   TOUCHSTONE_RETURN_IF_ERROR(effector->Start());
   return effector;
 }
 
-SerialEffector::SerialEffector(EffectorOptions options, Signal* news)
-    : options_(std::move(options)), news_(news), sync_(options_.time_scale) {
+SerialEffector::SerialEffector(EffectorOptions options, ChangeNotifier* changes)
+    : options_(std::move(options)), changes_(changes), sync_(options_.time_scale) {
   state_.why = "not yet connected";
   state_.pressed.resize(options_.fingers.size());
 }
@@ -125,7 +125,7 @@ void SerialEffector::SetDisconnected(const std::string& why) {
     }
   }
   changed_.notify_all();
-  if (news_ != nullptr) news_->Notify();
+  if (changes_ != nullptr) changes_->Notify();
 }
 
 bool SerialEffector::Stopping() const {

@@ -26,7 +26,7 @@ namespace touchstone {
 
 class SerialEffector : public Effector {
  public:
-  SerialEffector(EffectorOptions options, Signal* news);
+  SerialEffector(EffectorOptions options, ChangeNotifier* changes);
   ~SerialEffector() override;
   // Starts the thread and waits for the first conversation to begin or fail.
   absl::Status Start();
@@ -79,7 +79,7 @@ class SerialEffector : public Effector {
   absl::Status Request(std::function<absl::Status()> work);
 
   const EffectorOptions options_;
-  Signal* const news_;
+  ChangeNotifier* const changes_;
   int wake_fd_ = -1;
   std::thread thread_;
 

@@ -7,7 +7,9 @@
 #include <thread>
 
 #include "server/base/status.h"
+#include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
+#include "server/gateway/rig/touch_result.h"
 
 namespace touchstone {
 namespace {
@@ -48,11 +50,11 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
     return journal().Failed(
         session, touch.id,
         absl::StrCat("interrupted, and the arm cannot be asked: ", arm.status().message()));
-  if (arm->runtime_state == 2) parts_.arm->Stop().IgnoreError();
+  if (arm->runtime_state == RuntimeState::kPlaying) parts_.arm->Stop().IgnoreError();
 
   // Contact times stand only if the approach ended as it should: by command or at its stroke, never by the
   // watchdog in mid-way. The program's own registers say which.
-  if (arm->program_id != touch.program_id || arm->phase < static_cast<int>(MotionPhase::kRetreat))
+  if (arm->program_id != touch.program_id || arm->phase < MotionPhase::kRetract)
     return journal().Failed(session, touch.id,
                             absl::StrCat("interrupted during '", PhaseName(arm->phase), "' of program ",
                                          arm->program_id, "; it can be made again under the same id"));
@@ -67,7 +69,7 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
         "interrupted, and the end effector was reset since; it can be made again under the same id");
   TouchRecording record;
   record.motion.program_id = touch.program_id;
-  record.motion.transfer = {Eigen::Isometry3d::Identity()};
+  record.motion.transit = {Eigen::Isometry3d::Identity()};
   record.motion.end = Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1));
   record.time_scale = options_.time_scale;
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);

@@ -26,6 +26,7 @@ double UnixNowS() {
 
 // Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens.
 constexpr uint32_t kProgramIdBlock = 1000;
+constexpr char kStopFact[] = "stop";  // who stopped the rig and why; "" once it was reset
 constexpr uint32_t kMaxProgramId = (1u << 28) - kProgramIdBlock;
 
 }  // namespace
@@ -39,7 +40,13 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
         absl::StrCat("the journal's next_program_id is '", next, "': a number was expected"));
   rig->reserved_program_id_ = rig->next_program_id_;
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.object, journal.Fact("mounted_object"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.placement, journal.Fact("mounted_placement"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string up_face, journal.Fact("mounted_placement"));
+  if (!up_face.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(rig->up_face_, ParseUpFace(up_face, "the journal's mounted_placement"));
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Fact(kStopFact));
+  rig->stopped_ = !rig->stop_reason_.empty();
+  if (rig->stopped_) spdlog::warn("still stopped {}; touchstone rig reset releases it", rig->stop_reason_);
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
   return rig;
 }
@@ -58,19 +65,27 @@ uint32_t Rig::NextProgramId() {
   return next_program_id_++;
 }
 
+MotionGuard Rig::UntilStopped(const MotionGuard& caller) const {
+  return [this, caller, stops = stops_.load()]() -> absl::Status {
+    if (stops_ == stops && !stopped_) return caller();
+    const std::string reason = StopReason();
+    return absl::AbortedError(absl::StrCat("the rig was stopped", reason.empty() ? "" : " ", reason,
+                                           ": make sure that it may move, then release the stop with "
+                                           "'touchstone rig reset'"));
+  };
+}
+
 absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const MotionGuard& guard) {
-  const uint64_t stops = stops_;
   for (;;) {
-    TOUCHSTONE_RETURN_IF_ERROR(Allowed(guard, stops));
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
     std::unique_lock<std::timed_mutex> lock(moving_, std::chrono::milliseconds(10));
     if (lock.owns_lock()) return lock;
   }
 }
 
-absl::Status Rig::Allowed(const MotionGuard& guard, uint64_t stops) const {
-  if (stops_ != stops || stopped_)
-    return absl::AbortedError("stopped: Control.Stop was called; acquire a lease to go on");
-  return guard();
+std::optional<UpFace> Rig::MountedUpFace() const {
+  std::lock_guard<std::mutex> lock(status_mutex_);
+  return up_face_;
 }
 
 void Rig::Remember(const absl::Status& status) {
@@ -79,29 +94,27 @@ void Rig::Remember(const absl::Status& status) {
 }
 
 SourceStatus Rig::Status() const {
-  SourceStatus facts;
+  SourceStatus status;
   {
     std::lock_guard<std::mutex> lock(status_mutex_);
-    facts = status_;
+    status = status_;
   }
   const ClockEstimate clock = parts_.effector->Clock();
-  if (clock.valid) facts.clock_uncertainty_s = clock.offset_uncertainty_s / clock.rate * options_.time_scale;
-  return facts;
+  if (clock.valid) status.clock_uncertainty_s = clock.offset_uncertainty_s / clock.rate * options_.time_scale;
+  return status;
 }
 
 absl::Status Rig::PowerUp(const MotionGuard& guard) {
-  constexpr int kRunning = 7;
   constexpr double kPatienceS = 10;
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, parts_.arm->State());
-  if (state.robot_mode >= kRunning || !SafetyPermitsMotion(state.safety_mode).ok())
+  if (state.robot_mode == RobotMode::kRunning || !SafetyPermitsMotion(state.safety_mode).ok())
     return parts_.arm->Ready();
   audit().Write("power_on", {{"robot_mode", RobotModeName(state.robot_mode)}}).IgnoreError();
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn());
-  // The states tell it a little later than the dashboard.
-  const uint64_t stops = stops_;
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn(guard));
+  // The states report it a little later than the dashboard.
   for (const double until_s = HostNowS() + kPatienceS; !parts_.arm->Ready().ok() && HostNowS() < until_s;) {
-    TOUCHSTONE_RETURN_IF_ERROR(Allowed(guard, stops));
-    parts_.news->WaitForNews(parts_.news->count(), 0.01);
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
   return parts_.arm->Ready();
 }
@@ -112,7 +125,7 @@ absl::Status Rig::EnsureSession(const std::string& name) {
   JournalSession session;
   session.name = name;
   session.created_unix_s = UnixNowS();
-  session.source = SourceInWords();
+  session.source = Provenance();
   session.calibration = FormatCalibration(parts_.planner->calibration());
   session.fingers = options_.fingers;
   session.spacing_m = options_.spacing_m;
@@ -121,11 +134,11 @@ absl::Status Rig::EnsureSession(const std::string& name) {
   return absl::OkStatus();
 }
 
-std::string Rig::SourceInWords() const {
+std::string Rig::Provenance() const {
   const EffectorState effector = parts_.effector->State();
-  return absl::StrCat(options_.source_note, options_.source_note.empty() ? "" : "; ", parts_.arm->Model(),
-                      " at ", parts_.arm->Address(), ", end effector ", effector.firmware, " at ",
-                      options_.effector_port);
+  return absl::StrCat(options_.provenance_note, options_.provenance_note.empty() ? "" : "; ",
+                      parts_.arm->Model(), " at ", parts_.arm->Address(), ", end effector ",
+                      effector.firmware, " at ", options_.effector_port);
 }
 
 absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchCommand& command) const {
@@ -139,7 +152,8 @@ absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchCommand& co
   return touch;
 }
 
-absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const MotionGuard& guard) {
+absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const MotionGuard& caller) {
+  const MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(command));
   if (known.has_value()) return *std::move(known);
@@ -151,17 +165,17 @@ absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const Motio
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   if (const EffectorState effector = parts_.effector->State(); !effector.connected)
     return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
-  const std::string placement = PlacementFor(command.touch.approach);
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, placement, guard));
+  const UpFace up_face = UpFaceFor(command.touch.approach);
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      PlannedTouch plan, parts_.planner->Plan(from, command.object, command.bounds, placement, command.touch,
+      PlannedTouch plan, parts_.planner->Plan(from, command.object, command.bounds, up_face, command.touch,
                                               "touch '" + command.id + "'"));
 
   const double began_s = HostNowS(), began_unix_s = UnixNowS();
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const JournalTouch intent,
-      journal().Begin(command.session, command.id, command.object, placement, command.bytes));
+      journal().Begin(command.session, command.id, command.object, UpFaceName(up_face), command.bytes));
   if (intent.stage == TouchStage::kDone) return intent;
   const uint32_t program_id = NextProgramId();
   TOUCHSTONE_RETURN_IF_ERROR(
@@ -210,7 +224,8 @@ absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix
   return (unix_s - first_s) * options_.time_scale;
 }
 
-absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGuard& guard) {
+absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGuard& caller) {
+  const MotionGuard guard = UntilStopped(caller);
   if (parts_.camera == nullptr)
     return absl::FailedPreconditionError(
         "this rig has no camera: set camera.source in the gateway's configuration");
@@ -219,16 +234,16 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
         "the calibration file has no flange_from_camera: where the camera sits");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
-  const std::string placement = PlacementFor(command.object_from_camera.rotation().col(2));
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, placement, guard));
+  const UpFace up_face = UpFaceFor(command.object_from_camera.rotation().col(2));
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
-                              parts_.planner->ObjectPose(command.object, command.bounds, placement));
+                              parts_.planner->ObjectPose(command.object, command.bounds, up_face));
   const Eigen::Isometry3d base_from_camera = base_from_object * command.object_from_camera;
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const PlannedTouch plan,
-      parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, placement, "view"));
-  TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transfer, {}, plan.motion.duration_s, guard));
+      parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, up_face, "view"));
+  TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
   const absl::StatusOr<Frame> frame = parts_.camera->Take(HostNowS());
   if (!frame.ok()) {
     Remember(frame.status());
@@ -237,7 +252,7 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   JournalImage image;
   image.id = ViewId(command);
-  image.object = command.object, image.placement = placement;
+  image.object = command.object, image.placement = UpFaceName(up_face);
   const Eigen::AngleAxisd turn(base_from_camera.rotation());
   for (int i = 0; i < 3; ++i) {
     image.base_from_camera[i] = base_from_camera.translation()[i];
@@ -265,16 +280,16 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
   ++motions_;
   absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
   if (status.ok())
-    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
-                       [](const ArmState& state) -> absl::StatusOr<bool> {
-                         return state.phase == static_cast<int>(MotionPhase::kDone);
-                       });
+    status = Supervise(
+        program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
+        [](const ArmState& state) -> absl::StatusOr<bool> { return state.phase == MotionPhase::kDone; });
   --motions_;
   if (!status.ok()) Remember(status);
   return status;
 }
 
-absl::Status Rig::Home(const MotionGuard& guard) {
+absl::Status Rig::Home(const MotionGuard& caller) {
+  const MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   return MoveHome(guard);
 }
@@ -286,40 +301,52 @@ absl::Status Rig::MoveHome(const MotionGuard& guard) {
   return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, guard);
 }
 
-absl::Status Rig::EnsureMounted(const std::string& object, const std::string& placement,
-                                const MotionGuard& guard) {
+absl::Status Rig::EnsureMounted(const std::string& object, UpFace up_face, const MotionGuard& guard) {
   const SourceStatus now = Status();
-  if (now.object == object && now.placement == placement) return absl::OkStatus();
+  const std::optional<UpFace> mounted_face = MountedUpFace();
+  if (now.object == object && mounted_face == up_face) return absl::OkStatus();
+  const std::string face = UpFaceName(up_face);
   if (options_.mount_command.empty())
     return absl::FailedPreconditionError(absl::StrCat(
         now.object.empty()
-            ? "nobody has told what lies on the fixture"
-            : absl::StrCat("'", now.object, "' lies on the fixture with its face ", now.placement, " up"),
-        ": put '", object, "' there with its face ", placement, " up, then: touchstone rig mount ", object,
-        " ", placement));
+            ? "what lies on the fixture is unknown"
+            : absl::StrCat("'", now.object, "' lies on the fixture",
+                           mounted_face.has_value()
+                               ? absl::StrCat(" with its face ", UpFaceName(*mounted_face), " up")
+                               : ""),
+        ": put '", object, "' there with its face ", face, " up, then: touchstone rig mount ", object, " ",
+        face));
   // The tool leaves before anything is moved there.
   TOUCHSTONE_RETURN_IF_ERROR(MoveHome(guard));
   std::vector<std::string> command = options_.mount_command;
   for (std::string& word : command)
-    word = absl::StrReplaceAll(word, {{"{object}", object}, {"{placement}", placement}});
+    word = absl::StrReplaceAll(word, {{"{object}", object}, {"{up_face}", face}, {"{placement}", face}});
   TOUCHSTONE_RETURN_IF_ERROR(RunCommand(command, options_.mount_timeout_s, guard));
+  return NoteMounted(object, up_face);
+}
+
+absl::Status Rig::NoteMounted(const std::string& object, UpFace up_face) {
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
-  audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", UpFaceName(up_face)));
+  audit().Write("mounted", {{"object", object}, {"up_face", UpFaceName(up_face)}}).IgnoreError();
   std::lock_guard<std::mutex> lock(status_mutex_);
-  status_.object = object, status_.placement = placement;
+  status_.object = object, up_face_ = up_face;
   return absl::OkStatus();
 }
 
-absl::Status Rig::Mount(const std::string& object, const std::string& placement, const MotionGuard& guard) {
+absl::Status Rig::Mount(const std::string& object, UpFace up_face, const MotionGuard& caller) {
+  const MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
-  if (!options_.mount_command.empty()) return EnsureMounted(object, placement, guard);
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", placement));
-  audit().Write("mounted", {{"object", object}, {"placement", placement}}).IgnoreError();
-  std::lock_guard<std::mutex> status_lock(status_mutex_);
-  status_.object = object, status_.placement = placement;
-  return absl::OkStatus();
+  if (!options_.mount_command.empty()) return EnsureMounted(object, up_face, guard);
+  return NoteMounted(object, up_face);
+}
+
+absl::Status Rig::PowerOn(const MotionGuard& caller) {
+  const MotionGuard guard = UntilStopped(caller);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  const absl::Status status = PowerUp(guard);
+  if (!status.ok()) Remember(status);
+  return status;
 }
 
 absl::StatusOr<PlannedTouch> Rig::Check(const std::string& object, const Bounds& bounds,
@@ -331,7 +358,7 @@ absl::StatusOr<PlannedTouch> Rig::Check(const std::string& object, const Bounds&
   } else {
     TOUCHSTONE_ASSIGN_OR_RETURN(here, parts_.arm->State());
   }
-  return parts_.planner->Plan(here, object, bounds, PlacementFor(touch.approach), touch, where);
+  return parts_.planner->Plan(here, object, bounds, UpFaceFor(touch.approach), touch, where);
 }
 
 uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
@@ -339,8 +366,16 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
   stopped_ = true;
   ++stops_;
   const absl::Status status = parts_.arm->Stop();
-  parts_.news->Notify();
+  parts_.changes->Notify();
   if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
+  {
+    std::lock_guard<std::mutex> lock(stop_mutex_);
+    // A reset that was under way may have released it since.
+    stopped_ = true;
+    stop_reason_ = absl::StrCat("by ", who, " (", reason, ")");
+    const absl::Status kept = journal().SetFact(kStopFact, stop_reason_);
+    if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
+  }
   audit()
       .Write("stop", {{"who", who},
                       {"reason", reason},
@@ -350,20 +385,53 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
   return motions;
 }
 
-void Rig::Resume() {
-  stopped_ = false;
+absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
+  const uint64_t stops = stops_;
+  if (!stopped_) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState arm, parts_.arm->State());
+  if (const absl::Status safety = SafetyPermitsMotion(arm.safety_mode); !safety.ok())
+    return absl::FailedPreconditionError(
+        absl::StrCat("the stop holds: ", safety.message(), "; then reset again"));
+  {
+    std::lock_guard<std::mutex> lock(stop_mutex_);
+    if (stops_ != stops) return absl::AbortedError("the rig was stopped again meanwhile: the stop holds");
+    // On the disk before anything may move.
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact(kStopFact, ""));
+    stop_reason_.clear();
+    stopped_ = false;
+  }
+  audit().Write("reset", {{"who", who}, {"reason", reason}}).IgnoreError();
+  return absl::OkStatus();
 }
 
-std::string Rig::State() const {
+std::string Rig::StopReason() const {
+  std::lock_guard<std::mutex> lock(stop_mutex_);
+  return stop_reason_;
+}
+
+SourceState Rig::State() const {
   const absl::StatusOr<ArmState> arm = parts_.arm->State();
-  if (!arm.ok()) return "disconnected";
-  if (arm->safety_mode == 3) return "protective_stop";
-  if (arm->safety_mode == 6 || arm->safety_mode == 7) return "emergency_stop";
-  if (arm->safety_mode > 3) return "fault";
-  if (arm->robot_mode < 7) return "powered_off";
-  if (stopped_) return "stopped";
-  if (!parts_.effector->State().connected) return "disconnected";
-  return motions_ > 0 ? "busy" : "idle";
+  if (!arm.ok()) return SourceState::kDisconnected;
+  switch (arm->safety_mode) {
+    case SafetyMode::kNormal:
+    case SafetyMode::kReduced:
+      break;
+    case SafetyMode::kProtectiveStop:
+      return SourceState::kProtectiveStop;
+    case SafetyMode::kRecovery:
+      return SourceState::kRecovery;
+    case SafetyMode::kSafeguardStop:
+      return SourceState::kSafeguardStop;
+    case SafetyMode::kSystemEmergencyStop:
+    case SafetyMode::kRobotEmergencyStop:
+      return SourceState::kEmergencyStop;
+    default:
+      return SourceState::kFault;
+  }
+  if (stopped_) return SourceState::kStopped;
+  if (arm->robot_mode != RobotMode::kRunning) return SourceState::kPoweredOff;
+  if (!parts_.effector->State().connected) return SourceState::kDisconnected;
+  return motions_ > 0 ? SourceState::kBusy : SourceState::kIdle;
 }
 
 }  // namespace touchstone

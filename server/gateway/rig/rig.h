@@ -1,9 +1,9 @@
 // The physical source without its protocol: one arm, one end effector, one camera, one object on a fixture,
 // and a journal that knows of every touch.
 //
-// A touch: check, journal the intent, go to the start, arm the end effector, approach, stop when every finger
-// has reported or the stroke ends, retreat, journal the result. See README.md for what happens when something
-// breaks.
+// A touch: check, journal the intent, go to the start, start the end effector's capture, approach, stop when
+// every finger has reported or the stroke ends, retract, journal the result. README.md says what happens when
+// something breaks.
 #pragma once
 
 #include <atomic>
@@ -33,17 +33,17 @@ struct RigOptions {
   int fingers = 3;
   double spacing_m = 0.030;
   double time_scale = 1;  // rig seconds in one host second; above 1 only with an emulator on a faster clock
-  double max_press_m = 0.045;  // how far the first finger may be pushed while the others are on their way
-  // Run to change the object: program and arguments, in which {object} and {placement} stand for themselves.
-  // Empty: a person does it and tells (Mount).
+  double max_overtravel_m = 0.045;  // of the first finger past its contact, while the others have none yet
+  // Run to change the object: program and arguments, in which {object} and {up_face} ("+x"; also {placement})
+  // are replaced. Empty: a person changes it and calls Mount.
   std::vector<std::string> mount_command;
   double mount_timeout_s = 120;
-  std::string source_note;  // who made the data; an emulator says here that it is one
+  std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
 };
 
 struct RigParts {
-  std::unique_ptr<Signal> news;
+  std::unique_ptr<ChangeNotifier> changes;  // of arm and end effector
   std::unique_ptr<Arm> arm;
   std::unique_ptr<Effector> effector;
   std::unique_ptr<CameraDevice> camera;  // null: none
@@ -74,24 +74,32 @@ class Rig : public RigDevice {
   double spacing_m() const override { return options_.spacing_m; }
   bool moves() const override { return true; }
   SourceStatus Status() const override;
+  // Of the object on the fixture; none: unknown.
+  std::optional<UpFace> MountedUpFace() const;
 
   // Puts (mount_command) or notes the object. Home first if the rig does it.
-  absl::Status Mount(const std::string& object, const std::string& placement, const MotionGuard& guard);
-  absl::Status Home(const MotionGuard& guard);
+  absl::Status Mount(const std::string& object, UpFace up_face, const MotionGuard& caller);
+  absl::Status Home(const MotionGuard& caller);
+  // Powers the arm on and releases its brakes; OK once it is ready to move. FAILED_PRECONDITION says what a
+  // person has to do first.
+  absl::Status PowerOn(const MotionGuard& caller);
 
-  // Every check of a touch without motion, from `from` (null: from where the arm is) and for the placement
-  // that it needs.
+  // Every check of a touch without motion, from `from` (null: from where the arm is) and with the face up that
+  // it needs.
   absl::StatusOr<PlannedTouch> Check(const std::string& object, const Bounds& bounds,
                                      const CommandedTouch& touch, const ArmState* from,
                                      const std::string& where) const;
 
-  // Stops everything, now; never waits for anything. Returns how many motions were under way. What is ordered
-  // later is refused until Resume.
+  // Stops everything, now; never waits for anything. Returns how many motions were under way. Every motion is
+  // refused (ABORTED) from now on, also by the next process on this journal, until Reset.
   uint32_t Stop(const std::string& reason, const std::string& who);
-  void Resume();
+  // Releases a stop, moving nothing; without a stop it does nothing. FAILED_PRECONDITION while the controller's
+  // own safety mode forbids motion, UNAVAILABLE while it cannot be asked: the stop holds then.
+  absl::Status Reset(const std::string& reason, const std::string& who);
+  // Who stopped it and why, for people; empty: it is not stopped.
+  std::string StopReason() const;
 
-  // "idle", "busy", "stopped", "protective_stop", ... (control.proto).
-  std::string State() const override;
+  SourceState State() const override;
 
   const RigOptions& options() const { return options_; }
   const Arm& arm() const { return *parts_.arm; }
@@ -100,21 +108,22 @@ class Rig : public RigDevice {
   const MotionPlanner& planner() const { return *parts_.planner; }
   Journal& journal() const { return *parts_.journal; }
   AuditLog& audit() const { return *parts_.audit; }
-  std::string SourceInWords() const;  // for a session's head
+  std::string Provenance() const;  // where a session's data come from: note, arm, end effector
 
  private:
   Rig(RigOptions options, RigParts parts) : options_(std::move(options)), parts_(std::move(parts)) {}
   absl::Status Reconcile();
   absl::Status ReconcileTouch(const std::string& session, const JournalTouch& touch);
 
-  // Holds the rig for one motion; CANCELLED or whatever the guard says while it waits for another one.
+  // The caller's guard, and that nobody has stopped the rig since this call: every motion asks it from its beginning on.
+  MotionGuard UntilStopped(const MotionGuard& caller) const;
+  // Holds the rig for one motion; the guard's error if that fails while it waits for another one.
   absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const MotionGuard& guard);
-  // The guard, and that nobody has stopped the rig since `stops`.
-  absl::Status Allowed(const MotionGuard& guard, uint64_t stops) const;
   // Powers the arm on and releases its brakes if they are not: only ever for somebody who may move it now.
   absl::Status PowerUp(const MotionGuard& guard);
-  absl::Status EnsureMounted(const std::string& object, const std::string& placement,
-                             const MotionGuard& guard);
+  absl::Status EnsureMounted(const std::string& object, UpFace up_face, const MotionGuard& guard);
+  // What lies on the fixture now, in the journal and the audit log.
+  absl::Status NoteMounted(const std::string& object, UpFace up_face);
   absl::Status MoveHome(const MotionGuard& guard);
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
@@ -127,8 +136,8 @@ class Rig : public RigDevice {
   // touch_cycle.cpp
   absl::StatusOr<JournalResult> MakeTouch(const PlannedTouch& plan, uint32_t program_id,
                                           const TouchCommand& command, const MotionGuard& guard);
-  // Beats and watches until `done` says so; stops the arm and tells why on anything else. `limit_s`: host
-  // time.
+  // Sends heartbeats and watches until `done` says so; stops the arm and returns why on anything else.
+  // `limit_s`: host time.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what, const MotionGuard& guard,
                          const std::function<absl::StatusOr<bool>(const ArmState&)>& done);
   void Remember(const absl::Status& status);
@@ -136,38 +145,18 @@ class Rig : public RigDevice {
   const RigOptions options_;
   RigParts parts_;
   std::timed_mutex moving_;           // held by the one that moves
-  std::atomic<bool> stopped_{false};  // until Resume
-  std::atomic<uint64_t> stops_{0};
+  std::atomic<bool> stopped_{false};  // until Reset
+  std::atomic<uint64_t> stops_{0};    // how often it was stopped: a motion of before a stop never resumes
+  mutable std::mutex stop_mutex_;     // of the reason, and of what the journal keeps of it
+  std::string stop_reason_;
   std::atomic<uint32_t> motions_{0};  // under way
-  std::atomic<double> last_beat_s_{0};
+  std::atomic<double> last_heartbeat_s_{0};
   mutable std::mutex status_mutex_;
   SourceStatus status_;
+  std::optional<UpFace> up_face_;  // of the object on the fixture
   std::mutex sessions_mutex_;
   std::set<std::string> sessions_;  // known to be in the journal
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
 };
-
-// --- touch_result.cpp: what the recorded states and contacts say of a touch. Pure functions.
-
-struct TouchRecording {
-  ArmTouch motion;
-  double acceleration_m_s2 = 0;
-  double time_scale = 1;
-  uint32_t tick_hz = 1;
-  EffectorTouch contacts;
-  ClockEstimate effector_clock;    // device seconds on host seconds
-  ClockEstimate controller_clock;  // controller seconds on host seconds
-  std::vector<ArmState> states;    // of the whole touch, oldest first
-};
-
-// Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds). Session and
-// Unix times stay 0. FAILED_PRECONDITION if the controller scaled the speed during the approach: times would
-// not be comparable.
-absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record);
-
-// base_from_tip between the two states round a controller time; nothing if they do not enclose it within 0.1
-// rig s.
-std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
-                                        double max_gap_s);
 
 }  // namespace touchstone

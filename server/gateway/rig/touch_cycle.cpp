@@ -9,18 +9,18 @@
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
+#include "server/gateway/rig/touch_result.h"
 
 namespace touchstone {
 namespace {
 
-constexpr double kBeatEveryS = 0.01;   // host time; also how soon a lost lease is noticed
-constexpr double kProgramStartsS = 2;  // host time that a program may take until it tells its phase
+constexpr double kHeartbeatPeriodS = 0.01;  // host time; also how soon a lost lease is noticed
+constexpr double kProgramStartsS = 2;       // host time that a program may take until it tells its phase
 
 }  // namespace
 
 absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what, const MotionGuard& guard,
                             const std::function<absl::StatusOr<bool>(const ArmState&)>& done) {
-  const uint64_t stops = stops_;
   const double began_s = HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program told its phase
@@ -32,13 +32,13 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     return status;
   };
   for (;;) {
-    const uint64_t news = parts_.news->count();
+    const uint64_t changes = parts_.changes->count();
     const double now_s = HostNowS();
-    if (now_s - last_beat_s_ >= kBeatEveryS) {
-      parts_.arm->Beat();
-      last_beat_s_ = now_s;
+    if (now_s - last_heartbeat_s_ >= kHeartbeatPeriodS) {
+      parts_.arm->SendHeartbeat();
+      last_heartbeat_s_ = now_s;
     }
-    if (const absl::Status allowed = Allowed(guard, stops); !allowed.ok()) return give_up(allowed);
+    if (const absl::Status allowed = guard(); !allowed.ok()) return give_up(allowed);
     const absl::StatusOr<ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
     if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok())
@@ -51,7 +51,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     }
 
     // A program that ended by itself, or never began.
-    const bool rests = state->runtime_state == 1 && now_s - began_s > 0.5;
+    const bool rests = state->runtime_state == RuntimeState::kStopped && now_s - began_s > 0.5;
     at_rest_since_s = !rests ? 0 : at_rest_since_s == 0 ? now_s : at_rest_since_s;
     if (seen && rests && now_s - at_rest_since_s > 0.5)
       return give_up(absl::UnavailableError(absl::StrCat("the arm's program ended during ", what,
@@ -63,7 +63,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (now_s - began_s > limit_s)
       return give_up(absl::UnavailableError(absl::StrCat(
           what, " took longer than ", ShortestNumber(std::round(limit_s)), " s and was stopped")));
-    parts_.news->WaitForNews(news, kBeatEveryS);
+    parts_.changes->WaitForChange(changes, kHeartbeatPeriodS);
   }
 }
 
@@ -77,9 +77,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   const double host_per_rig = 1 / options_.time_scale;
   const double limit_s = 2 * plan.motion.duration_s * host_per_rig + 15;
   const auto phase_is = [](MotionPhase phase) {
-    return [phase](const ArmState& state) -> absl::StatusOr<bool> {
-      return state.phase == static_cast<int>(phase);
-    };
+    return [phase](const ArmState& state) -> absl::StatusOr<bool> { return state.phase == phase; };
   };
 
   // To the start. The end effector is armed there, at rest and free.
@@ -94,17 +92,18 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   // The approach: until every finger has reported, the first one is pushed far enough, or the stroke ends.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->BeginApproach(program_id));
   const Eigen::Vector3d approach =
-      (plan.motion.end.translation() - plan.motion.transfer.back().translation()).normalized();
+      (plan.motion.end.translation() - plan.motion.transit.back().translation()).normalized();
   bool ended = false;
   std::optional<double> pressed_from_m;
   TOUCHSTONE_RETURN_IF_ERROR(Supervise(
       program_id, limit_s, "the approach", guard, [&](const ArmState& state) -> absl::StatusOr<bool> {
-        if (state.phase == static_cast<int>(MotionPhase::kDone)) return true;
+        if (state.phase == MotionPhase::kDone) return true;
         TOUCHSTONE_ASSIGN_OR_RETURN(const EffectorTouch contacts, parts_.effector->Touch());
         const int count = contacts.Contacts();
         const double way_m = approach.dot(state.base_from_tip.translation());
         if (count > 0 && !pressed_from_m.has_value()) pressed_from_m = way_m;
-        const bool pressed = pressed_from_m.has_value() && way_m - *pressed_from_m > options_.max_press_m;
+        const bool pressed =
+            pressed_from_m.has_value() && way_m - *pressed_from_m > options_.max_overtravel_m;
         if (!ended && (count == options_.fingers || pressed)) {
           TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->EndApproach(program_id));
           ended = true;

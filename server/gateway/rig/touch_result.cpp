@@ -1,3 +1,5 @@
+#include "server/gateway/rig/touch_result.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -5,7 +7,6 @@
 #include <limits>
 
 #include "server/base/text.h"
-#include "server/gateway/rig/rig.h"
 
 namespace touchstone {
 namespace {
@@ -66,14 +67,14 @@ std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, dou
 
 absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
   const ArmTouch& motion = record.motion;
-  const Eigen::Vector3d start = motion.transfer.back().translation();
+  const Eigen::Vector3d start = motion.transit.back().translation();
   const Eigen::Vector3d way = motion.end.translation() - start;
   const Eigen::Vector3d approach = way.normalized();
 
   // The states of the approach, and those of them that move at full speed.
   std::vector<const ArmState*> states;
   for (const ArmState& state : record.states)
-    if (state.program_id == motion.program_id && state.phase == static_cast<int>(MotionPhase::kApproach))
+    if (state.program_id == motion.program_id && state.phase == MotionPhase::kApproach)
       states.push_back(&state);
   std::vector<std::pair<double, double>> full_speed;
   double min_scaling = 1;

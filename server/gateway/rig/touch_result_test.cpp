@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/gateway/rig/rig.h"
+#include "server/gateway/rig/touch_result.h"
 
 namespace touchstone {
 namespace {
@@ -28,7 +28,7 @@ struct Made {
   explicit Made(std::vector<std::optional<double>> contacts_s, double scale = 1) {
     record.motion.program_id = 7;
     record.motion.speed_m_s = kSpeed;
-    record.motion.transfer = {Eigen::Isometry3d(Eigen::Translation3d(0.3, 0, 0.3))};
+    record.motion.transit = {Eigen::Isometry3d(Eigen::Translation3d(0.3, 0, 0.3))};
     record.motion.end = Eigen::Isometry3d(Eigen::Translation3d(0.3, 0, 0.2));
     record.acceleration_m_s2 = kAcceleration;
     record.tick_hz = kTickHz;
@@ -39,7 +39,7 @@ struct Made {
       state.controller_time_s = 100 + 0.002 * k;
       const double t = (state.controller_time_s - began_controller_s) / record.controller_clock.rate;
       state.program_id = 7;
-      state.phase = static_cast<int>(t < 0 ? MotionPhase::kReady : MotionPhase::kApproach);
+      state.phase = t < 0 ? MotionPhase::kReady : MotionPhase::kApproach;
       state.base_from_tip.translation() = Eigen::Vector3d(0.3, 0, 0.3 - Distance(t));
       state.tip_velocity_m_s = Eigen::Vector3d(0, 0, -(Distance(t + 5e-4) - Distance(t - 5e-4)) / 1e-3);
       state.speed_scaling = scale;

@@ -13,7 +13,7 @@ namespace touchstone {
 double HostNowS();
 
 // Nobody's lock is held while it waits, so that whoever is woken may look at anything.
-class Signal {
+class ChangeNotifier {
  public:
   // Any thread, after what others look at has changed.
   void Notify() {
@@ -29,7 +29,7 @@ class Signal {
     return count_;
   }
   // Waits until there is news since `seen`, at most so long.
-  void WaitForNews(uint64_t seen, double max_s) const {
+  void WaitForChange(uint64_t seen, double max_s) const {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_for(lock, std::chrono::duration<double>(max_s), [&] { return count_ != seen; });
   }

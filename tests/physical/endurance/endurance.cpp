@@ -105,10 +105,10 @@ v1::CommandedTouch Endurance::Command(uint64_t k) {
 void Endurance::Recover() {
   const double until_s = NowS() + 60;
   while (NowS() < until_s) {
-    const std::string state = State();
-    if (state == "idle" || state == "busy") break;
-    if (state == "protective_stop") UnlockByHand();
-    if (state == "stopped") NewLease();
+    const v1::SourceState state = State();
+    if (state == v1::SOURCE_STATE_IDLE || state == v1::SOURCE_STATE_BUSY) break;
+    if (state == v1::SOURCE_STATE_PROTECTIVE_STOP) UnlockByHand();
+    if (state == v1::SOURCE_STATE_STOPPED) Reset();
     SleepS(0.002);
   }
   NewLease();

@@ -16,7 +16,7 @@ namespace touchstone {
 struct EnduranceOptions {
   uint64_t touches = 300;
   uint64_t seed = 1;
-  // At most 130: the gateway allows for a second of the host's between an event and its news, and the
+  // At most 130: the gateway allows for a second of the host's between an event and its changes, and the
   // device's 32-bit counter comes round in 268 s of the rig's.
   double speedup = 100;
   double fault_share = 0.1;      // of the attempts that something breaks in

@@ -5,6 +5,7 @@
 
 #include "server/base/thread_pool.h"
 #include "server/gateway/arm/ur_arm.h"
+#include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
 #include "server/service/convert.h"
 #include "server/service/gateway_options.h"
@@ -46,7 +47,7 @@ absl::Status Overhead::Open() {
   bounds_ = (*object)->surface->bounds();
 
   RigParts parts;
-  parts.news = std::make_unique<Signal>();
+  parts.changes = std::make_unique<ChangeNotifier>();
   auto calibration = ReadCalibration(options.calibration);
   if (!calibration.ok()) return calibration.status();
   auto planner = MotionPlanner::Create(options.arm.model, options.limits, *calibration);
@@ -64,20 +65,20 @@ absl::Status Overhead::Open() {
   arm.secondary_port = options.arm.secondary_port, arm.rtde_port = options.arm.rtde_port;
   arm.script.flange_from_tip = calibration->flange_from_tip;
   arm.script.payload_kg = options.limits.payload_kg;
-  arm.script.transfer_speed_m_s = options.limits.transfer_speed_m_s;
+  arm.script.transit_speed_m_s = options.limits.transit_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
-  auto connected = ConnectUrArm(arm, parts.news.get());
+  auto connected = ConnectUrArm(arm, parts.changes.get());
   if (!connected.ok()) return connected.status();
   parts.arm = std::make_unique<StampedArm>(*std::move(connected), &stamps_);
-  auto effector = Effector::Open(options.effector, parts.news.get());
+  auto effector = Effector::Open(options.effector, parts.changes.get());
   if (!effector.ok()) return effector.status();
   const int fingers = static_cast<int>(options.effector.fingers.size());
   parts.effector = std::make_unique<StampedEffector>(*std::move(effector), fingers, &stamps_);
   RigOptions rig;
   rig.fingers = fingers;
   rig.time_scale = options.time_scale;
-  rig.max_press_m = options.max_press_mm / 1000;
+  rig.max_overtravel_m = options.max_press_mm / 1000;
   rig.mount_command = options.mount_command;
   auto made = Rig::Create(std::move(rig), std::move(parts));
   if (!made.ok()) return made.status();
@@ -88,9 +89,8 @@ absl::Status Overhead::Open() {
 // Host time at which the first state of this program with this phase arrived.
 absl::StatusOr<double> Overhead::FirstHeardS(const ArmState& last, MotionPhase phase) const {
   for (const ArmState& state : made_rig_->arm().History(last.controller_time_s - 29, last.controller_time_s))
-    if (state.program_id == last.program_id && state.phase == static_cast<int>(phase))
-      return state.host_time_s;
-  return absl::NotFoundError(std::string("no state told the phase ") + PhaseName(static_cast<int>(phase)));
+    if (state.program_id == last.program_id && state.phase == phase) return state.host_time_s;
+  return absl::NotFoundError(std::string("no state told the phase ") + PhaseName(phase));
 }
 
 void PrintRow(const char* name, std::vector<double> times_s) {
@@ -107,7 +107,7 @@ int Overhead::Measure(int touches, double speedup) {
     std::fprintf(stderr, "error: %s\n", std::string(opened.message()).c_str());
     return 1;
   }
-  WaitUntil([this] { return made_rig_->State() == "idle"; }, "the rig is ready");
+  WaitUntil([this] { return made_rig_->State() == SourceState::kIdle; }, "the rig is ready");
   std::vector<double> before_s, go_s, retreat_s, after_s, all_s, disk_s, answers_s, wall_s;
   for (int k = -2; k < touches; ++k) {  // the first two mount the object and are not counted
     const v1::CommandedTouch message = FromAbove(0.02 + 1e-5 * k, k % 4);
@@ -131,7 +131,7 @@ int Overhead::Measure(int touches, double speedup) {
     wall_s.push_back(ended_s - began_s);
     before_s.push_back(stamps_.program_sent_s - began_s - stamps_.disk_before_s);
     go_s.push_back(stamps_.go_sent_s - *ready - stamps_.effector_arm_s);
-    retreat_s.push_back(stamps_.retreat_sent_s - stamps_.all_heard_s);
+    retreat_s.push_back(stamps_.retract_sent_s - stamps_.all_heard_s);
     after_s.push_back(ended_s - *done - stamps_.effector_disarm_s - (stamps_.disk_s - stamps_.disk_before_s));
     all_s.push_back(before_s.back() + go_s.back() + retreat_s.back() + after_s.back());
     disk_s.push_back(stamps_.disk_s);

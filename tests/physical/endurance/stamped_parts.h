@@ -14,7 +14,7 @@ namespace touchstone {
 // Host seconds of one touch; 0: not yet.
 struct Stamps {
   double program_sent_s = 0;                 // StartTouch returned: its program is on the wire
-  double go_sent_s = 0, retreat_sent_s = 0;  // BeginApproach, EndApproach returned
+  double go_sent_s = 0, retract_sent_s = 0;  // BeginApproach, EndApproach returned
   double all_heard_s = 0;                    // all contacts were known
   double disk_s = 0, disk_before_s = 0;      // spent in the journal in all, and before the program went out
   double effector_arm_s = 0, effector_disarm_s = 0;  // waited for the end effector's answers
@@ -41,7 +41,7 @@ class StampedArm : public Arm {
   }
   absl::Status EndApproach(uint32_t program_id) override {
     const absl::Status status = arm_->EndApproach(program_id);
-    stamps_->retreat_sent_s = HostNowS();
+    stamps_->retract_sent_s = HostNowS();
     return status;
   }
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
@@ -49,8 +49,8 @@ class StampedArm : public Arm {
     return arm_->MoveThrough(program_id, poses, joints);
   }
   absl::Status Stop() override { return arm_->Stop(); }
-  absl::Status PowerOn() override { return arm_->PowerOn(); }
-  void Beat() override { arm_->Beat(); }
+  absl::Status PowerOn(const std::function<absl::Status()>& guard) override { return arm_->PowerOn(guard); }
+  void SendHeartbeat() override { arm_->SendHeartbeat(); }
   ClockEstimate ControllerClock() const override { return arm_->ControllerClock(); }
   double StateRateHz() const override { return arm_->StateRateHz(); }
   std::string Model() const override { return arm_->Model(); }
