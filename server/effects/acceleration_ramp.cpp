@@ -1,5 +1,5 @@
 // Acceleration ramp: the arm starts at rest and accelerates constantly up to its speed.
-//   t = sqrt(2 d / acc) while d < v^2 / (2 acc), then t = d / v + v / (2 acc)      (touch/motion.h)
+//   t = sqrt(2 d / acc) while d < v^2 / (2 acc), then t = d / v + v / (2 acc)      (touch/motion.cpp)
 // No ramp is an infinite acceleration; files write the upper bound for it, and from there on the effect is
 // off.
 #include "server/effects/define_effect.h"

@@ -1,5 +1,4 @@
-// What holds for every effect of the catalogue, whatever its physics. A new effect is in here by being
-// listed.
+// What holds for every effect of the catalogue, whatever its physics. A new effect is tested as soon as it is listed.
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>

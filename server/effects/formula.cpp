@@ -19,7 +19,7 @@
 
 namespace touchstone {
 
-// The catalogue's description; MakeFormulaEffect makes the ones that do something.
+// The catalogue's entry, which only describes; MakeFormulaEffect makes effects that act.
 Effect Formula() {
   Effect effect;
   effect.name = "formula";

@@ -2,7 +2,7 @@
 //   Student-t deviates with these degrees of freedom instead of normal ones, times the sigma of
 //   gaussian_noise
 // sigma is then the scale of the distribution; its standard deviation is sigma * sqrt(nu / (nu - 2)) for nu
-// > 2. The normal distribution is the limit of many degrees; files write the upper bound for it, and from
+// > 2. The normal distribution is the limit of many degrees of freedom; files write the upper bound for it, and from
 // there on the noise is exactly Gaussian. The order in the stack does not matter.
 #include "server/effects/define_effect.h"
 

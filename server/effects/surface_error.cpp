@@ -66,9 +66,9 @@ std::vector<Eigen::Vector3d> PointsOnSurface(const TriangleMesh& mesh) {
   return points;
 }
 
-// Fields and surface points that were used lately, so that a field is made once and not once a batch. A
-// memory of pure functions: forgetting changes the speed alone.
-class FieldMemory {
+// Fields and surface points that were used lately, so that a field is made once and not once per batch. A
+// cache of pure functions: eviction changes the speed alone.
+class FieldCache {
  public:
   std::shared_ptr<const SmoothField> Get(const Surface& surface, uint64_t seed, double length_m) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -94,8 +94,8 @@ class FieldMemory {
 
 void Apply(const Parameters& p, TouchBatch& touches) {
   if (p.rms_m == 0) return;
-  static FieldMemory& memory = *new FieldMemory;  // never destroyed: worker threads may outlive main
-  const std::shared_ptr<const SmoothField> field = memory.Get(*touches.surface, touches.seed, p.length_m);
+  static FieldCache& cache = *new FieldCache;  // never destroyed: worker threads may outlive main
+  const std::shared_ptr<const SmoothField> field = cache.Get(*touches.surface, touches.seed, p.length_m);
   const Eigen::Matrix3d mesh_from_object = touches.surface_rotation.transpose() / touches.surface_scale;
   for (int finger = 0; finger < touches.fingers(); ++finger) {
     for (int touch = 0; touch < touches.size(); ++touch) {

@@ -89,7 +89,7 @@ inline double BruteForceBall(const TriangleMesh& mesh, const Vector3d& centre, c
                              double radius, double longest) {
   double best = std::numeric_limits<double>::infinity();
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    // Triangles that stay outside a ball round them, inflated by the radius, are not worth a search.
+    // Triangles that stay outside a sphere round them, inflated by the radius, are not worth a search.
     const Vector3d a = mesh.Corner(t, 0);
     const double size =
         std::max((mesh.Corner(t, 1) - a).norm(), (mesh.Corner(t, 2) - a).norm()) + radius + 1e-6;
@@ -99,8 +99,7 @@ inline double BruteForceBall(const TriangleMesh& mesh, const Vector3d& centre, c
   return best;
 }
 
-// --- Meshes
-// -----------------------------------------------------------------------------------------------------
+// --- Meshes ---
 
 inline TriangleMesh Soup(int triangles, double size, unsigned seed) {
   std::mt19937 random(seed);
@@ -141,7 +140,7 @@ inline TriangleMesh Awkward() {
   return mesh;
 }
 
-// A ball of unit directions, subdivided from an octahedron.
+// A sphere of unit directions, subdivided from an octahedron.
 inline TriangleMesh Sphere(double radius_m, int divisions) {
   TriangleMesh mesh;
   const Eigen::Vector3d poles[6] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
@@ -168,8 +167,7 @@ inline TriangleMesh Sphere(double radius_m, int divisions) {
   return mesh;
 }
 
-// --- Lines
-// ------------------------------------------------------------------------------------------------------
+// --- Lines ---
 
 struct Lines {
   std::vector<Vector3d> origins_m, directions;

@@ -16,7 +16,7 @@
 namespace touchstone {
 
 typedef float Float8 __attribute__((vector_size(32)));
-typedef int32_t Mask8 __attribute__((vector_size(32)));  // -1 or 0 a lane, from comparisons
+typedef int32_t Mask8 __attribute__((vector_size(32)));  // -1 or 0 per lane, from comparisons
 typedef double Double4 __attribute__((vector_size(32)));
 typedef int64_t Mask4 __attribute__((vector_size(32)));
 
@@ -44,7 +44,7 @@ Lanes MinLanes(Lanes a, Lanes b) {
   return a < b ? a : b;
 }
 
-// One bit a lane.
+// One bit per lane.
 inline uint32_t BitsOf(Mask8 mask) {
 #ifdef __AVX__
   return static_cast<uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));

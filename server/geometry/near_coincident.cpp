@@ -76,7 +76,7 @@ bool Surface::Search::ComputeNearCoincident(uint32_t triangle) const {
   return near_coincident;
 }
 
-// Two bits a triangle: 0 not yet known, 1 no, 2 yes. Asked by two threads at once, both find the same.
+// Two bits per triangle: 0 not yet known, 1 no, 2 yes. Asked by two threads at once, both find the same.
 bool Surface::Search::NearCoincident(uint32_t triangle) const {
   std::atomic<uint8_t>& known = near_coincident_[triangle / 4];
   const int shift = 2 * (triangle % 4);

@@ -36,7 +36,7 @@ void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m)
     const Vector3d start = lines.origins_m[i] - radius_m * direction;
     const double expected = BruteForceBall(surface->mesh(), start, direction, radius_m, kLongestM);
     if (contacts.triangle[i] == kNoTriangle || !std::isfinite(expected)) {
-      // A grazing ball may go either way: then one that is a nanometre larger or smaller does.
+      // A grazing sphere may go either way: then one that is a nanometre larger or smaller does.
       if ((contacts.triangle[i] == kNoTriangle) == std::isinf(expected)) continue;
       EXPECT_NE(std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestM)),
                 std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestM)))
@@ -45,7 +45,7 @@ void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m)
     }
     ++touched;
     const double off = std::fabs(contacts.travel_m[i] - expected);
-    // A ball that first slips by an edge: how far it goes then depends on the last nanometre of its radius.
+    // A sphere that first slips by an edge: how far it goes then depends on the last nanometre of its radius.
     if (off > kUnderMicrometreM) {
       const double larger = BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestM);
       const double smaller = BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestM);
@@ -105,7 +105,7 @@ TEST(SweepSpheres, OnACornerFollowsTheBallRoundIt) {
 
 TEST(SweepSpheres, OnABallActsLikeAPointOnALargerBall) {
   const double ball_m = 0.05;
-  const auto ball = Make(Sphere(ball_m, 120));  // facets stand at most 6 um below the ball
+  const auto ball = Make(Sphere(ball_m, 120));  // facets stand at most 6 um below the sphere
   for (const double radius_m : {0.001, 0.005}) {
     for (const double beside_m : {0.0, 0.01, 0.03, 0.045}) {
       const double sum_m = ball_m + radius_m;

@@ -55,7 +55,7 @@ inline constexpr uint64_t kMinSupershapeTriangles = 48;
 inline constexpr uint64_t kMaxSupershapeTriangles = 4'000'000;
 
 // The tessellation nearest to a number of triangles (20,000 gives 20,368), with steps of about the same size
-// both ways, lines on the equator, on every quarter and between two quarters, where the seed's shapes have
+// both ways, lines on the equator, on every quarter and between two quarters, where the built-in shapes have
 // their edges. Never more than kMaxSupershapeTriangles.
 absl::StatusOr<SupershapeSegments> SegmentsForTriangles(uint64_t triangles);
 

@@ -1,4 +1,4 @@
-// The folder meshes/: the seed's five supershapes as files, with a manifest. Made by code, never by hand.
+// The folder meshes/: the five built-in supershapes as files, with a manifest. Made by code, never by hand.
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 

@@ -1,5 +1,5 @@
-// A mesh that fingers can touch: exact first contact of lines (point finger tips) and of swept spheres (ball
-// tips). The only files that include Embree are the ones beside this header.
+// A mesh that fingers can touch: exact first contact of lines (point finger tips) and of swept spheres
+// (sphere tips). The only files that include Embree are the ones beside this header.
 //
 // A contact is defined in double precision: the least travel over all triangles that the line meets (borders
 // included), and among equals the smallest triangle number. Embree, in single precision, only proposes; where
@@ -54,11 +54,11 @@ class Surface {
                  double longest_m, Contacts* contacts) const;
 
   // The same for spheres of radius_m (> 0) whose centre runs along the line: travel_m is what the *foremost
-  // point* of the ball has gone when the ball first touches, that is, the centre starts radius_m behind the
-  // origin: centre(t) = origin + (t - radius_m) * direction. On a plane met at right angles the result equals
-  // CastLines'. Exact to 1 um on faces, edges and vertices of any mesh. `normal` points from the contact to
-  // the centre. A ball that touches or overlaps the surface where it starts has travel 0, and the point and
-  // the normal of the nearest spot of the surface; so here 0 <= travel_m <= longest_m.
+  // point* of the sphere has gone when the sphere first touches, that is, the centre starts radius_m behind
+  // the origin: centre(t) = origin + (t - radius_m) * direction. On a plane met at right angles the result
+  // equals CastLines'. Exact to 1 um on faces, edges and vertices of any mesh. `normal` points from the
+  // contact to the centre. A sphere that touches or overlaps the surface where it starts has travel 0, and
+  // the point and the normal of the nearest spot of the surface; so here 0 <= travel_m <= longest_m.
   void SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
                     double radius_m, double longest_m, Contacts* contacts) const;
 

@@ -1,4 +1,4 @@
-// A ball that moves along a line against one triangle, in double precision.
+// A sphere that moves along a line against one triangle, in double precision.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@ Eigen::Vector3d NearestPointOfTriangle(const Eigen::Vector3d& a, const Eigen::Ve
 // relative to where the centre starts); `touch` is the triangle's point there. False if there is none.
 //
 // The centres that touch form the triangle moved by the radius to both sides, three cylinders round the edges
-// and three balls round the corners; the first of these that the line enters is the contact.
+// and three spheres round the corners; the first of these that the line enters is the contact.
 bool SweepTriangle(const Eigen::Vector3d& direction, double radius, const Eigen::Vector3d& a,
                    const Eigen::Vector3d& b, const Eigen::Vector3d& c, double most, double* t,
                    Eigen::Vector3d* touch);

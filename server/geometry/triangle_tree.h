@@ -1,7 +1,7 @@
 // An eight-wide tree of boxes over a mesh's triangles: finds every triangle whose box, inflated by a radius,
 // meets a line. It errs only towards too many, so what is tested exactly afterwards does not depend on it. It
-// serves swept spheres of any radius and the few lines that single precision cannot decide. About ten bytes a
-// triangle.
+// serves swept spheres of any radius and the few lines that single precision cannot decide. About ten bytes
+// per triangle.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,8 @@ class TriangleTree {
   void VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double inflate_m,
                   double last_m, Visit visit) const;
 
-  // The same for a ball of radius_m, rounding included, that moves along the line: the boxes that it reaches.
+  // The same for a sphere of radius_m, rounding included, that moves along the line: the boxes that it
+  // reaches.
   template <typename Visit>
   void VisitSwept(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction, double radius_m,
                   double last_m, Visit visit) const;
@@ -49,7 +50,7 @@ class TriangleTree {
   static constexpr int kMaxInLeaf = 8;
   static constexpr uint32_t kFull = 8 * 8 * kMaxInLeaf;  // what two levels of nodes hold
   // Deeper than this, ranges are halved, whatever the cost: at most 22 more levels for 4 million triangles.
-  // Seven children a level may wait, so the stack never overflows.
+  // Seven children per level may wait, so the stack never overflows.
   static constexpr int kDepthOfHalves = 12;
   static constexpr int kStack = 256;
 
@@ -138,7 +139,7 @@ void TriangleTree::VisitAlong(const Eigen::Vector3d& origin_m, const Eigen::Vect
 template <typename Visit>
 void TriangleTree::VisitSwept(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
                               double radius_m, double last_m, Visit visit) const {
-  // In axes along and across the line a box has a middle and half extents. A ball whose line passes the box
+  // In axes along and across the line a box has a middle and half extents. A sphere whose line passes the box
   // at a distance meets it no sooner than where a point of the box's near side, that far off, would be met.
   Eigen::Vector3d axes[3];
   axes[0] = direction;

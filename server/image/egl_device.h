@@ -1,7 +1,7 @@
 // EGL devices and OpenGL contexts without any window system. Part of the EGL renderer only.
 //
 // A display (EGL's handle of a device) belongs to the whole process: it is initialised once and never
-// terminated, since termination would take the contexts of everybody else in the process along.
+// terminated, since termination would take the contexts of all other users in the process along.
 #pragma once
 
 #include <memory>

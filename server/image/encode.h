@@ -14,7 +14,7 @@ absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int heig
 absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels,
                                        int quality);
 
-// For tests and clients; refuses more than kMaxImageSide a side.
+// For tests and clients; refuses more than kMaxImageSide per side.
 absl::StatusOr<Image> DecodePng(const std::string& png);
 
 }  // namespace touchstone

@@ -151,7 +151,7 @@ void GlRasterizer::Delete(const Buffers& buffers) {
 
 absl::StatusOr<uint32_t> GlRasterizer::VertexArrayOf(const std::shared_ptr<const Surface>& surface,
                                                      const ShadingMesh& mesh) {
-  // What belongs to dead surfaces goes; what was asked for moves to the front.
+  // Buffers of destroyed surfaces are freed; the one asked for moves to the front.
   uint64_t bytes = 0;
   bool found = false;
   for (auto entry = meshes_.begin(); entry != meshes_.end();) {

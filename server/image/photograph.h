@@ -13,7 +13,8 @@ struct Frame {
   uint64_t number = 0;
 };
 
-// Pinhole with radial and tangential distortion, as OpenCV writes it (camera_matrix, distortion_coefficients).
+// Pinhole with radial and tangential distortion, as OpenCV writes it (camera_matrix,
+// distortion_coefficients).
 struct Intrinsics {
   int width = 0, height = 0;
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;

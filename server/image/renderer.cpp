@@ -15,14 +15,14 @@
 namespace touchstone {
 namespace {
 
-// A wavy ball of about 10,000 triangles: as many as an object of a usual data set has in sight.
+// A wavy sphere of about 10,000 triangles: as many as an object of a usual data set has in sight.
 absl::StatusOr<std::shared_ptr<const Surface>> TimingSurface() {
   constexpr uint32_t kRings = 72, kSectors = 72;
   TriangleMesh mesh;
   for (uint32_t ring = 0; ring <= kRings; ++ring) {
     for (uint32_t sector = 0; sector < kSectors; ++sector) {
       const double latitude = kPi * (ring / double{kRings} - 0.5), longitude = 2 * kPi * sector / kSectors;
-      // Exactly 0 at the poles, so that their vertices coincide and the ball is closed.
+      // Exactly 0 at the poles, so that their vertices coincide and the sphere is closed.
       const double cos_latitude = ring == 0 || ring == kRings ? 0.0 : std::cos(latitude);
       const double radius_m = 0.07 + 0.01 * std::cos(4 * longitude) * cos_latitude;
       mesh.vertices_m.emplace_back(static_cast<float>(radius_m * cos_latitude * std::cos(longitude)),
@@ -42,7 +42,7 @@ absl::StatusOr<std::shared_ptr<const Surface>> TimingSurface() {
   return Surface::Create("timing", std::move(mesh));
 }
 
-// Images a second on one thread: the best of several, after two that warm up.
+// Images per second on one thread: the best of several, after two that warm up.
 absl::StatusOr<double> ImagesPerSecond(Renderer& renderer, const std::shared_ptr<const Surface>& surface) {
   Camera camera;
   camera.eye_m = {0.25, 0.12, 0.08};

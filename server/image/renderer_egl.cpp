@@ -4,8 +4,8 @@
 // wait, so whatever contexts they have themselves stay untouched, and drivers never see a context change
 // threads.
 //
-// There is one context, for two reasons: llvmpipe has one rasteriser a process, so that further contexts wait
-// for it (measured: two drew no more images a second than one), and a GPU has one queue.
+// There is one context, for two reasons: llvmpipe has one rasteriser per process, so that further contexts wait
+// for it (measured: two drew no more images per second than one), and a GPU has one queue.
 #include <condition_variable>
 #include <deque>
 #include <future>

@@ -20,7 +20,7 @@ using testing::HasSubstr;
 class RendererTest : public testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
-    // One renderer of a kind for the whole run: contexts are dear.
+    // One renderer of each kind for the whole run: contexts are expensive.
     static std::map<std::string, std::pair<std::shared_ptr<Renderer>, std::string>> renderers;
     auto found = renderers.find(GetParam());
     if (found == renderers.end()) {

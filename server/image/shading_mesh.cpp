@@ -75,7 +75,7 @@ uint32_t NextCorner(uint32_t corner) {
 }
 
 // Whether any ray from outside meets a back face first: inverted parts, walls that cross each other. Rays
-// between random points of the bounding sphere and of the ball inside it; the same ones for every mesh.
+// between random points of the bounding sphere and of the sphere inside it; the same ones for every mesh.
 bool ShowsBackFaces(const Surface& surface, double sign) {
   constexpr int kProbes = 8192;
   const double radius_m = 0.5 * surface.bounds().DiagonalM();
@@ -190,7 +190,7 @@ std::shared_ptr<const ShadingMesh> ShadingMeshCache::Get(const std::shared_ptr<c
   {
     std::lock_guard<std::mutex> lock(mutex_);
     auto found = entries_.find(surface.get());
-    // A dead surface's address may have been given to a new one.
+    // A new surface may have the address of one that was destroyed.
     if (found != entries_.end() && found->second.surface.lock() != surface) {
       entries_.erase(found);
       found = entries_.end();
@@ -205,7 +205,7 @@ std::shared_ptr<const ShadingMesh> ShadingMeshCache::Get(const std::shared_ptr<c
   }
   if (!compute) return mesh.get();
 
-  // Others who ask for the same surface meanwhile wait; those who ask for another do not.
+  // Callers who ask for the same surface meanwhile wait; those who ask for another do not.
   promise.set_value(std::make_shared<const ShadingMesh>(MakeShadingMesh(*surface)));
   std::lock_guard<std::mutex> lock(mutex_);
   const auto found = entries_.find(surface.get());

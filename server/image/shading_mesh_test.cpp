@@ -36,7 +36,7 @@ TEST(ShadingMesh, SplitsACubeIntoItsFaces) {
   const ShadingMesh mesh = MakeShadingMesh(*MakeSurface("cube", CubeMesh()));
   EXPECT_TRUE(mesh.outward);
   EXPECT_EQ(mesh.corners.size(), 36u);
-  EXPECT_EQ(mesh.vertices.size(), 24u);  // four a face
+  EXPECT_EQ(mesh.vertices.size(), 24u);  // four per face
   for (size_t corner = 0; corner < mesh.corners.size(); ++corner)
     EXPECT_NEAR(NormalOf(mesh.vertices[mesh.corners[corner]]).dot(FaceNormal(mesh, corner / 3)), 1, 1e-6);
 }
@@ -66,7 +66,7 @@ TEST(ShadingMesh, SplitsExactlyBeyondTheCrease) {
 
 TEST(ShadingMesh, WeldsPositionsThatTheFileRepeats) {
   const TriangleMesh ball = BallMesh(0.05, 24, 48);
-  TriangleMesh soup;  // as an STL file has it: three vertices a triangle
+  TriangleMesh soup;  // as an STL file has it: three vertices per triangle
   for (const auto& triangle : ball.triangles) {
     const uint32_t first = static_cast<uint32_t>(soup.vertices_m.size());
     for (uint32_t vertex : triangle) soup.vertices_m.push_back(ball.vertices_m[vertex]);
@@ -86,7 +86,7 @@ TEST(ShadingMesh, TurnsWhatIsInsideOut) {
 
 TEST(ShadingMesh, IsNotOutwardWhereBackFacesShow) {
   EXPECT_FALSE(MakeShadingMesh(*MakeSurface("bowl", BowlMesh())).outward);
-  // One of two balls inside out: every edge is closed and consistent, only rays tell.
+  // One of two spheres inside out: every edge is closed and consistent, only rays tell.
   TriangleMesh pair = BallMesh(0.05, 24, 48);
   const TriangleMesh second = InsideOut(BallMesh(0.03, 24, 48));
   const uint32_t first = static_cast<uint32_t>(pair.vertices_m.size());

@@ -16,7 +16,7 @@
 
 namespace touchstone {
 
-// A ball of 2 * rings * sectors triangles, less those at the poles; closed.
+// A sphere of 2 * rings * sectors triangles, less those at the poles; closed.
 inline TriangleMesh BallMesh(double radius_m, uint32_t rings, uint32_t sectors) {
   TriangleMesh mesh;
   const auto add = [&mesh](double x, double y, double z) {
@@ -72,7 +72,7 @@ inline TriangleMesh LetterMesh() {
   return mesh;
 }
 
-// The lower half of a ball: open, seen from inside and outside.
+// The lower half of a sphere: open, seen from inside and outside.
 inline TriangleMesh BowlMesh() {
   TriangleMesh ball = BallMesh(0.06, 24, 30), bowl;
   bowl.vertices_m = ball.vertices_m;

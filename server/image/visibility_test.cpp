@@ -55,8 +55,8 @@ TEST(Visibility, OfDrawnTrianglesIsThatOfRays) {
 }
 
 TEST(Visibility, HasNoHoleInAClosedSurface) {
-  // Every pixel whose centre lies well inside the silhouette of a ball must be covered, whatever edges cross
-  // it.
+  // Every pixel whose centre lies well inside the silhouette of a sphere must be covered, whatever edges
+  // cross it.
   const auto surface = MakeSurface("ball", BallMesh(0.07, 180, 200));
   const ShadingMesh mesh = MakeShadingMesh(*surface);
   ImageOptions options;

@@ -86,7 +86,7 @@ struct Effect {
 class EffectCatalogue {
  public:
   virtual ~EffectCatalogue() = default;
-  // In the order of the design. The last, "formula", only describes: it has no parameters and changes
+  // By stage, in the order of application. The last, "formula", only describes: it has no parameters and changes
   // nothing.
   virtual std::vector<std::shared_ptr<const Effect>> All() const = 0;
   virtual std::shared_ptr<const Effect> Find(const std::string& name) const = 0;  // null if unknown

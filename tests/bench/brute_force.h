@@ -1,4 +1,4 @@
-// The seed's way of finding a contact: a segment against every triangle (Ericson, Real-Time Collision
+// The simplest way of finding a contact: a segment against every triangle (Ericson, Real-Time Collision
 // Detection, 5.3.6), single precision, no acceleration.
 #pragma once
 

@@ -1,4 +1,4 @@
-// CGAL's AABB tree on the same object and lines: first intersections of three rays a touch, one thread, in
+// CGAL's AABB tree on the same object and lines: first intersections of three rays per touch, one thread, in
 // the order of the samples. One JSON object on stdout.
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>

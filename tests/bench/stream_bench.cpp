@@ -44,7 +44,7 @@ v1::StreamDatasetRequest Request(uint64_t samples, bool images, v1::ImageEncodin
   return request;
 }
 
-// Samples a second of a stream inside the process, without gRPC.
+// Samples per second of a stream inside the process, without gRPC.
 double InProcess(int threads, uint64_t samples, bool images, ImageEncoding encoding) {
   auto specification = Touches(Lat20(), kNoise);
   specification->samples = samples;

@@ -82,7 +82,7 @@ void TouchesTipRadius(benchmark::State& state) {
 }
 BENCHMARK(TouchesTipRadius)->Name("touches/tip_radius")->Unit(benchmark::kMillisecond);
 
-// The plain loop: three rtcIntersect1 a touch, samples in their order, distances only.
+// The plain loop: three rtcIntersect1 per touch, samples in their order, distances only.
 void Intersect1(benchmark::State& state) {
   const auto specification = Touches(Lat20(state.range(0)), "");
   const std::vector<TouchPose> poses = AcceptedPoses(*specification, 1 << 16);
@@ -118,7 +118,7 @@ BENCHMARK(Intersect1)
     ->Arg(2000000)
     ->Unit(benchmark::kMillisecond);
 
-// The seed's: Ericson's segment against every triangle, single precision.
+// The baseline: Ericson's segment against every triangle, single precision.
 void BruteForce(benchmark::State& state) {
   const auto specification = Touches(Lat20(), "");
   const std::vector<TouchPose> poses = AcceptedPoses(*specification, 64);

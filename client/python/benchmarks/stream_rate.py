@@ -19,7 +19,7 @@ import touchstone
 
 
 def measure(dataset, seconds, consume):
-    """(samples a second, milliseconds until the first batch), over about `seconds`."""
+    """(samples per second, milliseconds until the first batch), over about `seconds`."""
     begin = time.perf_counter()
     batches = iter(dataset)
     consume(next(batches))

@@ -15,7 +15,7 @@ namespace {
 
 using Vec = Eigen::Vector3d;
 
-// Poses as the seed's real protocol has them: round each face of the bounding box, targets on the surface,
+// Poses as in measurements by faces: round each face of the bounding box, targets on the surface,
 // approaches up to 32 degrees from the face's inward normal, any roll; drawn again until all fingers hit.
 constexpr double kMaxTilt = 32 * M_PI / 180;
 constexpr double kSpread = 0.62;

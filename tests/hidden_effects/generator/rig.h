@@ -53,7 +53,7 @@ class Rig {
   Scenario scenario_;
   std::map<std::string, std::vector<double>> values_;
   std::vector<Bumps> bumps_;        // one an object
-  std::vector<double> pressed_mm_;  // by the touch before, a finger
+  std::vector<double> pressed_mm_;  // by the previous touch, per finger
 };
 
 }  // namespace touchstone::hidden

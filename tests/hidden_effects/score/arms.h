@@ -17,7 +17,7 @@ enum class Kind {
   kUnlisted,           // physics that the catalogue lacks
   kNoPoses,            // only objects and times
   kWrongValue,         // a value of the model's own
-  kNoiseMissing,       // the seed's own story
+  kNoiseMissing,       // an ideal model against measurements with noise
 };
 
 struct Arm {

@@ -15,7 +15,7 @@ namespace {
 
 struct Columns {
   std::string effect;
-  Eigen::MatrixXd gradient;  // one row a finger's time, in s
+  Eigen::MatrixXd gradient;  // one row per finger's time, in s
   int rank = 0;
 };
 

@@ -86,7 +86,7 @@ TEST(TheModelsOwnValues, AreCorrectedWhereTheyAreWrong) {
   ExpectAlways("wrong value", 1, "value right", true);
 }
 
-// The seed's own story: an ideal model against measurements with Gaussian noise of 0.04779.
+// The first experiment with such a rig: an ideal model against measurements with Gaussian noise of 0.04779.
 TEST(TheSeedsOwnStory, IsThatNoiseIsMissing) {
   ExpectAlways("noise missing", 1, "noise named", true);
   ExpectAlways("noise missing", 1, "noise within 5 %", true);

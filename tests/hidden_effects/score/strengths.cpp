@@ -21,7 +21,7 @@ double EitherSign(double low, double high, Random& random) {
   return Between(-1, 1, random) < 0 ? -size : size;
 }
 
-// One number a finger, sum 0, the middle finger apart from the others, so that no tilt looks like it.
+// One number per finger, sum 0; the middle one differs from the others, so that no tilt resembles it.
 std::vector<double> FingerPattern(int fingers, double size, Random& random) {
   std::vector<double> out(fingers);
   double mean = 0;
