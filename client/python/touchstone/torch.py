@@ -31,15 +31,16 @@ from typing import Any, Dict, Iterator, Sequence
 import numpy as np
 import torch
 from google.protobuf import json_format
-from torch.utils.data import DataLoader, IterableDataset, get_worker_info
+from torch.utils.data import IterableDataset, get_worker_info
 
 from . import checks
 from .batch import Batch, EncodedImages
 from .client import Client
-from .connection import Connection, Targets, grpc_was_used, parse_targets
+from .connection import Connection, Targets, parse_targets
 from .dataset import Dataset, fingerprint
 from .errors import InvalidRequest, Refused, SourceChanged
 from .images import ImageOptions
+from .loader import TouchstoneLoader
 from .models import ModelLike
 from .plans import PlanLike
 from .shared_lease import LeaseSlot, SharedLease
@@ -50,7 +51,7 @@ __all__ = ["TouchstoneDataset", "TouchstoneLoader", "epoch_seed"]
 
 # Workers that compare what their sources serve; further ones share places.
 _FINGERPRINTS = 256
-_PICTURES = ("image", "depth_mm", "mask")
+_IMAGE_COLUMNS = ("image", "depth_mm", "mask")
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
@@ -270,75 +271,6 @@ class TouchstoneDataset(IterableDataset):
                 )
 
 
-class TouchstoneLoader:
-    """A DataLoader that counts the batches it has returned. Made by TouchstoneDataset.loader().
-
-    Each `for` goes through one epoch, or through the rest of one after load_state_dict(). A loop that was broken
-    off begins its epoch again, unless a state is loaded.
-    """
-
-    def __init__(self, dataset: TouchstoneDataset, num_workers: int, options: Dict[str, Any]):
-        for name in ("batch_size", "shuffle", "sampler", "batch_sampler", "drop_last"):
-            if name in options:
-                raise InvalidRequest(f"{name} is the dataset's; leave it out here.")
-        if not options.get("in_order", True):
-            raise InvalidRequest("in_order=False gives up the order that a state refers to.")
-        self.dataset = dataset
-        self._num_workers = num_workers
-        self._options = options
-        self._loader: DataLoader | None = None
-        # False from the begin of an epoch to its end: then it was broken off.
-        self._fresh = True
-
-    def __len__(self) -> int:
-        """Batches of this rank in a whole epoch."""
-        return self.dataset._rank_batches(self.dataset.start)
-
-    @property
-    def epoch(self) -> int:
-        return self.dataset.epoch
-
-    def set_epoch(self, epoch: int) -> None:
-        self.dataset.set_epoch(epoch)
-        self._fresh = True
-
-    def state_dict(self) -> Dict[str, Any]:
-        return self.dataset.state_dict()
-
-    def load_state_dict(self, state: Dict[str, Any]) -> None:
-        self.dataset.load_state_dict(state)
-        self._fresh = True
-
-    def _make(self) -> DataLoader:
-        options = dict(self._options)
-        if self._num_workers > 0 and options.get("multiprocessing_context") is None and grpc_was_used():
-            options["multiprocessing_context"] = "forkserver"
-        if options.get("multiprocessing_context") == "forkserver":
-            # The imports are made once, by the process that all workers are forked from.
-            torch.multiprocessing.get_context("forkserver").set_forkserver_preload(["__main__", __name__])
-        batch_size = None if self.dataset.batched else self.dataset.batch_size
-        return DataLoader(self.dataset, batch_size=batch_size, num_workers=self._num_workers, **options)
-
-    def __iter__(self) -> Iterator[Any]:
-        dataset = self.dataset
-        if not self._fresh:
-            dataset.set_epoch(dataset.epoch + dataset._all_delivered())
-        self._fresh = False
-        # Persistent workers belong to one DataLoader; others are started for each, by fork only while that is safe.
-        if self._loader is None or not self._options.get("persistent_workers"):
-            self._loader = self._make()
-        dataset._delivered = dataset._skipped = 0
-        dataset._loader_counts = True
-        try:
-            for batch in self._loader:
-                dataset._delivered += 1
-                yield batch
-            dataset._end_epoch()
-            self._fresh = True
-        finally:
-            dataset._loader_counts = False
-
-
 def _tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
     """The batch as tensors, without its first `skip` samples; images with the channels first."""
     result: Dict[str, Any] = {}
@@ -352,7 +284,7 @@ def _tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
             # PyTorch has no read-only tensors.
             values = values.copy()
         tensor = torch.from_numpy(values)[skip:]
-        result[name] = tensor.permute(0, 3, 1, 2) if name in _PICTURES and tensor.dim() == 4 else tensor
+        result[name] = tensor.permute(0, 3, 1, 2) if name in _IMAGE_COLUMNS and tensor.dim() == 4 else tensor
     return result
 
 
