@@ -1,4 +1,4 @@
-// Measurement files by name (DESIGN 7), as touchstone.v1.Sessions keeps them: in a folder, so that replicas
+// Measurement files by name, as touchstone.v1.Sessions keeps them: in a folder, so that replicas
 // that share it have the same ones, or in memory. A name never changes its meaning. Every function may be
 // called from several threads.
 #pragma once

@@ -1,5 +1,5 @@
-// The measurement file (DESIGN 7): CSV, one touch a row, millimetres, microseconds, mm/s. A plan is the same
-// file without times.
+// The measurement file (format: proto/README.md): CSV, one touch per row, mm, us, mm/s. A plan is the same file without
+// times.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct MeasuredTouch {
   uint64_t touch = 0;
   std::string object;
   v1::CommandedTouch commanded;
-  // One a finger, NaN where it reported nothing; empty in a plan.
+  // One per finger, NaN where it reported nothing; empty in a plan.
   std::vector<double> time_s;
   std::optional<int> round, face;
 };

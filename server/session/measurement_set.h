@@ -1,4 +1,4 @@
-// A measurement file (DESIGN 7) as columns: what the diagnosis reads. SI units, object frame. A million rows
+// A measurement file (format: proto/README.md) as columns: what the diagnosis reads. SI units, object frame. A million rows
 // are read in seconds, in about 200 bytes a row.
 #pragma once
 

@@ -19,7 +19,7 @@ namespace touchstone {
 absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
                                                                const std::string& session);
 
-// The measurement file of DESIGN 7; whole or absent. FAILED_PRECONDITION if no touch is done.
+// The measurement file (format: proto/README.md); whole or absent. FAILED_PRECONDITION if no touch is done.
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path);
 
 // HDF5 in SI: a dataset a column with the attribute "unit", one row a touch that is done (contact_time_s is

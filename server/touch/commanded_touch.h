@@ -1,4 +1,4 @@
-// A touch as it is commanded (DESIGN 4), checked and made exact.
+// A touch as it is commanded (defined in proto/README.md), checked and made exact.
 #pragma once
 
 #include <map>

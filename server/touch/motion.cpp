@@ -1,7 +1,8 @@
 // Motion: travel -> time of contact.
-//   t(d) = d / v                      at full speed from the start
-//   t(d) = sqrt(2 d / a), then v / (2 a) + d / v    with a ramp from rest at acceleration a, after v^2 / (2
-//   a) after the first contact, at t1: t1 + (t(d) - t1) / (1 - slowdown)
+//   t(d) = d / v                        at full speed from the start
+//   t(d) = sqrt(2 d / a)                with a ramp from rest at acceleration a, while d < v^2 / (2 a),
+//          v / (2 a) + d / v            then
+//   t1 + (t(d) - t1) / (1 - slowdown)   after the first contact, at time t1
 #include <algorithm>
 #include <cmath>
 

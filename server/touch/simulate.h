@@ -1,4 +1,4 @@
-// The touch simulation: a batch of commanded touches through pose -> contact -> motion -> sensor (DESIGN 3).
+// The touch simulation: a batch of commanded touches through pose -> contact -> motion -> sensor.
 // A pure function of the batch's given fields, the model and the surface; no state between calls but work
 // space.
 #pragma once
