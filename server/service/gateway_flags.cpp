@@ -55,7 +55,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"arm.rtde_port", "", &o.arm.rtde_port},
       {"arm.silence_s", "Seconds without a state after which the controller counts as frozen",
        &o.arm.silence_s},
-      {"arm.watchdog_hz", "The controller stops the arm when this gateway beats more slowly",
+      {"arm.watchdog_hz", "The controller stops the arm when this gateway sends heartbeats more slowly",
        &o.arm.watchdog_hz},
       {"effector.port", "Serial port of the end effector, /dev/ttyACM0", &o.effector.port},
       {"effector.baud", "", &o.effector.baud},
@@ -141,8 +141,11 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   finger.threshold = raw.threshold;
   finger.hysteresis = raw.hysteresis;
   o.effector.fingers.assign(raw.fingers, finger);
-  for (int k = 0; k < raw.fingers && !raw.sensor.empty(); ++k)
-    o.effector.fingers[k].sensor = raw.sensor[raw.sensor.size() == 1 ? 0 : k];
+  for (int k = 0; k < raw.fingers && !raw.sensor.empty(); ++k) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(o.effector.fingers[k].sensor,
+                                ParseSensor(raw.sensor[raw.sensor.size() == 1 ? 0 : k],
+                                            absl::StrCat("effector.sensor: finger ", k + 1)));
+  }
   o.effector.time_scale = o.time_scale;
 
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;

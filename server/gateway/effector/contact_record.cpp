@@ -34,7 +34,7 @@ void ContactRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
   waiting_ = true;
 }
 
-bool ContactRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks) {
+bool ContactRecord::OnArmed(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks) {
   if (!waiting_ || armed.touch != touch_.touch) return false;
   if (armed.ticks < min_ticks || armed.ticks > max_ticks) return false;
   touch_.armed_ticks = armed.ticks;
@@ -43,34 +43,34 @@ bool ContactRecord::Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64
   return true;
 }
 
-void ContactRecord::Lose(std::string why) {
+void ContactRecord::MarkLost(std::string why) {
   if (Final()) return;
   armed_ = false;
   lost_ = std::move(why);
 }
 
-ContactRecord::Verdict ContactRecord::Take(const firmware::Event& event, uint64_t max_ticks) {
+ContactRecord::Verdict ContactRecord::OnEvent(const firmware::Event& event, uint64_t max_ticks) {
   if (event.touch != touch_.touch) return Verdict::kStale;
   // Before Armed came it is not known what is too early; the event will come again.
-  if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kUnbelievable;
-  if (event.ticks < touch_.armed_ticks || event.ticks > max_ticks) return Verdict::kUnbelievable;
-  if (event.kind == firmware::EventKind::kRelease) return Verdict::kNews;  // nobody asks for it
+  if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kRejected;
+  if (event.ticks < touch_.armed_ticks || event.ticks > max_ticks) return Verdict::kRejected;
+  if (event.kind == firmware::EventKind::kRelease) return Verdict::kNew;  // nobody asks for it
   std::optional<uint64_t>& contact = touch_.contact_ticks[event.finger];
   if (contact.has_value()) {
     if (*contact == event.ticks) return Verdict::kRepeated;
-    if (!settled_) doubtful_ = true;
-    return Verdict::kUnbelievable;
+    if (!reconciled_) doubtful_ = true;
+    return Verdict::kRejected;
   }
-  if (settled_ || !armed_) {
+  if (reconciled_ || !armed_) {
     // The device kept no such contact when its record was read, or is not armed: read it again.
-    settled_ = false;
+    reconciled_ = false;
     doubtful_ = true;
   }
   contact = event.ticks;
-  return Verdict::kNews;
+  return Verdict::kNew;
 }
 
-bool ContactRecord::Settle(const firmware::Recalled& recalled, uint64_t max_ticks) {
+bool ContactRecord::OnReading(const firmware::Recalled& recalled, uint64_t max_ticks) {
   if (recalled.touch != touch_.touch || recalled.fingers != touch_.contact_ticks.size()) return false;
   for (int i = 0; i < recalled.fingers; ++i) {
     if ((recalled.contact_mask >> i & 1) == 0) continue;
@@ -81,7 +81,7 @@ bool ContactRecord::Settle(const firmware::Recalled& recalled, uint64_t max_tick
   has_reading_ = !agreed;
   if (!agreed) return false;
   touch_.contact_ticks = ContactsOf(recalled);
-  settled_ = true;
+  reconciled_ = true;
   doubtful_ = false;
   return true;
 }

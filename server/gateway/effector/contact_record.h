@@ -1,7 +1,7 @@
-// What is known of one touch, and which messages of the device are believed about it. Not thread-safe.
+// The contacts of one touch as the device reports them, and which of its messages are accepted. Not thread-safe.
 //
-// A contact counts at once, because the arm has to stop, but is settled only after the device's record of the
-// touch was read twice and agreed: checksums make a damaged message rare, this makes it harmless.
+// A contact counts at once, because the arm has to stop, but is final only after the device's record of the touch
+// was read twice with the same result: checksums make a damaged message rare, this makes it harmless.
 #pragma once
 
 #include <cstdint>
@@ -16,33 +16,32 @@ namespace touchstone {
 class ContactRecord {
  public:
   enum class Verdict {
-    kNews,         // believed and new
-    kRepeated,     // known already; acknowledge again
-    kStale,        // of an earlier touch
-    kUnbelievable  // acknowledge not: if the device means it, it comes again
+    kNew,       // accepted
+    kRepeated,  // known already; acknowledge again
+    kStale,     // of an earlier touch
+    kRejected   // implausible; not acknowledged, so that the device sends it again if it is true
   };
 
   // Forgets everything and waits for the device's Armed.
   void Begin(uint32_t touch, uint32_t boot_id, int fingers);
   // Whether `armed` may be the answer: this touch, and ticks between these two.
-  bool Arm(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks);
+  bool OnArmed(const firmware::Armed& armed, uint64_t min_ticks, uint64_t max_ticks);
   // `max_ticks`: no contact can be later.
-  Verdict Take(const firmware::Event& event, uint64_t max_ticks);
-  // One reading of the device's record. Once two in succession agree it replaces what was heard; returns
-  // whether.
-  bool Settle(const firmware::Recalled& recalled, uint64_t max_ticks);
-  // Nothing more will be heard.
-  void Disarm() { armed_ = false; }
-  void Lose(std::string why);
+  Verdict OnEvent(const firmware::Event& event, uint64_t max_ticks);
+  // One reading of the device's record. Once two in succession agree it replaces the events; returns whether.
+  bool OnReading(const firmware::Recalled& recalled, uint64_t max_ticks);
+  // No more events will come.
+  void EndCapture() { armed_ = false; }
+  void MarkLost(std::string why);
 
   const EffectorTouch& touch() const { return touch_; }
   bool armed() const { return armed_; }
   bool Complete() const { return touch_.Contacts() == static_cast<int>(touch_.contact_ticks.size()); }
-  // All that will ever be known is known and agreed.
-  bool Final() const { return touch_.touch != 0 && settled_ && (Complete() || !armed_) && lost_.empty(); }
+  // Everything that can be known of the touch is known, and was read twice alike.
+  bool Final() const { return touch_.touch != 0 && reconciled_ && (Complete() || !armed_) && lost_.empty(); }
   // The device's record should be read: every finger reported, or something contradicted itself.
-  bool WantsSettling() const {
-    return touch_.touch != 0 && lost_.empty() && !settled_ && (doubtful_ || Complete());
+  bool NeedsReconciliation() const {
+    return touch_.touch != 0 && lost_.empty() && !reconciled_ && (doubtful_ || Complete());
   }
   const std::string& lost() const { return lost_; }
 
@@ -51,15 +50,15 @@ class ContactRecord {
   bool waiting_ = false;  // for Armed
   bool armed_ = false;
   bool doubtful_ = false;
-  bool settled_ = false;
+  bool reconciled_ = false;
   std::string lost_;
   bool has_reading_ = false;
   firmware::Recalled reading_;
 };
 
-// The contacts of a record as the device tells it.
+// The contacts of a record as the device sends it.
 std::vector<std::optional<uint64_t>> ContactsOf(const firmware::Recalled& recalled);
-// Whether both tell the same, apart from what came to pass between them.
+// Whether both say the same, apart from contacts that were made between them.
 bool Agree(const firmware::Recalled& earlier, const firmware::Recalled& later);
 
 }  // namespace touchstone

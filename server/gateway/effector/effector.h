@@ -11,13 +11,17 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "firmware/core/messages.h"
 #include "server/gateway/timing/change_notifier.h"
 #include "server/gateway/timing/clock_sync.h"
 
 namespace touchstone {
 
+// "optical", "microswitch" or "resistor". INVALID_ARGUMENT begins with `where`.
+absl::StatusOr<firmware::Sensor> ParseSensor(const std::string& name, const std::string& where);
+
 struct EffectorFinger {
-  std::string sensor = "optical";  // "optical", "microswitch", "resistor"
+  firmware::Sensor sensor = firmware::Sensor::kOptical;
   bool active_high = true;
   double debounce_s = 0.005;             // microswitch
   int threshold = 512, hysteresis = 16;  // resistor, ADC counts
@@ -29,16 +33,17 @@ struct EffectorOptions {
   std::vector<EffectorFinger> fingers = std::vector<EffectorFinger>(3);
   double reply_timeout_s = 0.25;  // of one try; a request is tried 8 times
   double silence_s = 1.0;         // without a heartbeat: the line is lost
-  double clock_query_s = 0.05;    // between two queries of its clock; 0.05 finds the shortest delay soon
-  double time_scale = 1;          // rig seconds in one host second
+  double clock_query_s =
+      0.05;  // between two queries of its clock; the shorter, the sooner the least delay is found
+  double time_scale = 1;  // rig seconds in one host second
 };
 
-// What was heard of one touch so far. Times in seconds of the device's clock (ticks / tick_hz, 64 bits).
+// The contacts of one touch so far. Times in ticks of the device's clock (tick_hz), 64 bits.
 struct EffectorTouch {
   uint32_t touch = 0;
   uint32_t boot_id = 0;
   uint64_t armed_ticks = 0;
-  std::vector<std::optional<uint64_t>> contact_ticks;  // one a finger
+  std::vector<std::optional<uint64_t>> contact_ticks;  // per finger; none: no contact yet
   int Contacts() const;
 };
 
@@ -60,12 +65,13 @@ class Effector {
   static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, ChangeNotifier* changes);
   virtual ~Effector() = default;
 
-  // Begins a touch (id above 0) and returns once the device has said so. FAILED_PRECONDITION names the
-  // fingers that are pressed already; UNAVAILABLE: the line is lost.
-  virtual absl::Status Arm(uint32_t touch) = 0;
-  virtual absl::Status Disarm() = 0;
-  // What was heard of the armed or last touch; changes->Notify() after every change. UNAVAILABLE if the line was
-  // lost since, or the device was reset, in which case its record is gone.
+  // Starts the capture of a touch's contacts (id above 0) and returns once the device has confirmed it.
+  // FAILED_PRECONDITION names the fingers that are pressed already; UNAVAILABLE: the line is lost.
+  virtual absl::Status StartCapture(uint32_t touch) = 0;
+  // Ends it, and waits until the device's record of the touch is known.
+  virtual absl::Status EndCapture() = 0;
+  // The contacts of the current or last capture; changes->Notify() after every change. UNAVAILABLE if the line
+  // was lost since, or the device was reset, in which case its record is gone.
   virtual absl::StatusOr<EffectorTouch> Touch() const = 0;
   // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has
   // another one.

@@ -43,7 +43,7 @@ class EffectorTest : public testing::Test {
     while (HostNowS() < until_s) {
       const uint64_t seen = changes_.count();
       if (done()) return true;
-      changes_.WaitForChange(seen, 0.02);  // not every change that tests look at is changes
+      changes_.WaitForChange(seen, 0.02);  // not every change that tests look at is notified
     }
     return false;
   }
@@ -56,10 +56,10 @@ class EffectorTest : public testing::Test {
       return touch.ok() && touch->Contacts() == contacts;
     });
   }
-  absl::Status ArmPatiently(uint32_t touch) {
+  absl::Status StartCapturePatiently(uint32_t touch) {
     absl::Status status;
     for (int i = 0; i < 50; ++i) {
-      status = effector_->Arm(touch);
+      status = effector_->StartCapture(touch);
       if (!absl::IsUnavailable(status)) return status;
       WaitForConnection();
     }
@@ -76,11 +76,11 @@ TEST_F(EffectorTest, TellsTheContactOfEachFinger) {
     Start();
     Open(Options(fingers));
     EXPECT_EQ(effector_->State().firmware, "fake 1.2.3");
-    ASSERT_TRUE(effector_->Arm(17).ok());
+    ASSERT_TRUE(effector_->StartCapture(17).ok());
     std::vector<uint64_t> truth;
     for (int i = 0; i < fingers; ++i) truth.push_back(device_->Press(i));
     ASSERT_TRUE(WaitForContacts(fingers));
-    ASSERT_TRUE(effector_->Disarm().ok());
+    ASSERT_TRUE(effector_->EndCapture().ok());
     const absl::StatusOr<EffectorTouch> touch = effector_->Touch();
     ASSERT_TRUE(touch.ok()) << touch.status();
     EXPECT_EQ(touch->touch, 17u);
@@ -96,7 +96,7 @@ TEST_F(EffectorTest, TellsTimesBeyondTheWrapOfTheCounter) {
   device.first_tick = 0xffffffff - 300000;  // 0.3 s before
   Start(device);
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(1).ok());
+  ASSERT_TRUE(effector_->StartCapture(1).ok());
   const uint64_t before = device_->Press(0);
   ASSERT_TRUE(WaitFor([&] { return device_->NowTicks() > (uint64_t{1} << 32) + 10000; }));
   const uint64_t after = device_->Press(1);
@@ -116,7 +116,7 @@ TEST_F(EffectorTest, LosesAndChangesNoContactOnABadLine) {
   device_->SetLine(line);
   int right = 0;
   for (uint32_t id = 1; id <= 30; ++id) {
-    ASSERT_TRUE(ArmPatiently(id).ok());
+    ASSERT_TRUE(StartCapturePatiently(id).ok());
     std::vector<uint64_t> truth;
     for (int i = 0; i < 3; ++i) truth.push_back(device_->Press(i));
     bool lost = false;
@@ -125,7 +125,7 @@ TEST_F(EffectorTest, LosesAndChangesNoContactOnABadLine) {
       lost = !touch.ok() && !effector_->State().connected;
       return lost || (touch.ok() && touch->Contacts() == 3);
     }));
-    const absl::Status disarmed = effector_->Disarm();
+    const absl::Status disarmed = effector_->EndCapture();
     const absl::StatusOr<EffectorTouch> touch = effector_->Touch();
     for (int i = 0; i < 3; ++i) device_->Release(i);
     if (!disarmed.ok() || !touch.ok()) continue;
@@ -139,7 +139,7 @@ TEST_F(EffectorTest, LosesAndChangesNoContactOnABadLine) {
 TEST_F(EffectorTest, GoesOnWithATouchWhenTheLineComesBack) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(5).ok());
+  ASSERT_TRUE(effector_->StartCapture(5).ok());
   std::vector<uint64_t> truth = {device_->Press(0)};
   ASSERT_TRUE(WaitForContacts(1));
   device_->Unplug();
@@ -147,12 +147,12 @@ TEST_F(EffectorTest, GoesOnWithATouchWhenTheLineComesBack) {
   ASSERT_TRUE(WaitForConnection(false));
   EXPECT_TRUE(absl::IsUnavailable(effector_->Touch().status()));
   EXPECT_THAT(std::string(effector_->Touch().status().message()), HasSubstr("touch 5"));
-  EXPECT_TRUE(absl::IsUnavailable(effector_->Arm(6)));
+  EXPECT_TRUE(absl::IsUnavailable(effector_->StartCapture(6)));
   device_->Plug();
   ASSERT_TRUE(WaitForContacts(2));
   truth.push_back(device_->Press(2));
   ASSERT_TRUE(WaitForContacts(3));
-  ASSERT_TRUE(effector_->Disarm().ok());
+  ASSERT_TRUE(effector_->EndCapture().ok());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(effector_->Touch()->contact_ticks[i], truth[i]);
   EXPECT_GE(effector_->State().reconnections, 1u);
   EXPECT_EQ(device_->hellos(), 1) << "Hello would have disarmed it";
@@ -162,7 +162,7 @@ TEST_F(EffectorTest, SaysThatATouchIsLostWithTheDevicesMemory) {
   for (const bool unplugged : {true, false}) {
     Start();
     Open(Options());
-    ASSERT_TRUE(effector_->Arm(5).ok());
+    ASSERT_TRUE(effector_->StartCapture(5).ok());
     device_->Press(0);
     ASSERT_TRUE(WaitForContacts(1));
     if (unplugged) device_->Unplug();
@@ -175,7 +175,7 @@ TEST_F(EffectorTest, SaysThatATouchIsLostWithTheDevicesMemory) {
     EXPECT_TRUE(absl::IsNotFound(effector_->Recall(5).status()));
     // The next one works.
     device_->Release(0);
-    ASSERT_TRUE(ArmPatiently(6).ok());
+    ASSERT_TRUE(StartCapturePatiently(6).ok());
     const uint64_t truth = device_->Press(2);
     ASSERT_TRUE(WaitForContacts(1));
     EXPECT_EQ(effector_->Touch()->contact_ticks[2], truth);
@@ -187,7 +187,7 @@ TEST_F(EffectorTest, SaysThatATouchIsLostWithTheDevicesMemory) {
 TEST_F(EffectorTest, SaysThatATouchIsLostIfTheDeviceWasDisarmedMeanwhile) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(5).ok());
+  ASSERT_TRUE(effector_->StartCapture(5).ok());
   device_->Press(0);
   ASSERT_TRUE(WaitForContacts(1));
   device_->Unplug();
@@ -202,7 +202,7 @@ TEST_F(EffectorTest, SaysThatATouchIsLostIfTheDeviceWasDisarmedMeanwhile) {
 TEST_F(EffectorTest, TellsTheRecordToTheNextGateway) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(9).ok());
+  ASSERT_TRUE(effector_->StartCapture(9).ok());
   const uint64_t first = device_->Press(1);
   ASSERT_TRUE(WaitForContacts(1));
   effector_.reset();
@@ -225,12 +225,12 @@ TEST_F(EffectorTest, NamesTheFingersThatArePressedTooEarly) {
   Open(Options());
   device_->Press(1);
   device_->Press(2);
-  const absl::Status status = effector_->Arm(3);
+  const absl::Status status = effector_->StartCapture(3);
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr("fingers 2, 3 are pressed"));
   device_->Release(1);
   device_->Release(2);
-  EXPECT_TRUE(effector_->Arm(4).ok());
+  EXPECT_TRUE(effector_->StartCapture(4).ok());
 }
 
 TEST_F(EffectorTest, RefusesAFirmwareOfAnotherVersion) {
@@ -249,10 +249,9 @@ TEST_F(EffectorTest, RefusesOptionsThatMakeNoSense) {
   };
   EXPECT_THAT(error(Options(0)), HasSubstr("0 fingers; right is 1 to 8"));
   EXPECT_THAT(error(Options(9)), HasSubstr("9 fingers; right is 1 to 8"));
+  EXPECT_THAT(std::string(ParseSensor("optcal", "finger 2").status().message()),
+              HasSubstr("finger 2: unknown sensor 'optcal', did you mean 'optical'?"));
   EffectorOptions options = Options();
-  options.fingers[1].sensor = "optcal";
-  EXPECT_THAT(error(options), HasSubstr("finger 2: unknown sensor 'optcal', did you mean 'optical'?"));
-  options = Options();
   options.baud = 12345;
   EXPECT_THAT(error(options), HasSubstr("no rate of 12345 baud"));
   options = Options();
@@ -278,10 +277,10 @@ TEST_F(EffectorTest, WaitsForADeviceThatDoesNotAnswer) {
   Open(options);
   EXPECT_FALSE(effector_->State().connected);
   EXPECT_THAT(effector_->State().why, HasSubstr("no answer"));
-  EXPECT_TRUE(absl::IsUnavailable(effector_->Arm(1)));
+  EXPECT_TRUE(absl::IsUnavailable(effector_->StartCapture(1)));
   device_->Mute(false);
   ASSERT_TRUE(WaitForConnection());
-  EXPECT_TRUE(ArmPatiently(1).ok());
+  EXPECT_TRUE(StartCapturePatiently(1).ok());
 }
 
 TEST_F(EffectorTest, NoticesSilence) {
@@ -289,7 +288,7 @@ TEST_F(EffectorTest, NoticesSilence) {
   EffectorOptions options = Options();
   options.silence_s = 0.6;
   Open(options);
-  ASSERT_TRUE(effector_->Arm(1).ok());
+  ASSERT_TRUE(effector_->StartCapture(1).ok());
   device_->Mute(true);
   ASSERT_TRUE(WaitForConnection(false));
   EXPECT_TRUE(absl::IsUnavailable(effector_->Touch().status()));
@@ -302,7 +301,7 @@ TEST_F(EffectorTest, NoticesSilence) {
 TEST_F(EffectorTest, BelievesNoImpossibleEvent) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(7).ok());
+  ASSERT_TRUE(effector_->StartCapture(7).ok());
   const uint64_t armed = effector_->Touch()->armed_ticks;
   const auto inject = [&](uint32_t number, uint32_t touch, uint8_t finger, uint64_t ticks) {
     device_->InjectMessage(firmware::Event{number, touch, finger, firmware::EventKind::kContact, ticks});
@@ -323,21 +322,21 @@ TEST_F(EffectorTest, BelievesNoImpossibleEvent) {
   EXPECT_GE(device_->Acknowledged(905), 1);
 
   // The device's record puts right what was possible but wrong.
-  ASSERT_TRUE(effector_->Disarm().ok());
+  ASSERT_TRUE(effector_->EndCapture().ok());
   EXPECT_EQ(effector_->Touch()->Contacts(), 0);
 }
 
 TEST_F(EffectorTest, CorrectsAWrongContactWhenAllFingersHaveReported) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(7).ok());
+  ASSERT_TRUE(effector_->StartCapture(7).ok());
   std::vector<uint64_t> truth = {device_->Press(0)};
   device_->InjectMessage(firmware::Event{900, 7, 1, firmware::EventKind::kContact, truth[0] + 3});
   ASSERT_TRUE(WaitForContacts(2));
   truth.push_back(device_->Press(1));
   truth.push_back(device_->Press(2));
   ASSERT_TRUE(WaitFor([&] { return effector_->Touch()->contact_ticks[1] == truth[1]; }));
-  ASSERT_TRUE(effector_->Disarm().ok());
+  ASSERT_TRUE(effector_->EndCapture().ok());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(effector_->Touch()->contact_ticks[i], truth[i]);
 }
 
@@ -346,7 +345,7 @@ TEST_F(EffectorTest, HearsThroughGarbage) {
   Open(Options());
   RandomStream random(3, RandomDomain::kTest);
   for (uint32_t id = 1; id <= 10; ++id) {
-    ASSERT_TRUE(ArmPatiently(id).ok());
+    ASSERT_TRUE(StartCapturePatiently(id).ok());
     std::vector<uint8_t> garbage;
     for (int i = 0; i < 300; ++i) garbage.push_back(static_cast<uint8_t>(random.Below(256)));
     device_->Inject(garbage);
@@ -355,7 +354,7 @@ TEST_F(EffectorTest, HearsThroughGarbage) {
     ASSERT_TRUE(WaitForContacts(1));
     EXPECT_EQ(effector_->Touch()->contact_ticks[1], truth);
     device_->Release(1);
-    ASSERT_TRUE(effector_->Disarm().ok());
+    ASSERT_TRUE(effector_->EndCapture().ok());
   }
   EXPECT_GT(effector_->State().bad_frames, 10u);
 }
@@ -363,14 +362,14 @@ TEST_F(EffectorTest, HearsThroughGarbage) {
 TEST_F(EffectorTest, CountsRepeatedEventsOnce) {
   Start();
   Open(Options());
-  ASSERT_TRUE(effector_->Arm(2).ok());
+  ASSERT_TRUE(effector_->StartCapture(2).ok());
   const uint64_t truth = device_->Press(0);
   ASSERT_TRUE(WaitForContacts(1));
   for (int i = 0; i < 3; ++i)
     device_->InjectMessage(firmware::Event{1, 2, 0, firmware::EventKind::kContact, truth});
   ASSERT_TRUE(WaitFor([&] { return effector_->State().repeated_events >= 3; }));
   EXPECT_EQ(effector_->Touch()->Contacts(), 1);
-  EXPECT_GE(device_->Acknowledged(1), 4) << "each copy is acknowledged";
+  EXPECT_TRUE(WaitFor([&] { return device_->Acknowledged(1) >= 4; })) << "each copy is acknowledged";
 }
 
 TEST_F(EffectorTest, TellsTheDevicesClockInHostTime) {
@@ -382,7 +381,7 @@ TEST_F(EffectorTest, TellsTheDevicesClockInHostTime) {
     options.time_scale = time_scale;
     Open(options);
     ASSERT_TRUE(WaitFor([&] { return effector_->Clock().round_trips >= 100; }));
-    ASSERT_TRUE(effector_->Arm(1).ok());
+    ASSERT_TRUE(effector_->StartCapture(1).ok());
     const double before_s = HostNowS();
     const uint64_t ticks = device_->Press(0);
     const double after_s = HostNowS();

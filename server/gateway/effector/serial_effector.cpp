@@ -1,5 +1,4 @@
-// The functions that any thread may call, and the thread's outermost loop. The conversation is in
-// conversation.cpp.
+// The functions that any thread may call, and the thread's outermost loop.
 #include "server/gateway/effector/serial_effector.h"
 
 #include <sys/eventfd.h>
@@ -27,9 +26,6 @@ absl::Status CheckOptions(const EffectorOptions& options) {
   for (size_t i = 0; i < options.fingers.size(); ++i) {
     const EffectorFinger& finger = options.fingers[i];
     const std::string name = absl::StrCat("finger ", i + 1, ": ");
-    if (finger.sensor != "optical" && finger.sensor != "microswitch" && finger.sensor != "resistor")
-      return wrong(absl::StrCat(name, "unknown sensor '", finger.sensor, "'",
-                                DidYouMean(finger.sensor, {"optical", "microswitch", "resistor"})));
     if (!(finger.debounce_s >= 0 && finger.debounce_s * 1e6 <= firmware::kMaxDebounceUs))
       return wrong(absl::StrCat(name, "debounce_s is ", finger.debounce_s, "; right is 0 to ",
                                 firmware::kMaxDebounceUs * 1e-6));
@@ -48,6 +44,14 @@ absl::Status CheckOptions(const EffectorOptions& options) {
 }
 
 }  // namespace
+
+absl::StatusOr<firmware::Sensor> ParseSensor(const std::string& name, const std::string& where) {
+  if (name == "optical") return firmware::Sensor::kOptical;
+  if (name == "microswitch") return firmware::Sensor::kMicroswitch;
+  if (name == "resistor") return firmware::Sensor::kResistor;
+  return absl::InvalidArgumentError(absl::StrCat(where, ": unknown sensor '", name, "'",
+                                                 DidYouMean(name, {"optical", "microswitch", "resistor"})));
+}
 
 absl::StatusOr<std::unique_ptr<Effector>> Effector::Open(EffectorOptions options, ChangeNotifier* changes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckOptions(options));
@@ -73,7 +77,7 @@ SerialEffector::~SerialEffector() {
 }
 
 absl::Status SerialEffector::Start() {
-  // What a person has to mend first is told at once: a port that is missing.
+  // A port that is missing is an error at once: a person has to fix it first.
   TOUCHSTONE_ASSIGN_OR_RETURN(port_, SerialPort::Open(options_.port, options_.baud));
   wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_fd_ < 0) return absl::ResourceExhaustedError("end effector: no more file descriptors");
@@ -94,9 +98,9 @@ void SerialEffector::Run() {
       if (port.ok()) port_ = *std::move(port);
       status = port.status();
     }
-    if (status.ok()) status = Converse();
-    if (greeted_) backoff_s = 0.05;
-    greeted_ = false;
+    if (status.ok()) status = RunSession();
+    if (handshake_done_) backoff_s = 0.05;
+    handshake_done_ = false;
     port_.Close();
     unsent_.clear();
     queries_.clear();
@@ -156,14 +160,14 @@ absl::Status SerialEffector::Request(std::function<absl::Status()> work) {
   return work_status_;
 }
 
-absl::Status SerialEffector::Arm(uint32_t touch) {
+absl::Status SerialEffector::StartCapture(uint32_t touch) {
   if (touch == firmware::kNoTouch)
     return absl::InvalidArgumentError("end effector: a touch's id is 0; right is above 0");
-  return Request([this, touch] { return ArmTouch(touch); });
+  return Request([this, touch] { return StartCaptureOnDevice(touch); });
 }
 
-absl::Status SerialEffector::Disarm() {
-  return Request([this] { return DisarmTouch(); });
+absl::Status SerialEffector::EndCapture() {
+  return Request([this] { return EndCaptureOnDevice(); });
 }
 
 absl::StatusOr<EffectorTouch> SerialEffector::Recall(uint32_t touch) {

@@ -1,8 +1,7 @@
-// The end effector at a serial port. One thread talks with the device; the others leave it a request and
-// wait.
+// The end effector at a serial port. One thread talks with the device; the others hand it a request and wait.
 //
-// After the line was lost the port is opened again. If the device is then still armed with the current touch,
-// it goes on as if nothing had been, and its record tells what was missed. Otherwise Hello starts it anew.
+// After the line was lost the port is opened again. If the device still captures the current touch, the session
+// resumes and the device's record supplies the events that were missed; otherwise Hello starts a new session.
 #pragma once
 
 #include <poll.h>
@@ -28,38 +27,54 @@ class SerialEffector : public Effector {
  public:
   SerialEffector(EffectorOptions options, ChangeNotifier* changes);
   ~SerialEffector() override;
-  // Starts the thread and waits for the first conversation to begin or fail.
+  // Starts the thread and waits for the first session to begin or fail.
   absl::Status Start();
 
-  absl::Status Arm(uint32_t touch) override;
-  absl::Status Disarm() override;
+  absl::Status StartCapture(uint32_t touch) override;
+  absl::Status EndCapture() override;
   absl::StatusOr<EffectorTouch> Touch() const override;
   absl::StatusOr<EffectorTouch> Recall(uint32_t touch) override;
   EffectorState State() const override;
   ClockEstimate Clock() const override;
 
  private:
-  // What a reply is to a request: not one, the answer, or why there will be none.
-  enum class Answer { kNo, kYes, kRefused };
-  using Judge = std::function<Answer(const uint8_t* payload, size_t size)>;
+  // What a message is to the request that waits: no reply to it, the reply, or its refusal.
+  enum class Reply { kNo, kYes, kRefused };
+  using ReplyMatcher = std::function<Reply(const uint8_t* payload, size_t size)>;
 
   // The thread.
   void Run();
-  absl::Status Converse();        // until the line is lost
-  absl::Status Greet();           // resume or Hello; then the device is ready
-  absl::StatusOr<bool> Resume();  // whether the device is still armed with the current touch
-  absl::Status SayHello();
-  absl::Status SettleTouch();
-  absl::Status ArmTouch(uint32_t touch);
-  absl::Status DisarmTouch();
+
+  // handshake.cpp
+  absl::Status Handshake();       // Resume or ExchangeHello; then the device is ready
+  absl::StatusOr<bool> Resume();  // whether the device still captures the current touch
+  absl::Status ExchangeHello();
+
+  // session.cpp
+  absl::Status RunSession();      // until the line is lost
+  absl::Status ReconcileTouch();  // reads the device's record of the current touch until two readings agree
+  absl::Status StartCaptureOnDevice(uint32_t touch);
+  absl::Status EndCaptureOnDevice();
   absl::StatusOr<EffectorTouch> RecallTouch(uint32_t touch);
   absl::Status ReadRecord(uint32_t touch, const std::function<bool(const firmware::Recalled&)>& take);
-  // Sends until `judge` says that it was answered. DEADLINE_EXCEEDED: no answer to 8 tries; else the line's
-  // error.
+
+  // message_loop.cpp
+  // Sends until `matcher` accepts a reply. DEADLINE_EXCEEDED: none after kTries; FAILED_PRECONDITION: refused;
+  // else the line's error.
   template <typename Message>
-  absl::Status Ask(const Message& message, const Judge& judge);
+  absl::Status Ask(const Message& message, const ReplyMatcher& matcher) {
+    uint8_t payload[firmware::kMaxPayload];
+    const size_t size = firmware::Encode(message, payload);
+    return AskPayload(payload, size, matcher);
+  }
   template <typename Message>
-  absl::Status Send(const Message& message);
+  absl::Status Send(const Message& message) {
+    uint8_t payload[firmware::kMaxPayload];
+    const size_t size = firmware::Encode(message, payload);
+    return SendPayload(payload, size);
+  }
+  absl::Status AskPayload(const uint8_t* payload, size_t payload_size, const ReplyMatcher& matcher);
+  absl::Status SendPayload(const uint8_t* payload, size_t size);
   absl::Status Flush();
   // Reads, handles and keeps time until then or until `done` (asked after each message).
   absl::Status Pump(double until_host_s, const std::function<bool()>& done);
@@ -70,13 +85,18 @@ class SerialEffector : public Effector {
   void HandleStatus(const firmware::Status& status);
   void QueryClock();
   void SetDisconnected(const std::string& why);
-  uint64_t MaxTicks() const;  // a second later than now, device clock; 0 while the clock is unknown
+  uint64_t MaxTicks() const;  // kClockSlackS later than now, device clock; 0 while the clock is unknown
+
+  // serial_effector.cpp
   bool Stopping() const;
   void Wake();
   void WaitAwake(double seconds);
 
   // The other threads.
   absl::Status Request(std::function<absl::Status()> work);
+
+  static constexpr int kTries = 8;           // of a request
+  static constexpr double kClockSlackS = 1;  // by which a device time may seem wrong, in host seconds
 
   const EffectorOptions options_;
   ChangeNotifier* const changes_;
@@ -88,15 +108,15 @@ class SerialEffector : public Effector {
   firmware::FrameParser parser_;
   std::vector<uint8_t> unsent_;
   ClockSync sync_;
-  Judge judge_;
-  Answer answer_ = Answer::kNo;
+  ReplyMatcher matcher_;
+  Reply reply_ = Reply::kNo;
   firmware::Refused refused_;
   std::map<uint32_t, double> queries_;  // sent at, host
   uint32_t next_query_ = 1, next_nonce_ = 1;
   double query_at_s_ = 0, heard_at_s_ = 0;
-  bool greeted_ = false;
-  int strange_statuses_ = 0;  // in succession
-  std::string strange_;
+  bool handshake_done_ = false;
+  int unexpected_statuses_ = 0;  // in succession
+  std::string session_error_;    // ends the session; empty: none
   firmware::Event stale_event_;
   uint64_t damaged_ = 0;  // frames, but for those that parser_ counts
 

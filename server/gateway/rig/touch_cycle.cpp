@@ -80,13 +80,13 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
     return [phase](const ArmState& state) -> absl::StatusOr<bool> { return state.phase == phase; };
   };
 
-  // To the start. The end effector is armed there, at rest and free.
+  // To the start. The capture begins there, at rest and with every finger free.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
   TOUCHSTONE_RETURN_IF_ERROR(
       Supervise(program_id, limit_s, "the way to the start", guard, phase_is(MotionPhase::kReady)));
-  if (const absl::Status armed = parts_.effector->Arm(program_id); !armed.ok()) {
+  if (const absl::Status started = parts_.effector->StartCapture(program_id); !started.ok()) {
     parts_.arm->Stop().IgnoreError();
-    return armed;
+    return started;
   }
 
   // The approach: until every finger has reported, the first one is pushed far enough, or the stroke ends.
@@ -112,7 +112,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
       }));
 
   // Only a device that was disarmed and asked has the last word on a finger that made no contact.
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->Disarm());
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
   record.contacts.contact_ticks.resize(options_.fingers);
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);

@@ -66,15 +66,15 @@ class StampedEffector : public Effector {
  public:
   StampedEffector(std::unique_ptr<Effector> effector, int fingers, Stamps* stamps)
       : effector_(std::move(effector)), fingers_(fingers), stamps_(stamps) {}
-  absl::Status Arm(uint32_t touch) override {
+  absl::Status StartCapture(uint32_t touch) override {
     const double began_s = HostNowS();
-    const absl::Status status = effector_->Arm(touch);
+    const absl::Status status = effector_->StartCapture(touch);
     stamps_->effector_arm_s = HostNowS() - began_s;
     return status;
   }
-  absl::Status Disarm() override {
+  absl::Status EndCapture() override {
     const double began_s = HostNowS();
-    const absl::Status status = effector_->Disarm();
+    const absl::Status status = effector_->EndCapture();
     stamps_->effector_disarm_s = HostNowS() - began_s;
     return status;
   }

@@ -1,0 +1,166 @@
+// What a session with the device does: captures of touches, their reconciliation with the device's record.
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include "server/base/status.h"
+#include "server/gateway/effector/serial_effector.h"
+
+namespace touchstone {
+absl::Status SerialEffector::RunSession() {
+  const uint8_t delimiter = 0;  // ends whatever an earlier owner of the port began
+  unsent_.assign(1, delimiter);
+  heard_at_s_ = HostNowS();
+  session_error_.clear();
+  TOUCHSTONE_RETURN_IF_ERROR(Handshake());
+  if (Stopping()) return absl::OkStatus();
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    state_.connected = true;
+    state_.why.clear();
+    first_try_over_ = true;
+  }
+  changed_.notify_all();
+  if (changes_ != nullptr) changes_->Notify();
+
+  while (!Stopping()) {
+    std::function<absl::Status()> work;
+    bool needs_reconciliation;
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (work_ != nullptr && !work_done_) work = work_;
+      needs_reconciliation = record_.NeedsReconciliation();
+    }
+    if (needs_reconciliation) {
+      TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch());
+    } else if (work != nullptr) {
+      absl::Status status = work();
+      // Whoever does not answer is not there.
+      if (absl::IsDeadlineExceeded(status)) status = absl::UnavailableError(status.message());
+      {
+        std::lock_guard<std::mutex> lock(mutex_);
+        work_done_ = true;
+        work_status_ = status;
+      }
+      changed_.notify_all();
+      if (absl::IsUnavailable(status)) return status;
+    } else {
+      TOUCHSTONE_RETURN_IF_ERROR(Pump(HostNowS() + 1, [this] {
+        std::lock_guard<std::mutex> lock(mutex_);
+        return record_.NeedsReconciliation() || (work_ != nullptr && !work_done_);
+      }));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SerialEffector::ReadRecord(uint32_t touch,
+                                        const std::function<bool(const firmware::Recalled&)>& take) {
+  // Each try sends Recall once; `take` wants two answers that agree.
+  for (int i = 0; i < kTries; ++i) {
+    firmware::Recalled recalled;
+    TOUCHSTONE_RETURN_IF_ERROR(Ask(firmware::Recall{touch}, [&](const uint8_t* payload, size_t size) {
+      return firmware::Decode(payload, size, &recalled) && recalled.touch == touch ? Reply::kYes : Reply::kNo;
+    }));
+    if (Stopping()) return absl::UnavailableError("the gateway ends");
+    if (take(recalled)) return absl::OkStatus();
+    // The clock may not be known yet, without which no time is believed.
+    if (!clock_.valid)
+      TOUCHSTONE_RETURN_IF_ERROR(
+          Pump(HostNowS() + options_.reply_timeout_s, [this] { return clock_.valid; }));
+  }
+  return absl::UnavailableError(
+      absl::StrCat("the device's records of touch ", touch, " contradict each other"));
+}
+
+absl::Status SerialEffector::ReconcileTouch() {
+  const absl::Status status = ReadRecord(record_.touch().touch, [this](const firmware::Recalled& recalled) {
+    const uint64_t max_ticks = MaxTicks();
+    std::lock_guard<std::mutex> lock(mutex_);
+    return record_.OnReading(recalled, max_ticks);
+  });
+  if (absl::IsFailedPrecondition(status)) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    record_.MarkLost(absl::StrCat("the device has no record of touch ", record_.touch().touch, " any more"));
+  }
+  if (changes_ != nullptr) changes_->Notify();
+  return absl::IsFailedPrecondition(status) ? absl::OkStatus() : status;
+}
+
+absl::StatusOr<EffectorTouch> SerialEffector::RecallTouch(uint32_t touch) {
+  firmware::Recalled before;
+  bool has_before = false;
+  EffectorTouch result;
+  const absl::Status status = ReadRecord(touch, [&](const firmware::Recalled& recalled) {
+    for (int i = 0; i < recalled.fingers; ++i)
+      if ((recalled.contact_mask >> i & 1) != 0 && recalled.ticks[i] > MaxTicks()) return false;
+    const bool agreed = has_before && Agree(before, recalled);
+    before = recalled;
+    has_before = true;
+    if (!agreed) return false;
+    result.touch = touch;
+    result.boot_id = state_.boot_id;
+    result.contact_ticks = ContactsOf(recalled);
+    return true;
+  });
+  if (absl::IsFailedPrecondition(status) && refused_.reason == firmware::RefusedReason::kUnknownTouch)
+    return absl::NotFoundError(absl::StrCat("end effector: the device has no record of touch ", touch));
+  if (!status.ok()) return status;
+  return result;
+}
+
+absl::Status SerialEffector::StartCaptureOnDevice(uint32_t touch) {
+  // Times of events are believed only against the device's clock.
+  const auto clock_known = [this] { return clock_.valid; };
+  TOUCHSTONE_RETURN_IF_ERROR(Pump(HostNowS() + kTries * options_.reply_timeout_s, clock_known));
+  if (!clock_known())
+    return absl::DeadlineExceededError(absl::StrCat("the device at ", options_.port, " tells no time"));
+  const double least = (clock_.RemoteOf(HostNowS() - kClockSlackS)) * state_.tick_hz;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    record_.Begin(touch, state_.boot_id, static_cast<int>(options_.fingers.size()));
+  }
+  const absl::Status status = Ask(firmware::Arm{touch}, [&](const uint8_t* payload, size_t size) {
+    firmware::Armed armed;
+    if (!firmware::Decode(payload, size, &armed)) return Reply::kNo;
+    const uint64_t max_ticks = MaxTicks();
+    std::lock_guard<std::mutex> lock(mutex_);
+    return record_.OnArmed(armed, least > 0 ? static_cast<uint64_t>(least) : 0, max_ticks) ? Reply::kYes
+                                                                                           : Reply::kNo;
+  });
+  if (status.ok()) return status;
+  std::string why(status.message());
+  const bool refused = absl::IsFailedPrecondition(status);
+  if (refused && refused_.reason == firmware::RefusedReason::kPressed) {
+    std::vector<int> fingers;
+    for (int i = 0; i < firmware::kMaxFingers; ++i)
+      if ((refused_.detail >> i & 1) != 0) fingers.push_back(i + 1);
+    why = absl::StrCat(fingers.size() == 1 ? "finger " : "fingers ", absl::StrJoin(fingers, ", "),
+                       fingers.size() == 1 ? " is" : " are",
+                       " pressed before the touch begins; retreat, or look whether something sticks");
+  }
+  std::lock_guard<std::mutex> lock(mutex_);
+  record_.MarkLost(absl::StrCat("touch ", touch, " was not armed: ", why));
+  // A device that forgot its configuration was reset: the conversation begins anew.
+  if (refused && refused_.reason == firmware::RefusedReason::kNotConfigured)
+    return absl::UnavailableError("end effector: the device was reset");
+  return absl::Status(status.code(), absl::StrCat("end effector: ", why));
+}
+
+absl::Status SerialEffector::EndCaptureOnDevice() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    record_.EndCapture();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(Ask(firmware::Disarm{}, [](const uint8_t* payload, size_t size) {
+    firmware::Disarmed disarmed;
+    return firmware::Decode(payload, size, &disarmed) ? Reply::kYes : Reply::kNo;
+  }));
+  const bool unfinished = record_.touch().touch != 0 && record_.lost().empty() && !record_.Final();
+  return unfinished ? ReconcileTouch() : absl::OkStatus();
+}
+
+}  // namespace touchstone
