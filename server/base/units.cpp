@@ -18,9 +18,9 @@ constexpr UnitRow kUnits[] = {
     {Unit::kDegree, kRadiansPerDegree, "deg", "_deg"},
     {Unit::kMicrosecond, kSecondsPerMicrosecond, "us", "_us"},
     {Unit::kSecond, 1.0, "s", "_s"},
-    {Unit::kMillimetrePerSecond, 1e-3, "mm/s", "_mm_s"},
-    {Unit::kMillimetrePerSecondSquared, 1e-3, "mm/s^2", "_mm_s2"},
-    {Unit::kMillimetrePerHour, 1e-3 / 3600.0, "mm/h", "_mm_per_h"},
+    {Unit::kMillimetrePerSecond, kMetresPerMillimetre, "mm/s", "_mm_s"},
+    {Unit::kMillimetrePerSecondSquared, kMetresPerMillimetre, "mm/s^2", "_mm_s2"},
+    {Unit::kMillimetrePerHour, kMetresPerMillimetre / 3600.0, "mm/h", "_mm_per_h"},
     {Unit::kPerMetre, 1.0, "1/m", "_per_m"},
 };
 

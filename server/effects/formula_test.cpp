@@ -6,6 +6,7 @@
 #include <cmath>
 #include <thread>
 
+#include "server/base/units.h"
 #include "server/effects/effect_test_batch.h"
 
 namespace touchstone {
@@ -102,24 +103,24 @@ TEST(Formula, KnowsEveryVariableWithItsMeaning) {
   const int entry = touches.At(finger, touch);
   const std::vector<std::pair<std::string, double>> expected = {
       {"finger", 1},
-      {"speed_mm_s", touches.speed_m_s[touch] * 1e3},
+      {"speed_mm_s", touches.speed_m_s[touch] * kMillimetresPerMetre},
       {"session_time_s", touches.session_time_s[touch]},
-      {"previous_press_mm", touches.previous_press_m[entry] * 1e3},
+      {"previous_press_mm", touches.previous_press_m[entry] * kMillimetresPerMetre},
       {"approach_x", touches.approach[touch].x()},
       {"approach_y", touches.approach[touch].y()},
       {"approach_z", touches.approach[touch].z()},
       {"lateral_x", touches.lateral[touch].x()},
       {"lateral_y", touches.lateral[touch].y()},
       {"lateral_z", touches.lateral[touch].z()},
-      {"travel_mm", touches.travel_m[entry] * 1e3},
-      {"incidence_deg", std::acos(touches.cos_incidence[entry]) * 180 / kPi},
+      {"travel_mm", touches.travel_m[entry] * kMillimetresPerMetre},
+      {"incidence_deg", std::acos(touches.cos_incidence[entry]) / kRadiansPerDegree},
       {"curvature_per_m", touches.curvature_per_m[entry]},
       {"normal_x", touches.normal[entry].x()},
       {"normal_y", touches.normal[entry].y()},
       {"normal_z", touches.normal[entry].z()},
-      {"contact_x_mm", touches.contact_m[entry].x() * 1e3},
-      {"contact_y_mm", touches.contact_m[entry].y() * 1e3},
-      {"contact_z_mm", touches.contact_m[entry].z() * 1e3},
+      {"contact_x_mm", touches.contact_m[entry].x() * kMillimetresPerMetre},
+      {"contact_y_mm", touches.contact_m[entry].y() * kMillimetresPerMetre},
+      {"contact_z_mm", touches.contact_m[entry].z() * kMillimetresPerMetre},
       {"first", touches.first_finger[touch] == finger ? 1.0 : 0.0},
       {"first_finger", touches.first_finger[touch] - 1.0},
       {"cov_humidity", 0.5}};
@@ -132,7 +133,8 @@ TEST(Formula, KnowsEveryVariableWithItsMeaning) {
     TouchBatch after = touches;
     std::fill(after.reported_time_s.begin(), after.reported_time_s.end(), 0.0);
     ApplyEffect(**effect, {}, &after);
-    EXPECT_NEAR(after.reported_time_s[entry] * 1e6, value, 1e-9 * (1 + std::fabs(value))) << name;
+    EXPECT_NEAR(after.reported_time_s[entry] * kMicrosecondsPerSecond, value, 1e-9 * (1 + std::fabs(value)))
+        << name;
   }
 }
 
@@ -169,7 +171,7 @@ TEST(Formula, KnowsEveryFunctionAndConstantThatItLists) {
     ASSERT_TRUE(effect.ok()) << effect.status();
     TouchBatch after = touches;
     ApplyEffect(**effect, {}, &after);
-    EXPECT_NEAR(after.travel_offset_m[0] * 1e3, value, 1e-13) << expression;
+    EXPECT_NEAR(after.travel_offset_m[0] * kMillimetresPerMetre, value, 1e-13) << expression;
   }
 }
 

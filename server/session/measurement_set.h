@@ -1,5 +1,5 @@
-// A measurement file (format: proto/README.md) as columns: what the diagnosis reads. SI units, object frame. A million rows
-// are read in seconds, in about 200 bytes a row.
+// A measurement file (format: proto/README.md) as columns: what the diagnosis reads. SI units, object frame. A million
+// rows are read in seconds, in about 200 bytes per row.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct MeasurementSet {
   bool has_session_time = false;
   std::vector<std::string> objects;  // in order of appearance
 
-  // One entry a touch, in the order of the file.
+  // One entry per touch, in the order of the file.
   std::vector<uint64_t> touch;  // its number in the file; without that column 0, 1, ...
   std::vector<int> object;      // index into objects
   std::vector<Eigen::Vector3d> target_m, approach, lateral;  // exactly unit and perpendicular

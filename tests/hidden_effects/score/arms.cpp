@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <random>
 
+#include "server/base/units.h"
 #include "tests/hidden_effects/generator/rig.h"
 #include "tests/hidden_effects/generator/unlisted.h"
 #include "tests/hidden_effects/score/strengths.h"
@@ -31,7 +32,7 @@ T Pick(const std::vector<T>& from, std::mt19937_64& random) {
 Scenario Bumpy(const TestObjects& objects, uint64_t seed, double sigmas) {
   auto random = Stream(seed, "kind");
   Scenario scenario = FullSet(objects);
-  const double sigma_mm = scenario.sigma_us * 1e-6 * kSpeed;
+  const double sigma_mm = scenario.sigma_us * kSecondsPerMicrosecond * kSpeed;
   scenario.hidden.push_back({"surface_error", {sigmas * sigma_mm, 12 + 28 * Part(random)}});
   return scenario;
 }

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
@@ -56,10 +57,10 @@ absl::StatusOr<double> ExactRmseUs(const Set& set, const std::string& model_yaml
   for (int k = 0; k < observations.size(); ++k)
     for (int i = 0; i < observations.fingers; ++i)
       observations.time_s[k * observations.fingers + i] =
-          set.exact_time_us[observations.row[k] * observations.fingers + i] * 1e-6;
+          set.exact_time_us[observations.row[k] * observations.fingers + i] * kSecondsPerMicrosecond;
   TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction prediction,
                               Predict(observations, *input.model, false, false, nullptr));
-  return 1e6 * Rmse(observations, Residuals(observations, prediction));
+  return kMicrosecondsPerSecond * Rmse(observations, Residuals(observations, prediction));
 }
 
 }  // namespace touchstone::hidden
