@@ -60,7 +60,7 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
   throw std::runtime_error("no pose found where all fingers hit " + solid.name());
 }
 
-// The protocol: everything that does not depend on what is hidden.
+// The plan: everything that does not depend on the hidden effects.
 struct Protocol {
   std::vector<Command> commands;
   std::vector<int> round;
@@ -179,7 +179,7 @@ std::string NominalYaml(const Scenario& scenario) {
   return yaml;
 }
 
-// Times without chance; tangents for the noise that grows with the incidence.
+// Times without noise; tangents for the noise that grows with the incidence.
 void Play(const Scenario& scenario, const Protocol& protocol, uint64_t seed, std::vector<double>* exact_us,
           std::vector<double>* tangents) {
   Rig rig(scenario, seed);

@@ -25,26 +25,24 @@ struct Set {
   int touches = 0;
   std::vector<Command> commands;                                // one per touch
   std::vector<double> speed_mm_s, session_time_s, temperature;  // one per touch
-  std::vector<double> exact_time_us;  // [touch * fingers + finger]: everything hidden but chance
-  std::vector<double> reported_us;    // the same with noise and all; NaN: nothing reported
+  std::vector<double> exact_time_us;  // [touch * fingers + finger]: with every hidden effect, without noise
+  std::vector<double> reported_us;    // the same with noise, polling, outliers; NaN: nothing reported
 };
 
 // A pure function. Draws of poses, session times, noise, bumps and losses come from separate streams of the
 // seed, so that two scenarios that differ in one thing differ in that thing only.
 Set Generate(const Scenario& scenario, uint64_t seed);
 
-// Touches of the six faces in turn, object by object in turn: as many as wanted, the first of them always the
-// same.
+// `count` touches, the six faces in turn, object by object in turn. A larger count begins with the same touches.
 std::vector<Command> DrawCommands(const Scenario& scenario, int count, uint64_t seed);
 
-// A session of these touches, once each. A longer list with the same beginning has the same beginning of
-// times.
+// A session of these touches, once each. The times of a longer list begin with those of its first touches.
 Set GenerateFor(const Scenario& scenario, const std::vector<Command>& commands, uint64_t seed);
 
-// Only exact_time_us, for poses that Generate has drawn: what the effects do without chance.
+// Only exact_time_us, for poses that Generate has drawn: the effects without noise.
 std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed);
 
-// sqrt(sum ||P (a - b)||^2) / sigma over all touches: how many standard errors an effect is strong.
+// sqrt(sum ||P (a - b)||^2) / sigma over all touches: the size of an effect in standard errors.
 double SignalInStandardErrors(const std::vector<double>& a_us, const std::vector<double>& b_us, int fingers,
                               double sigma_us);
 

@@ -83,7 +83,7 @@ std::vector<Rig::Landing> Rig::Land(const Command& command) const {
   const double yaw = Value("tool_yaw") * kRadians;
   const Vec lateral = Eigen::AngleAxisd(yaw, a) * command.lateral;
   const double spacing = scenario_.spacing_mm + Value("finger_spacing");
-  // The real object: moved by v -> R (size v) + moved, so lines go the other way.
+  // The real object is the mesh under v -> R (size v) + moved; lines get the inverse transform.
   const double size = 1 + Value("object_scale");
   Vec turn = Vec::Zero(), moved = Vec::Zero();
   if (const auto pose = values_.find("object_pose"); pose != values_.end()) {
@@ -134,7 +134,7 @@ std::vector<Rig::Finger> Rig::Touch(const Command& command, double commanded_mm_
   std::vector<Finger> out(fingers);
   if (first < 0) return out;
 
-  // What is added to the way of each finger on the way.
+  // Travel added to each finger by effects of the motion and the contact.
   for (int i = 0; i < fingers; ++i) {
     Landing& landing = landings[i];
     double extra = i == first ? 0 : Value("object_push");

@@ -1,5 +1,5 @@
-// The rig with everything hidden in it, touch by touch, without chance: pose, contact, motion, and the part
-// of the sensor that is not random. Millimetres, seconds.
+// The rig with all hidden effects, touch by touch, without noise: pose, contact, motion, and the part of the sensor
+// that is not random. Millimetres, seconds.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,12 @@ class Rig {
     double tan_incidence = 0;
   };
 
-  // The session's next touch. Touches must come in the order of the session: fingers remember.
+  // The session's next touch. Touches must come in the order of the session, since fingers keep the indentation of the last one.
   std::vector<Finger> Touch(const Command& command, double speed_mm_s, double session_time_s,
                             double temperature);
 
-  // Corrects what the fingers remember of the last touch, where it was not the whole approach that Touch
-  // supposed: how far each was pressed, mm.
+  // Corrects the indentation of each finger by the last touch, mm, where that was not the whole approach that Touch
+  // assumed.
   void Remember(std::vector<double> pressed_mm) { pressed_mm_ = std::move(pressed_mm); }
 
   double clock_factor() const { return 1 + Value("clock_skew"); }
@@ -52,7 +52,7 @@ class Rig {
 
   Scenario scenario_;
   std::map<std::string, std::vector<double>> values_;
-  std::vector<Bumps> bumps_;        // one an object
+  std::vector<Bumps> bumps_;        // one per object
   std::vector<double> pressed_mm_;  // by the previous touch, per finger
 };
 

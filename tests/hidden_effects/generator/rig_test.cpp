@@ -99,7 +99,7 @@ TEST(HiddenRig, AnObjectGrowsAboutTheOriginOfItsMesh) {
 
 TEST(HiddenRig, ContactEffectsHaveTheirClosedForms) {
   Expect(Times({{"tip_radius", {2}}}), [](int i) { return Nominal(i) - 2 * (1 / kCos - 1) / kSpeed; });
-  // Bumps much longer than the row of fingers lift all of them alike, and never by much more than their RMS.
+  // Bumps much longer than the row of fingers lift all of them equally, and never by much more than their RMS.
   const auto bumpy = Times({{"surface_error", {0.1, 1e6}}});
   EXPECT_NEAR(bumpy[0] - Nominal(0), bumpy[2] - Nominal(2), 1e-6);
   EXPECT_GT(std::abs(bumpy[0] - Nominal(0)), 1e-6);

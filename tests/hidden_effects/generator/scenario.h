@@ -9,14 +9,14 @@
 
 namespace touchstone::hidden {
 
-// One hidden effect. `values` are those of the catalogue, flat, in the order of its parameters there; object_pose has its
-// six numbers once for every object, surface_error (rms_mm, length_mm) draws a field for every object.
+// One hidden effect. `values` are those of the catalogue, flat, in the order of its parameters there; object_pose has its six
+// numbers once per object, surface_error (rms_mm, length_mm) draws one field per object.
 struct Hidden {
   std::string effect;
   std::vector<double> values;
 };
 
-// Physics that no catalogue lists; what each is stands in unlisted.h. `second` is a lead or the like.
+// Physics that the catalogue does not list, defined in unlisted.cpp. `second` is a lead or the like.
 struct Unlisted {
   std::string name;
   double k_mm = 0;

@@ -117,7 +117,7 @@ void Solid::TryTriangle(uint32_t triangle, const Vec& centre, const Vec& directi
     *best = {t, point, outward, true};
   };
 
-  // The face, moved out by the radius towards where the ball comes from.
+  // The face, moved out by the radius towards where the sphere comes from.
   Vec normal = (p[1] - p[0]).cross(p[2] - p[0]);
   const double twice_area = normal.norm();
   if (twice_area > 0) {
@@ -155,7 +155,7 @@ Contact Solid::FirstContact(const Vec& origin, const Vec& direction, double radi
   stack[depth++] = 0;
   while (depth > 0) {
     const Box& box = boxes_[stack[--depth]];
-    // The line against the box grown by the radius.
+    // The line against the box inflated by the radius.
     double from = 0, until = best.hit ? best.travel_mm : 1e300;
     for (int axis = 0; axis < 3 && from <= until; ++axis) {
       const double low = box.low[axis] - radius - 1e-9, high = box.high[axis] + radius + 1e-9;

@@ -1,4 +1,4 @@
-// A triangle mesh that lines and balls run into, in double precision, millimetres: the oracle's own casting.
+// A triangle mesh that lines and spheres are cast against, in double precision, millimetres: the oracle's own casting.
 // It shares nothing with the product's: no Embree, no single precision, no packets; a median-split tree of
 // boxes, and exact tests against every face, edge and vertex that a box lets through.
 #pragma once
@@ -38,9 +38,8 @@ class Solid {
   const Eigen::Vector3d& low_mm() const { return boxes_[0].low; }
   const Eigen::Vector3d& high_mm() const { return boxes_[0].high; }
 
-  // A ball of this radius (0: a point) whose foremost point stands at `origin` and moves along the unit
-  // vector `direction`: the first time that it touches. A ball that overlaps where it starts counts as a
-  // miss.
+  // First contact of a sphere of this radius (0: a point) whose foremost point starts at `origin` and moves along the
+  // unit vector `direction`. A sphere that overlaps the solid where it starts counts as a miss.
   Contact FirstContact(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                        double radius_mm) const;
 

@@ -1,4 +1,4 @@
-// Physics that the catalogue does not list: what the diagnosis must own up to.
+// Physics that the catalogue does not list: the diagnosis must report it as unexplained.
 #pragma once
 
 #include <string>

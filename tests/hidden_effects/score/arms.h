@@ -11,9 +11,9 @@
 namespace touchstone::hidden {
 
 enum class Kind {
-  kNothing,            // perhaps but surface bumps
+  kNothing,            // at most surface bumps
   kEffects,            // one or more of the catalogue
-  kIndistinguishable,  // one of the catalogue that these data cannot tell from its rivals
+  kIndistinguishable,  // one of the catalogue that these data cannot distinguish from others
   kUnlisted,           // physics that the catalogue lacks
   kNoPoses,            // only objects and times
   kWrongValue,         // a value of the model's own
@@ -25,7 +25,7 @@ struct Arm {
   Kind kind = Kind::kNothing;
   int sets = 0;  // at --share 1
   std::function<Scenario(const TestObjects&, uint64_t seed)> draw;
-  // Effects that may be named besides the truth: what the set's own accidents look like.
+  // Effects that may be named besides the truth: what lost contacts and outliers resemble.
   std::vector<std::string> tolerated;
 };
 

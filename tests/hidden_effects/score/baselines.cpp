@@ -27,7 +27,7 @@ std::vector<int> RowsOf(const std::vector<double>& residuals) {
   return rows;
 }
 
-// A step of each value that a finite difference can be trusted with, SI.
+// The step of the finite difference of each value, SI.
 std::vector<std::vector<double>> Steps(const Effect& effect, int fingers) {
   std::vector<std::vector<double>> steps;
   const std::vector<double> neutral = effect.NeutralValues(fingers);
@@ -67,7 +67,7 @@ Eigen::MatrixXd Beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return out;
 }
 
-// Adds the best effect as long as `accept` likes (before, after, ranks).
+// Adds the best effect as long as `accept(before, after, ranks)` is true.
 template <typename Accept>
 std::vector<std::string> Forward(const std::vector<Columns>& candidates, const Eigen::VectorXd& y,
                                  Accept accept) {

@@ -1,4 +1,4 @@
-// What others would do with the same sets: to be beaten, not to be used.
+// Baselines: what common methods make of the same sets.
 #pragma once
 
 #include <string>

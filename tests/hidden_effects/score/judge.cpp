@@ -27,7 +27,7 @@ bool Names_(const v1::Step& step, const Hidden& truth, const Scenario& scenario)
   return Contains(RivalsOf(truth, scenario), step.effect()) && Contains(EquivalentsOf(step), truth.effect);
 }
 
-// The hidden value that a parameter of the report stands for. False: it stands for none.
+// The hidden value that a parameter of the report estimates. False: there is none.
 bool TrueValue(const v1::ParameterValue& parameter, const Hidden& truth, const Scenario& scenario,
                double* value) {
   const auto& values = truth.values;
@@ -61,7 +61,7 @@ bool TrueValue(const v1::ParameterValue& parameter, const Hidden& truth, const S
 
 void JudgeValues(const v1::Step& step, const Hidden& truth, const Scenario& scenario,
                  std::vector<Mark>* marks) {
-  // surface_error is a competitor whose length is not meant to be read.
+  // surface_error competes with the effects; its length is not an estimate of anything.
   if (step.effect() != truth.effect || truth.effect == "surface_error") return;
   bool near = step.parameters_size() > 0;
   for (const v1::ParameterValue& parameter : step.parameters()) {
@@ -217,7 +217,7 @@ std::vector<Mark> JudgeNames(const Arm& arm, const Scenario& truth, const Names&
   for (const std::string& name : names) {
     v1::Step* step = report.add_steps();
     step->set_effect(name);
-    // Methods that know no equivalents are forgiven exact ties.
+    // For methods that report no equivalents, exact ties count as right.
     for (const Hidden& hidden : truth.hidden)
       if (Contains(RivalsOf(hidden, truth), name)) step->add_equivalent(hidden.effect);
   }

@@ -1,4 +1,4 @@
-// The judge is judged: reports made by hand, and what they are worth.
+// The marks of reports that were written by hand.
 #include "tests/hidden_effects/score/judge.h"
 
 #include <gtest/gtest.h>
@@ -62,7 +62,7 @@ TEST(Judge, TheTruthIsRightByItsNameOrAsAnEquivalentOfItsOwnClass) {
   AddStep(&report, "oblique_slip");
   EXPECT_EQ(Ask("right first", Judge(One(), Hiding({{"oblique_slip", {0.3}}}), report, NAN)), true);
   EXPECT_EQ(Ask("right first", Judge(One(), Hiding({{"tip_radius", {2}}}), report, NAN)), false);
-  // "Radius or slip" names the truth, but is not right: data can tell the two apart.
+  // "Radius or slip" names the truth, but is not right: data can distinguish the two.
   v1::Report either;
   AddStep(&either, "oblique_slip", {"tip_radius"});
   EXPECT_EQ(Ask("right first", Judge(One(), Hiding({{"tip_radius", {2}}}), either, NAN)), false);

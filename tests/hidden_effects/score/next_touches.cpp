@@ -17,7 +17,7 @@ namespace {
 constexpr int kBegin = 48;
 // 6 nats: 400 to 1.
 constexpr double kSure = 0.9975;
-// Effects of geometry that look alike in few touches and that no tie binds.
+// Geometric effects that few touches cannot distinguish, although none are exactly equivalent.
 constexpr const char* kEffects[] = {"tip_radius", "oblique_slip", "finger_spacing", "object_scale",
                                     "tool_yaw"};
 
@@ -98,7 +98,7 @@ Races RunRaces(const TestObjects& objects, Seeds seeds, int count, int threads,
   std::atomic<int> next{0};
   const auto work = [&] {
     for (int k = next++; k < count; k = next++) {
-      // Behind the seeds of the arms.
+      // Seeds beyond those of the arms.
       const Race race = RunRace(objects, SeedOf(seeds, Arms().back(), 500'000 + k));
       const std::lock_guard<std::mutex> lock(mutex);
       ++sum.races;

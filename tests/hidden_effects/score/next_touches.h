@@ -1,5 +1,5 @@
-// Does it pay to make the touches that the diagnosis proposes? A small set with a faint effect grows, once by
-// the touches that are proposed, once by random ones, until the verdict is right and sure.
+// Are the touches that the diagnosis proposes better than random ones? A small set with a weak effect is extended by
+// either until the verdict is right and certain.
 #pragma once
 
 #include <functional>

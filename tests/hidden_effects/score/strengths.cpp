@@ -117,7 +117,7 @@ Hidden RealisticEffect(const std::string& effect, const Scenario& scenario, uint
 Hidden WeakEffect(const std::string& effect, const Scenario& scenario, uint64_t seed, double signal) {
   auto random = Stream(seed, "effect");
   Hidden whole = Drawn(effect, scenario, random);
-  // One pose for all objects: thirty numbers cannot be seen in so little.
+  // One pose for all objects: a weak signal cannot determine thirty numbers.
   if (effect == "object_pose") whole.values.resize(6);
   const Set like = Generate(scenario, seed);
   double low = std::log(1e-3), high = std::log(30.0);

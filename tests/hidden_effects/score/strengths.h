@@ -13,8 +13,8 @@ namespace touchstone::hidden {
 const std::vector<std::string>& EffectsOfExpectation();
 const std::vector<std::string>& EffectsOfScatter();
 
-// Values of a size that rigs show, with a random direction. What would be invisible in the scenario (less
-// than 25 standard errors) is made stronger.
+// Values of a realistic size with a random direction, made stronger where the scenario would not show them (less than
+// 25 standard errors).
 Hidden RealisticEffect(const std::string& effect, const Scenario& scenario, uint64_t seed);
 
 // The same direction, as weak as this signal (in standard errors over the whole set), found by bisection.

@@ -53,7 +53,7 @@ absl::StatusOr<double> ExactRmseUs(const Set& set, const std::string& model_yaml
                                    const TestObjects& objects) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set.csv, model_yaml, objects));
   TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
-  // In the place of what was reported, what is exactly so.
+  // The exact times in place of the reported ones.
   for (int k = 0; k < observations.size(); ++k)
     for (int i = 0; i < observations.fingers; ++i)
       observations.time_s[k * observations.fingers + i] =

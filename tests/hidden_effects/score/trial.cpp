@@ -15,7 +15,7 @@
 namespace touchstone::hidden {
 namespace {
 
-// CPU time of this thread: what else the machine does is not the diagnosis's.
+// CPU time of this thread, so that other work on the machine does not count.
 double ThreadSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

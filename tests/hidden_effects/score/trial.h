@@ -33,7 +33,7 @@ struct Outcome {
 
 Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines);
 
-// Whether nothing about it was judged wrong.
+// Whether every answer about it was right.
 bool AllRight(const Outcome& outcome);
 
 struct TrialResult {
