@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include "client/cli/journal_session.h"
 #include "client/cli/rig_record.h"
 #include "server/base/random.h"
+#include "server/base/test_folder.h"
 
 namespace touchstone::cli {
 namespace {
@@ -121,14 +121,8 @@ TEST(NoiseOfRepeats, IsUnknownWithoutRepeatsAndIgnoresMisses) {
 
 class RigRecordTest : public ::testing::Test {
  protected:
-  RigRecordTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "touchstone_record_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~RigRecordTest() override { std::filesystem::remove_all(folder_); }
-
   std::unique_ptr<RigRecord> Open() {
-    auto record = RigRecord::Open(folder_ + "/session.db", "monday", v1::RigState());
+    auto record = RigRecord::Open(folder_.Path("session.db"), "monday", v1::RigState());
     EXPECT_TRUE(record.ok()) << record.status();
     return *std::move(record);
   }
@@ -139,7 +133,7 @@ class RigRecordTest : public ::testing::Test {
     return result;
   }
 
-  std::string folder_;
+  TestFolder folder_;
 };
 
 TEST_F(RigRecordTest, WhatIsDoneIsNotAskedForAgain) {

@@ -13,6 +13,7 @@
 
 #include "client/source/measurement_csv.h"
 #include "client/source/npy.h"
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 
 namespace touchstone::client {
@@ -76,16 +77,10 @@ Batch MakeBatch(uint64_t start, uint64_t rows, bool encoded_image) {
 
 class ShardWriterTest : public ::testing::Test {
  protected:
-  ShardWriterTest() {
-    std::string name = (fs::temp_directory_path() / "touchstone_shard_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~ShardWriterTest() override { fs::remove_all(folder_); }
-
   DatasetLayout Layout(ShardFormat format, const std::string& subfolder) {
     DatasetLayout layout;
     layout.format = format;
-    layout.folder = folder_ + "/" + subfolder;
+    layout.folder = folder_.Path(subfolder);
     fs::create_directories(layout.folder);
     layout.samples = 25;
     layout.shard_size = 10;
@@ -111,7 +106,7 @@ class ShardWriterTest : public ::testing::Test {
     return facts.value_or(ShardFacts());
   }
 
-  std::string folder_;
+  TestFolder folder_;
 };
 
 std::map<std::string, std::string> ReadTar(const std::string& path) {

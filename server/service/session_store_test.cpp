@@ -8,6 +8,7 @@
 #include <fstream>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 
 namespace touchstone {
@@ -23,11 +24,8 @@ constexpr char kOther[] = "object,t_0_us,t_1_us\ncup,3,0\n";
 class SessionStoreTest : public ::testing::TestWithParam<bool> {
  protected:
   SessionStoreTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "touchstone_sessions_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     if (GetParam()) options_.sessions_dir = folder_;
   }
-  ~SessionStoreTest() override { std::filesystem::remove_all(folder_); }
 
   std::unique_ptr<SessionStore> Open() {
     auto store = SessionStore::Open(options_);
@@ -35,7 +33,8 @@ class SessionStoreTest : public ::testing::TestWithParam<bool> {
     return *std::move(store);
   }
 
-  std::string folder_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
   ServerOptions options_;
 };
 INSTANTIATE_TEST_SUITE_P(MemoryAndFolder, SessionStoreTest, ::testing::Bool());
@@ -125,9 +124,9 @@ TEST_P(SessionStoreTest, KeepsItsLimits) {
 }
 
 TEST(SessionStoreFolder, IsSharedByReplicasAndLeavesStrangeFilesAlone) {
-  std::string name = (std::filesystem::temp_directory_path() / "touchstone_sessions_XXXXXX").string();
+  const TestFolder folder;
   ServerOptions options;
-  options.sessions_dir = ::mkdtemp(name.data());
+  options.sessions_dir = folder.path();
   const auto one = *SessionStore::Open(options), two = *SessionStore::Open(options);
   ASSERT_TRUE(one->Create("monday", kSet).ok());
   EXPECT_EQ(two->Find("monday")->hash(), Sha256Hex(kSet));

@@ -16,6 +16,7 @@
 #include <random>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "server/session/journal.h"
 
 namespace touchstone {
@@ -26,12 +27,7 @@ using Mode = Journal::Mode;
 
 class JournalDamage : public ::testing::Test {
  protected:
-  JournalDamage() {
-    std::string folder = ::testing::TempDir() + "journal_damage_XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    path_ = folder_ + "/session.db";
-  }
-  ~JournalDamage() override { std::filesystem::remove_all(folder_); }
+  JournalDamage() { path_ = folder_ + "/session.db"; }
 
   static JournalSession Session() {
     JournalSession session;
@@ -73,7 +69,9 @@ class JournalDamage : public ::testing::Test {
   absl::Status Opened(Mode mode) { return Journal::Open(path_, mode).status(); }
   static std::string Message(const absl::Status& status) { return std::string(status.message()); }
 
-  std::string folder_, path_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
+  std::string path_;
 };
 
 // The child's part: touches one after the other; a byte down the pipe after every step that was acknowledged.

@@ -10,6 +10,7 @@
 #include <limits>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 
@@ -23,12 +24,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class JournalTest : public ::testing::Test {
  protected:
-  JournalTest() {
-    std::string folder = ::testing::TempDir() + "journal_XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    path_ = folder_ + "/session.db";
-  }
-  ~JournalTest() override { std::filesystem::remove_all(folder_); }
+  JournalTest() { path_ = folder_ + "/session.db"; }
 
   std::unique_ptr<Journal> Open(Journal::Mode mode = Journal::Mode::kCreateOrReadWrite,
                                 std::string path = "") {
@@ -72,7 +68,9 @@ class JournalTest : public ::testing::Test {
 
   static std::string Message(const absl::Status& status) { return std::string(status.message()); }
 
-  std::string folder_, path_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
+  std::string path_;
 };
 
 TEST_F(JournalTest, ATouchGoesFromIntentOverExecutingToItsResult) {

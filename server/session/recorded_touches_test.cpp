@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "server/base/test_folder.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone {
@@ -26,15 +27,8 @@ v1::CommandedTouch Command(double x_m, double speed_m_s = 0.02) {
 class RecordedTouchesTest : public ::testing::Test {
  protected:
   RecordedTouchesTest() {
-    std::string folder = ::testing::TempDir() + "recorded_XXXXXX";
-    folder_ = mkdtemp(folder.data());
     journal_ = *Journal::Open(folder_ + "/session.db", Journal::Mode::kCreateOrReadWrite);
   }
-  ~RecordedTouchesTest() override {
-    journal_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
   void Session(const std::string& name, int fingers = 1) {
     JournalSession session;
     session.name = name;
@@ -54,7 +48,8 @@ class RecordedTouchesTest : public ::testing::Test {
     ASSERT_TRUE(added.ok()) << added;
   }
 
-  std::string folder_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
   std::unique_ptr<Journal> journal_;
 };
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 
@@ -26,24 +27,19 @@ const char kCsv[] =
 class SessionFiles : public ::testing::Test {
  protected:
   SessionFiles() {
-    std::string folder = ::testing::TempDir() + "session_files_XXXXXX";
-    folder_ = mkdtemp(folder.data());
     journal_ = *Journal::Open(folder_ + "/session.db", Journal::Mode::kCreateOrReadWrite);
     csv_ = folder_ + "/set.csv";
     options_.session = "s";
   }
-  ~SessionFiles() override {
-    journal_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
   void Import(const std::string& text) {
     ASSERT_TRUE(WriteFileAtomically(csv_, text).ok());
     const absl::Status imported = ImportSessionCsv(csv_, options_, journal_.get());
     ASSERT_TRUE(imported.ok()) << imported;
   }
 
-  std::string folder_, csv_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
+  std::string csv_;
   std::unique_ptr<Journal> journal_;
   ImportOptions options_;
 };

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 
 namespace touchstone {
@@ -18,12 +19,7 @@ using ::testing::MatchesRegex;
 
 class AuditLogTest : public ::testing::Test {
  protected:
-  AuditLogTest() {
-    std::string folder = ::testing::TempDir() + "audit_log_XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    path_ = folder_ + "/audit.jsonl";
-  }
-  ~AuditLogTest() override { std::filesystem::remove_all(folder_); }
+  AuditLogTest() { path_ = folder_ + "/audit.jsonl"; }
 
   std::vector<std::string> Lines() const {
     std::ifstream file(path_);
@@ -32,7 +28,9 @@ class AuditLogTest : public ::testing::Test {
     return lines;
   }
 
-  std::string folder_, path_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
+  std::string path_;
 };
 
 TEST_F(AuditLogTest, EveryEventIsOneJsonObjectALine) {

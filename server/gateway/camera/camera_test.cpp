@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "server/base/test_folder.h"
 #include "server/gateway/camera/mjpeg_server.h"
 
 namespace touchstone {
@@ -22,12 +23,6 @@ using testing::HasSubstr;
 
 class CameraTest : public testing::Test {
  protected:
-  CameraTest() {
-    std::string pattern = testing::TempDir() + "/touchstone_camera_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~CameraTest() override { std::filesystem::remove_all(folder_); }
-
   // A picture all of one grey.
   void Write(const std::string& name, int grey) const {
     cv::imwrite(folder_ + "/" + name, cv::Mat(12, 16, CV_8UC3, cv::Scalar(grey, grey, grey)));
@@ -47,7 +42,8 @@ class CameraTest : public testing::Test {
     return MjpegServer::SceneOf(frame.rgb.data(), frame.width, frame.height);
   }
 
-  std::string folder_;
+  const TestFolder test_folder_;
+  const std::string& folder_ = test_folder_.path();
 };
 
 TEST_F(CameraTest, RefusesASourceThatIsNot) {
