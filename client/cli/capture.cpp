@@ -34,12 +34,11 @@ absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std:
 }
 
 absl::Status AddViews(const Options& options, v1::CaptureRequest* request) {
-  const int ways = !options.plan.empty() + !options.eye_mm.empty() + !options.touch.approach.empty();
-  if (ways != 1)
+  const int given = !options.plan.empty() + !options.eye_mm.empty() + !options.touch.approach.empty();
+  if (given != 1)
     return absl::InvalidArgumentError(
         "where from? Give exactly one of --approach (the camera of that touch), --eye-mm (a camera of your "
-        "own) and "
-        "--plan FILE (the cameras of its touches)");
+        "own) and --plan FILE (the cameras of its touches)");
   if (!options.plan.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<client::MeasuredTouch> touches, ReadTouches(options.plan));
     for (client::MeasuredTouch& touch : touches)
@@ -66,64 +65,97 @@ fs::path FileOfView(const fs::path& output, int view, int views) {
   return output.parent_path() / absl::StrCat(output.stem().string(), number, output.extension().string());
 }
 
+// "side" of "views/side.png", for what stands beside the photograph: side.mask.png, side.depth_mm.npy.
+std::string StemOf(const fs::path& file) {
+  return (file.parent_path() / file.stem()).string();
+}
+
+// Every file that the request will give; depth is a column of its own name.
+std::vector<OutputFile> FilesOf(const fs::path& output, int views, const v1::ImageSpec& image) {
+  std::vector<OutputFile> files;
+  for (int view = 0; view < views; ++view) {
+    const fs::path file = FileOfView(output, view, views);
+    const auto add = [&](const std::string& path) {
+      files.push_back({"-o", path, OutputKind::kFile, /*makes_folders=*/views > 1});
+    };
+    add(file.string());
+    if (image.mask()) add(StemOf(file) + ".mask.png");
+    if (image.depth()) add(StemOf(file) + ".depth_mm.npy");
+  }
+  return files;
+}
+
+// A column of one photograph as a file: its path and its bytes.
+absl::StatusOr<std::pair<std::string, std::string>> FileOfColumn(const v1::Column& column,
+                                                                 const fs::path& file) {
+  const client::FileColumn shape = client::FileColumnOf(column);
+  if (column.type() == v1::DATA_TYPE_BYTES)
+    return std::make_pair(file.string(), std::string(client::FileOf(column, 0)));
+  std::string bytes;
+  if (column.name() == "mask" && shape.shape.size() >= 2) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        bytes, EncodePng(reinterpret_cast<const uint8_t*>(column.data().data()),
+                         static_cast<int>(shape.shape[1]), static_cast<int>(shape.shape[0]), 1));
+    return std::make_pair(StemOf(file) + ".mask.png", bytes);
+  }
+  client::AppendLabValues(shape, column, 0, 1, &bytes);
+  return std::make_pair(absl::StrCat(StemOf(file), ".", shape.name, ".npy"),
+                        client::NpyFile(shape.type, shape.shape, bytes));
+}
+
+// The format of the photograph, by the name of its file; standard output gets PNG.
+absl::StatusOr<std::string> EncodingOf(const std::string& output) {
+  const std::string extension = fs::path(output).extension().string();
+  if (IsStandardOutput(output) || extension == ".png") return std::string("png");
+  if (extension == ".jpg" || extension == ".jpeg") return std::string("jpeg");
+  return absl::InvalidArgumentError(
+      absl::StrCat("-o: '", output, "' does not say the format; its name ends in .png or .jpg"));
+}
+
 absl::Status RunCapture(const Cli& cli, const Options& options) {
   const fs::path output(options.output);
-  const std::string extension = output.extension().string();
-  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg")
-    return absl::InvalidArgumentError(
-        absl::StrCat("-o: '", options.output, "' does not say the format; its name ends in .png or .jpg"));
   v1::CaptureRequest request;
   request.set_object(options.object);
-  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_image(),
-                              MakeImageSpec(cli, options.image, extension == ".png" ? "png" : "jpeg"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string encoding, EncodingOf(options.output));
+  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_image(), MakeImageSpec(cli, options.image, encoding));
   TOUCHSTONE_RETURN_IF_ERROR(AddViews(options, &request));
+  const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
+  if (IsStandardOutput(options.output)) {
+    if (views.size() != 1 || request.image().depth() || request.image().mask())
+      return absl::InvalidArgumentError(
+          "-o: standard output takes one photograph; several files need a name, for instance view.png");
+  } else {
+    TOUCHSTONE_RETURN_IF_ERROR(cli.CheckOutputs(FilesOf(output, views.size(), request.image())));
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), options.motion));
   const StopOnInterrupt stop_on_interrupt(source.get());
 
-  if (request.views_size() > 1 && output.has_parent_path()) {
+  if (views.size() > 1 && output.has_parent_path()) {
     std::error_code error;
     fs::create_directories(output.parent_path(), error);
     if (error)
       return absl::InvalidArgumentError(
           absl::StrCat("-o: ", output.parent_path().string(), " cannot be made: ", error.message()));
   }
-  // One view a request: any number of views, and no large message.
+  // One view per request: any number of views, and no large message.
   std::vector<std::string> written;
-  const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
   for (int i = 0; i < views.size(); ++i) {
     request.clear_views();
     *request.add_views() = views[i];
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CaptureResponse response, source->Capture(request));
-    const fs::path file = FileOfView(output, i, views.size());
-    const auto beside = [&](const char* ending) {
-      return (file.parent_path() / file.stem()).string() + ending;
-    };
     for (const v1::Column& column : response.columns()) {
       TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(column, response.rows()));
-      std::string path = file.string();
-      std::string bytes;
-      const client::FileColumn shape = client::FileColumnOf(column);
-      if (column.type() == v1::DATA_TYPE_BYTES) {
-        bytes = std::string(client::FileOf(column, 0));
-      } else if (column.name() == "mask" && shape.shape.size() >= 2) {
-        path = beside(".mask.png");
-        TOUCHSTONE_ASSIGN_OR_RETURN(
-            bytes, EncodePng(reinterpret_cast<const uint8_t*>(column.data().data()),
-                             static_cast<int>(shape.shape[1]), static_cast<int>(shape.shape[0]), 1));
-      } else {
-        path = beside(("." + shape.name + ".npy").c_str());
-        client::AppendLabValues(shape, column, 0, 1, &bytes);
-        bytes = client::NpyFile(shape.type, shape.shape, bytes);
-      }
-      TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(path, bytes));
-      written.push_back(path);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const auto file, FileOfColumn(column, FileOfView(output, i, views.size())));
+      TOUCHSTONE_RETURN_IF_ERROR(cli.Write(file.first, file.second));
+      written.push_back(file.first);
     }
   }
   if (cli.output().json) PrintJson({{"files", written}});
-  cli.Log(written.size() == 1
-              ? "wrote " + written[0]
-              : absl::StrCat("wrote ", written.size(), " files, ", written.front(), " to ", written.back()));
+  if (written.size() == 1)
+    cli.LogWritten(written[0]);
+  else
+    cli.Log(absl::StrCat("wrote ", written.size(), " files, ", written.front(), " to ", written.back()));
   return absl::OkStatus();
 }
 
@@ -142,8 +174,8 @@ void AddCapture(Cli* cli) {
   command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
       ->type_name("")
       ->required();
-  command->add_option("-o,--output", options->output, "The file to write, .png or .jpg")
-      ->type_name("FILE")
+  cli->AddOutput(command, "-o,--output", &options->output, "The file to write, .png or .jpg; -: stdout, PNG",
+                 OutputKind::kPrefix)
       ->required();
   const auto camera = [&](const std::string& name, std::string& value, const std::string& text) {
     command->add_option(name, value, text)->type_name("X,Y,Z")->group("Camera");
@@ -151,9 +183,10 @@ void AddCapture(Cli* cli) {
   camera("--eye-mm", options->eye_mm, "Where the camera stands, in the object's frame");
   camera("--at-mm", options->at_mm, "What it looks at. Default: 0,0,0");
   camera("--up", options->up, "What is up in the picture. Default: 0,0,1");
-  command->add_option("--plan", options->plan, "The cameras of the touches of a CSV file")
-      ->type_name("FILE")
-      ->group("Camera");
+  cli->AddInput(command,
+                command->add_option("--plan", options->plan, "The cameras of the touches of a CSV file")
+                    ->type_name("FILE")
+                    ->group("Camera"));
   AddTouchOptions(command, &options->touch);
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);

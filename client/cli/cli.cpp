@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <set>
+
+#include <absl/strings/match.h>
 
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
@@ -16,6 +19,7 @@ namespace {
 
 constexpr size_t kHelpColumn = 32;
 constexpr size_t kHelpWidth = 110;
+constexpr double kMaxWaitS = 3600;
 
 // One line of what it is, then examples, then usage and options.
 class ExamplesFirst : public CLI::Formatter {
@@ -148,6 +152,82 @@ CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
   return group;
 }
 
+CLI::Option* Cli::AddOutputOf(CLI::App* command, const std::string& name, std::string* path,
+                              const std::string& text, OutputKind kind, bool json_is_a_format) {
+  CLI::Option* option = command->add_option(name, *path, text);
+  option->type_name(kind == OutputKind::kFolder ? "FOLDER" : "FILE");
+  files_[command].outputs.push_back({option, kind, json_is_a_format});
+  const bool replaces = kind == OutputKind::kFile || kind == OutputKind::kPrefix;
+  if (replaces && command->get_option_no_throw("--force") == nullptr)
+    command->add_flag("--force", output_.force, "Replace output files that exist")->group("Output");
+  return option;
+}
+
+CLI::Option* Cli::AddOutput(CLI::App* command, const std::string& name, std::string* path,
+                            const std::string& text, OutputKind kind) {
+  return AddOutputOf(command, name, path, text, kind, /*json_is_a_format=*/false);
+}
+
+CLI::Option* Cli::AddFormattedOutput(CLI::App* command, const std::string& name, std::string* path,
+                                     const std::string& text) {
+  return AddOutputOf(command, name, path, text, OutputKind::kFile, /*json_is_a_format=*/true);
+}
+
+void Cli::AddInput(CLI::App* command, const CLI::Option* option) {
+  files_[command].inputs.push_back(option);
+}
+
+absl::Status Cli::CheckFiles(const CLI::App* command) {
+  const CommandFiles& files = files_[command];
+  std::vector<std::string> inputs = source_.meshes;
+  for (std::string& mesh : inputs) {
+    const absl::StatusOr<MeshSource> source = ParseMeshSource(mesh);
+    mesh = source.ok() ? source->path : "";  // what is wrong with it is said where it is read
+  }
+  for (const CLI::Option* option : files.inputs)
+    for (const std::string& path : option->results()) inputs.push_back(path);
+  std::error_code error;
+  if (!source_.mesh_folder.empty())
+    for (const auto& entry : std::filesystem::directory_iterator(source_.mesh_folder, error))
+      inputs.push_back(entry.path().string());
+  // A journal has two files beside it while it is open.
+  for (size_t i = inputs.size(); i-- > 0;)
+    if (absl::EndsWith(inputs[i], ".db"))
+      for (const char* beside : {"-wal", "-shm"}) inputs.push_back(inputs[i] + beside);
+  inputs_ = std::move(inputs);
+
+  std::vector<OutputFile> outputs;
+  for (const auto& [option, kind, json_is_a_format] : files.outputs) {
+    if (option->count() == 0) continue;
+    const std::string path = option->results().back();
+    const std::string name =
+        option->get_snames().empty() ? option->get_name() : "-" + option->get_snames()[0];
+    if (kind != OutputKind::kPrefix) outputs.push_back({name, path, kind});
+    if (!IsStandardOutput(path)) continue;
+    stdout_taken_ = true;
+    if (output_.json && !json_is_a_format)
+      return absl::InvalidArgumentError(absl::StrCat(name, " and --json: both are standard output"));
+  }
+  return CheckOutputs(outputs);
+}
+
+absl::Status Cli::CheckOutputs(const std::vector<OutputFile>& outputs) const {
+  return CheckOutputFiles(outputs, inputs_, output_.force);
+}
+
+absl::Status Cli::Write(const std::string& path, absl::string_view data) const {
+  return WriteOutputFile(path, data, output_.force);
+}
+
+absl::Status Cli::Print(absl::string_view text) const {
+  std::fwrite(text.data(), 1, text.size(), stdout_taken_ ? stderr : stdout);
+  return absl::OkStatus();
+}
+
+void Cli::LogWritten(const std::string& path, absl::string_view details) const {
+  if (!path.empty() && !IsStandardOutput(path)) Log(absl::StrCat("wrote ", path, details));
+}
+
 void Cli::AddOutputOptions(CLI::App* command) {
   // A command whose --json names a file has its own.
   if (command->get_option_no_throw("--json") == nullptr)
@@ -165,11 +245,12 @@ void Cli::AddSourceOptions(CLI::App* command) {
     return command->add_option(name, value, text)->type_name(type)->group("Source");
   };
   add("--server", source_.servers, "HOST:PORT",
-      "A touchstone-server, or several with commas (the next one goes on if one is lost). "
+      "A touchstone-server, or several with commas (the next one takes over from a lost one). "
       "Default: simulate in this process")
       ->delimiter(',')
       ->take_all()
       ->expected(1);
+  add("--wait-s", source_.wait_s, "S", "How long to wait for a server that is starting, from 0. Default: 10");
   add("--mesh", source_.meshes, "NAME=FILE",
       "A mesh to touch besides the built-in shapes, repeatable; with what the file does not say: "
       "NAME=FILE,unit=mm|cm|m|inch,up=x|y|z,scale=1,fit_mm=150")
@@ -179,7 +260,7 @@ void Cli::AddSourceOptions(CLI::App* command) {
   add("--renderer", source_.renderer, "KIND",
       "auto, egl or cpu: what makes images. Default: auto, the faster one");
   add("--egl-device", source_.egl_device, "N", "EGL device to render on, as touchstone doctor numbers them");
-  add("--threads", source_.threads, "N", "Threads that simulate. Default: one a core");
+  add("--threads", source_.threads, "N", "Threads that simulate. Default: one per core");
 }
 
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
@@ -201,6 +282,12 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
   return ConnectWithMeshes(std::move(meshes));
 }
 
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
+  client::ConnectionOptions options;
+  options.servers = SplitCommas(source_.servers);
+  return client::Connection::Open(std::move(options));
+}
+
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     std::vector<MeshSource> meshes) const {
   client::ConnectionOptions options;
@@ -211,6 +298,11 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
                                 : source_.egl_device >= 0 ? "--egl-device"
                                                           : nullptr;
     if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
+    if (!(source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS))
+      return absl::InvalidArgumentError(
+          absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
+    options.wait_s = source_.wait_s;
+    options.on_wait = [this](const std::string& line) { Log(line); };
     TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
     Detail("connected to " + connection->address());
     return connection;
@@ -219,7 +311,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
   embedded.meshes = std::move(meshes);
   if (source_.threads < 0)
     return absl::InvalidArgumentError(
-        absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one a core"));
+        absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one per core"));
   embedded.threads = source_.threads;
   embedded.renderer.kind = source_.renderer == "egl"   ? RendererKind::kEgl
                            : source_.renderer == "cpu" ? RendererKind::kCpu
@@ -288,7 +380,8 @@ int Cli::Run(int argc, char** argv) {
     std::fprintf(stderr, "%s", app_.help().c_str());
     return kBadInput;
   }
-  absl::Status status = run->second();
+  absl::Status status = CheckFiles(app);
+  if (status.ok()) status = run->second();
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
     if (status.ok()) status = absl::ResourceExhaustedError("stdout: the output could not be written whole");
   }

@@ -1,7 +1,9 @@
 // The command line as people and scripts meet it: the real binary, its exit codes, words and files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -128,7 +130,7 @@ TEST_F(CommandLineTest, BadInputIsExitCode2AndNamesFieldAndValue) {
        "--session: 'a b' is no session's name"},
       {{"rig", "status"}, "--server is missing"},
       {{"rig", "stop"}, "--server is missing"},
-      {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "PLACEMENT: '+w'"},
+      {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "FACE: '+w'"},
       {{"rig", "run", "none.csv", "-o", "set.txt"}, "-o: 'set.txt' does not say the format"},
       {{"session", "list", "set.csv"}, "'set.csv' is no journal"},
       {{"session", "list", "none.db"}, "none.db"},
@@ -143,9 +145,31 @@ TEST_F(CommandLineTest, BadInputIsExitCode2AndNamesFieldAndValue) {
 }
 
 TEST_F(CommandLineTest, AnUnreachableSourceIsExitCode3) {
-  const Outcome outcome = Run({"objects", "--server", "127.0.0.1:1"});
+  const Outcome outcome = Run({"objects", "--server", "127.0.0.1:1", "--wait-s", "0"});
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("127.0.0.1:1"));
+}
+
+TEST_F(CommandLineTest, AServerThatIsStartingIsWaitedFor) {
+  // A port that is free now.
+  const int probe = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(probe, reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(::getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  ::close(probe);
+  ServerOptions options;
+  options.listen = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  const pid_t child = Start({"objects", "--server", options.listen, "--wait-s", "300"});
+  while (Read(".err").find("waiting for " + options.listen) == std::string::npos)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  auto server = Server::Start(options);
+  ASSERT_TRUE(server.ok()) << server.status();
+  const Outcome outcome = Wait(child);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("lat20"));
 }
 
 TEST_F(CommandLineTest, DataGoesToStdoutAsMeasurementFiles) {
@@ -291,7 +315,7 @@ TEST_P(ResumeTest, KilledAtAnyMomentTheResultIsTheSameByteForByte) {
   EXPECT_GT(kills_in_the_middle, 0) << "no run was slow enough to be killed; the test shows nothing";
 }
 
-TEST_P(ResumeTest, InterruptedItSaysHowToGoOnAndLeavesNoPart) {
+TEST_P(ResumeTest, InterruptedItSaysHowToResumeAndLeavesNoPart) {
   const pid_t child =
       Start({"stream", "--to", GetParam(), "--samples", "2000000", "--shard-size", "500", "--out", "d"});
   // Until the first shard stands.
@@ -301,7 +325,7 @@ TEST_P(ResumeTest, InterruptedItSaysHowToGoOnAndLeavesNoPart) {
   ::kill(child, SIGINT);
   const Outcome outcome = Wait(child);
   EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("Run the same command again to go on"));
+  EXPECT_THAT(outcome.err, HasSubstr("Run the same command again to resume"));
   int shards = 0;
   for (const auto& entry : fs::directory_iterator(Path("d"))) {
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
@@ -373,7 +397,7 @@ TEST_F(CommandLineTest, ImagesComeAsFilesInTheShards) {
   EXPECT_TRUE(fs::exists(Path("side.depth_mm.npy")));
 }
 
-TEST_F(CommandLineTest, DoctorTellsWhatRendersAndTheLimits) {
+TEST_F(CommandLineTest, DoctorSaysWhatRendersAndTheLimits) {
   const Outcome outcome = Run({"doctor"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("Embree"), HasSubstr("EGL"), HasSubstr("Limits")));

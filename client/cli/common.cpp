@@ -146,10 +146,4 @@ void PrintJson(const Json& json) {
   std::printf("%s\n", json.dump(2).c_str());
 }
 
-absl::Status WriteOutput(const std::string& path, const std::string& data) {
-  if (!path.empty() && path != "-") return WriteFileAtomically(path, data);
-  std::fwrite(data.data(), 1, data.size(), stdout);
-  return absl::OkStatus();
-}
-
 }  // namespace touchstone::cli

@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/output_file.h"
 #include "client/source/connection.h"
 
 namespace touchstone::cli {
@@ -26,6 +27,7 @@ ExitCode ExitCodeOf(const absl::Status& status);
 // Options of every command.
 struct OutputOptions {
   bool json = false;
+  bool force = false;  // replace files that exist
   bool quiet = false;
   bool verbose = false;
 };
@@ -35,6 +37,7 @@ struct SourceOptions {
   std::vector<std::string> servers;
   std::vector<std::string> meshes;
   std::string mesh_folder;
+  double wait_s = 10;  // for a server that is starting
   std::string renderer = "auto";
   int egl_device = -1;
   int threads = 0;
@@ -44,17 +47,37 @@ class Cli {
  public:
   Cli();
 
-  // A command under `parent` (null: touchstone itself). Examples stand first in its help, one a line.
+  // A command under `parent` (null: touchstone itself). Examples stand first in its help, one per line.
   CLI::App* AddCommand(CLI::App* parent, const std::string& name, const std::string& description,
                        const std::string& examples, std::function<absl::Status()> run);
   // A command that only holds others ("model").
   CLI::App* AddGroup(const std::string& name, const std::string& description, const std::string& examples);
 
+  // An option that names a file which the command writes, with --force beside it. Before the command runs, all
+  // of its outputs are checked (output_file.h).
+  CLI::Option* AddOutput(CLI::App* command, const std::string& name, std::string* path,
+                         const std::string& text, OutputKind kind = OutputKind::kFile);
+  // The same where --json is another format of this output and not a text beside it.
+  CLI::Option* AddFormattedOutput(CLI::App* command, const std::string& name, std::string* path,
+                                  const std::string& text);
+  // The option names files that the command reads: none of its outputs may be one of them.
+  void AddInput(CLI::App* command, const CLI::Option* option);
+  // The same check for outputs whose names the command makes up, before its work.
+  absl::Status CheckOutputs(const std::vector<OutputFile>& outputs) const;
+  // Writes an output; empty and "-" are standard output.
+  absl::Status Write(const std::string& path, absl::string_view data) const;
+  // For people: to stdout, or to stderr where an output of the command is standard output.
+  absl::Status Print(absl::string_view text) const;
+  // "wrote report.html", unless it went to standard output.
+  void LogWritten(const std::string& path, absl::string_view details = "") const;
+
   // --server, --mesh, ...: for commands that need a source.
   void AddSourceOptions(CLI::App* command);
   // The source that those options name.
   absl::StatusOr<std::unique_ptr<client::Connection>> Connect() const;
-  // The same, with these meshes in place of --mesh and --mesh-dir where the source is in this process; a
+  // The same at a server, without --wait-s: for what must not wait.
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectNow() const;
+  // As Connect, with these meshes in place of --mesh and --mesh-dir where the source is in this process; a
   // server has its own, and the caller may send these along.
   absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(std::vector<MeshSource> meshes) const;
   const SourceOptions& source() const { return source_; }
@@ -68,6 +91,19 @@ class Cli {
   int Run(int argc, char** argv);
 
  private:
+  // What a command reads and writes, by its options.
+  struct CommandFiles {
+    struct Output {
+      const CLI::Option* option;
+      OutputKind kind;
+      bool json_is_a_format;
+    };
+    std::vector<Output> outputs;
+    std::vector<const CLI::Option*> inputs;
+  };
+  absl::Status CheckFiles(const CLI::App* command);
+  CLI::Option* AddOutputOf(CLI::App* command, const std::string& name, std::string* path,
+                           const std::string& text, OutputKind kind, bool json_is_a_format);
   void AddOutputOptions(CLI::App* command);
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
@@ -76,10 +112,12 @@ class Cli {
   OutputOptions output_;
   SourceOptions source_;
   std::map<const CLI::App*, std::function<absl::Status()>> runs_;
+  std::map<const CLI::App*, CommandFiles> files_;
+  std::vector<std::string> inputs_;  // paths that the running command reads
+  bool stdout_taken_ = false;        // an output of the running command is standard output
 };
 
 // --- Input
-// -----------------------------------------------------------------------------------------------------
 
 // Three numbers, "0,0,-1"; `name` stands in errors.
 absl::StatusOr<v1::Vector3> ParseVector(const std::string& name, const std::string& text);
@@ -96,10 +134,8 @@ absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& te
                                   const std::vector<std::string>& known);
 
 // --- Output
-// ----------------------------------------------------------------------------------------------------
 
-// Columns of text, each as wide as its widest cell, two blanks between them; the last one is broken into
-// lines.
+// Columns of text, each as wide as its widest cell, two blanks between them; the last one is wrapped.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
@@ -121,11 +157,7 @@ std::string Counted(uint64_t count, const std::string& one, const std::string& m
 
 void PrintJson(const Json& json);
 
-// Writes a file whole or not at all; "-" or empty is stdout.
-absl::Status WriteOutput(const std::string& path, const std::string& data);
-
 // --- Commands: one file each
-// -----------------------------------------------------------------------------------
 void AddObjects(Cli* cli);
 void AddEffects(Cli* cli);
 void AddModel(Cli* cli);

@@ -6,8 +6,7 @@ namespace touchstone::cli {
 namespace {
 
 absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckOutputs(cli, options, {{"--html", options.html}, {"--json", options.json}}));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CompareRequest request;
   *request.mutable_evidence() = comparison->evidence();
@@ -26,7 +25,7 @@ void AddCompare(Cli* cli) {
       nullptr, "compare", "Says how wrong a model is against measured touches, and where.",
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
-      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json | jq .initial",
+      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq .initial",
       [cli, options] { return RunCompare(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
 }

@@ -77,7 +77,7 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
       continue;
     const auto [other, is_new] = paths.emplace(name, entry.path().string());
     if (is_new || meshes->count(name) > 0) continue;
-    // The same object in two formats: the format that MeshFormatNames names first, and the user is told.
+    // The same object in two formats: the format that MeshFormatNames names first, and a note to the user.
     const auto rank = [&](const fs::path& path) {
       return std::find(formats.begin(), formats.end(),
                        absl::AsciiStrToLower(path.extension().string()).substr(1)) -
@@ -106,7 +106,7 @@ absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vect
     TOUCHSTONE_ASSIGN_OR_RETURN(const MeshSource source, ParseMeshSource(text));
     if (!meshes.emplace(source.name, source).second)
       return absl::InvalidArgumentError(
-          absl::StrCat("--mesh: two are named '", source.name, "'; one an object was expected"));
+          absl::StrCat("--mesh: two are named '", source.name, "'; one per object was expected"));
     if (std::find(objects.begin(), objects.end(), source.name) == objects.end()) {
       cli.Log(absl::StrCat("note: --mesh ", text, ": the set has no such object",
                            DidYouMean(source.name, objects)));
@@ -129,59 +129,44 @@ int TerminalWidth() {
 }  // namespace
 
 void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html) {
-  command
-      ->add_option(
-          "SET", options->set,
-          "The measurement file (CSV), or the journal (.db) of a rig's session; -: stdin; with --server "
-          "also a stored session's name")
-      ->type_name("")
+  const auto add_input = [&](const std::string& name, auto& value, const std::string& type,
+                             const std::string& text) {
+    CLI::Option* option = command->add_option(name, value, text)->type_name(type);
+    cli->AddInput(command, option);
+    return option;
+  };
+  add_input(
+      "SET", options->set, "",
+      "The measurement file (CSV), or the journal (.db) of a rig's session; -: stdin; with --server also "
+      "a stored session's name")
       ->required();
-  command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")
-      ->type_name("MODEL");
-  command
-      ->add_option("--also", options->also,
-                   "A file of your own effects (formulas) that compete with the catalogue, repeatable")
-      ->type_name("FILE")
+  add_input("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own");
+  add_input("--also", options->also, "FILE",
+            "A file of your own effects (formulas) that compete with the catalogue, repeatable")
       ->take_all()
       ->expected(1);
   command->add_option("--seed", options->seed, "Seed of permutations and draws. Default: 0")->type_name("N");
   if (html)
-    command->add_option("--html", options->html, "Write the report as one HTML file that opens offline")
-        ->type_name("FILE");
-  CLI::Option* json = command->add_option(
-      "--json", options->json, "Write the report as JSON; alone or with -: to stdout, instead of the text");
-  json->type_name("[FILE]")->expected(0, 1)->group("Output");
-  options->json_option = json;
+    cli->AddOutput(command, "--html", &options->html, "Write the report as one HTML file that opens offline");
+  cli->AddOutput(command, "--json", &options->json,
+                 "Write the report as JSON; -: to stdout, in place of the report in words")
+      ->group("Output");
   cli->AddSourceOptions(command);
 }
 
-absl::Status CheckOutputs(const Cli& cli, const ComparisonOptions& options,
-                          const std::vector<std::pair<std::string, std::string>>& outputs) {
-  std::vector<std::string> inputs = options.also;
-  inputs.push_back(options.set);
-  inputs.push_back(options.model);
-  for (const std::string& text : cli.source().meshes)
-    if (const auto mesh = ParseMeshSource(text); mesh.ok()) inputs.push_back(mesh->path);
-  const std::string folder = cli.source().mesh_folder;
-  for (size_t k = 0; k < outputs.size(); ++k) {
-    const auto& [option, path] = outputs[k];
-    if (path.empty() || path == "-") continue;
+absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::string, std::string>>& outputs) {
+  const std::string& folder = cli.source().mesh_folder;
+  if (folder.empty()) return absl::OkStatus();
+  const std::vector<std::string> formats = MeshFormatNames();
+  for (const auto& [option, path] : outputs) {
+    if (path.empty() || IsStandardOutput(path)) continue;
     std::error_code error;
-    for (const std::string& input : inputs)
-      if (fs::equivalent(path, input, error))
-        return absl::InvalidArgumentError(absl::StrCat(
-            option, ": ", path, " is ", input, ", which is read and never changed; choose another name"));
     const fs::path parent = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
     const std::string extension = absl::AsciiStrToLower(fs::path(path).extension().string());
-    const std::vector<std::string> formats = MeshFormatNames();
-    if (!folder.empty() && fs::equivalent(parent, folder, error) && !extension.empty() &&
+    if (fs::equivalent(parent, folder, error) && !extension.empty() &&
         std::find(formats.begin(), formats.end(), extension.substr(1)) != formats.end())
       return absl::InvalidArgumentError(
           absl::StrCat(option, ": ", path, " would be a mesh of --mesh-dir; choose another name"));
-    for (size_t other = 0; other < k; ++other)
-      if (fs::weakly_canonical(outputs[other].second, error) == fs::weakly_canonical(path, error))
-        return absl::InvalidArgumentError(absl::StrCat(option, " and ", outputs[other].first, ": both are ",
-                                                       path, "; one would replace the other"));
   }
   return absl::OkStatus();
 }
@@ -305,20 +290,24 @@ absl::Status Comparison::SendAhead(const std::string& csv) {
   return absl::OkStatus();
 }
 
-absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
+absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
   if (!options.html.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.html, client::HtmlReport(report)));
-    if (options.html != "-") cli.Log("wrote " + options.html);
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.html, client::HtmlReport(report)));
+    cli.LogWritten(options.html);
   }
-  if (options.JsonGiven()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::string json, client::JsonReport(report));
-    if (!absl::EndsWith(json, "\n")) json += '\n';
-    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.json, json));
-    if (!options.JsonOnStdout()) cli.Log("wrote " + options.json);
-  }
-  if (options.JsonOnStdout() || options.html == "-") return absl::OkStatus();
+  if (options.json.empty()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::string json, client::JsonReport(report));
+  if (!absl::EndsWith(json, "\n")) json += '\n';
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.json, json));
+  cli.LogWritten(options.json);
+  return absl::OkStatus();
+}
+
+absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
+  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
+  if (options.ReportOnStdout()) return absl::OkStatus();
   const bool colour = ::isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
-  return WriteOutput("", client::TerminalReport(report, TerminalWidth(), colour));
+  return cli.Print(client::TerminalReport(report, TerminalWidth(), colour));
 }
 
 }  // namespace touchstone::cli

@@ -20,19 +20,16 @@ struct ComparisonOptions {
   uint64_t seed = 0;
   std::string html;
   std::string json;
-  const CLI::Option* json_option = nullptr;
 
-  // --json alone and --json - are the output's form, as everywhere; --json FILE is a file beside the report.
-  bool JsonGiven() const { return json_option->count() > 0; }
-  bool JsonOnStdout() const { return JsonGiven() && (json.empty() || json == "-"); }
+  // What goes to standard output takes the place of the report in words.
+  bool ReportOnStdout() const { return IsStandardOutput(json) || IsStandardOutput(html); }
 };
 
 // SET, --model, --also, --seed, --json FILE and, if `html`, --html FILE; then the options of the source.
 void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html);
 
-// Refuses, before any work, outputs (option and path) that would replace what is read, or one another.
-absl::Status CheckOutputs(const Cli& cli, const ComparisonOptions& options,
-                          const std::vector<std::pair<std::string, std::string>>& outputs);
+// Refuses outputs (option and path) that the next command would take for meshes of --mesh-dir.
+absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::string, std::string>>& outputs);
 
 // A source and what to ask it.
 class Comparison {
@@ -61,7 +58,9 @@ class Comparison {
   std::string sent_ahead_;  // the session's name
 };
 
-// The report as JSON, as HTML and in the terminal, as the options ask.
+// The report as JSON and as HTML, as the options ask.
+absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
+// The same, and the report in words unless one of them went to standard output.
 absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
 
 template <typename Response, typename Start>

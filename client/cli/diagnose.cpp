@@ -14,7 +14,7 @@ struct Options : ComparisonOptions {
   std::string keep_as;
 };
 
-// The improved model under the file's name, or the model itself where nothing was to be changed.
+// The improved model under the file's name, or the model itself where nothing had to change.
 absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report& report,
                        Comparison* comparison) {
   const bool changed = !report.improved_model_yaml().empty();
@@ -32,19 +32,17 @@ absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report&
   const Model as_it_was = model;
   model.name = std::filesystem::path(options.save_model).stem().string();
   if (!ParseModel(FormatModel(model), options.save_model, Catalogue()).ok()) model.name = as_it_was.name;
-  TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.save_model, FormatModel(model)));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.save_model, FormatModel(model)));
   const std::string hash = model.Hash().substr(0, 12);
-  cli.Log(changed ? absl::StrCat("wrote ", options.save_model, " (", model.name, ", hash ", hash, ")")
-                  : absl::StrCat("wrote ", options.save_model,
-                                 ": the same model, nothing was to be changed (hash ", hash, ")"));
+  cli.LogWritten(options.save_model,
+                 changed ? absl::StrCat(" (", model.name, ", hash ", hash, ")")
+                         : absl::StrCat(": the same model, nothing had to change (hash ", hash, ")"));
   return absl::OkStatus();
 }
 
 absl::Status RunDiagnose(const Cli& cli, const Options& options) {
-  // What would spoil the end is told at the beginning.
-  TOUCHSTONE_RETURN_IF_ERROR(CheckOutputs(
-      cli, options,
-      {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(
+      cli, {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
   if (!options.keep_as.empty() && cli.source().servers.empty())
     return absl::InvalidArgumentError(
         "--keep-as: a server keeps models; give --server, or --save-model for a file");
@@ -68,8 +66,7 @@ void AddDiagnose(Cli* cli) {
   auto options = std::make_shared<Options>();
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
-      "Says how wrong a model is against measured touches, where, why, and what to add; climbs until the "
-      "rest is "
+      "Says how wrong a model is against measured touches, where, why, and what to add, until the rest is "
       "noise.",
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
@@ -79,8 +76,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
-  command->add_option("--save-model", options->save_model, "Write the improved model to this file")
-      ->type_name("FILE");
+  cli->AddOutput(command, "--save-model", &options->save_model, "Write the improved model to this file");
   command
       ->add_option("--keep-as", options->keep_as,
                    "With --server: keep the improved model there under this name, served at once")

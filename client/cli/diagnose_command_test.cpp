@@ -47,11 +47,11 @@ class DiagnoseCommandTest : public RealBinaryTest {
                     .exit_code,
                 0);
       ASSERT_EQ(Run({"plan", name, "--mesh-dir", "meshes", "--plan", "faces", "--samples-per-face", "4",
-                     "--rounds", "2", "-o", "plan.csv"})
+                     "--rounds", "2", "-o", absl::StrCat(name, "_plan.csv")})
                     .exit_code,
                 0);
-      const Outcome outcome = Run({"touch", "--plan", "plan.csv", "--mesh-dir", "meshes", "--model",
-                                   "tips.yaml", "--seed", std::to_string(touches.size() + 1)});
+      const Outcome outcome = Run({"touch", "--plan", absl::StrCat(name, "_plan.csv"), "--mesh-dir", "meshes",
+                                   "--model", "tips.yaml", "--seed", std::to_string(touches.size() + 1)});
       ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
       auto some = client::ParseMeasurements(outcome.out, "touch");
       ASSERT_TRUE(some.ok()) << some.status();
@@ -112,7 +112,7 @@ TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
   EXPECT_THAT(Read("report.html"), HasSubstr("</html>"));
 
   const Outcome after =
-      Run({"compare", "set.csv", "--model", "better.yaml", "--mesh-dir", "meshes", "--json"});
+      Run({"compare", "set.csv", "--model", "better.yaml", "--mesh-dir", "meshes", "--json", "-"});
   ASSERT_EQ(after.exit_code, 0) << after.err;
   EXPECT_LT(Json::parse(after.out)["initial"]["rmse_us"],
             0.5 * Json::parse(Read("before.json"))["initial"]["rmse_us"].get<double>());
@@ -128,7 +128,7 @@ TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   ASSERT_TRUE(server.ok()) << server.status();
   const std::string address = absl::StrCat("127.0.0.1:", (*server)->port());
 
-  const Outcome here = Run(Command("diagnose", {"--json", "--seed", "4"}));
+  const Outcome here = Run(Command("diagnose", {"--json", "-", "--seed", "4"}));
   ASSERT_EQ(here.exit_code, 0) << here.err;
   const Outcome there =
       Run(Command("diagnose", {"--json", "-", "--seed", "4", "--server", address, "--keep-as", "kept"}));
@@ -140,7 +140,7 @@ TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   // The same as a stored session, whose meshes are sent along.
   ASSERT_EQ(Run({"session", "create", "monday", "set.csv", "--server", address}).exit_code, 0);
   const Outcome stored = Run({"compare", "monday", "--model", "nominal.yaml", "--mesh-dir", "meshes",
-                              "--server", address, "--json"});
+                              "--server", address, "--json", "-"});
   ASSERT_EQ(stored.exit_code, 0) << stored.err;
   EXPECT_EQ(Json::parse(stored.out)["initial"], Json::parse(here.out)["initial"]);
 }
@@ -238,7 +238,10 @@ TEST_F(DiagnoseCommandTest, WhatIsReadIsNeverWrittenOver) {
   EXPECT_EQ(Read("set.csv"), set);
   EXPECT_THAT(Run(Command("diagnose", {"--save-model", "./nominal.yaml"})).err, HasSubstr("never changed"));
   EXPECT_EQ(Read("nominal.yaml"), kModel);
-  EXPECT_THAT(Run(Command("propose", {"-o", "meshes/cup.off"})).err, HasSubstr("would be a mesh"));
+  const std::string mesh = Read("meshes/cup.off");
+  EXPECT_THAT(Run(Command("propose", {"-o", "meshes/cup.off", "--force"})).err, HasSubstr("never changed"));
+  EXPECT_EQ(Read("meshes/cup.off"), mesh);
+  EXPECT_THAT(Run(Command("propose", {"-o", "meshes/new.off"})).err, HasSubstr("would be a mesh"));
   EXPECT_THAT(Run(Command("compare", {"--json", "a", "--html", "a"})).err,
               HasSubstr("one would replace the other"));
 }
@@ -247,7 +250,7 @@ TEST_F(DiagnoseCommandTest, OnlyMeshesThatTheSetNamesAreRead) {
   MakeSet();
   Write("meshes/broken.off", "this is no mesh");
   EXPECT_EQ(Run(Command("compare", {"-q"})).exit_code, 0);
-  // OFF comes before STL, and the user is told.
+  // OFF comes before STL, with a note to the user.
   Write("meshes/cup.stl", "nor is this");
   const Outcome two_files = Run(Command("compare"));
   EXPECT_EQ(two_files.exit_code, 0);
@@ -262,7 +265,7 @@ TEST_F(DiagnoseCommandTest, AUsersFormulaMayStandAlone) {
   Write("mine.yaml",
         "formula:\n  name: mine\n  adds: travel_mm\n  expression: \"k * finger\"\n"
         "  parameters: {k: {value: 0, unit: mm, min: -1, max: 1}}\n");
-  const Outcome outcome = Run(Command("diagnose", {"--also", "mine.yaml", "--json"}));
+  const Outcome outcome = Run(Command("diagnose", {"--also", "mine.yaml", "--json", "-"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("formula mine"));
   Write("mine.yaml", "formula:\n  name: mine\n  adds: travel_mm\n  expression: \"k * fingr\"\n");

@@ -81,7 +81,7 @@ class Doctor {
     if (cli_.output().json)
       PrintJson(json_);
     else
-      TOUCHSTONE_RETURN_IF_ERROR(WriteOutput("", Text()));
+      TOUCHSTONE_RETURN_IF_ERROR(cli_.Print(Text()));
     return source;
   }
 

@@ -137,7 +137,7 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
                     value, " -o better.yaml\n");
   }
   if (effect.name() == "formula") text += FormulaHelp();
-  return WriteOutput("", text);
+  return cli.Print(text);
 }
 
 absl::Status RunEffects(const Cli& cli, const std::string& name) {
@@ -166,7 +166,7 @@ absl::Status RunEffects(const Cli& cli, const std::string& name) {
       absl::StrAppend(&parameters, parameters.empty() ? "" : ", ", p.name());
     table.Add({effect.name(), StageWord(effect.stage()), parameters, effect.meaning()});
   }
-  return WriteOutput("", absl::StrCat(table.Text(), "\ntouchstone effects NAME explains one.\n"));
+  return cli.Print(absl::StrCat(table.Text(), "\ntouchstone effects NAME explains one.\n"));
 }
 
 }  // namespace

@@ -33,10 +33,8 @@ absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::st
   std::string list;
   for (const std::string& known : names) absl::StrAppend(&list, list.empty() ? "" : ", ", known);
   return absl::InvalidArgumentError(absl::StrCat(path, ": the journal has ", names.size(), " sessions (",
-                                                 list,
-                                                 "); say which: touchstone session "
-                                                 "export ",
-                                                 path, " NAME -o set.csv writes one as a measurement file"));
+                                                 list, "); say which: touchstone session export ", path,
+                                                 " NAME -o set.csv writes one as a measurement file"));
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& journal,
@@ -55,15 +53,16 @@ absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::strin
   return client::FormatMeasurements(touches);
 }
 
-absl::Status ExportFromJournal(const std::string& path, const std::string& session,
-                               const std::string& output) {
+absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
+                               bool force) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
   TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
-    return ExportSessionHdf5(*journal, found.name, output);
-  if (!output.empty() && output != "-") return ExportSessionCsv(*journal, found.name, output);
+    return WriteOutputFileBy(output, force, [&](const std::string& free_path) {
+      return ExportSessionHdf5(*journal, found.name, free_path);
+    });
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, JournalCsv(path, found.name));
-  return WriteOutput(output, csv);
+  return WriteOutputFile(output, csv, force);
 }
 
 absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,

@@ -28,9 +28,9 @@ absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& jour
 // The measurement file of a session.
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session);
 
-// Writes it to a file (.csv, .h5) or to stdout (empty, "-": CSV).
-absl::Status ExportFromJournal(const std::string& path, const std::string& session,
-                               const std::string& output);
+// Writes it to a file (.csv, .h5) or to stdout (empty, "-": CSV); an existing file with `force` only.
+absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
+                               bool force);
 
 // Makes a session out of a measurement file (.csv) or of what was exported (.h5), in a journal that may have
 // others. Returns its number of touches.

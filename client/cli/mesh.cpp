@@ -1,6 +1,8 @@
 // touchstone mesh import|supershape|info: mesh files.
 #include <filesystem>
 
+#include <absl/strings/ascii.h>
+
 #include "client/cli/common.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
@@ -18,7 +20,6 @@ struct Options {
   std::string up = "z";
   double scale = 1;
   double fit_mm = 0;
-  bool force = false;
   // Supershapes.
   std::string name;
   uint64_t triangles = 20000;
@@ -99,7 +100,7 @@ void Report(const Cli& cli, const std::string& name, const TriangleMesh& mesh) {
   if (cli.output().json)
     PrintJson(ReportJson(mesh, report));
   else if (!cli.output().quiet)
-    std::fputs(ReportInWords(name, mesh, report).c_str(), stdout);
+    cli.Print(ReportInWords(name, mesh, report)).IgnoreError();
 }
 
 absl::StatusOr<TriangleMesh> Read(const Cli& cli, const Options& options) {
@@ -117,12 +118,17 @@ absl::StatusOr<TriangleMesh> Read(const Cli& cli, const Options& options) {
 }
 
 absl::Status Write(const Cli& cli, const Options& options, const TriangleMesh& mesh) {
-  std::error_code error;
-  if (!options.force && std::filesystem::exists(options.output, error))
-    return absl::AlreadyExistsError(absl::StrCat(
-        "-o: ", options.output, " exists already; choose another name, or --force to replace it"));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteMeshFile(options.output, mesh));
-  Report(cli, options.output, mesh);
+  // The ending names the format; standard output gets OFF.
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  const std::string format = IsStandardOutput(options.output) ? "off"
+                             : extension.empty()              ? ""
+                                                              : absl::AsciiStrToLower(extension.substr(1));
+  const absl::StatusOr<std::string> text = MeshFileText(mesh, format);
+  if (!text.ok())
+    return absl::Status(text.status().code(),
+                        absl::StrCat("-o: ", options.output, ": ", text.status().message()));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, *text));
+  Report(cli, IsStandardOutput(options.output) ? "mesh" : options.output, mesh);
   return absl::OkStatus();
 }
 
@@ -195,10 +201,9 @@ void AddMesh(Cli* cli) {
                                   "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
                                   "touchstone mesh supershape lat20 --triangles 100000 -o lat20.obj");
   const auto add_output = [&](CLI::App* command) {
-    command->add_option("-o,--output", options->output, "The file to write, .off or .obj")
-        ->type_name("FILE")
+    cli->AddOutput(command, "-o,--output", &options->output,
+                   "The file to write, .off or .obj; -: stdout, OFF")
         ->required();
-    command->add_flag("--force", options->force, "Replace the file if it exists");
   };
 
   CLI::App* import =
@@ -206,7 +211,8 @@ void AddMesh(Cli* cli) {
                       "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
                       "touchstone mesh import scan.ply --fit-mm 150 -o scan.obj",
                       [cli, options] { return RunImport(*cli, *options); });
-  import->add_option("FILE", options->input, "The mesh to read")->type_name("")->required();
+  cli->AddInput(import,
+                import->add_option("FILE", options->input, "The mesh to read")->type_name("")->required());
   add_output(import);
   AddImportOptions(import, options.get());
 

@@ -17,7 +17,6 @@ struct ModelOptions {
   double spacing_mm = 30;
   std::string model, other, effect, output;
   std::vector<std::string> assignments;
-  bool force = false;
 };
 
 // A model named by file, hash or name. Files are read here, the rest is asked of the source.
@@ -46,17 +45,13 @@ Json ModelJson(const Model& model) {
 }
 
 absl::Status Save(const Cli& cli, const Model& model, const ModelOptions& options) {
-  const std::string& path = options.output;
-  if (path.empty() || path == "-") return WriteOutput("", FormatModel(model));
-  std::error_code error;
-  if (!options.force && std::filesystem::exists(path, error))
-    return absl::AlreadyExistsError(
-        absl::StrCat("-o: ", path, " exists already; choose another name, or --force to replace it"));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(path, FormatModel(model)));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, FormatModel(model)));
+  if (options.output.empty()) return absl::OkStatus();
   if (cli.output().json)
     PrintJson(ModelJson(model));
   else
-    cli.Log(absl::StrCat("wrote ", path, " (", model.name, ", hash ", model.Hash().substr(0, 12), ")"));
+    cli.LogWritten(options.output,
+                   absl::StrCat(" (", model.name, ", hash ", model.Hash().substr(0, 12), ")"));
   return absl::OkStatus();
 }
 
@@ -80,21 +75,16 @@ absl::Status RunShow(const Cli& cli, const ModelOptions& options) {
     PrintJson(ModelJson(model));
     return absl::OkStatus();
   }
-  return WriteOutput("", absl::StrCat("# hash ", model.Hash(), "\n", FormatModel(model)));
+  return cli.Print(absl::StrCat("# hash ", model.Hash(), "\n", FormatModel(model)));
 }
 
 absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Model before, LoadModel(cli, options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(Model after,
                               AddEffect(before, options.effect, options.assignments, Catalogue()));
-  // The same path would change the old file, even with --force.
-  std::error_code error;
-  if (!options.output.empty() && std::filesystem::equivalent(options.output, options.model, error))
-    return absl::InvalidArgumentError(absl::StrCat(
-        "-o: ", options.output, " is the model itself, which is never changed; choose another name"));
   // A new model under the old one's name would be refused by a server that knows the old one.
   const std::string stem = std::filesystem::path(options.output).stem().string();
-  if (!stem.empty() && options.output != "-") after.name = stem;
+  if (!stem.empty() && !IsStandardOutput(options.output)) after.name = stem;
   TOUCHSTONE_RETURN_IF_ERROR(ParseModel(FormatModel(after), options.output, Catalogue()).status());
   TOUCHSTONE_RETURN_IF_ERROR(Save(cli, after, options));
   if (!cli.output().json)
@@ -111,10 +101,10 @@ absl::Status RunDiff(const Cli& cli, const ModelOptions& options) {
     return absl::OkStatus();
   }
   if (lines.empty())
-    return WriteOutput("", "The physics is the same (hash " + before.Hash().substr(0, 12) + ").\n");
+    return cli.Print("The physics is the same (hash " + before.Hash().substr(0, 12) + ").\n");
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
-  return WriteOutput("", text);
+  return cli.Print(text);
 }
 
 }  // namespace
@@ -128,9 +118,7 @@ void AddModel(Cli* cli) {
       "touchstone model show tips.yaml\n"
       "touchstone model diff nominal.yaml tips.yaml");
   const auto add_output = [&](CLI::App* command) {
-    command->add_option("-o,--output", options->output, "The file to write. Default: stdout")
-        ->type_name("FILE");
-    command->add_flag("--force", options->force, "Replace the file if it exists");
+    cli->AddOutput(command, "-o,--output", &options->output, "The file to write. Default: stdout");
   };
 
   CLI::App* make =
@@ -159,10 +147,13 @@ void AddModel(Cli* cli) {
       "touchstone model add nominal.yaml formula name=screw adds=travel_mm \\\n"
       "    'expression=k * sin(2*pi*travel_mm/lead)' k=0.1 k_unit=mm lead=4 lead_unit=mm -o screw.yaml",
       [cli, options] { return RunAdd(*cli, *options); });
-  add->add_option("MODEL", options->model, "A model file, a name or a hash")->type_name("")->required();
+  cli->AddInput(
+      add,
+      add->add_option("MODEL", options->model, "A model file, a name or a hash")->type_name("")->required());
   add->add_option("EFFECT", options->effect, "An effect of touchstone effects")->type_name("")->required();
-  add->add_option("PARAMETER=VALUE", options->assignments,
-                  "Its parameters, in the units of their names; one value per finger or a vector with commas")
+  add->add_option(
+         "PARAMETER=VALUE", options->assignments,
+         "Its parameters, in the units of their names; one value per finger or a vector, with commas")
       ->type_name("");
   add_output(add);
   cli->AddSourceOptions(add);

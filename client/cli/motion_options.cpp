@@ -3,8 +3,9 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <cmath>
+#include <chrono>
 #include <cstdio>
+#include <thread>
 
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
@@ -13,6 +14,29 @@ namespace touchstone::cli {
 namespace {
 
 constexpr int kLookForInterruptMs = 100;
+constexpr std::chrono::milliseconds kLookAtRig{100};
+
+// A gateway answers before its parts are connected: while it is starting they are waited for, as long as for the
+// gateway itself. What is still missing then is said by the call that needs it.
+absl::Status WaitForParts(const Cli& cli, client::Connection* connection,
+                          const std::function<void(const std::string&)>& log) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(cli.source().wait_s);
+  for (bool waiting = false;; waiting = true) {
+    const absl::StatusOr<v1::RigState> rig =
+        client::Connection::Call(&v1::Rig::Stub::GetRig, connection->rig(), v1::GetRigRequest());
+    if (!rig.ok()) return absl::OkStatus();  // a source of another kind
+    const bool arm = rig->arm().connected(), effector = rig->effector().connected();
+    if ((arm && effector) || std::chrono::steady_clock::now() > end) return absl::OkStatus();
+    if (Interrupt::Raised()) return absl::CancelledError("interrupted");
+    if (!waiting)
+      log(absl::StrCat("waiting for the rig's ",
+                       arm        ? "end effector"
+                       : effector ? "arm"
+                                  : "arm and end effector",
+                       ", up to ", cli.source().wait_s, " s"));
+    std::this_thread::sleep_for(kLookAtRig);
+  }
+}
 
 }  // namespace
 
@@ -37,7 +61,9 @@ absl::StatusOr<std::unique_ptr<client::LeasedSource>> OpenLeased(
   client::LeasedSourceOptions options;
   options.take_lease = flags.take_lease;
   options.log = log != nullptr ? std::move(log) : [&cli](const std::string& line) { cli.Log(line); };
+  const std::function<void(const std::string&)> say = options.log;
   TOUCHSTONE_ASSIGN_OR_RETURN(auto source, client::LeasedSource::Open(connection, std::move(options)));
+  if (source->physical()) TOUCHSTONE_RETURN_IF_ERROR(WaitForParts(cli, connection, say));
   if (source->lease()->required()) cli.Detail("holds the lease as " + client::LeaseHolder());
   return source;
 }
@@ -57,17 +83,10 @@ absl::Status AskPerson(const std::string& what) {
     if (::read(STDIN_FILENO, &c, 1) <= 0) {
       std::fputc('\n', stderr);
       return absl::FailedPreconditionError(
-          absl::StrCat("a person is needed (", what, "), but nobody answers: stdin has ended"));
+          absl::StrCat("a person is needed (", what, "), but there is no answer: stdin has ended"));
     }
   }
   return absl::OkStatus();
-}
-
-std::string DurationInWords(double seconds) {
-  const auto whole = static_cast<long long>(std::ceil(std::max(seconds, 0.0)));
-  if (whole < 60) return absl::StrCat(whole, " s");
-  if (whole < 3600) return absl::StrCat(whole / 60, " min ", whole % 60, " s");
-  return absl::StrCat(whole / 3600, " h ", whole % 3600 / 60, " min");
 }
 
 }  // namespace touchstone::cli

@@ -38,7 +38,4 @@ class StopOnInterrupt {
 // has ended.
 absl::Status AskPerson(const std::string& what);
 
-// "40 s", "4 min 10 s", "2 h 5 min".
-std::string DurationInWords(double seconds);
-
 }  // namespace touchstone::cli

@@ -43,7 +43,7 @@ absl::Status RunObjects(const Cli& cli) {
                             side(low.z(), high.z())),
                object.closed() ? "yes" : "no", object.mesh_hash().substr(0, 12), object.origin()});
   }
-  return WriteOutput("", table.Text());
+  return cli.Print(table.Text());
 }
 
 }  // namespace

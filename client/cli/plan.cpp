@@ -51,7 +51,7 @@ absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
       done += step;
     }
   }
-  if (!cli.output().json) return WriteOutput(options.output, client::FormatMeasurements(touches));
+  if (!cli.output().json) return cli.Write(options.output, client::FormatMeasurements(touches));
 
   Json list = Json::array();
   for (const client::MeasuredTouch& touch : touches) {
@@ -70,7 +70,7 @@ absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
     if (c.has_session_time_s()) item["session_time_s"] = c.session_time_s();
     list.push_back(std::move(item));
   }
-  return WriteOutput(options.output, Json({{"touches", list}}).dump(2) + "\n");
+  return cli.Write(options.output, Json({{"touches", list}}).dump(2) + "\n");
 }
 
 }  // namespace
@@ -94,9 +94,8 @@ void AddPlan(Cli* cli) {
   (*count)->type_name("N");
   command->add_option("--first", options->first, "Number of the first one. Default: 0")->type_name("N");
   command->add_option("--seed", options->seed, "Seed of the directions. Default: 0")->type_name("N");
-  command->add_option("-o,--output", options->output, "The file to write. Default: stdout")
-      ->type_name("FILE");
-  AddPlanOptions(command, &options->plan);
+  cli->AddFormattedOutput(command, "-o,--output", &options->output, "The file to write. Default: stdout");
+  AddPlanOptions(cli, command, &options->plan);
   cli->AddSourceOptions(command);
 }
 

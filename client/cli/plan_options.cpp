@@ -42,15 +42,16 @@ double Norm(const v1::Vector3& v) {
 
 }  // namespace
 
-void AddPlanOptions(CLI::App* command, PlanOptions* options) {
+void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options) {
   const auto add = [&](const std::string& name, auto& value, const std::string& type,
                        const std::string& text) {
-    command->add_option(name, value, text)->type_name(type)->group(kPlanGroup);
+    return command->add_option(name, value, text)->type_name(type)->group(kPlanGroup);
   };
-  add("--plan", options->plan, "PLAN",
-      "sphere: random directions round the object; faces: rounds of poses on the six faces of its box; or a "
-      "CSV file "
-      "of explicit touches (touchstone plan writes one). Default: sphere");
+  cli->AddInput(command,
+                add("--plan", options->plan, "PLAN",
+                    "sphere: random directions round the object; faces: rounds of poses on the six "
+                    "faces of its box; or a CSV file of explicit touches (touchstone plan writes one). "
+                    "Default: sphere"));
   add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20; a file has its own");
   add("--touch-interval-s", options->touch_interval_s, "S", "Time between the starts of touches. Default: 0");
   add("--step-angle-deg", options->step_angle_deg, "DEG",
@@ -59,7 +60,7 @@ void AddPlanOptions(CLI::App* command, PlanOptions* options) {
       "sphere: the fingers' row is turned by random multiples of it. Default: 0, not turned");
   add("--radius-ratio", options->radius_ratio, "RATIO",
       "sphere: radius of the start sphere over half the box's diagonal. Default: 1.05");
-  add("--samples-per-face", options->samples_per_face, "N", "faces: poses a face. Default: 8");
+  add("--samples-per-face", options->samples_per_face, "N", "faces: poses per face. Default: 8");
   add("--rounds", options->rounds, "N", "faces: repeats of all poses. Default: 4");
   add("--max-tilt-deg", options->max_tilt_deg, "DEG",
       "faces: largest angle to the face's normal. Default: 20");
@@ -69,7 +70,7 @@ void AddPlanOptions(CLI::App* command, PlanOptions* options) {
 }
 
 absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>* objects) {
-  // An option that does nothing is a mistake; it is told, not passed over.
+  // An option that does nothing is a mistake, and refused.
   const std::pair<const char*, bool> sphere_only[] = {{"--step-angle-deg", o.step_angle_deg.has_value()},
                                                       {"--roll-step-deg", o.roll_step_deg.has_value()},
                                                       {"--radius-ratio", o.radius_ratio.has_value()}};

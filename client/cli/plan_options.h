@@ -18,7 +18,7 @@ struct PlanOptions {
   std::optional<double> max_tilt_deg, spread, standoff_mm;
   std::optional<double> speed_mm_s, touch_interval_s;
 };
-void AddPlanOptions(CLI::App* command, PlanOptions* options);
+void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options);
 
 // The plan with every default written out, so that a specification means the same for ever. A list's objects,
 // in the order of their first row, go to `objects` (may be null).
@@ -38,7 +38,7 @@ void AddImageOptions(CLI::App* command, ImageFlags* options);
 absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& options,
                                             const std::string& encoding);
 
-// One touch told by options: --approach and so on.
+// One touch given by options: --approach and so on.
 struct TouchFlags {
   std::string target_mm = "0,0,0";
   std::string approach;

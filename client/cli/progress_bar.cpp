@@ -3,23 +3,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <string>
+
+#include "server/base/text.h"
 
 namespace touchstone::cli {
 namespace {
 
 constexpr int kBarWidth = 30;
 constexpr std::chrono::milliseconds kInterval{100};
-
-// "3 s", "4 min 10 s", "2 h 5 min".
-std::string Duration(double seconds) {
-  const auto whole = static_cast<long long>(std::ceil(seconds));
-  if (whole < 60) return std::to_string(whole) + " s";
-  if (whole < 3600) return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
-  return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
-}
 
 }  // namespace
 
@@ -34,7 +27,7 @@ void ProgressBar::Show(uint64_t done, uint64_t total, uint64_t this_run) {
   const double share = static_cast<double>(done) / total;
   const int filled = static_cast<int>(share * kBarWidth);
   const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
-  const std::string left = rate > 0 ? Duration((total - done) / rate) + " left" : "";
+  const std::string left = rate > 0 ? DurationInWords((total - done) / rate) + " left" : "";
   std::fprintf(stderr, "\r\x1b[K[%s] %5.1f %%  %llu of %llu samples  %.0f samples/s  %s", bar.c_str(),
                100 * share, static_cast<unsigned long long>(done), static_cast<unsigned long long>(total),
                rate, left.c_str());

@@ -18,7 +18,7 @@ struct Options : ComparisonOptions {
 absl::Status RunPropose(const Cli& cli, const Options& options) {
   if (options.touches < 1)
     return absl::InvalidArgumentError("--touches: 0 is out of range; 1 or more was expected");
-  TOUCHSTONE_RETURN_IF_ERROR(CheckOutputs(cli, options, {{"--json", options.json}, {"-o", options.output}}));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::ProposeRequest request;
   *request.mutable_evidence() = comparison->evidence();
@@ -40,18 +40,18 @@ absl::Status RunPropose(const Cli& cli, const Options& options) {
   }
   for (const auto& [purpose, touches] : purposes)
     cli.Log(absl::StrCat(Counted(touches, "touch", "touches"), ": ", purpose));
-  // What no touch can decide is told too.
+  // What no touch can decide needs another measurement.
   for (const v1::Ambiguity& ambiguity : report.ambiguities())
     if (!ambiguity.decided_by().empty())
       cli.Log(absl::StrCat("to tell ", absl::StrJoin(ambiguity.effects(), " from "), ": ",
                            ambiguity.decided_by()));
-  if (options.JsonGiven()) TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (plan.empty()) {
     cli.Log("no touches to propose: no explanations are left that further touches would tell apart");
     return absl::OkStatus();
   }
-  if (options.JsonOnStdout() && options.output.empty()) return absl::OkStatus();
-  return WriteOutput(options.output, client::FormatMeasurements(plan));
+  if (options.ReportOnStdout() && options.output.empty()) return absl::OkStatus();
+  return cli.Write(options.output, client::FormatMeasurements(plan));
 }
 
 }  // namespace
@@ -66,8 +66,7 @@ void AddPropose(Cli* cli) {
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
   command->add_option("--touches", options->touches, "How many to propose. Default: 24")->type_name("N");
-  command->add_option("-o,--output", options->output, "The plan (CSV) to write. Default: stdout")
-      ->type_name("FILE");
+  cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) to write. Default: stdout");
 }
 
 }  // namespace touchstone::cli

@@ -6,11 +6,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "server/base/test_folder.h"
 #include "server/base/text.h"
 
 namespace touchstone::cli {
@@ -22,20 +22,14 @@ struct Outcome {
 
 class RealBinaryTest : public ::testing::Test {
  protected:
-  RealBinaryTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "touchstone_cli_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~RealBinaryTest() override { std::filesystem::remove_all(folder_); }
-
-  std::string Path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
 
   // Starts touchstone in the test's folder, its output in files.
   pid_t Start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), TOUCHSTONE_BINARY);
     const pid_t child = ::fork();
     if (child != 0) return child;
-    if (::chdir(folder_.c_str()) != 0) ::_exit(99);
+    if (::chdir(folder_.path().c_str()) != 0) ::_exit(99);
     for (const auto& [descriptor, name] : {std::pair{1, ".out"}, std::pair{2, ".err"}}) {
       const int file = ::open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
       ::dup2(file, descriptor);
@@ -64,7 +58,8 @@ class RealBinaryTest : public ::testing::Test {
   }
   std::string Read(const std::string& name) { return ReadFile(Path(name)).value_or(""); }
 
-  std::string folder_;
+ private:
+  TestFolder folder_;
 };
 
 }  // namespace touchstone::cli

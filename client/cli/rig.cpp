@@ -97,7 +97,7 @@ void AddRig(Cli* cli) {
       "touchstone rig status --server 127.0.0.1:50052\n"
       "touchstone rig stop --server 127.0.0.1:50052\n"
       "touchstone rig reset --reason 'cable freed' --server 127.0.0.1:50052\n"
-      "touchstone rig dry-run plan.csv -o way.svg --server 127.0.0.1:50052\n"
+      "touchstone rig dry-run plan.csv -o path.svg --server 127.0.0.1:50052\n"
       "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052");
   AddRigStatus(cli, group);
   AddRigMotions(cli, group);

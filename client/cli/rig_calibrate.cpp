@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
-#include <filesystem>
 
 #include "client/cli/journal_session.h"
 #include "client/cli/progress_bar.h"
@@ -10,6 +9,7 @@
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/flat_calibration.h"
@@ -19,8 +19,6 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr double kMilli = 1e3;
-constexpr double kMicro = 1e6;
 constexpr double kStraight = 0.9999;  // an approach along an axis of the object, within about a degree
 constexpr double kStandoffM = 0.03;
 constexpr int kMaxTouches = 10000;
@@ -44,7 +42,7 @@ absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const Options& options) {
   touch.mutable_approach()->set_z(-1);
   touch.mutable_lateral()->set_x(1);
   touch.set_standoff_m(kStandoffM);
-  touch.set_speed_m_s(options.speed_mm_s / kMilli);
+  touch.set_speed_m_s(options.speed_mm_s / kMillimetresPerMetre);
 
   ProgressBar bar(!cli.output().quiet);
   TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -98,7 +96,6 @@ absl::StatusOr<FlatTouches> RecordedFlat(const Options& options) {
 }
 
 absl::Status RunFlat(const Cli& cli, const Options& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckNewFile(options.output));
   FlatTouches flat;
   if (options.from.empty()) {
     if (options.object.empty())
@@ -109,33 +106,35 @@ absl::Status RunFlat(const Cli& cli, const Options& options) {
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const FlatCalibration fit,
-      CalibrateFlat(flat.touches, options.spacing_mm > 0 ? options.spacing_mm / kMilli : flat.spacing_m));
+      CalibrateFlat(flat.touches,
+                    options.spacing_mm > 0 ? options.spacing_mm / kMillimetresPerMetre : flat.spacing_m));
   Model base = NominalModel(fit.fingers, fit.spacing_m);
   base.name = client::SessionNameOf(options.output);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string model, CalibratedModelFile(base, fit, Catalogue()));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(options.output, model));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, model));
   if (cli.output().json) {
     Json offset_mm = Json::array(), error_mm = Json::array();
     for (int finger = 0; finger < fit.fingers; ++finger) {
-      offset_mm.push_back(fit.offset_m[finger] * kMilli);
-      error_mm.push_back(fit.offset_std_error_m[finger] * kMilli);
+      offset_mm.push_back(fit.offset_m[finger] * kMillimetresPerMetre);
+      error_mm.push_back(fit.offset_std_error_m[finger] * kMillimetresPerMetre);
     }
     PrintJson({{"model", options.output},
                {"touches", fit.touches},
                {"left_out", fit.left_out},
                {"offset_mm", offset_mm},
                {"offset_std_error_mm", error_mm},
-               {"sigma_us", fit.sigma_s * kMicro},
-               {"sigma_std_error_us", fit.sigma_std_error_s * kMicro},
+               {"sigma_us", fit.sigma_s * kMicrosecondsPerSecond},
+               {"sigma_std_error_us", fit.sigma_std_error_s * kMicrosecondsPerSecond},
                {"note", fit.note}});
   }
   cli.Log(absl::StrCat(options.output, ": from ", Counted(fit.touches, "touch", "touches"),
                        fit.left_out > 0 ? absl::StrCat(", ", fit.left_out, " left out") : ""));
   for (int finger = 0; finger < fit.fingers; ++finger)
-    cli.Log(absl::StrCat("  finger ", finger, "  offset ", Rounded(fit.offset_m[finger] * kMilli), " +- ",
-                         Rounded(fit.offset_std_error_m[finger] * kMilli), " mm"));
-  cli.Log(absl::StrCat("  noise     ", Rounded(fit.sigma_s * kMicro), " +- ",
-                       Rounded(fit.sigma_std_error_s * kMicro), " us"));
+    cli.Log(absl::StrCat("  finger ", finger, "  offset ",
+                         Rounded(fit.offset_m[finger] * kMillimetresPerMetre), " +- ",
+                         Rounded(fit.offset_std_error_m[finger] * kMillimetresPerMetre), " mm"));
+  cli.Log(absl::StrCat("  noise     ", Rounded(fit.sigma_s * kMicrosecondsPerSecond), " +- ",
+                       Rounded(fit.sigma_std_error_s * kMicrosecondsPerSecond), " us"));
   if (!fit.note.empty()) cli.Log(Wrap(fit.note, 110, 0));
   return absl::OkStatus();
 }
@@ -145,20 +144,18 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
     return absl::InvalidArgumentError("--calibration is missing: the file that the gateway runs with now");
   if (options.poses < 4 || options.poses > 100)
     return absl::InvalidArgumentError(absl::StrCat("--poses: ", options.poses, " is out of range; 4 to 100"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckNewFile(options.output));
   TOUCHSTONE_ASSIGN_OR_RETURN(Calibration calibration, ReadCalibration(options.calibration));
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   cli.Log(
       "Fix a sharp point in the rig's reach. Guide the tool by hand (free drive) so that the middle finger's "
-      "tip "
-      "rests on it, every time tilted another way by 20 deg and more.");
+      "tip rests on it, every time tilted another way by 20 deg and more.");
   std::vector<Eigen::Isometry3d> base_from_flange;
   for (int k = 0; k < options.poses; ++k) {
     TOUCHSTONE_RETURN_IF_ERROR(
         AskPerson(absl::StrCat("Pose ", k + 1, " of ", options.poses, ": tip on the point")));
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
     if (!state.arm().connected())
-      return absl::UnavailableError("the arm is not connected, so nobody knows where the tool is");
+      return absl::UnavailableError("the arm is not connected, so it is unknown where the tool is");
     base_from_flange.push_back(PoseOf(state.arm().base_from_tip()) * calibration.flange_from_tip.inverse());
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const ToolCalibration fit, CalibrateTool(base_from_flange));
@@ -166,21 +163,21 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
   calibration.flange_from_tip.translation() = fit.flange_from_tip_m;
   calibration.notes["date"] = Today();
   calibration.notes["how"] = absl::StrCat("tip from a pivot in ", options.poses, " poses");
-  calibration.notes["rms_mm tip"] = Rounded(fit.rms_m * kMilli);
-  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(options.output, FormatCalibration(calibration)));
+  calibration.notes["rms_mm tip"] = Rounded(fit.rms_m * kMillimetresPerMetre);
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, FormatCalibration(calibration)));
   if (cli.output().json) {
-    const Eigen::Vector3d mm = fit.flange_from_tip_m * kMilli,
-                          error_mm = fit.flange_from_tip_std_error_m * kMilli;
+    const Eigen::Vector3d mm = fit.flange_from_tip_m * kMillimetresPerMetre,
+                          error_mm = fit.flange_from_tip_std_error_m * kMillimetresPerMetre;
     PrintJson({{"calibration", options.output},
                {"flange_from_tip_mm", {mm.x(), mm.y(), mm.z()}},
                {"std_error_mm", {error_mm.x(), error_mm.y(), error_mm.z()}},
-               {"rms_mm", fit.rms_m * kMilli}});
+               {"rms_mm", fit.rms_m * kMillimetresPerMetre}});
   }
   cli.Log(absl::StrCat(options.output, ": tip at ", InMillimetres(fit.flange_from_tip_m),
                        " mm of the flange (it was ", InMillimetres(before_m), "), standard errors ",
                        InMillimetres(fit.flange_from_tip_std_error_m), " mm; it moved about its point by ",
-                       Rounded(fit.rms_m * kMilli), " mm (rms); pose ", fit.worst + 1, " fits worst, ",
-                       Rounded(fit.worst_m * kMilli), " mm"));
+                       Rounded(fit.rms_m * kMillimetresPerMetre), " mm (rms); pose ", fit.worst + 1,
+                       " fits worst, ", Rounded(fit.worst_m * kMillimetresPerMetre), " mm"));
   cli.Log("the gateway takes it when it is started with this file");
   return absl::OkStatus();
 }
@@ -200,14 +197,6 @@ absl::Status RunCalibrate(const Cli& cli, const Options& options) {
 
 }  // namespace
 
-absl::Status CheckNewFile(const std::string& path) {
-  std::error_code error;
-  if (path.empty()) return absl::InvalidArgumentError("-o is missing: the file to write");
-  if (std::filesystem::exists(path, error))
-    return absl::AlreadyExistsError(absl::StrCat("-o: ", path, " is there already; choose another name"));
-  return absl::OkStatus();
-}
-
 std::string Today() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm parts{};
@@ -226,8 +215,9 @@ Eigen::Isometry3d PoseOf(const v1::BasePose& pose) {
 }
 
 std::string InMillimetres(const Eigen::Vector3d& metres) {
-  return absl::StrCat(Rounded(metres.x() * kMilli), ", ", Rounded(metres.y() * kMilli), ", ",
-                      Rounded(metres.z() * kMilli));
+  return absl::StrCat(Rounded(metres.x() * kMillimetresPerMetre), ", ",
+                      Rounded(metres.y() * kMillimetresPerMetre), ", ",
+                      Rounded(metres.z() * kMillimetresPerMetre));
 }
 
 absl::StatusOr<v1::Object> FindObject(client::Connection* connection, const std::string& name) {
@@ -247,7 +237,7 @@ void AddRigCalibrate(Cli* cli, CLI::App* group) {
   CLI::App* command = cli->AddCommand(
       group, "calibrate",
       "Measures the rig itself: the fingers' offsets and noise on a flat face (a model file), or where the "
-      "tip is, or where an object lies (a calibration file). What it reads is never written over.",
+      "tip is, or where an object lies (a calibration file). What it reads is never changed.",
       "touchstone rig calibrate flat plate --touches 20 -o model.yaml --server 127.0.0.1:50052\n"
       "touchstone rig calibrate flat --from session.db -o model.yaml       from touches that were recorded\n"
       "touchstone rig calibrate object lat20 --calibration calibration.yaml -o new.yaml --server "
@@ -259,27 +249,22 @@ void AddRigCalibrate(Cli* cli, CLI::App* group) {
       ->add_option("OBJECT", options->object,
                    "flat: the object whose upper face is flat; object: the one that lies there")
       ->type_name("");
-  command
-      ->add_option("-o,--output", options->output, "The model or calibration file to write; it must be new")
-      ->type_name("FILE");
+  cli->AddOutput(command, "-o,--output", &options->output, "The model or calibration file to write")
+      ->required();
   command->add_option("--touches", options->touches, "flat, object: how many. Default: 20")->type_name("N");
   command->add_option("--speed-mm-s", options->speed_mm_s, "flat, object: speed of the approach. Default: 20")
       ->type_name("V");
   command
       ->add_option("--spacing-mm", options->spacing_mm,
-                   "flat, object: between neighbouring fingers. Default: as the rig tells, or the session")
+                   "flat, object: between neighbouring fingers. Default: the rig's own, or the session's")
       ->type_name("MM");
-  command
-      ->add_option("--from", options->from,
-                   "flat: take the touches straight onto a face of a session that this journal (.db) has")
-      ->type_name("FILE");
-  command
-      ->add_option("--calibration", options->calibration, "object, tip: the file that the gateway runs with")
-      ->type_name("FILE");
-  command
-      ->add_option("--surface", options->surface,
-                   "object: its mesh file. Default: the built-in shape of that name")
-      ->type_name("FILE");
+  const auto add_input = [&](const std::string& name, std::string& value, const std::string& text) {
+    cli->AddInput(command, command->add_option(name, value, text)->type_name("FILE"));
+  };
+  add_input("--from", options->from,
+            "flat: take the touches straight onto a face of a session that this journal (.db) has");
+  add_input("--calibration", options->calibration, "object, tip: the file that the gateway runs with");
+  add_input("--surface", options->surface, "object: its mesh file. Default: the built-in shape of that name");
   command->add_option("--poses", options->poses, "tip: in how many orientations. Default: 6")->type_name("N");
   AddMotionOptions(command, &options->motion, true);
   command->get_option("--session")

@@ -14,11 +14,9 @@ struct CalibrateOptions {
   std::string kind = "flat", object, output, from, calibration, surface;
   int touches = 20, poses = 6;
   double speed_mm_s = 20;
-  double spacing_mm = 0;  // 0: as the rig or the recorded session tells
+  double spacing_mm = 0;  // 0: that of the rig or of the recorded session
 };
 
-// Files that others made are never written over.
-absl::Status CheckNewFile(const std::string& path);
 // "2026-01-31", UTC.
 std::string Today();
 Eigen::Isometry3d PoseOf(const v1::BasePose& pose);

@@ -7,6 +7,7 @@
 #include "client/report/path_drawing.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
 
 namespace touchstone::cli {
 namespace {
@@ -48,9 +49,9 @@ std::string Drawing(const Options& options, const v1::RigState& state, const std
     // The target lies on the approach, a standoff from its start.
     const size_t start = touch.transit_poses;
     if (start > 0 && start < touch.path.size()) {
-      const Eigen::Vector3d way = touch.path.back() - touch.path[start - 1];
-      if (way.norm() > 0)
-        touch.target_m = touch.path[start - 1] + way.normalized() * rows[k].touch.commanded.standoff_m();
+      const Eigen::Vector3d stroke = touch.path.back() - touch.path[start - 1];
+      if (stroke.norm() > 0)
+        touch.target_m = touch.path[start - 1] + stroke.normalized() * rows[k].touch.commanded.standoff_m();
     }
     drawing.touches.push_back(std::move(touch));
   }
@@ -70,8 +71,8 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
       CheckRows(rig.connection.get(), all, &rows, options.drawing.empty() ? nullptr : &checks));
 
   if (!options.drawing.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput(options.drawing, Drawing(options, state, rows, checks)));
-    cli.Log("wrote " + options.drawing);
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.drawing, Drawing(options, state, rows, checks)));
+    cli.LogWritten(options.drawing);
   }
   const size_t possible =
       std::count_if(rows.begin(), rows.end(), [](const PlannedRow& row) { return row.possible; });
@@ -103,7 +104,7 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
     absl::StrAppend(&text, possible, " of ", Counted(rows.size(), "touch", "touches"), " possible, ",
                     DurationInWords(duration_s), " of motion, the object is put ",
                     Counted(groups.size(), "time", "times"), ". Nothing was moved.\n");
-    TOUCHSTONE_RETURN_IF_ERROR(WriteOutput("", text));
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Print(text));
   }
   if (possible == rows.size()) return absl::OkStatus();
   return absl::FailedPreconditionError(absl::StrCat(options.plan, ": ", rows.size() - possible, " of ",
@@ -118,16 +119,16 @@ void AddRigDryRun(Cli* cli, CLI::App* group) {
       group, "dry-run",
       "Checks every touch of a plan as a run would, without motion. Exit code 4 if any is impossible.",
       "touchstone rig dry-run plan.csv --server 127.0.0.1:50052\n"
-      "touchstone rig dry-run plan.csv -o way.svg --server 127.0.0.1:50052       also draws the way of the "
+      "touchstone rig dry-run plan.csv -o path.svg --server 127.0.0.1:50052      also draws the path of the "
       "tip",
       [cli, options] { return RunDryRun(*cli, *options); });
-  command->add_option("PLAN", options->plan, "A CSV file of touches (touchstone plan writes one)")
-      ->type_name("")
-      ->required();
-  command
-      ->add_option("-o,--output", options->drawing,
-                   "Draw the way of the tip, from above and from the side (SVG)")
-      ->type_name("FILE");
+  cli->AddInput(
+      command,
+      command->add_option("PLAN", options->plan, "A CSV file of touches (touchstone plan writes one)")
+          ->type_name("")
+          ->required());
+  cli->AddOutput(command, "-o,--output", &options->drawing,
+                 "Draw the path of the tip, from above and from the side (SVG)");
   cli->AddSourceOptions(command);
 }
 

@@ -10,6 +10,7 @@
 #include "client/source/batch.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/service/convert.h"
 
 namespace touchstone::cli {
@@ -17,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDegree = M_PI / 180;
 constexpr double kMargin = 1.05;  // the object's sphere fills the picture but for this
 
 struct Options {
@@ -120,8 +120,8 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
         bar.ShowStage(absl::StrCat(options.object, ", face ", face, " up: picture ", number + 1),
                       (turn + static_cast<double>(number) / views_a_turn) / options.turns);
         request.clear_views();
-        *request.add_views() =
-            ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kDegree, 2 * M_PI * k / ring.views);
+        *request.add_views() = ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
+                                      2 * kPi * k / ring.views);
         const absl::StatusOr<v1::CaptureResponse> captured = source->Capture(request);
         // Where the arm cannot take the camera there is no picture; the others stand for themselves.
         if (absl::IsOutOfRange(captured.status()) || absl::IsInvalidArgument(captured.status())) {
@@ -136,7 +136,7 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
         if (response.columns_size() != 1 || response.columns(0).type() != v1::DATA_TYPE_BYTES)
           return absl::InternalError("the source did not send one encoded picture");
         TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(response.columns(0), response.rows()));
-        TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(path, client::FileOf(response.columns(0), 0)));
+        TOUCHSTONE_RETURN_IF_ERROR(cli.Write(path, client::FileOf(response.columns(0), 0)));
       }
     }
   }
@@ -165,8 +165,8 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
   command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
       ->type_name("")
       ->required();
-  command->add_option("-o,--output", options->folder, "The folder for the pictures")
-      ->type_name("FOLDER")
+  cli->AddOutput(command, "-o,--output", &options->folder,
+                 "The folder for the pictures; those that are there are kept", OutputKind::kFolder)
       ->required();
   command
       ->add_option(

@@ -1,4 +1,4 @@
-// The order in which a rig makes the touches of a plan, and what people are told about it. Pure functions.
+// The order in which a rig makes the touches of a plan, and its messages. Pure functions.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// touchstone rig run: a plan's touches, one by one, into a session that can be gone on with.
+// touchstone rig run: a plan's touches, one by one, into a session that can be resumed.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -9,13 +9,14 @@
 #include "client/cli/rig_record.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/session/session_files.h"
 
 namespace touchstone::cli {
 namespace {
 
 constexpr size_t kMaxLines = 20;
-constexpr double kMicro = 1e6;
 
 struct Options {
   MotionFlags motion;
@@ -32,6 +33,9 @@ class Run {
         options_.motion.session.empty() ? client::SessionNameOf(options_.plan) : options_.motion.session;
     TOUCHSTONE_RETURN_IF_ERROR(client::CheckSessionName(session_, "--session"));
     TOUCHSTONE_ASSIGN_OR_RETURN(journal_path_, JournalPathOf(options_.output));
+    std::vector<OutputFile> files = {{"-o", journal_path_, OutputKind::kJournal}};
+    if (options_.output != journal_path_) files.push_back({"-o", options_.output});
+    TOUCHSTONE_RETURN_IF_ERROR(cli_.CheckOutputs(files));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> plan, ReadTouches(options_.plan));
     TOUCHSTONE_ASSIGN_OR_RETURN(rows_, RowsOf(plan, session_, options_.plan));
     TOUCHSTONE_ASSIGN_OR_RETURN(rig_, ConnectToRig(cli_));
@@ -44,13 +48,13 @@ class Run {
     }
     if (wanted.size() < rows_.size())
       cli_.Log(absl::StrCat(journal_path_, " has ", rows_.size() - wanted.size(), " of ",
-                            Counted(rows_.size(), "touch", "touches"), " already; going on with the rest"));
+                            Counted(rows_.size(), "touch", "touches"), " already; the rest is made now"));
     TOUCHSTONE_RETURN_IF_ERROR(Check(wanted));
     const absl::Status status = wanted.empty() ? absl::OkStatus() : TouchAll(wanted, state);
     bar_.Clear();
     if (!status.ok()) {
       cli_.Log(absl::StrCat(Counted(made_, "touch was", "touches were"),
-                            " made now; run the same command again to go on"));
+                            " made now; run the same command again to resume"));
       return status;
     }
     return Finish();
@@ -116,7 +120,7 @@ class Run {
     request.add_touch_ids(row.id);
     const auto start = std::chrono::steady_clock::now();
     absl::StatusOr<v1::TouchResponse> response = source_->Touch(request);
-    // Somebody took the object away or told of another one: a person can mend that, once.
+    // Somebody took the object away or mounted another one: a person can correct that, once.
     if (absl::IsFailedPrecondition(response.status())) {
       const absl::StatusOr<v1::RigState> now = GetRig(rig_.connection.get());
       if (now.ok() &&
@@ -155,7 +159,12 @@ class Run {
       misses += std::any_of(touch.time_s.begin(), touch.time_s.end(), [](double t) { return std::isnan(t); });
     const double noise_s = NoiseOfRepeats(touches);
     const bool csv = options_.output != journal_path_;
-    if (csv) TOUCHSTONE_RETURN_IF_ERROR(ExportSessionCsv(record_->journal(), session_, options_.output));
+    if (csv) {
+      if (touches.empty())
+        return absl::FailedPreconditionError(
+            absl::StrCat("session '", session_, "' has no touch that is done"));
+      TOUCHSTONE_RETURN_IF_ERROR(cli_.Write(options_.output, client::FormatMeasurements(touches)));
+    }
     if (cli_.output().json)
       PrintJson({{"session", session_},
                  {"journal", journal_path_},
@@ -163,14 +172,14 @@ class Run {
                  {"made_now", made_},
                  {"impossible", impossible_},
                  {"misses", misses},
-                 {"noise_us", std::isfinite(noise_s) ? Json(noise_s * kMicro) : Json()}});
+                 {"noise_us", std::isfinite(noise_s) ? Json(noise_s * kMicrosecondsPerSecond) : Json()}});
     cli_.Log(absl::StrCat(
         options_.output, ": session '", session_, "', ", Counted(touches.size(), "touch", "touches"), ", ",
         misses, " in which a finger met nothing",
         impossible_ > 0 ? absl::StrCat(", ", impossible_, " impossible ones left out") : "",
-        std::isfinite(noise_s)
-            ? absl::StrCat("; repeats differ by ", Rounded(noise_s * kMicro), " us a finger")
-            : ""));
+        std::isfinite(noise_s) ? absl::StrCat("; repeats differ by ",
+                                              Rounded(noise_s * kMicrosecondsPerSecond), " us per finger")
+                               : ""));
     cli_.Log(absl::StrCat("next: touchstone diagnose ", options_.output, " --model nominal.yaml",
                           csv ? ""
                               : absl::StrCat("\n      touchstone session export ", options_.output, " ",
@@ -194,25 +203,28 @@ class Run {
 
 void AddRigRun(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = cli->AddCommand(group, "run",
-                                      "Makes the touches of a plan, object by object and face by face. "
-                                      "Interrupted in whatever way, the same command "
-                                      "goes on where it stopped: no touch is lost and none is made twice.",
-                                      "touchstone plan lat00,lat20 --plan faces -o plan.csv\n"
-                                      "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052\n"
-                                      "touchstone rig run plan.csv -o monday.csv --session monday --server "
-                                      "127.0.0.1:50052     also monday.db",
-                                      [cli, options] { return Run(*cli, *options).Go(); });
-  command->add_option("PLAN", options->plan, "A CSV file of touches (touchstone plan writes one)")
-      ->type_name("")
+  CLI::App* command =
+      cli->AddCommand(group, "run",
+                      "Makes the touches of a plan, object by object and face by face. "
+                      "Interrupted in whatever way, the same command resumes where it stopped: "
+                      "no touch is lost and none is made twice.",
+                      "touchstone plan lat00,lat20 --plan faces -o plan.csv\n"
+                      "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052\n"
+                      "touchstone rig run plan.csv -o monday.csv --session monday --server "
+                      "127.0.0.1:50052     also monday.db",
+                      [cli, options] { return Run(*cli, *options).Go(); });
+  cli->AddInput(
+      command,
+      command->add_option("PLAN", options->plan, "A CSV file of touches (touchstone plan writes one)")
+          ->type_name("")
+          ->required());
+  cli->AddOutput(
+         command, "-o,--output", &options->output,
+         "A journal (.db) that gets every touch as soon as it is made; one that is there is resumed. Or a "
+         "measurement file (.csv) that is written at the end, with the journal of the same name beside it",
+         OutputKind::kPrefix)
       ->required();
-  command
-      ->add_option(
-          "-o,--output", options->output,
-          "A journal (.db) that gets every touch as soon as it is made, or a measurement file (.csv) that is "
-          "written at the end, with the journal of the same name beside it")
-      ->type_name("FILE")
-      ->required();
+  command->get_option("--force")->description("Replace a measurement file that exists; never a journal");
   command->add_flag("--skip-impossible", options->skip_impossible,
                     "Leave out touches that the rig cannot make. Default: move nothing if there is one");
   AddMotionOptions(command, &options->motion, true);

@@ -8,12 +8,12 @@
 #include "client/cli/rig.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
 
 namespace touchstone::cli {
 namespace {
 
-constexpr double kMicro = 1e6;
-constexpr double kMilli = 1e3;
 constexpr double kPartsPerMillion = 1e6;
 
 struct Options {
@@ -28,14 +28,13 @@ std::string Line(const std::string& name, const std::string& text) {
 }
 
 std::string Pose(const v1::BasePose& pose) {
-  constexpr double kDegrees = 180 / M_PI;
   const auto three = [](const v1::Vector3& v, double factor) {
     return absl::StrCat(Rounded(std::round(v.x() * factor * 10) / 10), ", ",
                         Rounded(std::round(v.y() * factor * 10) / 10), ", ",
                         Rounded(std::round(v.z() * factor * 10) / 10));
   };
-  return absl::StrCat(three(pose.position_m(), kMilli), " mm; rotation ",
-                      three(pose.rotation_rad(), kDegrees), " deg");
+  return absl::StrCat(three(pose.position_m(), kMillimetresPerMetre), " mm; rotation ",
+                      three(pose.rotation_rad(), 1 / kRadiansPerDegree), " deg");
 }
 
 std::string ArmText(const v1::ArmStatus& arm) {
@@ -50,10 +49,11 @@ std::string ArmText(const v1::ArmStatus& arm) {
                                                 : absl::StrCat(arm.program_id(), ", phase ",
                                                                client::MotionPhaseWord(arm.phase())));
   text += Line("States", absl::StrCat(Rounded(arm.rate_hz()), " Hz, the newest is ",
-                                      Rounded(kMilli * arm.state_age_s()), " ms old"));
+                                      Rounded(kMillisecondsPerSecond * arm.state_age_s()), " ms old"));
   text += Line("Tip", Pose(arm.base_from_tip()));
-  text += Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * arm.clock_drift()),
-                                     " ppm, known to ", Rounded(kMicro * arm.clock_uncertainty_s()), " us"));
+  text +=
+      Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * arm.clock_drift()), " ppm, known to ",
+                                 Rounded(kMicrosecondsPerSecond * arm.clock_uncertainty_s()), " us"));
   return text;
 }
 
@@ -67,12 +67,12 @@ std::string EffectorText(const v1::EffectorStatus& effector) {
   text += Line("Firmware", effector.firmware());
   text += Line("Fingers", absl::StrCat(effector.fingers(),
                                        pressed.empty() ? ", none pressed" : ", PRESSED: " + pressed));
-  text +=
-      Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * effector.clock_drift()), " +- ",
-                                 Rounded(kPartsPerMillion * effector.clock_drift_uncertainty()),
-                                 " ppm, known to ", Rounded(kMicro * effector.clock_uncertainty_s()), " us; ",
-                                 Counted(effector.round_trips(), "round trip", "round trips"), ", shortest ",
-                                 Rounded(kMilli * effector.shortest_round_trip_s()), " ms"));
+  text += Line("Clock",
+               absl::StrCat("drift ", Rounded(kPartsPerMillion * effector.clock_drift()), " +- ",
+                            Rounded(kPartsPerMillion * effector.clock_drift_uncertainty()), " ppm, known to ",
+                            Rounded(kMicrosecondsPerSecond * effector.clock_uncertainty_s()), " us; ",
+                            Counted(effector.round_trips(), "round trip", "round trips"), ", shortest ",
+                            Rounded(kMillisecondsPerSecond * effector.shortest_round_trip_s()), " ms"));
   text += Line("Line", absl::StrCat(Counted(effector.bad_frames(), "bad frame", "bad frames"), ", ",
                                     Counted(effector.repeated_events(), "repeated event", "repeated events"),
                                     ", ", Counted(effector.reconnections(), "reconnection", "reconnections"),
@@ -85,9 +85,9 @@ std::string EffectorText(const v1::EffectorStatus& effector) {
 std::string StateText(const v1::RigState& rig, const v1::State& state) {
   std::string text = absl::StrCat(
       "State         ", client::SourceStateWord(state.state()), ", ",
-      state.lease_holder().empty() ? "nobody holds the lease" : state.lease_holder() + " holds the lease",
-      "; ", Counted(state.touches(), "touch", "touches"), ", ",
-      Counted(state.images(), "picture", "pictures"), " in ", DurationInWords(state.uptime_s()), "\n");
+      state.lease_holder().empty() ? "no lease is held" : state.lease_holder() + " holds the lease", "; ",
+      Counted(state.touches(), "touch", "touches"), ", ", Counted(state.images(), "picture", "pictures"),
+      " in ", DurationInWords(state.uptime_s()), "\n");
   if (!state.stop_reason().empty())
     text += Line("", absl::StrCat("stopped ", state.stop_reason(), "; touchstone rig reset releases it"));
   text += absl::StrCat("Object        ",
@@ -123,7 +123,7 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const v1::State state,
       client::Connection::Call(&v1::Control::Stub::GetState, connection->control(), v1::GetStateRequest()));
-  if (!cli.output().json) return WriteOutput("", StateText(rig, state));
+  if (!cli.output().json) return cli.Print(StateText(rig, state));
   google::protobuf::util::JsonPrintOptions print;
   print.always_print_primitive_fields = true;
   print.preserve_proto_field_names = true;
@@ -168,7 +168,7 @@ absl::Status RunStatus(const Cli& cli, const Options& options) {
 void AddRigStatus(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
-      cli->AddCommand(group, "status", "Tells how every part of the rig is. Needs no lease.",
+      cli->AddCommand(group, "status", "Shows the state of every part of the rig. Needs no lease.",
                       "touchstone rig status --server 127.0.0.1:50052\n"
                       "touchstone rig status --watch --server 127.0.0.1:50052\n"
                       "touchstone rig status --json --server 127.0.0.1:50052     SI units, as on the wire",

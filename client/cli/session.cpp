@@ -13,6 +13,7 @@
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 
 namespace touchstone::cli {
 namespace {
@@ -56,7 +57,7 @@ Json JournalSessionJson(const JournalSession& session) {
           {"source", session.source},
           {"created_unix_s", session.created_unix_s},
           {"fingers", session.fingers},
-          {"spacing_mm", session.spacing_m * 1e3},
+          {"spacing_mm", session.spacing_m * kMillimetresPerMetre},
           {"touches", session.touches},
           {"done", session.done},
           {"failed", session.failed},
@@ -87,7 +88,7 @@ absl::Status ListJournal(const Cli& cli, const std::string& path) {
     table.Add({session.name, std::to_string(session.touches), std::to_string(session.done),
                std::to_string(session.images), UtcText(session.created_unix_s),
                absl::StrJoin(session.objects, ", ")});
-  return WriteOutput("", table.Text());
+  return cli.Print(table.Text());
 }
 
 absl::Status ShowJournal(const Cli& cli, const Options& options) {
@@ -98,12 +99,11 @@ absl::Status ShowJournal(const Cli& cli, const Options& options) {
     PrintJson(JournalSessionJson(session));
     return absl::OkStatus();
   }
-  return WriteOutput(
-      "", absl::StrCat(session.name, ": ", Counted(session.touches, "touch", "touches"), ", ", session.done,
-                       " done, ", session.failed, " failed, ", Counted(session.images, "picture", "pictures"),
-                       ", ", Counted(session.fingers, "finger", "fingers"), "\n  Objects   ",
-                       absl::StrJoin(session.objects, ", "), "\n  Source    ", session.source,
-                       "\n  Created   ", UtcText(session.created_unix_s), "\n"));
+  return cli.Print(absl::StrCat(
+      session.name, ": ", Counted(session.touches, "touch", "touches"), ", ", session.done, " done, ",
+      session.failed, " failed, ", Counted(session.images, "picture", "pictures"), ", ",
+      Counted(session.fingers, "finger", "fingers"), "\n  Objects   ", absl::StrJoin(session.objects, ", "),
+      "\n  Source    ", session.source, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
 }
 
 absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {
@@ -196,7 +196,7 @@ absl::Status RunList(const Cli& cli, const Options& options) {
     table.Add({session.name(), std::to_string(session.touches()), std::to_string(session.fingers()),
                session.has_poses() ? "yes" : "no", session.hash().substr(0, 12),
                absl::StrJoin(session.objects(), ", ")});
-  return WriteOutput("", table.Text());
+  return cli.Print(table.Text());
 }
 
 absl::Status RunShow(const Cli& cli, const Options& options) {
@@ -212,14 +212,15 @@ absl::Status RunShow(const Cli& cli, const Options& options) {
     PrintJson(SessionJson(session));
     return absl::OkStatus();
   }
-  return WriteOutput("", absl::StrCat(session.name(), ": ", InWords(session), "\n  Objects   ",
-                                      absl::StrJoin(session.objects(), ", "), "\n  Size      ",
-                                      session.bytes(), " bytes\n"));
+  return cli.Print(absl::StrCat(session.name(), ": ", InWords(session), "\n  Objects   ",
+                                absl::StrJoin(session.objects(), ", "), "\n  Size      ", session.bytes(),
+                                " bytes\n"));
 }
 
 absl::Status RunExport(const Cli& cli, const Options& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
-  if (IsJournalPath(options.name)) return ExportFromJournal(options.name, options.in_journal, options.output);
+  if (IsJournalPath(options.name))
+    return ExportFromJournal(options.name, options.in_journal, options.output, cli.output().force);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
@@ -230,7 +231,7 @@ absl::Status RunExport(const Cli& cli, const Options& options) {
   std::string csv;
   while (reader->Read(&response)) csv += response.csv();
   TOUCHSTONE_RETURN_IF_ERROR(client::FromGrpc(reader->Finish()));
-  return WriteOutput(options.output, csv);
+  return cli.Write(options.output, csv);
 }
 
 absl::Status RunDelete(const Cli& cli, const Options& options) {
@@ -265,9 +266,11 @@ void AddSession(Cli* cli) {
         ->required();
   };
   const auto add_place = [&](CLI::App* command) {
-    command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
-        ->type_name("")
-        ->required();
+    cli->AddInput(
+        command,
+        command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
+            ->type_name("")
+            ->required());
     command
         ->add_option("SESSION", options->in_journal,
                      "The session's name in that journal. Default: its only one")
@@ -305,20 +308,21 @@ void AddSession(Cli* cli) {
                                       "touchstone session export session.db monday -o set.h5",
                                   [cli, options] { return RunExport(*cli, *options); });
   add_place(out);
-  out->add_option("-o,--output", options->output,
-                  "The file to write; from a journal also .h5, with poses and pictures. Default: stdout")
-      ->type_name("FILE");
+  cli->AddOutput(out, "-o,--output", &options->output,
+                 "The file to write; from a journal also .h5, with poses and pictures. Default: stdout");
   cli->AddSourceOptions(out);
 
   CLI::App* in = cli->AddCommand(group, "import", "Puts a measurement file into a journal.",
                                  "touchstone session import set.csv -o session.db\n"
                                  "touchstone session import set.csv -o session.db --session monday",
                                  [cli, options] { return RunImport(*cli, *options); });
-  in->add_option("FILE", options->file, "The measurement file (.csv), or what session export wrote (.h5)")
-      ->type_name("")
-      ->required();
-  in->add_option("-o,--output", options->output, "The journal (.db); made if it is not there")
-      ->type_name("FILE")
+  cli->AddInput(in, in->add_option("FILE", options->file,
+                                   "The measurement file (.csv), or what session export wrote (.h5)")
+                        ->type_name("")
+                        ->required());
+  cli->AddOutput(in, "-o,--output", &options->output,
+                 "The journal (.db); made if it is not there, else the session is added to what it has",
+                 OutputKind::kJournal)
       ->required();
   in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
       ->type_name("NAME");

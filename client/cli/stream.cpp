@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 
 #include "client/cli/interrupt.h"
 #include "client/cli/motion_options.h"
@@ -159,6 +160,10 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
   job.batch_size = o.batch_size;
   job.restart = o.restart;
   TOUCHSTONE_RETURN_IF_ERROR(ParseShards(o.shards, &job));
+  std::error_code error;
+  if (o.restart && std::filesystem::equivalent(std::filesystem::path(o.like).parent_path(), o.output, error))
+    return absl::InvalidArgumentError(
+        "--restart would delete the dataset that --like names; choose another folder for --out");
   TOUCHSTONE_ASSIGN_OR_RETURN(job.format, client::ParseShardFormat(o.format));
   if (!o.like.empty()) TOUCHSTONE_RETURN_IF_ERROR(RepeatManifest(o, &job, shard_size_given));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
@@ -170,7 +175,7 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), o.motion));
   job.lease = source->lease();
   job.session = o.motion.session;
-  // Where a touch takes seconds, each is heard of when it is done.
+  // Where a touch takes seconds, each is reported when it is done.
   if (source->physical() && job.batch_size == 0) job.batch_size = 1;
   client::DatasetWriter writer(connection.get(), job);
   writer.on_log = [&](const std::string& line) {
@@ -195,7 +200,7 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
   if (Interrupt::Raised() && absl::IsCancelled(status)) {
     const uint64_t whole = result.shards_found + result.shards_written;
     cli.Log(absl::StrCat("interrupted: ", Counted(whole, "whole shard stands", "whole shards stand"), " in ",
-                         job.folder, ". Run the same command again to go on"));
+                         job.folder, ". Run the same command again to resume"));
     return status;
   }
   TOUCHSTONE_RETURN_IF_ERROR(status);
@@ -211,9 +216,9 @@ void AddStream(Cli* cli) {
   auto shard_size = std::make_shared<CLI::Option*>(nullptr);
   CLI::App* command = cli->AddCommand(
       nullptr, "stream",
-      "Writes a dataset of touches and images as files. Interrupted in whatever way, the same command goes "
-      "on where "
-      "it stopped, and the result is the same, byte for byte.",
+      "Writes a dataset of touches and images as files. Interrupted in whatever way, the same command "
+      "resumes "
+      "where it stopped, and the result is the same, byte for byte.",
       "touchstone stream --samples 100000 --out data\n"
       "touchstone stream --objects lat00,lat20 --samples 10000 --image 224x224 --out data\n"
       "touchstone stream --plan faces --model noisy.yaml --to folder --out faces\n"
@@ -237,6 +242,7 @@ void AddStream(Cli* cli) {
   specification.push_back(add("--seed", options->seed, "N", "Seed of poses and noise. Default: 0", what));
   specification.push_back(
       add("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own", what));
+  cli->AddInput(command, specification.back());
   specification.push_back(add("--columns", options->columns, "A,B,...",
                               "Of index, object, descriptor, contact_time, pose, contact, image. "
                               "Default: index,object,pose,descriptor, and image with any image option",
@@ -246,22 +252,28 @@ void AddStream(Cli* cli) {
       add("--max-draws", options->max_draws, "N",
           "A touch that misses is drawn again this often before the stream fails. Default: 1000", what));
   const char* files = "Files";
-  add("--out", options->output, "FOLDER", "Where the shards and dataset.json go", files)->required();
+  cli->AddOutput(
+         command, "--out", &options->output,
+         "Where the shards and dataset.json go. What is there of the same dataset is resumed; another "
+         "dataset is refused",
+         OutputKind::kFolder)
+      ->group(files)
+      ->required();
   const auto* to =
       add("--to", options->format, "FORMAT",
           "webdataset: tar files; folder: touches.csv and images; hdf5. Default: webdataset", files);
-  *shard_size = add("--shard-size", options->shard_size, "N", "Samples a shard. Default: 10000", files);
+  *shard_size = add("--shard-size", options->shard_size, "N", "Samples per shard. Default: 10000", files);
   add("--shards", options->shards, "K/N",
       "Write only shards K, K + N, ...: the part of job K of N that share the folder. Default: 0/1, all",
       files);
   add("--batch-size", options->batch_size, "N",
-      "Samples a message; changes no byte. Default: the source's own", files);
+      "Samples per message; changes no byte. Default: the source's own", files);
   CLI::Option* like =
       add("--like", options->like, "DATASET.JSON",
           "Make the dataset of that file again: everything about what to make is read there", files);
   command->add_flag("--restart", options->restart, "Delete what the folder holds of a dataset first")
       ->group(files);
-  AddPlanOptions(command, &options->plan);
+  AddPlanOptions(cli, command, &options->plan);
   AddImageOptions(command, &options->image);
   specification.push_back(add("--encoding", options->encoding, "FORMAT",
                               "png, jpeg or raw (.npy). Default: png; raw in HDF5", "Image"));

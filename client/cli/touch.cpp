@@ -57,9 +57,9 @@ absl::StatusOr<std::vector<TouchRow>> CommandedRows(const Options& options) {
   return rows;
 }
 
-// Rows of one object that follow each other are one session; the noise hangs on the row's number alone. A
+// Rows of one object that follow each other are one session; the noise depends on the row's number alone. A
 // physical source gets one at a time, with ids: those of a plan's touches are always the same, so that a
-// repeated command goes on where it stopped.
+// repeated command resumes where it stopped.
 absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchRow>* rows,
                       std::string* model_hash) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
@@ -72,7 +72,7 @@ absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchR
                               }));
   const StopOnInterrupt stop_on_interrupt(source.get());
   const std::string session = options.motion.session.empty() ? "default" : options.motion.session;
-  const size_t most = source->touches_a_request();
+  const size_t max_touches = source->touches_per_request();
   for (size_t first = 0; first < rows->size();) {
     v1::TouchRequest request;
     request.set_object((*rows)[first].measured.object);
@@ -81,7 +81,8 @@ absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchR
     request.set_first_index(first);
     if (source->physical()) request.set_session(session);
     size_t stop = first;
-    while (stop < rows->size() && stop - first < most && (*rows)[stop].measured.object == request.object()) {
+    while (stop < rows->size() && stop - first < max_touches &&
+           (*rows)[stop].measured.object == request.object()) {
       const TouchRow& row = (*rows)[stop++];
       *request.add_touches() = row.measured.commanded;
       if (source->physical())
@@ -97,7 +98,7 @@ absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchR
       bar.Clear();
       if (source->physical() && first > 0 && !options.plan.empty())
         cli.Log(absl::StrCat(first, " of ", rows->size(), " touches stand in session '", session,
-                             "' of the source; the same command goes on after them"));
+                             "' of the source; the same command resumes after them"));
       return response.status();
     }
     for (size_t row = first; row < stop; ++row) {
@@ -143,11 +144,11 @@ absl::Status RunTouch(const Cli& cli, const Options& options) {
   if (cli.output().json) {
     Json list = Json::array();
     for (const TouchRow& row : rows) list.push_back(RowJson(row));
-    return WriteOutput(options.output, Json({{"model_hash", model_hash}, {"touches", list}}).dump(2) + "\n");
+    return cli.Write(options.output, Json({{"model_hash", model_hash}, {"touches", list}}).dump(2) + "\n");
   }
   std::vector<client::MeasuredTouch> measured;
   for (TouchRow& row : rows) measured.push_back(std::move(row.measured));
-  return WriteOutput(options.output, client::FormatMeasurements(measured));
+  return cli.Write(options.output, client::FormatMeasurements(measured));
 }
 
 }  // namespace
@@ -156,7 +157,7 @@ void AddTouch(Cli* cli) {
   auto options = std::make_shared<Options>();
   CLI::App* command = cli->AddCommand(
       nullptr, "touch",
-      "Touches an object and prints a measurement file: one row a touch, t_*_us when each finger met it.",
+      "Touches an object and prints a measurement file: one row per touch, t_*_us when each finger met it.",
       "touchstone touch lat20 --approach 0,0,-1\n"
       "touchstone touch lat20 --approach 0,0,-1 --target-mm 10,0,0 --lateral 0,1,0 --repeats 10 --model "
       "noisy.yaml\n"
@@ -165,15 +166,18 @@ void AddTouch(Cli* cli) {
       [cli, options] { return RunTouch(*cli, *options); });
   command->add_option("OBJECT", options->object, "What to touch; with --plan, instead of the file's objects")
       ->type_name("");
-  command->add_option("--plan", options->plan, "A CSV file of touches (touchstone plan writes one)")
-      ->type_name("FILE");
-  command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")
-      ->type_name("MODEL");
+  cli->AddInput(
+      command,
+      command->add_option("--plan", options->plan, "A CSV file of touches (touchstone plan writes one)")
+          ->type_name("FILE"));
+  cli->AddInput(
+      command,
+      command->add_option("--model", options->model, "Model file, name or hash. Default: the source's own")
+          ->type_name("MODEL"));
   command->add_option("--seed", options->seed, "Seed of the noise. Default: 0")->type_name("N");
   command->add_option("--repeats", options->repeats, "How often all of it is touched. Default: 1")
       ->type_name("N");
-  command->add_option("-o,--output", options->output, "The file to write. Default: stdout")
-      ->type_name("FILE");
+  cli->AddFormattedOutput(command, "-o,--output", &options->output, "The file to write. Default: stdout");
   AddTouchOptions(command, &options->touch);
   AddMotionOptions(command, &options->motion, true);
   cli->AddSourceOptions(command);

@@ -1,18 +1,23 @@
 #include "client/source/connection.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
 #include <chrono>
+#include <thread>
 
 #include "server/base/status.h"
 
 namespace touchstone::client {
 namespace {
 
+constexpr std::chrono::milliseconds kRetryInterval{100};
+
 std::chrono::system_clock::time_point InSeconds(double seconds) {
-  return std::chrono::system_clock::now() + std::chrono::microseconds(static_cast<int64_t>(seconds * 1e6));
+  return std::chrono::system_clock::now() +
+         std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::duration<double>(seconds));
 }
 
 // "host:port" with a port from 1 to 65535, or an address scheme of gRPC's own ("unix:/run/touchstone").
@@ -44,7 +49,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(ConnectionOptions o
     return connection;
   }
   connection->server_index_ = connection->server_count() - 1;
-  TOUCHSTONE_RETURN_IF_ERROR(connection->ConnectToNext());
+  TOUCHSTONE_RETURN_IF_ERROR(connection->ConnectToOneThatStarts());
   return connection;
 }
 
@@ -57,6 +62,18 @@ Connection::~Connection() {
   diagnosis_.reset();
   rig_.reset();
   channel_.reset();
+}
+
+absl::Status Connection::ConnectToOneThatStarts() {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.wait_s);
+  for (bool waiting = false;; waiting = true) {
+    const absl::Status status = ConnectToNext();
+    if (status.ok() || std::chrono::steady_clock::now() + kRetryInterval > end) return status;
+    if (!waiting && options_.on_wait)
+      options_.on_wait(absl::StrCat("waiting for ", absl::StrJoin(options_.servers, " or "),
+                                    " to answer, up to ", options_.wait_s, " s"));
+    std::this_thread::sleep_for(kRetryInterval);
+  }
 }
 
 absl::Status Connection::ConnectToNext() {

@@ -2,6 +2,7 @@
 // process. Both are gRPC channels, so whatever runs over one runs over the other and gives the same bytes.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,13 +30,15 @@ struct ConnectionOptions {
   std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process
   ServerOptions embedded;            // of the source in this process; `listen` is ignored
   double connect_timeout_s = 5;      // for one server
+  double wait_s = 0;                 // Open tries again for so long while none answers: one may be starting
+  std::function<void(const std::string&)> on_wait;  // called once, with what is waited for; may be null
 };
 
 // Not safe for use by several threads at once, apart from the stubs, which are.
 class Connection {
  public:
   // Connects to the first server that answers, or starts a source in this process. UNAVAILABLE names every
-  // server that was tried.
+  // server that was tried, after `wait_s`.
   static absl::StatusOr<std::unique_ptr<Connection>> Open(ConnectionOptions options);
   ~Connection();
 
@@ -53,7 +56,7 @@ class Connection {
   bool embedded() const { return server_ != nullptr; }
   int server_count() const { return static_cast<int>(options_.servers.size()); }
 
-  // Goes on to the next server that answers, beginning after the present one; the present one is the last
+  // Connects to the next server that answers, beginning after the present one; the present one is the last
   // that is tried. For a source in this process: an error, since it cannot be lost.
   absl::Status ConnectToNext();
 
@@ -72,6 +75,7 @@ class Connection {
  private:
   Connection() = default;
   absl::Status Connect(int server_index);
+  absl::Status ConnectToOneThatStarts();
   void MakeStubs();
 
   ConnectionOptions options_;

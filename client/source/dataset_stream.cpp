@@ -20,11 +20,11 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// The stream may go on only where the same request means the same bytes.
+// The stream may resume only where the same request means the same bytes.
 absl::Status CompareHeaders(const v1::DatasetHeader& before, const v1::DatasetHeader& now,
                             const std::string& address) {
   const auto differs = [&](const char* what, const auto& a, const auto& b) {
-    return absl::FailedPreconditionError(absl::StrCat("the stream cannot go on at ", address, ": its ", what,
+    return absl::FailedPreconditionError(absl::StrCat("the stream cannot resume at ", address, ": its ", what,
                                                       " is ", b, ", it was ", a,
                                                       "; the rest would not fit the beginning"));
   };
@@ -98,7 +98,7 @@ absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
     if (reader_->Read(&batch->message_)) {
       if (!batch->message_.has_batch())
         return absl::InternalError("the source sent a message without a batch in the middle of a dataset");
-      // Where the stream would go on after this batch, were the server lost now.
+      // Where the stream would resume after this batch if the server were lost now.
       if (request_.batch_size() > 0)
         batch_rows_ = request_.batch_size();
       else
@@ -133,14 +133,14 @@ absl::Status DatasetStream::Reconnect(absl::Status lost) {
     if (status.ok()) {
       if (options_.log)
         options_.log(
-            absl::StrCat("going on at ", connection_->address(), " with sample ", request_.start_index()));
+            absl::StrCat("resuming at ", connection_->address(), " with sample ", request_.start_index()));
       return status;
     }
     // A server that is full may have room soon; anything else will not get better by waiting.
     if (!IsLostServer(status) && !absl::IsResourceExhausted(status)) return status;
     if (SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
     const Clock::time_point wake =
-        Clock::now() + std::chrono::milliseconds(static_cast<int>(backoff_s * 1000));
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(backoff_s));
     while (Clock::now() < wake) {
       if (cancelled_) return absl::CancelledError("the stream was cancelled");
       std::this_thread::sleep_for(std::chrono::milliseconds(20));

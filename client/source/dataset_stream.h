@@ -1,5 +1,5 @@
 // A dataset as a stream of batches that survives the loss of its server: since a sample is a pure function of
-// its index, the stream goes on at the same or another server where it stopped, without a gap or a repeat.
+// its index, the stream resumes at the same or another server where it stopped, without a gap or a repeat.
 #pragma once
 
 #include <atomic>
@@ -20,9 +20,9 @@ struct DatasetStreamOptions {
   // A lost server is looked for, there and at the others, for this long since the last batch; then the stream
   // fails with UNAVAILABLE.
   double reconnect_s = 60;
-  // Told, from the reading thread, when a server was lost and when the stream goes on.
+  // Called from the reading thread when a server was lost and when the stream resumes.
   std::function<void(const std::string&)> log;
-  // Of a source that needs a lease: its token now, and what keeps it when the stream goes on elsewhere. Null:
+  // Of a source that needs a lease: its token now, and what keeps it when the stream resumes elsewhere. Null:
   // none.
   LeaseKeeper* lease = nullptr;
 };

@@ -1,4 +1,4 @@
-// Streams from sources made here, which fail where they are told to.
+// Streams from sources made here, which fail where a test wants it.
 #include "client/source/dataset_stream.h"
 
 #include <gmock/gmock.h>

@@ -188,7 +188,7 @@ absl::Status DatasetWriter::Resolve() {
       break;
     }
   }
-  // One sample tells all: the header comes with it.
+  // One sample is enough: the header comes with it.
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<DatasetStream> stream, OpenStream(0, 1, 1));
   const v1::DatasetHeader& header = stream->header();
   if (header.samples() == 0)

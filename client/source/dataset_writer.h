@@ -1,5 +1,5 @@
 // Writes a dataset into a folder: shards and dataset.json. Interrupted in any way, the next run with the same
-// specification goes on at the first missing shard, and the result is the same, byte for byte.
+// specification resumes at the first missing shard, and the result is the same, byte for byte.
 #pragma once
 
 #include <atomic>

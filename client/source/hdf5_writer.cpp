@@ -74,7 +74,7 @@ class Hdf5Writer : public ShardWriter {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // errors are ours to report
     Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
-    // The root group keeps times of its own unless it is told not to.
+    // The root group keeps times of its own unless that is switched off.
     Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
     H5Pset_obj_track_times(creation, false);
     errno = 0;

@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kRenewalsAWindow = 5;
 constexpr double kShortestAnswerS = 0.5;  // what a call to a busy source gets at the least
 constexpr double kAcquireS = 10;
-// A lease that nobody renews, because its holder was killed, is over by then.
+// A lease that is not renewed, because its holder was killed, has ended by then.
 constexpr std::chrono::milliseconds kHolderMayBeGone{2500};
 constexpr std::chrono::milliseconds kAskAgain{100};
 
@@ -32,8 +32,9 @@ absl::StatusOr<Response> CallWithin(double seconds,
                                                                               const Request&, Response*),
                                     v1::Control::Stub* control, const Request& request) {
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() +
-                       std::chrono::microseconds(static_cast<int64_t>(seconds * 1e6)));
+  context.set_deadline(
+      std::chrono::system_clock::now() +
+      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::duration<double>(seconds)));
   Response response;
   TOUCHSTONE_RETURN_IF_ERROR(FromGrpc((control->*method)(&context, request, &response)));
   return response;
@@ -157,7 +158,7 @@ absl::Status LeaseKeeper::Lost(v1::Control::Stub* control, const absl::Status& w
   if (state.ok() && !state->lease_holder().empty())
     return absl::AbortedError(absl::StrCat("'", state->lease_holder(), "' took the lease (epoch ",
                                            state->lease_epoch(),
-                                           "); agree with them, then run the same command again to go on"));
+                                           "); agree with them, then run the same command again to resume"));
   return absl::AbortedError(absl::StrCat("the lease was lost: ", why.message()));
 }
 

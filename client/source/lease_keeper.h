@@ -45,7 +45,7 @@ class LeaseKeeper {
   bool required() const { return required_; }
   // For lease_token of requests; empty where none is needed.
   std::string token() const;
-  // OK while the lease is held, or none is needed; ABORTED tells who took it, or that it ran out.
+  // OK while the lease is held, or none is needed; ABORTED says who took it, or that it ran out.
   absl::Status status() const;
 
   // After the connection was lost and found again: keeps the lease if it stands, else acquires a new one.

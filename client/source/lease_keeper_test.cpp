@@ -81,18 +81,18 @@ TEST_F(LeaseKeeperTest, RefusesTellWhoHoldsItAndHowToTakeIt) {
 }
 
 TEST_F(LeaseKeeperTest, TellsItsHolderWhoTookTheLease) {
-  std::atomic<int> told{0};
+  std::atomic<int> losses{0};
   LeaseOptions options;
   options.holder = "ana@bench2";
-  options.on_lost = [&](const absl::Status&) { ++told; };
+  options.on_lost = [&](const absl::Status&) { ++losses; };
   const auto ana = LeaseKeeper::Acquire(connection_.get(), needs_lease_, options);
   ASSERT_TRUE(ana.ok());
   const auto ben = Acquire("ben@desk", true);
   ASSERT_TRUE(ben.ok()) << ben.status();
-  ASSERT_TRUE(Eventually([&] { return told > 0; }));
+  ASSERT_TRUE(Eventually([&] { return losses > 0; }));
   EXPECT_EQ((*ana)->status().code(), absl::StatusCode::kAborted);
   EXPECT_THAT(std::string((*ana)->status().message()), HasSubstr("ben@desk"));
-  EXPECT_EQ(told, 1);
+  EXPECT_EQ(losses, 1);
   // It does not come back by itself, and does not take it back either.
   const absl::Status follow = (*ana)->Follow(connection_.get());
   EXPECT_EQ(follow.code(), absl::StatusCode::kFailedPrecondition);
@@ -114,8 +114,8 @@ TEST_F(LeaseKeeperTest, FollowsToANewLeaseOnceTheOldOneIsFree) {
   EXPECT_EQ(State().lease_holder(), "ana@bench2");
 }
 
-// A source that wants a lease, with a window so short that renewals are many, and that fails where it is told
-// to.
+// A source that wants a lease, with a window so short that renewals are many, and that fails where a test
+// wants it.
 class FakeRig : public v1::Control::Service {
  public:
   class Touches : public v1::Source::Service {
@@ -262,7 +262,7 @@ TEST(LeasedSource, AsksForTheSameTouchAgainAfterALoss) {
   const auto connection = rig.Connect();
   const auto source = LeasedSource::Open(connection.get());
   ASSERT_TRUE(source.ok()) << source.status();
-  EXPECT_EQ((*source)->touches_a_request(), 1u);
+  EXPECT_EQ((*source)->touches_per_request(), 1u);
   rig.failures = 2;
   const auto response = (*source)->Touch(OneTouch("monday/lat20/7"));
   ASSERT_TRUE(response.ok()) << response.status();

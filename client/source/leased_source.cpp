@@ -33,8 +33,8 @@ absl::StatusOr<std::unique_ptr<LeasedSource>> LeasedSource::Open(Connection* con
   return source;
 }
 
-size_t LeasedSource::touches_a_request() const {
-  // What moves takes seconds a touch; a recorded source tells repeats apart within a request only.
+size_t LeasedSource::touches_per_request() const {
+  // What moves takes seconds per touch; a recorded source can tell repeats apart only within a request.
   return description_.lease_required() ? 1 : std::max<uint32_t>(1, description_.max_touches_per_request());
 }
 
@@ -130,7 +130,8 @@ absl::Status LeasedSource::FindAgain() {
 }
 
 absl::Status LeasedSource::SleepFor(double seconds) {
-  const Clock::time_point wake = Clock::now() + std::chrono::milliseconds(static_cast<int>(seconds * 1000));
+  const Clock::time_point wake =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
   while (Clock::now() < wake) {
     {
       std::lock_guard<std::mutex> lock(mutex_);

@@ -1,5 +1,5 @@
 // A source as the commands that touch and photograph use it: with a lease where it needs one, with ids, and
-// with the patience to go on when it was lost. A virtual source and a physical one look the same from here.
+// with repeated attempts when it was lost. A virtual source and a physical one look the same from here.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ struct LeasedSourceOptions {
   bool take_lease = false;
   // How long a lost source is looked for before a touch fails with UNAVAILABLE.
   double reconnect_s = 60;
-  // Told when a source was lost, found again, or lost its lease.
+  // Called when a source was lost, found again, or lost its lease.
   std::function<void(const std::string&)> log;
 };
 
@@ -31,10 +31,10 @@ class LeasedSource {
   const v1::DescribeResponse& description() const { return description_; }
   bool physical() const { return description_.kind() == "physical"; }
   // Touches to send in one request: one where each takes seconds, so that each is seen when it is done.
-  size_t touches_a_request() const;
+  size_t touches_per_request() const;
 
   // With the lease. A request with touch ids is repeated with the same ids when the source was lost, within
-  // reconnect_s; one without is not, since nobody knows which touches were made.
+  // reconnect_s; one without is not, since it is unknown which touches were made.
   absl::StatusOr<v1::TouchResponse> Touch(v1::TouchRequest request);
   absl::StatusOr<v1::CaptureResponse> Capture(v1::CaptureRequest request);
   absl::StatusOr<v1::RigState> Mount(const std::string& object, v1::UpFace up_face);

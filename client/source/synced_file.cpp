@@ -39,7 +39,7 @@ absl::Status FileError(int error_number, const std::string& path, absl::string_v
     case ENOSPC:
     case EDQUOT:
       return absl::ResourceExhaustedError(
-          absl::StrCat(message, ". Make room and run the same command again: it goes on where it stopped"));
+          absl::StrCat(message, ". Make room and run the same command again: it resumes where it stopped"));
     case EIO:
       return absl::DataLossError(message);
     default:

@@ -19,7 +19,7 @@ struct FileFacts {
 };
 
 enum class Durability {
-  kAlone,     // as told above
+  kAlone,     // as described above
   kInFolder,  // part of a folder that is synced (SyncFileSystem) and renamed as a whole: written in place
 };
 

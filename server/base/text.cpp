@@ -102,6 +102,13 @@ std::string ShortestNumber(double value) {
   return std::string(buffer, result.ptr);
 }
 
+std::string DurationInWords(double seconds) {
+  const auto whole = static_cast<long long>(std::ceil(std::max(seconds, 0.0)));
+  if (whole < 60) return absl::StrCat(whole, " s");
+  if (whole < 3600) return absl::StrCat(whole / 60, " min ", whole % 60, " s");
+  return absl::StrCat(whole / 3600, " h ", whole % 3600 / 60, " min");
+}
+
 absl::StatusOr<double> ParseNumber(absl::string_view text) {
   double value = 0;
   if (!absl::SimpleAtod(text, &value))

@@ -22,6 +22,9 @@ absl::StatusOr<std::string> Sha256HexOfFile(const std::string& path);
 // The shortest decimal text that reads back as the same double ("0.1", "1e-09", "nan").
 std::string ShortestNumber(double value);
 
+// A duration for people, rounded up to whole seconds: "40 s", "4 min 10 s", "2 h 5 min". Below 0 is 0.
+std::string DurationInWords(double seconds);
+
 // The whole of `text` as a number; an error says what was found. Accepts inf and nan only if allowed.
 absl::StatusOr<double> ParseNumber(absl::string_view text);
 

@@ -6,6 +6,8 @@
 
 #include <filesystem>
 
+#include "server/base/test_folder.h"
+
 namespace touchstone {
 namespace {
 
@@ -35,8 +37,16 @@ TEST(ParseNumber, RefusesWordsAndInfinity) {
   EXPECT_FALSE(ParseNumber("inf").ok());
 }
 
+TEST(DurationInWords, HasTwoUnitsAtMost) {
+  EXPECT_EQ(DurationInWords(-1), "0 s");
+  EXPECT_EQ(DurationInWords(39.2), "40 s");
+  EXPECT_EQ(DurationInWords(250), "4 min 10 s");
+  EXPECT_EQ(DurationInWords(7500), "2 h 5 min");
+}
+
 TEST(WriteFileAtomically, LeavesAWholeFileOrNone) {
-  const std::string folder = testing::TempDir();
+  const TestFolder test_folder;
+  const std::string& folder = test_folder.path();
   const std::string path = folder + "/atomic.txt";
   ASSERT_TRUE(WriteFileAtomically(path, "hello").ok());
   EXPECT_EQ(ReadFile(path).value(), "hello");

@@ -1,5 +1,5 @@
 """The whole circle: an emulated rig hides an effect, the gateway makes a session of touches on it, the diagnosis names
-the effect and tells its size, and with it the model's error is the noise.
+the effect and its size, and with it the model's error is the noise.
 
 Over real sockets and a real pseudo-terminal, 192 touches an object. Half of the sessions are made by `touchstone rig
 run`, half by the Python package. Nothing that the emulated rig reports was measured on anything.
@@ -65,7 +65,7 @@ CIRCLES = [
            near={"contact_slowdown": 0.01}),
     # Sensor.
     Circle("oblique_slip", "python", {"oblique_slip": ("travel_mm", [0.5])}, seed=17, near={"oblique_slip": 0.1}),
-    # The simulated clock goes on while our programs take their time: at a lower speed the drift depends less on theirs.
+    # The simulated clock runs while our programs take their time: at a lower speed the drift depends less on theirs.
     Circle("thermal_drift", "command line", {"thermal_drift": ("rate_mm_per_h", [0.6, -0.15, -0.45])}, seed=18,
            speedup=100, near={"thermal_drift": 0.12}),
     Circle("return_hysteresis", "python", {"return_hysteresis": ("fraction", [0.08])}, seed=19,
@@ -212,7 +212,7 @@ def test_the_error_comes_down_to_the_noise(circles, circle):
 
 
 @parameter([c for c in CIRCLES if c.unlisted])
-def test_what_no_catalogue_lists_is_owned_up_to_with_what_it_hangs_on(circles, circle):
+def test_what_no_catalogue_lists_is_reported_with_what_it_depends_on(circles, circle):
     report = circles[circle.name][1].result()
     assert report["final"]["rmse_us"] > 1.1 * report["noise_floor_us"], report["summary"]
     assert "travel_mm" in json.dumps(report["unexplained"]), report["unexplained"]
@@ -232,7 +232,7 @@ def test_the_better_model_is_adequate_and_makes_a_dataset(circles, circle):
 
 
 @parameter(CIRCLES, "tip_radius")
-def test_the_journal_tells_that_its_data_are_emulated_and_repeats_nothing(circles, circle):
+def test_the_journal_says_that_its_data_are_emulated_and_repeats_nothing(circles, circle):
     folder, future = circles[circle.name]
     future.result()
     run(BIN / "touchstone", "session", "export", "session.db", "plan", "-o", "exported.csv", cwd=folder)

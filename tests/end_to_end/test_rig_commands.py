@@ -88,7 +88,7 @@ def journal_of_gateway(rig):
     return {entry["name"]: entry for entry in sessions}
 
 
-def test_status_tells_every_part_and_that_it_is_emulated(rig):
+def test_status_shows_every_part_and_that_it_is_emulated(rig):
     # Looking powers nothing on.
     assert "POWER_OFF" in touchstone("rig", "status", server=rig)
     touchstone("rig", "power-on", server=rig)
@@ -122,10 +122,10 @@ def test_mount_stop_and_home(rig):
 
 def test_a_dry_run_checks_and_draws_and_moves_nothing(rig, plan, tmp_path):
     before = json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]["arm"]["program_id"]
-    checked = json.loads(touchstone("rig", "dry-run", plan, "-o", tmp_path / "way.svg", "--json", server=rig))
+    checked = json.loads(touchstone("rig", "dry-run", plan, "-o", tmp_path / "path.svg", "--json", server=rig))
     assert checked["touches"] == checked["possible"] == 25
     assert {group["up_face"]: group["touches"] for group in checked["groups"]}["+z"] == 24
-    assert (tmp_path / "way.svg").read_text().startswith("<svg")
+    assert (tmp_path / "path.svg").read_text().startswith("<svg")
     assert json.loads(touchstone("rig", "status", "--json", server=rig))["rig"]["arm"]["program_id"] == before
 
 

@@ -1,0 +1,331 @@
+#include "client/cli/output_file.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "server/base/status.h"
+
+namespace touchstone::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxLinks = 40;
+constexpr size_t kBlockBytes = 1 << 20;
+
+absl::Status FileFailure(const std::string& path, absl::string_view what, int error_number) {
+  const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error_number));
+  if (error_number == ENOSPC || error_number == EDQUOT) return absl::ResourceExhaustedError(message);
+  return absl::InvalidArgumentError(message);
+}
+
+absl::Status Refused(const std::string& path, absl::string_view why) {
+  return absl::InvalidArgumentError(absl::StrCat(path, " ", why));
+}
+
+// Where the bytes go in the end: links are followed.
+struct Destination {
+  std::string path;
+  bool exists = false;
+  struct stat info = {};
+
+  bool regular() const { return !exists || S_ISREG(info.st_mode); }
+};
+
+absl::StatusOr<Destination> Resolve(const std::string& path) {
+  Destination destination;
+  destination.path = path;
+  if (::stat(path.c_str(), &destination.info) == 0) {
+    destination.exists = true;
+    // What is no regular file is opened by the name that it has: /dev/fd/3 leads to no other.
+    if (!S_ISREG(destination.info.st_mode)) return destination;
+    const std::unique_ptr<char, void (*)(void*)> real(::realpath(path.c_str(), nullptr), std::free);
+    if (real == nullptr) return FileFailure(path, "cannot be followed", errno);
+    destination.path = real.get();
+    return destination;
+  }
+  if (errno != ENOENT) return FileFailure(path, "cannot be written", errno);
+  // A link to what is not there yet.
+  for (int links = 0; links < kMaxLinks; ++links) {
+    std::error_code error;
+    if (!fs::is_symlink(fs::symlink_status(destination.path, error))) return destination;
+    const fs::path target = fs::read_symlink(destination.path, error);
+    if (error) return FileFailure(path, "cannot be followed", error.value());
+    destination.path =
+        target.is_absolute() ? target.string() : (fs::path(destination.path).parent_path() / target).string();
+  }
+  return FileFailure(path, "cannot be followed", ELOOP);
+}
+
+std::string FolderOf(const std::string& path) {
+  const std::string folder = fs::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+// A name in the folder that nothing has.
+std::string FreePath(const std::string& folder, const std::string& name) {
+  std::random_device random;
+  while (true) {
+    const std::string path =
+        absl::StrCat(folder, "/.", name, ".", absl::Hex(random(), absl::kZeroPad8), ".part");
+    struct stat info;
+    if (::lstat(path.c_str(), &info) != 0) return path;
+  }
+}
+
+absl::Status CheckFolder(const std::string& path, std::string folder, bool makes_folders) {
+  std::error_code error;
+  while (makes_folders && !fs::exists(folder, error) && FolderOf(folder) != folder) folder = FolderOf(folder);
+  if (!fs::exists(folder, error))
+    return Refused(path, absl::StrCat("cannot be made: there is no folder ", folder));
+  if (!fs::is_directory(folder, error))
+    return Refused(path, absl::StrCat("cannot be made: ", folder, " is no folder"));
+  // Only trying shows it: permissions, a read-only file system, and what root may not do either.
+  const std::string probe = FreePath(folder, "touchstone-probe");
+  const int file = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (file < 0) return Refused(path, absl::StrCat("cannot be made in ", folder, ": ", std::strerror(errno)));
+  ::close(file);
+  ::unlink(probe.c_str());
+  return absl::OkStatus();
+}
+
+absl::Status CheckDestination(const OutputFile& output, const Destination& destination, bool force) {
+  const std::string& path = output.path;
+  if (!destination.exists) {
+    if (output.kind != OutputKind::kFolder && fs::path(path).filename().empty())
+      return Refused(path, "is the name of a folder; a file's was expected");
+    return CheckFolder(path, FolderOf(destination.path),
+                       output.makes_folders || output.kind == OutputKind::kFolder);
+  }
+  const mode_t mode = destination.info.st_mode;
+  if (output.kind == OutputKind::kFolder)
+    return S_ISDIR(mode) ? CheckFolder(path, path, false) : Refused(path, "is no folder; one was expected");
+  if (S_ISDIR(mode)) return Refused(path, "is a folder; a file's name was expected");
+  if (S_ISBLK(mode)) return Refused(path, "is a block device, whose content would be destroyed");
+  if (S_ISSOCK(mode)) return Refused(path, "is a socket, which cannot be written to");
+  if (::access(path.c_str(), W_OK) != 0)
+    return Refused(path, absl::StrCat("may not be written: ", std::strerror(errno)));
+  if (!S_ISREG(mode) || output.kind == OutputKind::kJournal) return absl::OkStatus();
+  if (!force)
+    return absl::AlreadyExistsError(
+        absl::StrCat(path, " exists already; choose another name, or --force to replace it"));
+  return CheckFolder(path, FolderOf(destination.path), false);
+}
+
+// Nothing is lost when a terminal or /dev/null is written to twice, or read as well.
+bool HoldsNothing(const Destination& destination) {
+  return destination.exists && S_ISCHR(destination.info.st_mode);
+}
+
+// Whether two paths lead to one file, be it through links, or would if it were there.
+bool SameFile(const Destination& a, const Destination& b) {
+  if (a.exists != b.exists) return false;
+  if (a.exists) return a.info.st_dev == b.info.st_dev && a.info.st_ino == b.info.st_ino;
+  std::error_code error;
+  return fs::weakly_canonical(fs::absolute(a.path, error), error) ==
+         fs::weakly_canonical(fs::absolute(b.path, error), error);
+}
+
+absl::Status WithOption(const std::string& option, const absl::Status& status) {
+  return absl::Status(status.code(), absl::StrCat(option, ": ", status.message()));
+}
+
+// --- Writing
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int number() const { return number_; }
+  bool Close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+absl::Status WriteAll(int descriptor, const std::string& path, absl::string_view data) {
+  while (!data.empty()) {
+    const ssize_t written = ::write(descriptor, data.data(), data.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return FileFailure(path, "writing failed", errno);
+    data.remove_prefix(static_cast<size_t>(written));
+  }
+  return absl::OkStatus();
+}
+
+// A new file with the permission bits that the umask leaves.
+absl::Status MakeFile(const std::string& path, absl::string_view data) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (file.number() < 0) return FileFailure(path, "cannot be made", errno);
+  TOUCHSTONE_RETURN_IF_ERROR(WriteAll(file.number(), path, data));
+  if (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)
+    return FileFailure(path, "cannot be synced", errno);
+  return file.Close() ? absl::OkStatus() : FileFailure(path, "closing failed", errno);
+}
+
+// Renames unless something stands there; EEXIST then.
+int RenameToNew(const char* from, const char* to) {
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+  // A file system that cannot: a second name does the same.
+  if (::link(from, to) != 0) return errno;
+  ::unlink(from);
+  return 0;
+}
+
+absl::Status MoveIntoPlace(const std::string& part, const std::string& path, const Destination& destination,
+                           bool force) {
+  if (!force) {
+    const int failed = RenameToNew(part.c_str(), destination.path.c_str());
+    if (failed == EEXIST)
+      return absl::AlreadyExistsError(absl::StrCat(
+          path, " exists now, though it did not when the command began; what it should have had is in ",
+          part));
+    return failed == 0 ? absl::OkStatus() : FileFailure(path, "cannot be renamed into place", failed);
+  }
+  if (destination.exists) {
+    // The file stays its owner's where we may say so; then its bits, which a change of owner clears.
+    if (::chown(part.c_str(), destination.info.st_uid, destination.info.st_gid) != 0) errno = 0;
+    if (::chmod(part.c_str(), destination.info.st_mode & 07777) != 0)
+      return FileFailure(path, "its permission bits cannot be kept", errno);
+  }
+  if (::rename(part.c_str(), destination.path.c_str()) != 0)
+    return FileFailure(path, "cannot be renamed into place", errno);
+  return absl::OkStatus();
+}
+
+// A FIFO, a terminal, /dev/null: opened as it is, never made, cut or replaced.
+absl::StatusOr<std::unique_ptr<Descriptor>> OpenSpecial(const std::string& path) {
+  auto file = std::make_unique<Descriptor>(::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC));
+  struct stat info;
+  if (file->number() < 0 || ::fstat(file->number(), &info) != 0)
+    return FileFailure(path, "cannot be opened", errno);
+  if (S_ISREG(info.st_mode) || S_ISBLK(info.st_mode)) return Refused(path, "has become another file");
+  return file;
+}
+
+absl::Status CopyTo(const std::string& from, int descriptor, const std::string& path) {
+  const Descriptor file(::open(from.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.number() < 0) return FileFailure(from, "cannot be read again", errno);
+  std::string block(kBlockBytes, '\0');
+  for (ssize_t got = 1; got > 0;) {
+    got = ::read(file.number(), block.data(), block.size());
+    if (got < 0) return FileFailure(from, "reading failed", errno);
+    TOUCHSTONE_RETURN_IF_ERROR(WriteAll(descriptor, path, {block.data(), static_cast<size_t>(got)}));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WriteBeside(const std::string& path, const Destination& destination, bool force,
+                         const std::function<absl::Status(const std::string&)>& write) {
+  const std::string part =
+      FreePath(FolderOf(destination.path), fs::path(destination.path).filename().string());
+  absl::Status status = write(part);
+  if (!status.ok()) {
+    ::unlink(part.c_str());
+    return absl::Status(status.code(), absl::StrReplaceAll(status.message(), {{part, path}}));
+  }
+  status = MoveIntoPlace(part, path, destination, force);
+  if (!status.ok() && !absl::IsAlreadyExists(status)) ::unlink(part.c_str());
+  return status;
+}
+
+}  // namespace
+
+bool IsStandardOutput(const std::string& path) {
+  return path == "-" || path == "/dev/stdout";
+}
+
+absl::Status CheckOutputFiles(const std::vector<OutputFile>& outputs, const std::vector<std::string>& inputs,
+                              bool force) {
+  std::vector<std::pair<const OutputFile*, Destination>> checked;
+  const OutputFile* on_stdout = nullptr;
+  for (const OutputFile& output : outputs) {
+    if (output.path.empty()) continue;
+    if (IsStandardOutput(output.path)) {
+      if (output.kind != OutputKind::kFile)
+        return absl::InvalidArgumentError(
+            absl::StrCat(output.option, ": ", output.kind == OutputKind::kFolder ? "a folder" : "a journal",
+                         " cannot go to standard output"));
+      if (on_stdout != nullptr)
+        return absl::InvalidArgumentError(
+            absl::StrCat(output.option, " and ", on_stdout->option, ": both are standard output"));
+      on_stdout = &output;
+      continue;
+    }
+    absl::StatusOr<Destination> destination = Resolve(output.path);
+    if (!destination.ok()) return WithOption(output.option, destination.status());
+    if (!HoldsNothing(*destination)) {
+      // Before --force is offered: it would not help.
+      for (const std::string& input : inputs) {
+        if (input.empty() || input == "-") continue;
+        const absl::StatusOr<Destination> read = Resolve(input);
+        if (read.ok() && read->exists && SameFile(*read, *destination))
+          return absl::InvalidArgumentError(
+              absl::StrCat(output.option, ": ", output.path, " is ", input,
+                           ", which is read and never changed; choose another name"));
+      }
+      for (const auto& [other, its_destination] : checked)
+        if (SameFile(its_destination, *destination))
+          return absl::InvalidArgumentError(absl::StrCat(output.option, " and ", other->option, ": both are ",
+                                                         output.path, "; one would replace the other"));
+    }
+    const absl::Status status = CheckDestination(output, *destination, force);
+    if (!status.ok()) return WithOption(output.option, status);
+    checked.emplace_back(&output, *std::move(destination));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force) {
+  if (path.empty() || IsStandardOutput(path)) {
+    ::fwrite(data.data(), 1, data.size(), stdout);  // Cli::Run reports what went wrong with it
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Destination destination, Resolve(path));
+  if (destination.regular())
+    return WriteBeside(path, destination, force,
+                       [&](const std::string& part) { return MakeFile(part, data); });
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto file, OpenSpecial(path));
+  return WriteAll(file->number(), path, data);
+}
+
+absl::Status WriteOutputFileBy(const std::string& path, bool force,
+                               const std::function<absl::Status(const std::string& free_path)>& write) {
+  const bool to_stdout = path.empty() || IsStandardOutput(path);
+  Destination destination;
+  if (!to_stdout) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(destination, Resolve(path));
+    if (destination.regular()) return WriteBeside(path, destination, force, write);
+  }
+  const std::string passing = FreePath(fs::temp_directory_path().string(), "touchstone-output");
+  absl::Status status = write(passing);
+  if (status.ok() && to_stdout) {
+    ::fflush(stdout);
+    status = CopyTo(passing, STDOUT_FILENO, "stdout");
+  } else if (status.ok()) {
+    const absl::StatusOr<std::unique_ptr<Descriptor>> file = OpenSpecial(path);
+    status = file.ok() ? CopyTo(passing, (*file)->number(), path) : file.status();
+  }
+  ::unlink(passing.c_str());
+  return status;
+}
+
+}  // namespace touchstone::cli
