@@ -109,7 +109,8 @@ class Doctor {
                        ". Configure with -DTOUCHSTONE_ARCH=native, or with an empty value"));
     Add("Rays", true, EmbreeDescription());
     json_["processor"] = {{"model", processor.model}, {"threads", cores}};
-    json_["build"] = {{"version", kVersion}, {"instructions", used}, {"instructions_missing", missing}};
+    json_["build"] = {
+        {"version", std::string(kVersion)}, {"instructions", used}, {"instructions_missing", missing}};
     json_["embree"] = EmbreeDescription();
   }
 
