@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/real_binary_test.h"
+#include "client/cli/test_server.h"
 #include "client/source/dataset_manifest.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/text.h"
@@ -187,11 +188,8 @@ TEST_F(CommandLineTest, DataGoesToStdoutAsMeasurementFiles) {
 }
 
 TEST_F(CommandLineTest, AVirtualSourceHasNoRigAndSaysWhatDoesTheSame) {
-  ServerOptions options;
-  options.listen = "127.0.0.1:0";
-  auto server = Server::Start(options);
-  ASSERT_TRUE(server.ok()) << server.status();
-  const std::string address = "127.0.0.1:" + std::to_string((*server)->port());
+  const TestServer server;
+  const std::string address = server.address();
   ASSERT_EQ(Run({"plan", "lat20", "--count", "2", "-o", "plan.csv"}).exit_code, 0);
   for (const std::vector<std::string>& command : {std::vector<std::string>{"rig", "status"},
                                                   {"rig", "home"},
@@ -363,13 +361,10 @@ TEST_P(ResumeTest, ADatasetIsMadeAgainFromItsOwnFile) {
 }
 
 TEST_P(ResumeTest, AServerGivesTheSameBytesAsThisProcess) {
-  ServerOptions options;
-  options.listen = "127.0.0.1:0";
-  auto server = Server::Start(options);
-  ASSERT_TRUE(server.ok()) << server.status();
+  const TestServer server;
   ASSERT_EQ(Run(Stream("embedded")).exit_code, 0);
   // The first address never answers.
-  const std::string servers = "127.0.0.1:1,127.0.0.1:" + std::to_string((*server)->port());
+  const std::string servers = "127.0.0.1:1," + server.address();
   const Outcome remote = Run(Stream("remote", {"--server", servers, "--batch-size", "77"}));
   ASSERT_EQ(remote.exit_code, 0) << remote.err;
   EXPECT_EQ(Snapshot("remote"), Snapshot("embedded"));

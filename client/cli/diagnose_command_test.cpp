@@ -16,8 +16,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/real_binary_test.h"
+#include "client/cli/test_server.h"
 #include "client/source/measurement_csv.h"
-#include "server/service/server.h"
 
 namespace touchstone::cli {
 namespace {
@@ -121,12 +121,10 @@ TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
 TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   MakeSet();
   ServerOptions options;
-  options.listen = "127.0.0.1:0";
   options.supershape_triangles = 1000;
   options.threads = 1;
-  auto server = Server::Start(options);
-  ASSERT_TRUE(server.ok()) << server.status();
-  const std::string address = absl::StrCat("127.0.0.1:", (*server)->port());
+  const TestServer server(options);
+  const std::string address = server.address();
 
   const Outcome here = Run(Command("diagnose", {"--json", "-", "--seed", "4"}));
   ASSERT_EQ(here.exit_code, 0) << here.err;
@@ -149,11 +147,9 @@ TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {
   Write("set.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,2\n");
   Write("other.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,3\n");
   ServerOptions options;
-  options.listen = "127.0.0.1:0";
   options.supershape_triangles = 1000;
-  auto server = Server::Start(options);
-  ASSERT_TRUE(server.ok()) << server.status();
-  const std::string at = absl::StrCat("--server=127.0.0.1:", (*server)->port());
+  const TestServer server(options);
+  const std::string at = "--server=" + server.address();
 
   EXPECT_THAT(Run({"session", "create", "monday", "set.csv", at}).err,
               HasSubstr("stored as monday: 1 touch"));

@@ -69,4 +69,19 @@ void AnnounceListening(const std::string& listen, int port) {
   spdlog::info("listening on {}:{}", host, port);
 }
 
+int ReportStartError(const char* program, const absl::Status& status) {
+  std::fprintf(stderr, "%s: error: %s\n", program, std::string(status.message()).c_str());
+  return absl::IsUnavailable(status) ? 3 : 2;
+}
+
+void ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins) {
+  AnnounceListening(options.listen, port);
+  const int signal = WaitForSignal();
+  spdlog::info("signal {}: {} for up to {} s", signal, what_begins, options.drain_s);
+}
+
+void LogStopped() {
+  spdlog::info("stopped");
+}
+
 }  // namespace touchstone

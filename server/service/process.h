@@ -3,6 +3,10 @@
 
 #include <string>
 
+#include <absl/status/statusor.h>
+
+#include "server/service/server_options.h"
+
 namespace touchstone {
 
 // Lines, or JSON objects, of at least this level ("info").
@@ -16,5 +20,29 @@ int WaitForSignal();
 
 // Prints "listening on HOST:PORT", the line that scripts wait for.
 void AnnounceListening(const std::string& listen, int port);
+
+// What went wrong, on stderr, and the exit status for it: 3 where something is unavailable, else 2.
+int ReportStartError(const char* program, const absl::Status& status);
+// Until a signal says otherwise; logs what the signal begins.
+void ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins);
+void LogStopped();
+
+// The life of a server's process, as its exit status: log, start, serving until a signal, draining. `Flags` has
+// log_level, log_json and done; `options_of` gives the options that every server has; `start` makes from the
+// flags what has port() and Drain().
+template <typename Flags, typename OptionsOf, typename Start>
+int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf options_of,
+              const char* what_a_signal_begins, Start start) {
+  if (!flags.ok()) return ReportStartError(program, absl::InvalidArgumentError(flags.status().message()));
+  if (flags->done) return 0;
+  SetUpLog(flags->log_level, flags->log_json);
+  BlockSignals();
+  auto server = start(*flags);
+  if (!server.ok()) return ReportStartError(program, server.status());
+  ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);
+  (*server)->Drain();
+  LogStopped();
+  return 0;
+}
 
 }  // namespace touchstone
