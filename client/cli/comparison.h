@@ -34,8 +34,8 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 // A source and what to ask it.
 class Comparison {
  public:
-  // Reads what is here and connects. Only meshes that the set names are read; a server is sent those that it
-  // lacks.
+  // Reads what is here and connects. Only meshes that the set names are read; a server is sent those
+  // that it lacks.
   static absl::StatusOr<std::unique_ptr<Comparison>> Open(const Cli& cli, const ComparisonOptions& options);
   // A set that was sent ahead is deleted again.
   ~Comparison();

@@ -66,12 +66,12 @@ void AddDiagnose(Cli* cli) {
   auto options = std::make_shared<Options>();
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
-      "Says how wrong a model is against measured touches, where, why, and what to add, until the rest is "
-      "noise.",
+      "Says how wrong a model is against measured touches, where, why, and what to add, until "
+      "the rest is noise.",
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
-      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --html report.html --json "
-      "report.json\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --html report.html "
+      "--json report.json\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });

@@ -33,8 +33,8 @@ constexpr char kModel[] =
 
 class DiagnoseCommandTest : public RealBinaryTest {
  protected:
-  // 24 poses twice on each of two objects, touched with balls for tips: set.csv. The meshes have names of
-  // their own.
+  // 24 poses twice on each of two objects, touched with balls for tips: set.csv. The meshes have names
+  // of their own.
   void MakeSet() {
     Write("nominal.yaml", kModel);
     Write("tips.yaml", absl::StrCat(kModel, "  - tip_radius: {radius_mm: 3}\n"));

@@ -1,5 +1,5 @@
-// touchstone doctor: is everything in order here? Processor, ray casting, renderers, the source and its
-// limits.
+// touchstone doctor: is everything in order here? Processor, ray casting, renderers, the source
+// and its limits.
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 

@@ -34,8 +34,8 @@ class StopOnInterrupt {
   Interrupt::Handler handler_;
 };
 
-// Asks a person to do something and waits for Enter. CANCELLED if interrupted; FAILED_PRECONDITION if stdin
-// has ended.
+// Asks a person to do something and waits for Enter. CANCELLED if interrupted; FAILED_PRECONDITION if
+// stdin has ended.
 absl::Status AskPerson(const std::string& what);
 
 }  // namespace touchstone::cli

@@ -1,5 +1,5 @@
-// What becomes of the file under the name of an output: what was there before, --force, and what is there
-// afterwards.
+// What becomes of the file under the name of an output: what was there before, --force, and what
+// is there afterwards.
 #include "client/cli/output_file.h"
 
 #include <fcntl.h>

@@ -194,9 +194,8 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Object object, FindObject(rig.connection.get(), options.object));
   if (options.surface.empty() && object.mesh_hash() != surface->hash())
     cli.Log(
-        "note: the gateway's mesh of this object is not the built-in one of 20,000 triangles; --surface "
-        "names "
-        "its file");
+        "note: the gateway's mesh of this object is not the built-in one of 20,000 triangles; "
+        "--surface names its file");
 
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
   const double spacing_m =

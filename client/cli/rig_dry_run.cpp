@@ -119,8 +119,8 @@ void AddRigDryRun(Cli* cli, CLI::App* group) {
       group, "dry-run",
       "Checks every touch of a plan as a run would, without motion. Exit code 4 if any is impossible.",
       "touchstone rig dry-run plan.csv --server 127.0.0.1:50052\n"
-      "touchstone rig dry-run plan.csv -o path.svg --server 127.0.0.1:50052      also draws the path of the "
-      "tip",
+      "touchstone rig dry-run plan.csv -o path.svg --server 127.0.0.1:50052      also draws the "
+      "path of the tip",
       [cli, options] { return RunDryRun(*cli, *options); });
   cli->AddInput(
       command,

@@ -1,5 +1,5 @@
-// touchstone session create|list|show|export|import|delete: measured sets that a server keeps, or that a
-// journal holds.
+// touchstone session create|list|show|export|import|delete: measured sets that a server keeps, or that
+// a journal holds.
 #include <absl/strings/str_join.h>
 
 #include <cstdio>
@@ -257,8 +257,8 @@ void AddSession(Cli* cli) {
       "touchstone session list --server 127.0.0.1:50051\n"
       "touchstone diagnose monday --model nominal.yaml --server 127.0.0.1:50051\n"
       "touchstone session export monday -o set.csv --server 127.0.0.1:50051\n"
-      "touchstone session list session.db                                        a journal of touchstone rig "
-      "run\n"
+      "touchstone session list session.db                                        a journal of "
+      "touchstone rig run\n"
       "touchstone session export session.db -o set.csv");
   const auto add_name = [&](CLI::App* command) {
     command->add_option("NAME", options->name, "The session's name: letters, digits, '_', '-' and '.'")

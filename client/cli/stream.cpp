@@ -217,15 +217,14 @@ void AddStream(Cli* cli) {
   CLI::App* command = cli->AddCommand(
       nullptr, "stream",
       "Writes a dataset of touches and images as files. Interrupted in whatever way, the same command "
-      "resumes "
-      "where it stopped, and the result is the same, byte for byte.",
+      "resumes where it stopped, and the result is the same, byte for byte.",
       "touchstone stream --samples 100000 --out data\n"
       "touchstone stream --objects lat00,lat20 --samples 10000 --image 224x224 --out data\n"
       "touchstone stream --plan faces --model noisy.yaml --to folder --out faces\n"
-      "touchstone stream --samples 1000000 --shards 0/4 --server a:50051,b:50051 --out data    one of four "
-      "jobs\n"
-      "touchstone stream --like data/dataset.json --out again                                  the same once "
-      "more",
+      "touchstone stream --samples 1000000 --shards 0/4 --server a:50051,b:50051 --out data    "
+      "one of four jobs\n"
+      "touchstone stream --like data/dataset.json --out again                                  "
+      "the same once more",
       [cli, options, shard_size] { return RunStream(*cli, *options, (*shard_size)->count() > 0); });
   const auto add = [&](const std::string& name, auto& value, const std::string& type, const std::string& text,
                        const std::string& group) {

@@ -159,8 +159,8 @@ void AddTouch(Cli* cli) {
       nullptr, "touch",
       "Touches an object and prints a measurement file: one row per touch, t_*_us when each finger met it.",
       "touchstone touch lat20 --approach 0,0,-1\n"
-      "touchstone touch lat20 --approach 0,0,-1 --target-mm 10,0,0 --lateral 0,1,0 --repeats 10 --model "
-      "noisy.yaml\n"
+      "touchstone touch lat20 --approach 0,0,-1 --target-mm 10,0,0 --lateral 0,1,0 --repeats 10 "
+      "--model noisy.yaml\n"
       "touchstone touch --plan plan.csv --model tips.yaml --seed 7 -o set.csv\n"
       "touchstone touch lat20 --approach=-1,0,0 --json",
       [cli, options] { return RunTouch(*cli, *options); });

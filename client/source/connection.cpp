@@ -96,8 +96,8 @@ absl::Status Connection::Connect(int server_index) {
   arguments.SetMaxSendMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  // A server whose machine died sends nothing: ask for a sign of life, so that a stream does not wait for
-  // ever.
+  // A server whose machine died sends nothing: ask for a sign of life, so that a stream does not
+  // wait for ever.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);

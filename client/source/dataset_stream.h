@@ -22,8 +22,8 @@ struct DatasetStreamOptions {
   double reconnect_s = 60;
   // Called from the reading thread when a server was lost and when the stream resumes.
   std::function<void(const std::string&)> log;
-  // Of a source that needs a lease: its token now, and what keeps it when the stream resumes elsewhere. Null:
-  // none.
+  // Of a source that needs a lease: its token now, and what keeps it when the stream resumes
+  // elsewhere. Null: none.
   LeaseKeeper* lease = nullptr;
 };
 

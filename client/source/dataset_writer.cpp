@@ -114,8 +114,8 @@ absl::Status DatasetWriter::Run() {
                                                    "; the first number goes from 0 to the second less one"));
   if (job_.restart && job_.job_count > 1)
     return absl::InvalidArgumentError(
-        "--restart with --shards would delete the other jobs' shards; empty the folder before the jobs "
-        "start");
+        "--restart with --shards would delete the other jobs' shards; empty the folder "
+        "before the jobs start");
   TOUCHSTONE_RETURN_IF_ERROR(PrepareFolder());
   TOUCHSTONE_RETURN_IF_ERROR(Resolve());
   TOUCHSTONE_RETURN_IF_ERROR(FindFinishedShards());

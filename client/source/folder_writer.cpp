@@ -1,6 +1,6 @@
-// A shard as a folder that people can open: touches.csv (a measurement file, see proto/README.md, whose touch is the
-// sample's index), one image file per sample named by its index, and one .npy over the whole shard for every other
-// column.
+// A shard as a folder that people can open: touches.csv (a measurement file, see proto/README.md, whose touch
+// is the sample's index), one image file per sample named by its index, and one .npy over the whole shard for
+// every other column.
 #include <absl/strings/str_cat.h>
 
 #include <filesystem>

@@ -13,9 +13,9 @@
 
 namespace touchstone::client {
 
-// "descriptor_s" -> {"descriptor_us", kMicrosecond}, "target_m" -> {"target_mm", kMillimetre}. A name without
-// a unit that files write differently keeps its name with kNone; session_time_s and touch_interval_s stay
-// seconds.
+// "descriptor_s" -> {"descriptor_us", kMicrosecond}, "target_m" -> {"target_mm", kMillimetre}. A name
+// without a unit that files write differently keeps its name with kNone; session_time_s and
+// touch_interval_s stay seconds.
 struct LabName {
   std::string name;
   Unit unit = Unit::kNone;

@@ -1,6 +1,6 @@
-// The lease of a source that moves something: acquired when the source says that it needs one, kept alive by
-// a thread, given back at the end. At a source that needs none there is nothing, and every caller can do the
-// same.
+// The lease of a source that moves something: acquired when the source says that it needs one, kept alive
+// by a thread, given back at the end. At a source that needs none there is nothing, and every caller can
+// do the same.
 #pragma once
 
 #include <condition_variable>
@@ -31,8 +31,8 @@ std::string LeaseHolder();
 
 class LeaseKeeper {
  public:
-  // Acquires the lease if `source` says lease_required. FAILED_PRECONDITION names who holds it and how to
-  // take it.
+  // Acquires the lease if `source` says lease_required. FAILED_PRECONDITION names who holds it and how
+  // to take it.
   static absl::StatusOr<std::unique_ptr<LeaseKeeper>> Acquire(Connection* connection,
                                                               const v1::DescribeResponse& source,
                                                               LeaseOptions options = {});

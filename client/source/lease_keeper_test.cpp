@@ -114,8 +114,8 @@ TEST_F(LeaseKeeperTest, FollowsToANewLeaseOnceTheOldOneIsFree) {
   EXPECT_EQ(State().lease_holder(), "ana@bench2");
 }
 
-// A source that wants a lease, with a window so short that renewals are many, and that fails where a test
-// wants it.
+// A source that wants a lease, with a window so short that renewals are many, and that fails where a
+// test wants it.
 class FakeRig : public v1::Control::Service {
  public:
   class Touches : public v1::Source::Service {

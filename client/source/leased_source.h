@@ -42,8 +42,8 @@ class LeasedSource {
   absl::StatusOr<v1::RigState> Home();
   LeaseKeeper* lease() { return lease_.get(); }
 
-  // Ends what is under way: at a physical source Control.Stop first. Safe from any thread; what runs returns
-  // CANCELLED.
+  // Ends what is under way: at a physical source Control.Stop first. Safe from any thread; what
+  // runs returns CANCELLED.
   void Interrupt(const std::string& reason);
 
  private:

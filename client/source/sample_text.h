@@ -16,8 +16,8 @@ bool IsPoseColumn(const FileColumn& column);
 // The name of the object that a sample shows.
 absl::StatusOr<std::string> ObjectOfSample(const DatasetLayout& layout, const Batch& batch, uint64_t row);
 
-// {"index":17,"object":"lat20","target_mm":[0,0,0],...}: the object, the pose and every scalar, in file
-// units.
+// {"index":17,"object":"lat20","target_mm":[0,0,0],...}: the object, the pose and every scalar,
+// in file units.
 absl::StatusOr<std::string> SampleJson(const DatasetLayout& layout, const Batch& batch, uint64_t row);
 
 // A row of a measurement file, line end included; needs the pose, and the contact times or the descriptor.

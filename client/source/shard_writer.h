@@ -44,8 +44,8 @@ struct ShardFacts {
   uint64_t first_index = 0;
   uint64_t samples = 0;
   uint64_t bytes = 0;
-  // Of the file's bytes; of a folder: of the lines "SHA-256  NAME" of its files sorted by name, as sha256sum
-  // prints them.
+  // Of the file's bytes; of a folder: of the lines "SHA-256  NAME" of its files sorted by name, as
+  // sha256sum prints them.
   std::string sha256;
 };
 

@@ -1,6 +1,6 @@
-// A file that is whole or absent: written beside its place as NAME.part, counted and hashed on the way,
-// synced, then renamed. A crash, a kill or a full disk leaves at most a .part, which the next run writes
-// anew.
+// A file that is whole or absent: written beside its place as NAME.part, counted and hashed on the
+// way, synced, then renamed. A crash, a kill or a full disk leaves at most a .part, which the next
+// run writes anew.
 #pragma once
 
 #include <memory>
@@ -50,8 +50,8 @@ class SyncedFile {
   std::unique_ptr<Hash> hash_;
 };
 
-// What went wrong with a path, from errno: the code and words for it ("... is full", "... may not be
-// written").
+// What went wrong with a path, from errno: the code and words for it ("... is full", "... may
+// not be written").
 absl::Status FileError(int error_number, const std::string& path, absl::string_view what);
 
 // Renames and syncs the folder around, so that the new name survives a power cut.

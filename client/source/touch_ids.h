@@ -8,9 +8,9 @@
 
 namespace touchstone::client {
 
-// A pure function of session, object and the touch's number in its file, so that a repeated command asks for
-// the same touches and gets those that are done from the journal. At most 128 bytes, the same in the Python
-// package.
+// A pure function of session, object and the touch's number in its file, so that a repeated command
+// asks for the same touches and gets those that are done from the journal. At most 128 bytes, the same
+// in the Python package.
 std::string TouchId(const std::string& session, const std::string& object, uint64_t number);
 
 // An id that no other call makes: for touches that are meant to be new whenever the command runs.
