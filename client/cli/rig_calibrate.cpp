@@ -14,6 +14,7 @@
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/flat_calibration.h"
 #include "server/gateway/calibration/tool_calibration.h"
+#include "server/geometry/pose.h"
 #include "server/model/model.h"
 
 namespace touchstone::cli {
@@ -207,9 +208,8 @@ std::string Today() {
 
 Eigen::Isometry3d PoseOf(const v1::BasePose& pose) {
   const Eigen::Vector3d rotation(pose.rotation_rad().x(), pose.rotation_rad().y(), pose.rotation_rad().z());
-  const double angle = rotation.norm();
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-  if (angle > 0) result.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
+  result.linear() = RotationFromVector(rotation);
   result.translation() = Eigen::Vector3d(pose.position_m().x(), pose.position_m().y(), pose.position_m().z());
   return result;
 }

@@ -1,12 +1,12 @@
-// Tells presses of a microswitch from the bounce of its contacts and from spikes on its wire.
+// Separates presses of a microswitch from the bounce of its contacts and from spikes on its wire.
 //
 // The switch has a settled state. While the pin says the other one, a bucket fills with the time that passes;
 // while the pin says the settled one, it empties, to 0 at least. When the bucket holds `hold` ticks the state
-// changes, and the time of the change is that of the earliest edge towards the new state in the 2 * hold
-// before. Hence:
+// changes; the time of the change is that of the earliest edge towards the new state in the 2 * hold before.
+// Hence:
 // - a spike shorter than `hold` is nothing, however often, if the pin is back for longer than it was away;
-// - a press that bounces for `hold` at most, or has short drop-outs later, has the time of its first edge
-// exactly;
+// - a press that bounces for `hold` at most, or has short drop-outs later, has exactly the time of its first
+//   edge;
 // - a spike that came more than 2 * hold before the state settled does not lend its time to a later press.
 #pragma once
 
@@ -24,7 +24,7 @@ class Debouncer {
 
   // The state is settled as it is.
   void Reset(bool active, uint64_t hold_ticks, uint64_t now);
-  // The pin's level changed; what settled before this edge is told. An edge older than Advance's last time
+  // The pin's level changed; what settled before this edge is reported. An edge older than Advance's last time
   // counts from there on, but keeps its own time.
   Change OnEdge(bool active, uint64_t ticks);
   // Time has passed without an edge.
@@ -43,8 +43,8 @@ class Debouncer {
   uint64_t hold_ = 0;
   uint64_t bucket_ = 0;
   uint64_t updated_ = 0;
-  // Edges away from the settled state, oldest first. When there is no room the newest gives way: the first
-  // one counts.
+  // Edges away from the settled state, oldest first. When there is no room the newest gives way: the
+  // first one counts.
   uint64_t edges_[kEdges] = {};
   size_t edge_count_ = 0;
 };

@@ -41,7 +41,7 @@ class Effector {
  private:
   struct Finger {
     FingerConfig config;
-    bool known = false;  // the pin's level was told
+    bool known = false;  // the pin's level was reported
     bool pin = false;
     Debouncer debouncer;   // optical (which holds at once), microswitch
     bool pressed = false;  // resistor

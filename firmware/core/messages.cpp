@@ -100,9 +100,9 @@ uint32_t Crc32(const uint8_t* data, size_t size) {
 bool IsIntact(const uint8_t* payload, size_t size) {
   if (size < 1 + kCheckSize) return false;
   const uint8_t* check = payload + size - kCheckSize;
-  uint32_t told = 0;
-  for (size_t i = kCheckSize; i-- > 0;) told = told << 8 | check[i];
-  return told == Crc32(payload, size - kCheckSize);
+  uint32_t sent = 0;
+  for (size_t i = kCheckSize; i-- > 0;) sent = sent << 8 | check[i];
+  return sent == Crc32(payload, size - kCheckSize);
 }
 
 size_t Encode(const Hello& m, uint8_t* out) {

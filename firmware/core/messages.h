@@ -1,5 +1,5 @@
 // The messages of the serial line (PROTOCOL.md): one a frame: u8 type, then the fields in the order given
-// here, little endian, packed; of an array with one entry a finger only as many as there are fingers; then
+// here, little endian, packed; of an array with one entry per finger only as many as there are fingers; then
 // u32 check. Both ends use these functions.
 #pragma once
 
@@ -50,9 +50,9 @@ enum class Sensor : uint8_t { kOptical = 0, kMicroswitch = 1, kResistor = 2 };
 struct FingerConfig {
   Sensor sensor = Sensor::kOptical;
   uint8_t active_level = 1;  // the pin's level while pressed: optical, microswitch
-  // Microswitch, at most kMaxDebounceUs: a press counts once the pin has been active for this much longer
-  // than inactive; its time is that of the first edge of the bounce, which lasts no longer than this either
-  // (debouncer.h).
+  // Microswitch, at most kMaxDebounceUs: a press counts once the pin has been active for this much
+  // longer than inactive; its time is that of the first edge of the bounce, which lasts no longer than
+  // this either (debouncer.h).
   uint32_t debounce_us = 0;
   uint16_t threshold = 512;  // resistor: pressed at or above
   uint16_t hysteresis = 16;  // resistor: released below threshold - hysteresis; less than the threshold

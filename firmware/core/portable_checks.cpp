@@ -103,8 +103,8 @@ const char* ContactTimesAreRightAcrossTheWrap(const char*) {
   for (unsigned bits : {24u, 32u}) {
     const uint64_t turn = uint64_t{1} << bits;
     for (int64_t around : {-3, -1, 0, 1, 3}) {
-      // 16 MHz; the counter wraps a moment before or after the edge, which is handled half a millisecond
-      // late.
+      // 16 MHz; the counter wraps a moment before or after the edge, which is handled half
+      // a millisecond late.
       TestDevice device(16000000, static_cast<uint8_t>(bits), turn - 16000 * 20);
       HOLDS(device.DoConfigure(3, FingerConfig{}));
       Armed armed;

@@ -1,5 +1,5 @@
-// Checks of the core that run anywhere: under gtest on the host, and on a Cortex-M4F without any library. No
-// heap.
+// Checks of the core that run anywhere: under gtest on the host, and on a Cortex-M4F without any
+// library. No heap.
 #pragma once
 
 namespace touchstone::firmware {

@@ -11,8 +11,8 @@ uint64_t TickExtender::Extend(uint32_t reading) {
     return last_;
   }
 
-  // Less than half a turn ahead is later, the rest is earlier: an edge that was captured before the newest
-  // reading.
+  // Less than half a turn ahead is later, the rest is earlier: an edge that was captured before
+  // the newest reading.
   const uint64_t ahead = (reading - last_) & mask;
   if (ahead < turn / 2) {
     last_ += ahead;

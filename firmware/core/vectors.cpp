@@ -161,14 +161,14 @@ size_t OtherUnframe(const uint8_t* frame, size_t size, uint8_t* payload) {
     return 0;
   }
   written -= 6;
-  uint32_t told = 0;
-  for (int i = 3; i >= 0; --i) told = told << 8 | payload[written + static_cast<size_t>(i)];
-  return told == OtherCrc32(payload, written) ? written : 0;
+  uint32_t sent = 0;
+  for (int i = 3; i >= 0; --i) sent = sent << 8 | payload[written + static_cast<size_t>(i)];
+  return sent == OtherCrc32(payload, written) ? written : 0;
 }
 
 template <typename Message>
 const char* Check(const Vector& vector, Type type) {
-  // The vector by other means: type and fields stand in it as they are told.
+  // The vector by other means: type and fields are in it as they were given.
   uint8_t plain[192];
   const size_t plain_size = OtherUnframe(vector.frame, vector.frame_size, plain);
   if (plain_size == 0) return "the frame is damaged";

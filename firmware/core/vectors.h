@@ -24,8 +24,8 @@ struct Vector {
   size_t frame_size = 0;
 };
 
-// Takes the next vector off the text; false at its end. A line that cannot be read gives a vector without a
-// frame.
+// Takes the next vector off the text; false at its end. A line that cannot be read gives a vector
+// without a frame.
 bool NextVector(const char** text, Vector* vector);
 
 // Null if the fields make this frame and the frame these fields, by the code under test and by the other

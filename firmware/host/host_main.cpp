@@ -1,5 +1,5 @@
-// touchstone-effector-host: an end effector without hardware. Prints the path of its pseudo-terminal, then
-// takes lines:
+// touchstone-effector-host: an end effector without hardware. Prints the path of its pseudo-terminal; takes
+// these lines:
 //   press N, release N   finger N, from 0
 //   sample N VALUE       of an analogue finger
 //   quit                 or the end of the input

@@ -1,6 +1,6 @@
-// The core behind a pseudo-terminal of the host: an end effector for trying a gateway without hardware. Its
-// fingers are pressed by calls; its times are the host's, so nothing that it reports was measured on
-// anything.
+// The core behind a pseudo-terminal of the host: an end effector for trying a gateway without
+// hardware. Its fingers are pressed by calls; its times are the host's, so nothing that it reports was
+// measured on anything.
 #pragma once
 
 #include <cstdint>

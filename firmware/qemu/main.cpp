@@ -1,5 +1,5 @@
-// The portable checks on an emulated Cortex-M4F: start-up, semihosting (text and exit code), and the list of
-// checks.
+// The portable checks on an emulated Cortex-M4F: start-up, semihosting (text and exit code), and the
+// list of checks.
 #include <cstddef>
 #include <cstdint>
 

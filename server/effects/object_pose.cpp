@@ -2,6 +2,7 @@
 //   surface = translation + R(rotation) * mesh: rotated about the mesh origin, then moved
 // The rotation vector points along the axis; its length is the angle (right-hand rule).
 #include "server/effects/define_effect.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone {
 namespace {
@@ -19,9 +20,7 @@ constexpr ParameterRow<Parameters> kRows[] = {
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  const double angle_rad = p.rotation_rad.norm();
-  if (angle_rad > 0) rotation = Eigen::AngleAxisd(angle_rad, p.rotation_rad / angle_rad).toRotationMatrix();
+  const Eigen::Matrix3d rotation = RotationFromVector(p.rotation_rad);
   // On top of what the surface has gone through already.
   touches.surface_rotation = rotation * touches.surface_rotation;
   touches.surface_translation_m = rotation * touches.surface_translation_m + p.translation_m;

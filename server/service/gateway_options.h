@@ -49,8 +49,8 @@ struct GatewayFlags {
   bool done = false;  // help or version was printed
 };
 
-// Command line and TOML file; flags win. Paths in the file are relative to its folder. Errors name file, line
-// and key.
+// Command line and TOML file; flags win. Paths in the file are relative to its folder. Errors name file,
+// line and key.
 absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv);
 
 }  // namespace touchstone

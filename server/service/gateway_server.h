@@ -13,16 +13,16 @@ namespace touchstone {
 class GatewayServer {
  public:
   // Opens journal, calibration, arm, end effector and camera, reconciles what was interrupted, and listens.
-  // Errors name the option or the file. An arm or end effector that does not answer yet is no error: GetState
-  // tells.
+  // Errors name the option or the file. An arm or end effector that does not answer yet is no error:
+  // GetState reports it.
   static absl::StatusOr<std::unique_ptr<GatewayServer>> Start(GatewayOptions options);
   ~GatewayServer();
 
   int port() const;
   // For tests: what is served.
   RigDevice& source();
-  // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s for running
-  // calls.
+  // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s
+  // for running calls.
   void Drain();
 
  private:

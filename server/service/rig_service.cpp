@@ -7,6 +7,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/geometry/pose.h"
 #include "server/service/convert.h"
 #include "server/service/permit.h"
 
@@ -15,9 +16,8 @@ namespace {
 
 v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   v1::BasePose message;
-  const Eigen::AngleAxisd turn(pose.rotation());
   *message.mutable_position_m() = ToProto(Eigen::Vector3d(pose.translation()));
-  *message.mutable_rotation_rad() = ToProto(Eigen::Vector3d(turn.angle() * turn.axis()));
+  *message.mutable_rotation_rad() = ToProto(RotationVectorOf(pose.linear()));
   return message;
 }
 

@@ -121,7 +121,7 @@ class Damage {
   Bytes before_;
 };
 
-// One end's ear: what it believes must be among what the other end sent.
+// One receiver: what it accepts must be among what the other end sent.
 class Ear {
  public:
   // Splits undamaged frames off, and keeps what they say.
@@ -130,9 +130,9 @@ class Ear {
       if (sender_.Push(byte)) sent_.emplace_back(sender_.payload(), sender_.payload() + sender_.size());
     }
   }
-  // False if something is believed that was never sent.
-  template <typename Believe>
-  bool Hear(const Bytes& bytes, Counts* counts, Believe believe) {
+  // False if something is accepted that was never sent.
+  template <typename Accept>
+  bool Hear(const Bytes& bytes, Counts* counts, Accept accept) {
     for (uint8_t byte : bytes) {
       const uint32_t bad = parser_.bad_frames();
       const bool good = parser_.Push(byte);
@@ -145,7 +145,7 @@ class Ear {
       ++counts->good_frames;
       const Bytes payload(parser_.payload(), parser_.payload() + parser_.size());
       if (std::find(sent_.begin(), sent_.end(), payload) == sent_.end()) return false;
-      believe(payload);
+      accept(payload);
     }
     return true;
   }
@@ -236,7 +236,7 @@ std::string CheckConversation(uint64_t seed, Counts* counts) {
     device_ear.Sent(bytes);
     if (damaged) damage.Apply(&bytes);
     if (!device_ear.Hear(bytes, counts, [](const Bytes&) {}))
-      wrong = "the device believed what was never sent";
+      wrong = "the device accepted what was never sent";
     for (uint8_t byte : bytes) device.effector.OnByte(byte);
   };
   const auto to_host = [&] {
@@ -253,9 +253,9 @@ std::string CheckConversation(uint64_t seed, Counts* counts) {
         return edge.finger == event.finger && edge.pressed == pressed && edge.ticks == event.ticks;
       });
       if (!happened || event.touch < 1 || event.touch > 4)
-        wrong = "the host believed a contact that never was";
+        wrong = "the host accepted a contact that never was";
     });
-    if (!good) wrong = "the host believed what was never sent";
+    if (!good) wrong = "the host accepted what was never sent";
   };
 
   // It begins well, so that there is something to lose.

@@ -1,6 +1,6 @@
 // touchstone-fuzz-frames [--seconds N] [--seed S]: damages conversations with the end effector's core for so
 // long. The same seed makes the same conversations. Ends with 1 and the seed of the conversation if anything
-// wrong was believed.
+// wrong was accepted.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
 
   std::printf(
       "%llu inputs in %.0f s: %llu damaged frames turned down, %llu more with a right CRC-16 stopped by the "
-      "CRC-32, %llu good frames, %llu events believed, none of them wrong\n",
+      "CRC-32, %llu good frames, %llu events accepted, none of them wrong\n",
       static_cast<unsigned long long>(counts.inputs), elapsed(),
       static_cast<unsigned long long>(counts.damaged_frames),
       static_cast<unsigned long long>(counts.slipped_frames),

@@ -1,5 +1,5 @@
-// An emulated rig, a gateway that drives it, and a client of the gateway. The emulator's data stand for no
-// measurement.
+// An emulated rig, a gateway that drives it, and a client of the gateway. The emulator's data stand
+// for no measurement.
 #pragma once
 
 #include <atomic>
@@ -46,8 +46,8 @@ class PhysicalTest : public testing::Test {
   PhysicalTest();
   ~PhysicalTest() override;
 
-  // With changes to the emulator's options before it begins. Touches from above of lat00 need no change of
-  // the object.
+  // With changes to the emulator's options before it begins. Touches from above of lat00 need no change
+  // of the object.
   void StartRig(const std::function<void(rig::EmulatorOptions*)>& change = nullptr);
   // In this process, or (over the program touchstone-gateway) in another one that can be killed.
   void StartGateway(std::vector<std::string> flags = {});

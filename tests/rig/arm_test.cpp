@@ -1,5 +1,5 @@
-// The gateway's arm against the emulated controller, over real sockets, and what it does when the controller
-// fails.
+// The gateway's arm against the emulated controller, over real sockets, and what it does when
+// the controller fails.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
-// An emulated UR controller on TCP: dashboard (29999), primary and secondary (30001, 30002), RTDE (30004), a
-// part of URScript, straight and joint motion with trapezoidal speed, safety modes and watchdogs. See
-// ../../server/gateway.
+// An emulated UR controller on TCP: dashboard (29999), primary and secondary (30001, 30002), RTDE
+// (30004), a part of URScript, straight and joint motion with trapezoidal speed, safety modes and
+// watchdogs. See ../../server/gateway.
 #pragma once
 
 #include <array>

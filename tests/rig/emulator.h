@@ -1,6 +1,6 @@
-// The whole emulated rig in one object: controller, end effector on a pseudo-terminal, camera, control port,
-// and the files with which a touchstone-gateway drives it. A test tool: what it reports was never measured on
-// anything.
+// The whole emulated rig in one object: controller, end effector on a pseudo-terminal, camera, control
+// port, and the files with which a touchstone-gateway drives it. A test tool: what it reports was never
+// measured on anything.
 #pragma once
 
 #include <memory>
@@ -50,8 +50,8 @@ class EmulatedCamera;
 
 class Emulator {
  public:
-  // Returns when everything listens and the files are written. Throws std::runtime_error or
-  // std::invalid_argument.
+  // Returns when everything listens and the files are written. Throws
+  // std::runtime_error or std::invalid_argument.
   static std::unique_ptr<Emulator> Start(const EmulatorOptions& options);
   virtual ~Emulator() = default;
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/base/text.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone::rig {
 namespace {
@@ -21,8 +22,7 @@ std::string Quoted(const std::string& text) {
 }
 
 std::string PoseText(const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
-  const Eigen::Vector3d mm = pose.translation() * 1e3, deg = turn.axis() * turn.angle() * (180 / M_PI);
+  const Eigen::Vector3d mm = pose.translation() * 1e3, deg = RotationVectorOf(pose.linear()) * (180 / M_PI);
   return absl::StrFormat("{translation_mm: [%.9g, %.9g, %.9g], rotation_deg: [%.9g, %.9g, %.9g]}", mm.x(),
                          mm.y(), mm.z(), deg.x(), deg.y(), deg.z());
 }

@@ -1,7 +1,7 @@
 // What the parts of the emulated rig share: the simulated clock, and what the arm does to the fingers.
 //
-// The emulator is a test tool. What it reports was never measured on anything; nothing that it makes is
-// called real.
+// The emulator is a test tool. What it reports was never measured on anything; nothing that it makes
+// is called real.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,8 @@ class SimClock {
   double began_host_s_;
 };
 
-// One straight motion of the tip, or the end of one, as the controller plans it. Base frame, SI, simulated
-// time.
+// One straight motion of the tip, or the end of one, as the controller plans it. Base frame,
+// SI, simulated time.
 struct StraightMotion {
   uint64_t number = 0;  // counts all straight motions
   double start_s = 0;
@@ -41,7 +41,7 @@ struct StraightMotion {
   double speed_m_s = 0, acceleration_m_s2 = 0;
 };
 
-// The controller tells the fingers what the arm does; they answer how hard they are pressed. Called from the
+// The controller reports the arm's motion to the fingers; they return how far they are indented. Called from the
 // controller's thread only.
 class TipListener {
  public:
@@ -57,18 +57,26 @@ class TipListener {
   virtual void OnMotionEnded(uint64_t number, double now_s) = 0;
 };
 
-// Faults that can be switched on while it runs, by name, each with a number (a probability, a length, a
-// finger):
-//   line (end effector): drop_bytes, corrupt_bytes, duplicate_bytes (probability a byte), unplug (seconds of
-//   host time),
-//     line_delay_ms (jitter, uniform up to)
-//   fingers: stuck_finger (index; -1: none), missing_finger (index), bounce (1: on), clock_drift_ppm
-//   controller: late_packets_ms, skip_packets (probability), freeze (seconds of host time: accepts but sends
-//   nothing and
-//     moves nothing), disconnect (closes every connection once), protective_stop (1: now), emergency_stop (1:
-//     now; 0: released), speed_scaling (0 to 1)
-//   camera: stale_frame (1: repeats the last picture), camera_unplug (seconds)
-// Thread-safe.
+// Faults that can be switched on while it runs, by name, each with a number. Thread-safe.
+//   part        name              number
+//   line        drop_bytes        probability per byte
+//               corrupt_bytes     probability per byte
+//               duplicate_bytes   probability per byte
+//               line_delay_ms     jitter, uniform from 0 to this
+//               unplug            seconds of host time
+//   fingers     stuck_finger      index; -1: none
+//               missing_finger    index; -1: none
+//               bounce            1: on
+//               clock_drift_ppm   of the device's clock
+//   controller  late_packets_ms   delay of state packets, up to
+//               skip_packets      probability per packet
+//               freeze            seconds of host time: accepts, but sends nothing and moves nothing
+//               disconnect        1: closes every connection once
+//               protective_stop   1: now
+//               emergency_stop    1: pressed; 0: released
+//               speed_scaling     0 to 1
+//   camera      stale_frame       1: repeats the last picture
+//               camera_unplug     seconds of host time
 class Faults {
  public:
   static const std::vector<std::string>& Names();
@@ -77,8 +85,8 @@ class Faults {
   double Get(const std::string& name) const;
   // Takes a one-time fault: its value, and back to 0.
   double Take(const std::string& name);
-  // Host seconds (steady clock) until which a timed fault (unplug, freeze, camera_unplug) lasts; 0: it does
-  // not.
+  // Host seconds (steady clock) until which a timed fault (unplug, freeze, camera_unplug) lasts; 0:
+  // it does not.
   double UntilHostS(const std::string& name) const;
 
  private:

@@ -94,8 +94,8 @@ class Arm {
  public:
   virtual ~Arm() = default;
 
-  // The newest state; UNAVAILABLE if there is none or the link is down or silent (frozen controller), with
-  // why.
+  // The newest state; UNAVAILABLE if there is none or the link is down or silent (frozen
+  // controller), with why.
   virtual absl::StatusOr<ArmState> State() const = 0;
   // The states between two controller times, oldest first, as far back as they are kept (30 rig seconds).
   virtual std::vector<ArmState> History(double from_controller_s, double to_controller_s) const = 0;

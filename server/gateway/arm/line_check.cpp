@@ -70,7 +70,7 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
                                bool may_slow, const std::string& what, Joints* joints,
                                int* wrist_3_beyond) const {
   *wrist_3_beyond = 0;
-  // An end that cannot be reached is told as that, not as the stretched elbow on the way to it.
+  // An end that cannot be reached is reported as such, not as the stretched elbow on the path to it.
   TOUCHSTONE_RETURN_IF_ERROR(CheckTips(to, what));
   if (Joints unused; !JointsAt(to, *joints, &unused)) return OutOfReach(to, what);
   const Eigen::Vector3d way_m = to.translation() - from.translation();

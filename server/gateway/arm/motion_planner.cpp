@@ -144,8 +144,8 @@ double UrMotionPlanner::ClearanceHeight(const Eigen::Isometry3d& base_from_objec
 }
 
 absl::StatusOr<Joints> UrMotionPlanner::JointsOf(const ArmState& from) const {
-  // Calibrated kinematics differ from the published ones by millimetres: joints a few degrees apart are
-  // another arm.
+  // Calibrated kinematics differ from the published ones by millimetres: joints a few degrees apart
+  // are another arm.
   constexpr double kOtherArmRad = 0.15;
   Joints joints;
   if (!from.base_from_tip.matrix().allFinite() ||

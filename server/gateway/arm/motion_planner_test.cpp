@@ -111,8 +111,8 @@ TEST(MotionPlanner, StrokeOfATouchIsItsOwn) {
               1e-9);
 }
 
-// Between two starts no fingertip comes lower than the object's top and the clearance, but on the lines of
-// approach.
+// Between two starts no fingertip comes lower than the object's top and the clearance, but on the
+// lines of approach.
 TEST(MotionPlanner, TransitsCrossAboveTheObject) {
   Rig rig("ur3e");
   std::mt19937_64 random(3);

@@ -13,7 +13,7 @@
 
 namespace touchstone {
 
-// What one package told. Everything else in it is skipped.
+// What is used of one package; the rest of it is skipped.
 struct PrimaryUpdate {
   // "PROGRAM_XXX_STARTED" with the program's name, an error or a runtime exception with its place, in words.
   std::string message;
@@ -23,8 +23,7 @@ struct PrimaryUpdate {
   std::optional<DhTable> kinematics;
 };
 
-// Cuts the stream into packages and understands them. What is malformed is DATA_LOSS; the stream is lost
-// then.
+// Cuts the stream into packages and parses them. What is malformed is DATA_LOSS; the stream is lost then.
 class PrimaryStream {
  public:
   void Append(absl::string_view bytes) { bytes_.append(bytes.data(), bytes.size()); }

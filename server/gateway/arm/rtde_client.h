@@ -36,8 +36,8 @@ class RtdeClient {
   absl::Status Link() const;
   std::string ControllerVersion() const;  // empty: not known yet
 
-  // Both registers in one package, on the wire before it returns. Any thread; never waits for the receiving
-  // one.
+  // Both registers in one package, on the wire before it returns. Any thread; never waits for
+  // the receiving one.
   absl::Status WriteInputs(int32_t heartbeat, int32_t command);
 
  private:

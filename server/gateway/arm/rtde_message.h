@@ -64,8 +64,8 @@ struct RtdeSample {
 std::string RtdeOutputNames(bool with_tcp_offset);
 std::string RtdeInputNames();  // the heartbeat and the command
 
-// The reply to a recipe: its id, or an error that names the fields that are NOT_FOUND, IN_USE or of another
-// type.
+// The reply to a recipe: its id, or an error that names the fields that are NOT_FOUND, IN_USE or
+// of another type.
 absl::StatusOr<uint8_t> ParseOutputRecipe(absl::string_view payload, bool with_tcp_offset);
 absl::StatusOr<uint8_t> ParseInputRecipe(absl::string_view payload);
 

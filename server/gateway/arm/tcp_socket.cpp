@@ -35,7 +35,7 @@ bool WaitReady(int fd, short events, Clock::time_point deadline) {
     const int ready = poll(&waiting, 1, std::max(0, static_cast<int>(std::ceil(left_s * 1e3))));
     if (ready > 0) return true;
     if (ready == 0 && Clock::now() >= deadline) return false;
-    if (ready < 0 && errno != EINTR) return true;  // the next call tells what is wrong
+    if (ready < 0 && errno != EINTR) return true;  // the next call returns what is wrong
   }
 }
 

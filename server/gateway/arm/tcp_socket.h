@@ -23,8 +23,8 @@ class TcpSocket {
 
   // All of it, without delay on the line (TCP_NODELAY), or an error; after one the connection is of no use.
   absl::Status Send(absl::string_view bytes, double timeout_s);
-  // What is there, as soon as something is; 0: nothing came in time. UNAVAILABLE: the other side has closed
-  // it.
+  // What is there, as soon as something is; 0: nothing came in time. UNAVAILABLE: the other side
+  // has closed it.
   absl::StatusOr<size_t> Receive(char* buffer, size_t size, double timeout_s);
 
  private:

@@ -32,7 +32,7 @@ Eigen::Isometry3d Lifted(Eigen::Isometry3d pose, double plane_m) {
 
 std::vector<Eigen::Isometry3d> TransitPath::Poses(int turn) const {
   if (turn == 0 && SamePose(from, to)) return {to};
-  // Tilted, a finger hangs lower than the middle one. No start is crossed below its own height.
+  // Tilted, an outer finger is lower than the middle one. No start is crossed below its own height.
   const double hang_m =
       outermost_finger_m * std::max(std::abs(from.linear()(2, 0)), std::abs(to.linear()(2, 0)));
   const double height_m =

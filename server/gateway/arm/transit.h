@@ -18,8 +18,8 @@ struct TransitPath {
   std::vector<Eigen::Isometry3d> Poses(int turn) const;
 };
 
-// Back along the tool's axis by `back_m` (less if it reaches the height before), then straight up to the
-// height.
+// Back along the tool's axis by `back_m` (less if it reaches the height before), then straight up
+// to the height.
 std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double back_m, double height_m);
 
 }  // namespace touchstone

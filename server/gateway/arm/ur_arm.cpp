@@ -16,6 +16,7 @@
 #include "server/gateway/arm/script_port.h"
 #include "server/gateway/arm/state_history.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone {
 namespace {
@@ -27,14 +28,6 @@ constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;       // the controller 
 
 double RateOf(const std::string& model) {
   return model == "ur3" ? 125 : 500;
-}
-
-Eigen::Isometry3d PoseOf(const std::array<double, 6>& vector) {
-  const Eigen::Vector3d turn(vector[3], vector[4], vector[5]);
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = Eigen::Vector3d(vector[0], vector[1], vector[2]);
-  if (turn.norm() > 0) pose.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-  return pose;
 }
 
 // When the last heartbeats were sent, host time.
@@ -75,7 +68,7 @@ class UrArmOnTcp final : public UrArm {
         clock_(options.script.time_scale),
         dashboard_(options.address, options.dashboard_port),
         primary_(options.address, options.primary_port,
-                 [this](const PrimaryUpdate& told) { OnPrimary(told); }),
+                 [this](const PrimaryUpdate& update) { OnPrimary(update); }),
         programs_(options.address, options.secondary_port, nullptr),
         stops_(options.address, options.secondary_port, nullptr),
         rtde_(
@@ -125,7 +118,7 @@ class UrArmOnTcp final : public UrArm {
   };
 
   void OnSample(const RtdeSample& sample, double host_s);
-  void OnPrimary(const PrimaryUpdate& told);
+  void OnPrimary(const PrimaryUpdate& update);
   absl::Status Begin(uint32_t program_id, const std::string& program);
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
@@ -172,8 +165,8 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   state.program_id = static_cast<uint32_t>(sample.program_register);
   state.phase = static_cast<MotionPhase>(sample.phase_register);
 
-  // The controller tells the pose of whatever tool was set last; ours may not have been set yet.
-  const Eigen::Isometry3d base_from_tcp = PoseOf(sample.actual_tcp_pose);
+  // The controller sends the pose of whatever tool was set last; ours may not have been set yet.
+  const Eigen::Isometry3d base_from_tcp = PoseFromVector(sample.actual_tcp_pose);
   const Eigen::Vector3d turning(sample.actual_tcp_speed[3], sample.actual_tcp_speed[4],
                                 sample.actual_tcp_speed[5]);
   state.tip_velocity_m_s << sample.actual_tcp_speed[0], sample.actual_tcp_speed[1],
@@ -181,14 +174,14 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   state.base_from_tip = base_from_tcp;
   if (sample.has_tcp_offset) {
     state.base_from_tip =
-        base_from_tcp * PoseOf(sample.tcp_offset).inverse() * options_.script.flange_from_tip;
+        base_from_tcp * PoseFromVector(sample.tcp_offset).inverse() * options_.script.flange_from_tip;
     state.tip_velocity_m_s += turning.cross(state.base_from_tip.translation() - base_from_tcp.translation());
   }
   {
     std::lock_guard<std::mutex> lock(mutex_);
     history_.Add(state);
-    // A state that tells a new heartbeat was made between the heartbeat's sending and its own arrival; without heartbeats,
-    // only the later of the two is known.
+    // A state that echoes a new heartbeat was made between the heartbeat's sending and its own arrival; without an
+    // echo only the later of the two is known.
     const double sent_s = sample.has_tcp_offset ? sent_heartbeats_.TakeSendingOf(sample.heartbeat_echo) : 0;
     if (sent_s > 0)
       clock_.AddRoundTrip(sent_s, state.controller_time_s, state.controller_time_s, host_s);
@@ -199,12 +192,12 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   changes_->Notify();
 }
 
-void UrArmOnTcp::OnPrimary(const PrimaryUpdate& told) {
+void UrArmOnTcp::OnPrimary(const PrimaryUpdate& update) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (told.kinematics.has_value()) kinematics_ = told.kinematics;
-  if (start_.program_id == 0 || !told.is_error) return;
-  start_.complaint = told.message;
-  start_.refused = start_.refused || told.is_exception;
+  if (update.kinematics.has_value()) kinematics_ = update.kinematics;
+  if (start_.program_id == 0 || !update.is_error) return;
+  start_.complaint = update.message;
+  start_.refused = start_.refused || update.is_exception;
   if (start_.refused) changes_->Notify();
 }
 
@@ -318,7 +311,7 @@ absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
 void UrArmOnTcp::SendHeartbeat() {
   if (withhold_heartbeats_) return;
   std::lock_guard<std::mutex> lock(inputs_mutex_);
-  WriteHeartbeat().IgnoreError();  // a lost link is told by State()
+  WriteHeartbeat().IgnoreError();  // State() reports a lost link
 }
 
 absl::Status UrArmOnTcp::WriteHeartbeat() {
@@ -329,8 +322,8 @@ absl::Status UrArmOnTcp::WriteHeartbeat() {
 
 absl::Status UrArmOnTcp::SendStop() {
   absl::Status status = stops_.TrySend(StopProgram());
-  // The second way arrives behind every program that was sent before, whatever the controller does with the
-  // first.
+  // The second way arrives behind every program that was sent before, whatever the controller does
+  // with the first.
   const absl::Status behind = programs_.TrySend(StopProgram());
   if (status.ok() || behind.ok()) return absl::OkStatus();
   const auto fresh = TcpSocket::Connect(options_.address, options_.secondary_port, kStopConnectS);

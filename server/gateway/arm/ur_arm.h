@@ -25,19 +25,19 @@ struct UrArmOptions {
 
 class UrArm : public Arm {
  public:
-  // The arm's own kinematics, as it was calibrated at the factory, once the controller has told them.
+  // The arm's own kinematics, as it was calibrated at the factory, once the controller has sent them.
   virtual std::optional<DhTable> CalibratedKinematics() const = 0;
 };
 
-// Begins to connect, and goes on trying as long as the object lives: State() tells. INVALID_ARGUMENT: the
-// options make no sense. `changes` is notified of every state and every change of the link; it must outlive the
-// arm.
+// Begins to connect, and keeps trying as long as the object lives; State() says whether it is connected.
+// INVALID_ARGUMENT: the options make no sense. `changes` is notified of every state and every change of the
+// link; it must outlive the arm.
 //
 // StartTouch and MoveThrough return when the program is on the wire. If the controller does not begin it,
 // State() becomes UNAVAILABLE with what the controller said, until the next program or stop. Stop() is not
 // queued behind anything: it has a connection of its own, goes a second way behind a program that is just
-// being sent, and falls back on the dashboard; if all fail, heartbeats are withheld so that the watchdog stops the
-// program.
+// being sent, and falls back on the dashboard; if all fail, heartbeats are withheld so that the watchdog
+// stops the program.
 absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, ChangeNotifier* changes);
 
 }  // namespace touchstone

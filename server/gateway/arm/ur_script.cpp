@@ -8,6 +8,7 @@
 
 #include "server/base/units.h"
 #include "server/gateway/arm/registers.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone {
 namespace {
@@ -26,8 +27,8 @@ std::string Phase(MotionPhase phase) {
                       ")\n");
 }
 
-// What every program begins with. The phase is told before the id, so that nobody sees this id with an old
-// phase.
+// What every program begins with. The phase is written before the id, so that nobody sees this id with
+// an old phase.
 std::string Head(uint32_t program_id, const ScriptOptions& options) {
   std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kHeartbeatRegister, "\", ",
                                   Number(options.watchdog_hz / options.time_scale), ", \"stop\")\n");
@@ -56,10 +57,10 @@ double TurnRad(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
 }  // namespace
 
 std::string PoseText(const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
-  const Eigen::Vector3d p = pose.translation(), r = turn.angle() * turn.axis();
-  return absl::StrCat("p[", Number(p.x()), ",", Number(p.y()), ",", Number(p.z()), ",", Number(r.x()), ",",
-                      Number(r.y()), ",", Number(r.z()), "]");
+  std::string text = "p[";
+  for (const double value : PoseVectorOf(pose))
+    absl::StrAppend(&text, text.size() > 2 ? "," : "", Number(value));
+  return text + "]";
 }
 
 int32_t CommandWord(uint32_t program_id, int command) {
@@ -89,8 +90,8 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
   std::string text = absl::StrCat("def touch_", touch.program_id, "():\n", Head(touch.program_id, options));
   absl::StrAppend(&text, Lines(touch.transit, speeds_m_s, options), Phase(MotionPhase::kReady));
 
-  // Waits for the command; the approach runs in a thread, so that the end can be commanded at any moment of
-  // it.
+  // Waits for the command; the approach runs in a thread, so that the end can be commanded at any
+  // moment of it.
   absl::StrAppend(&text, "  while ", command, " != ", CommandWord(touch.program_id, kCommandGo),
                   ":\n    sync()\n  end\n");
   absl::StrAppend(&text, "  global approaching = True\n  thread approach():\n    ",

@@ -38,8 +38,8 @@ std::string StopProgram();
 // What stands in the command register to command a program.
 int32_t CommandWord(uint32_t program_id, int command);
 
-// How a straight line of the tip is made: as fast as `speed_m_s`, slower where the tool turns much on a short
-// way.
+// How a straight line of the tip is made: as fast as `speed_m_s`, slower where the tool turns much on
+// a short way.
 double LineSpeed(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s);
 // Rig seconds that it takes, from rest to rest.
 double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,

@@ -16,8 +16,8 @@ class AuditLog {
   // Empty path: keeps nothing.
   static absl::StatusOr<std::unique_ptr<AuditLog>> Open(const std::string& path);
   virtual ~AuditLog() = default;
-  // {"time": "2026-01-31T12:00:00.123Z", "event": "stop", "holder": ..., ...}. Thread-safe; fdatasync before
-  // it returns.
+  // {"time": "2026-01-31T12:00:00.123Z", "event": "stop", "holder": ..., ...}. Thread-safe; fdatasync
+  // before it returns.
   virtual absl::Status Write(const std::string& event,
                              const std::vector<std::pair<std::string, std::string>>& fields) = 0;
 };

@@ -9,6 +9,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
+#include "server/geometry/pose.h"
 #include "server/model/yaml_tree.h"
 
 namespace touchstone {
@@ -101,9 +102,7 @@ class CalibrationReader {
                                 Vector(node, "rotation_deg", what, kMaxTurnDeg));
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = translation_mm * kMetresPerMillimetre;
-    const double angle_rad = rotation_deg.norm() * kRadiansPerDegree;
-    if (angle_rad > 0)
-      pose.linear() = Eigen::AngleAxisd(angle_rad, rotation_deg.normalized()).toRotationMatrix();
+    pose.linear() = RotationFromVector(rotation_deg * kRadiansPerDegree);
     return pose;
   }
 
@@ -184,9 +183,9 @@ std::string Numbers(const Eigen::Vector3d& values, double per_unit) {
 
 // Rounded to 1 nm and 1e-9 deg, so that what a person wrote comes back as it was.
 std::string PoseText(const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
   return absl::StrCat("{translation_mm: ", Numbers(pose.translation() / kMetresPerMillimetre, 1e6),
-                      ", rotation_deg: ", Numbers(turn.angle() / kRadiansPerDegree * turn.axis(), 1e9), "}");
+                      ", rotation_deg: ", Numbers(RotationVectorOf(pose.linear()) / kRadiansPerDegree, 1e9),
+                      "}");
 }
 
 }  // namespace

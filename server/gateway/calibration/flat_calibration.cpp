@@ -17,7 +17,7 @@ constexpr double kMaxTiltRad = 3 * kRadiansPerDegree;
 constexpr double kMinReported = 0.8;   // of the touches, by every finger
 constexpr double kSignificant = 4;     // standard errors
 constexpr double kOutlier = 6;         // robust standard deviations
-constexpr size_t kMinForOutliers = 8;  // below, a spread cannot be told robustly
+constexpr size_t kMinForOutliers = 8;  // below, a spread cannot be estimated robustly
 
 // A touch's times less their mean: what an unknown start leaves.
 std::vector<double> Centred(const FlatTouch& touch) {
@@ -91,7 +91,7 @@ absl::StatusOr<std::vector<FlatTouch>> Whole(const std::vector<FlatTouch>& touch
     if (static_cast<double>(reported[i]) < kMinReported * static_cast<double>(touches.size()))
       return absl::InvalidArgumentError(absl::StrCat(
           "finger ", i, " (of 0 to ", fingers - 1, ") reported in ", reported[i], " of ", touches.size(),
-          " flat touches; mend its sensor, or place the face so that every finger meets it"));
+          " flat touches; repair its sensor, or place the face so that every finger meets it"));
   return whole;
 }
 

@@ -13,7 +13,7 @@ namespace touchstone {
 
 struct FlatTouch {
   double speed_m_s = 0;                // measured, or as commanded
-  std::vector<double> contact_time_s;  // one a finger; NaN: reported nothing
+  std::vector<double> contact_time_s;  // per finger; NaN: reported nothing
 };
 
 struct FlatCalibration {
@@ -40,8 +40,8 @@ absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& touc
 absl::StatusOr<std::string> CalibratedModelFile(const Model& base, const FlatCalibration& calibration,
                                                 const EffectCatalogue& catalogue);
 
-// Contact times as fingers of equal length would have had them, less the earliest: the descriptor. NaN stays
-// NaN.
+// Contact times as fingers of equal length would have had them, less the earliest: the descriptor.
+// NaN stays NaN.
 std::vector<double> CorrectedTimes(const FlatTouch& touch, const FlatCalibration& calibration);
 
 // A number and its standard error.

@@ -12,6 +12,7 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone {
 namespace {
@@ -28,7 +29,7 @@ constexpr double kGrazingCosine =
 constexpr double kMissM = 0.01;  // what a contact that meets no surface counts as
 constexpr double kMinScaleM = 5e-6;     // of the robust weights
 constexpr double kOutlier = 5;          // robust standard deviations
-constexpr double kUndetermined = 0.02;  // singular value below which a direction is not told
+constexpr double kUndetermined = 0.02;  // singular value below which a direction is undetermined
 constexpr double kWorstRmsM = 0.002;    // above, the contacts are of something else
 constexpr double kMaxLeftOut = 0.25;
 constexpr int kMaxSteps = 100;
@@ -181,7 +182,7 @@ class Registration {
   Isometry3d Moved(const Isometry3d& pose, const Vector6d& change) const {
     const Vector3d turn = change.tail<3>() / length_m_;
     Isometry3d move = Isometry3d::Identity();
-    if (turn.norm() > 0) move.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    move.linear() = RotationFromVector(turn);
     move.translation() = pivot_m_ + change.head<3>() - move.linear() * pivot_m_;
     Isometry3d moved = move * pose;
     moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();

@@ -1,5 +1,5 @@
-// Where an object lies on the fixture, from touches of it: the pose of its mesh that the measured contacts
-// fit best.
+// Where an object lies on the fixture, from touches of it: the pose of its mesh that the measured
+// contacts fit best.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ struct ObjectRegistration {
   double rms_m = 0;     // of the distances along the approach, per degree of freedom
   size_t contacts = 0;  // used
   size_t left_out = 0;  // beside the surface, at a grazing angle, or far off
-  // How well the touches tell the six directions, best to worst: 1 is a direction that every contact sees in
-  // full.
+  // How well the touches tell the six directions, best to worst: 1 is a direction that every contact
+  // sees in full.
   std::array<double, 6> singular_values{};
 };
 
@@ -36,7 +36,7 @@ inline constexpr size_t kMinRegistrationContacts = 7;
 // Gauss-Newton from `start`, which may be 5 mm and 3 degrees off, minimising the distances along the approach
 // between the measured points of contact and the surface; far-off contacts weigh less and at last nothing.
 // INVALID_ARGUMENT: too few contacts. FAILED_PRECONDITION names the directions that the touches cannot
-// determine (a flat face tells neither its shift in its plane nor its turn), or says that the contacts fit no
+// determine (a flat face determines neither its shift in its plane nor its rotation about its normal), or says that the contacts fit no
 // pose near the start.
 absl::StatusOr<ObjectRegistration> RegisterObject(const Surface& surface,
                                                   const std::vector<RegistrationContact>& contacts,

@@ -14,9 +14,8 @@ class Mat;
 
 namespace touchstone {
 
-// A camera that goes on whether anyone looks or not: UVC, or pictures over HTTP. Opened again when it was
-// unplugged. Real pictures are never equal bit by bit (but for a covered lens), so equal ones mean that it
-// froze.
+// A camera that delivers frames all the time: UVC, or pictures over HTTP. Opened again when it was unplugged.
+// Real pictures are never equal bit by bit (but for a covered lens), so equal ones mean that it froze.
 absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options);
 
 // A folder into which another program puts pictures (whole: written under another name, then renamed). A

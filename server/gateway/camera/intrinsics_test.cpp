@@ -133,8 +133,8 @@ TEST(Rectify, FoldsNothingBackIntoThePicture) {
   EXPECT_GT(grey[101 * 50 + 50], 50);
 }
 
-// How far the corners of each row and column of the board lie from the straight line through them, root mean
-// square.
+// How far the corners of each row and column of the board lie from the straight line through them,
+// root mean square.
 double Crookedness(const std::vector<cv::Point2f>& corners, int columns, int rows) {
   double squares = 0;
   int count = 0;

@@ -8,7 +8,7 @@
 namespace touchstone {
 
 // Serves one client at a time at 127.0.0.1. Every picture is a bright square on noise; the square's column
-// tells the value of `scene` at the time.
+// reports the value of `scene` at the time.
 class MjpegServer {
  public:
   explicit MjpegServer(int port = 0);

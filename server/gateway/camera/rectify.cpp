@@ -20,8 +20,8 @@ double Radial(const std::vector<double>& k, double r) {
   return r * (1 + r2 * (at(0) + r2 * (at(1) + r2 * at(4)))) / (1 + r2 * (at(5) + r2 * (at(6) + r2 * at(7))));
 }
 
-// The polynomial holds only where it grows: beyond, rays that the camera never saw would fold back into the
-// picture.
+// The polynomial holds only where it grows: beyond, rays that the camera never saw would fold back
+// into the picture.
 double FoldsAt(const std::vector<double>& k, double most) {
   constexpr int kSteps = 1000;
   double before = 0;

@@ -61,7 +61,7 @@ struct EffectorState {
 // lost. All functions may be called from any thread.
 class Effector {
  public:
-  // Opens the port and agrees on version and fingers; goes on trying in the background if nothing answers.
+  // Opens the port and agrees on version and fingers; keeps trying in the background if nothing answers.
   static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, ChangeNotifier* changes);
   virtual ~Effector() = default;
 
@@ -73,8 +73,8 @@ class Effector {
   // The contacts of the current or last capture; changes->Notify() after every change. UNAVAILABLE if the line
   // was lost since, or the device was reset, in which case its record is gone.
   virtual absl::StatusOr<EffectorTouch> Touch() const = 0;
-  // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it has
-  // another one.
+  // Asks the device for the record of that touch, as after a restart of this process. NOT_FOUND: it
+  // has another one.
   virtual absl::StatusOr<EffectorTouch> Recall(uint32_t touch) = 0;
 
   virtual EffectorState State() const = 0;

@@ -58,9 +58,8 @@ class SerialEffector : public Effector {
   absl::StatusOr<EffectorTouch> RecallTouch(uint32_t touch);
   absl::Status ReadRecord(uint32_t touch, const std::function<bool(const firmware::Recalled&)>& take);
 
-  // message_loop.cpp
-  // Sends until `matcher` accepts a reply. DEADLINE_EXCEEDED: none after kTries; FAILED_PRECONDITION: refused;
-  // else the line's error.
+  // message_loop.cpp Sends until `matcher` accepts a reply. DEADLINE_EXCEEDED: none after kTries;
+  // FAILED_PRECONDITION: refused; else the line's error.
   template <typename Message>
   absl::Status Ask(const Message& message, const ReplyMatcher& matcher) {
     uint8_t payload[firmware::kMaxPayload];

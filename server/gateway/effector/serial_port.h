@@ -27,8 +27,8 @@ class SerialPort {
   absl::StatusOr<size_t> Read(uint8_t* data, size_t room);
   // Bytes taken, perhaps none.
   absl::StatusOr<size_t> Write(const uint8_t* data, size_t size);
-  // How long a byte takes on the wire: known for a UART; 0 for USB and pseudo-terminals, whose rate is only a
-  // name.
+  // How long a byte takes on the wire: known for a UART; 0 for USB and pseudo-terminals, whose rate is
+  // only a name.
   double seconds_per_byte() const { return seconds_per_byte_; }
 
  private:

@@ -38,7 +38,7 @@ absl::Status SerialEffector::RunSession() {
       TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch());
     } else if (work != nullptr) {
       absl::Status status = work();
-      // Whoever does not answer is not there.
+      // No answer means that the line is lost.
       if (absl::IsDeadlineExceeded(status)) status = absl::UnavailableError(status.message());
       {
         std::lock_guard<std::mutex> lock(mutex_);
@@ -67,7 +67,7 @@ absl::Status SerialEffector::ReadRecord(uint32_t touch,
     }));
     if (Stopping()) return absl::UnavailableError("the gateway ends");
     if (take(recalled)) return absl::OkStatus();
-    // The clock may not be known yet, without which no time is believed.
+    // The clock may not be known yet, without which no time is accepted.
     if (!clock_.valid)
       TOUCHSTONE_RETURN_IF_ERROR(
           Pump(HostNowS() + options_.reply_timeout_s, [this] { return clock_.valid; }));
@@ -113,11 +113,12 @@ absl::StatusOr<EffectorTouch> SerialEffector::RecallTouch(uint32_t touch) {
 }
 
 absl::Status SerialEffector::StartCaptureOnDevice(uint32_t touch) {
-  // Times of events are believed only against the device's clock.
+  // Times of events are checked against the device's clock, so that must be known.
   const auto clock_known = [this] { return clock_.valid; };
   TOUCHSTONE_RETURN_IF_ERROR(Pump(HostNowS() + kTries * options_.reply_timeout_s, clock_known));
   if (!clock_known())
-    return absl::DeadlineExceededError(absl::StrCat("the device at ", options_.port, " tells no time"));
+    return absl::DeadlineExceededError(
+        absl::StrCat("the device at ", options_.port, " answers no query of its clock"));
   const double least = (clock_.RemoteOf(HostNowS() - kClockSlackS)) * state_.tick_hz;
   {
     std::lock_guard<std::mutex> lock(mutex_);

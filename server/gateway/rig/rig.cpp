@@ -14,6 +14,7 @@
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/run_command.h"
+#include "server/geometry/pose.h"
 #include "server/image/encode.h"
 #include "server/session/command_bytes.h"
 
@@ -253,11 +254,7 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
   JournalImage image;
   image.id = ViewId(command);
   image.object = command.object, image.placement = UpFaceName(up_face);
-  const Eigen::AngleAxisd turn(base_from_camera.rotation());
-  for (int i = 0; i < 3; ++i) {
-    image.base_from_camera[i] = base_from_camera.translation()[i];
-    image.base_from_camera[3 + i] = turn.angle() * turn.axis()[i];
-  }
+  image.base_from_camera = PoseVectorOf(base_from_camera);
   image.unix_s = UnixNowS();
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, EncodePng(frame->rgb.data(), frame->width, frame->height, 3));

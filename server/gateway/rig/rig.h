@@ -2,8 +2,8 @@
 // and a journal that knows of every touch.
 //
 // A touch: check, journal the intent, go to the start, start the end effector's capture, approach, stop when
-// every finger has reported or the stroke ends, retract, journal the result. README.md says what happens when
-// something breaks.
+// every finger has reported or the stroke ends, retract, journal the result. README.md says what happens
+// when something breaks.
 #pragma once
 
 #include <atomic>
@@ -84,8 +84,8 @@ class Rig : public RigDevice {
   // person has to do first.
   absl::Status PowerOn(const MotionGuard& caller);
 
-  // Every check of a touch without motion, from `from` (null: from where the arm is) and with the face up that
-  // it needs.
+  // Every check of a touch without motion, from `from` (null: from where the arm is) and with the face up
+  // that it needs.
   absl::StatusOr<PlannedTouch> Check(const std::string& object, const Bounds& bounds,
                                      const CommandedTouch& touch, const ArmState* from,
                                      const std::string& where) const;

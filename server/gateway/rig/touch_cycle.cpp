@@ -15,7 +15,7 @@ namespace touchstone {
 namespace {
 
 constexpr double kHeartbeatPeriodS = 0.01;  // host time; also how soon a lost lease is noticed
-constexpr double kProgramStartsS = 2;       // host time that a program may take until it tells its phase
+constexpr double kProgramStartsS = 2;       // host time that a program may take until its phase is reported
 
 }  // namespace
 
@@ -23,7 +23,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
                             const std::function<absl::StatusOr<bool>(const ArmState&)>& done) {
   const double began_s = HostNowS();
   double at_rest_since_s = 0;
-  bool seen = false;  // the program told its phase
+  bool seen = false;  // the program's phase was reported
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
     const absl::Status stop = parts_.arm->Stop();
@@ -83,7 +83,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   // To the start. The capture begins there, at rest and with every finger free.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
   TOUCHSTONE_RETURN_IF_ERROR(
-      Supervise(program_id, limit_s, "the way to the start", guard, phase_is(MotionPhase::kReady)));
+      Supervise(program_id, limit_s, "the transit to the start", guard, phase_is(MotionPhase::kReady)));
   if (const absl::Status started = parts_.effector->StartCapture(program_id); !started.ok()) {
     parts_.arm->Stop().IgnoreError();
     return started;
@@ -111,7 +111,7 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
         return false;
       }));
 
-  // Only a device that was disarmed and asked has the last word on a finger that made no contact.
+  // A finger without contact is certain only after the capture has ended and the device's record was read.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
   record.contacts.contact_ticks.resize(options_.fingers);

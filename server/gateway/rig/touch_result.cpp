@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "server/base/text.h"
+#include "server/geometry/pose.h"
 
 namespace touchstone {
 namespace {
@@ -30,12 +31,6 @@ Line FitLine(const std::vector<std::pair<double, double>>& points) {
   }
   line.speed_m_s = tt > 0 ? td / tt : 0;
   return line;
-}
-
-std::array<double, 6> SixNumbers(const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.rotation());
-  const Eigen::Vector3d p = pose.translation(), r = turn.angle() * turn.axis();
-  return {p.x(), p.y(), p.z(), r.x(), r.y(), r.z()};
 }
 
 std::array<double, 6> NoPose() {
@@ -93,17 +88,17 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
         " % during the approach, so its contact times cannot be compared with others: set the speed "
         "slider to 100 % and touch again"));
 
-  // When the approach began: from the line of constant speed and the ramp before it; else when its phase was
-  // first told.
+  // When the approach began: from the line of constant speed and the ramp before it; else when its phase
+  // was first reported.
   const Line line = FitLine(full_speed);
   JournalResult result;
   double began_controller_s = origin_s;
   if (line.points > 0) {
-    // Few states, as on an accelerated clock, do not tell the speed: then it is the commanded one.
-    const bool told = line.points >= 3 && line.speed_m_s > 0;
-    if (told) result.speed_m_s = line.speed_m_s;
+    // Few states, as on an accelerated clock, do not determine the speed: then it is the commanded one.
+    const bool measured = line.points >= 3 && line.speed_m_s > 0;
+    if (measured) result.speed_m_s = line.speed_m_s;
     began_controller_s = origin_s + line.time_s -
-                         line.distance_m / (told ? line.speed_m_s : motion.speed_m_s) -
+                         line.distance_m / (measured ? line.speed_m_s : motion.speed_m_s) -
                          motion.speed_m_s / (2 * record.acceleration_m_s2);
   }
 
@@ -129,7 +124,7 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
       if (placed) {
         const double controller_s = record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
         if (const auto pose = PoseAt(record.states, controller_s, 0.1 * std::max(1.0, record.time_scale)))
-          finger.base_from_tip = SixNumbers(*pose);
+          finger.base_from_tip = PoseVectorOf(*pose);
       }
     }
     result.fingers.push_back(finger);
@@ -147,9 +142,9 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
   // No damage to the line or the device's counter may pass for a contact.
   if (motion.duration_s > 0 && span_s > 2 * motion.duration_s + 10)
     return absl::DataLossError(
-        absl::StrCat("the end effector tells contacts ", ShortestNumber(std::round(span_s)),
+        absl::StrCat("the end effector reports contacts ", ShortestNumber(std::round(span_s)),
                      " s apart in a touch of about ", ShortestNumber(std::round(motion.duration_s)),
-                     " s: its counter cannot be believed"));
+                     " s: its counter must be wrong"));
   const double tick_s = 1.0 / record.tick_hz / device_rate * scale;
   const double rate_share =
       record.effector_clock.valid ? record.effector_clock.rate_uncertainty / device_rate : 2e-4;

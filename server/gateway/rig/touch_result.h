@@ -29,8 +29,8 @@ struct TouchRecording {
 // not be comparable.
 absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record);
 
-// base_from_tip between the two states round a controller time; nothing if they do not enclose it within 0.1
-// rig s.
+// base_from_tip between the two states round a controller time; nothing if they do not enclose it within
+// 0.1 rig s.
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
                                         double max_gap_s);
 

@@ -19,8 +19,8 @@ double Distance(double t) {
 }
 
 // An approach along -z that began at controller time 100.0013 s, told 500 times a second by a controller
-// whose clock is 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is 120
-// ppm slow.
+// whose clock is 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is
+// 120 ppm slow.
 struct Made {
   TouchRecording record;
   double began_controller_s = 100.0013;

@@ -1,5 +1,4 @@
-// What the threads of the rig wake each other with: news came from the arm, the end effector, the lease or a
-// client.
+// Wakes the threads of the rig when something has changed: the arm's state, the end effector, the lease, a client.
 #pragma once
 
 #include <chrono>
@@ -9,10 +8,10 @@
 
 namespace touchstone {
 
-// Seconds of the host's steady clock: the time that everything in the gateway is told in.
+// Seconds of the host's steady clock: the time base of everything in the gateway.
 double HostNowS();
 
-// Nobody's lock is held while it waits, so that whoever is woken may look at anything.
+// An event count: no lock is held while it waits, so that the woken thread may lock anything.
 class ChangeNotifier {
  public:
   // Any thread, after what others look at has changed.
@@ -28,7 +27,7 @@ class ChangeNotifier {
     std::lock_guard<std::mutex> lock(mutex_);
     return count_;
   }
-  // Waits until there is news since `seen`, at most so long.
+  // Waits for a change since `seen`, at most so long.
   void WaitForChange(uint64_t seen, double max_s) const {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_for(lock, std::chrono::duration<double>(max_s), [&] { return count_ != seen; });

@@ -18,7 +18,7 @@ constexpr double kMinScaleS = 5e-7;   // ticks are whole
 constexpr size_t kContradictions = 4;
 constexpr double kSettledS = 0.2;
 
-// Bounds closer than this cannot be told apart from the envelope.
+// Bounds closer than this count as part of the envelope.
 double Loosening(double age_s) {
   return 0.5 * kWander * age_s * age_s;
 }
@@ -42,9 +42,9 @@ struct ClockSync::Side {
     return height;
   }
 
-  // How dense the bounds lie at the envelope gives its distance from the truth: of a Poisson process the k-th
-  // nearest lies k scales away. Two of them the line touches itself. Also adds where the nearest are to
-  // `sum`.
+  // How dense the bounds lie at the envelope gives its distance from the truth: of a Poisson process the
+  // k-th nearest lies k scales away. Two of them the line touches itself. Also adds where the nearest
+  // are to `sum`.
   void Measure(double slope, double shortest_s, double* sum, int* count) {
     const double height = Height(slope, 0);
     std::vector<std::pair<double, double>> near;

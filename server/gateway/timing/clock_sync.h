@@ -1,4 +1,4 @@
-// One clock told in terms of another, over a line that delays: offset, rate, and how well they are known.
+// Estimates one clock from another over a line with delays: offset, rate, and their uncertainties.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,8 @@ struct ClockEstimate {
 // reset, a step) start it anew.
 class ClockSync {
  public:
-  // nominal_rate: remote seconds in one host second, right within 1000 ppm (1; the time scale of an
-  // accelerated emulator).
+  // nominal_rate: remote seconds in one host second, right within 1000 ppm (1; the time scale of
+  // an accelerated emulator).
   explicit ClockSync(double nominal_rate = 1);
 
   // A query that left at host_send_s, was received and answered at these remote times, and came back. Ignored

@@ -59,8 +59,8 @@ struct Line {
   }
 };
 
-// Statistics over hours of queries: sanitizers would make minutes of it and find nothing that the rest does
-// not.
+// Statistics over hours of queries: sanitizers would make minutes of it and find nothing that the
+// rest does not.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kUnderSanitizers = true;
 #else

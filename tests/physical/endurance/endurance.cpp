@@ -37,8 +37,8 @@ Eigen::Vector3d StartOf(const v1::CommandedTouch& touch) {
           touch.target_m().z() - touch.standoff_m() * touch.approach().z()};
 }
 
-// Differences from the first finger that reported; how far they lie from the truth's. Infinite if others
-// reported.
+// Differences from the first finger that reported; how far they lie from the truth's. Infinite
+// if others reported.
 double FurthestS(const std::vector<double>& contact_time_s, const std::vector<double>& truth_s) {
   if (contact_time_s.size() != truth_s.size()) return INFINITY;
   size_t first = 0;

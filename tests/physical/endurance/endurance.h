@@ -54,7 +54,7 @@ struct EnduranceReport {
 class Endurance : public PhysicalTest {
  public:
   explicit Endurance(EnduranceOptions options) : options_(options), random_(options.seed) {}
-  // `progress` is told now and then how far it has come.
+  // `progress` is called now and then with how far it has come.
   EnduranceReport Run(const std::function<void(const EnduranceReport&)>& progress = nullptr);
 
  private:

@@ -90,7 +90,7 @@ absl::Status Overhead::Open() {
 absl::StatusOr<double> Overhead::FirstHeardS(const ArmState& last, MotionPhase phase) const {
   for (const ArmState& state : made_rig_->arm().History(last.controller_time_s - 29, last.controller_time_s))
     if (state.program_id == last.program_id && state.phase == phase) return state.host_time_s;
-  return absl::NotFoundError(std::string("no state told the phase ") + PhaseName(phase));
+  return absl::NotFoundError(std::string("no state has the phase ") + PhaseName(phase));
 }
 
 void PrintRow(const char* name, std::vector<double> times_s) {

@@ -237,8 +237,8 @@ class EmulatedController : public Controller {
     if (client->received.size() > kMaxLine) client->connection.Close();
   }
 
-  // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest once
-  // it does.
+  // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest
+  // once it does.
   void SendData(bool all) {
     const double host_s = HostNowS();
     std::optional<RobotState> state;

@@ -36,19 +36,19 @@ double HostS() {
 }
 
 std::string Complaint(const Row& row, double value) {
-  const std::string told = "fault '" + std::string(row.name) + "' = " + std::to_string(value) + ": ";
-  if (!std::isfinite(value)) return told + "must be a finite number";
+  const std::string which = "fault '" + std::string(row.name) + "' = " + std::to_string(value) + ": ";
+  if (!std::isfinite(value)) return which + "must be a finite number";
   switch (row.range) {
     case Range::kProbability:
-      return value >= 0 && value <= 1 ? "" : told + "must lie between 0 and 1";
+      return value >= 0 && value <= 1 ? "" : which + "must lie between 0 and 1";
     case Range::kPositive:
-      return value >= 0 ? "" : told + "must be at least 0";
+      return value >= 0 ? "" : which + "must be at least 0";
     case Range::kFinger:
       return value >= -1 && value < 64 && value == std::floor(value)
                  ? ""
-                 : told + "must be the index of a finger, or -1 for none";
+                 : which + "must be the index of a finger, or -1 for none";
     case Range::kSwitch:
-      return value == 0 || value == 1 ? "" : told + "must be 0 or 1";
+      return value == 0 || value == 1 ? "" : which + "must be 0 or 1";
     case Range::kSigned:
       return "";
   }

@@ -12,7 +12,7 @@ namespace touchstone::rig {
 
 using Joints = Eigen::Matrix<double, 6, 1>;
 using Vector6 =
-    Eigen::Matrix<double, 6, 1>;  // a pose as URScript tells it (x, y, z, rotation vector), or a twist
+    Eigen::Matrix<double, 6, 1>;  // a pose as URScript writes it (x, y, z, rotation vector), or a twist
 
 // Denavit-Hartenberg rows as the controller publishes them: T = RotZ(theta) TransZ(d) TransX(a) RotX(alpha).
 struct ArmGeometry {

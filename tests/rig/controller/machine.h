@@ -28,7 +28,7 @@ struct Registers {
   std::array<bool, 128> input_bit{}, output_bit{};
 };
 
-// A message on the primary and secondary interfaces (RIG.md: kinds).
+// A message on the primary and secondary interfaces (the numbers are UR's, of its primary client interface).
 struct Announcement {
   enum Kind { kText = 0, kPopup = 2, kError = 6, kKey = 7, kException = 10 };
   Kind kind;

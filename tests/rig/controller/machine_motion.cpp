@@ -80,8 +80,8 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
                        double first_speed) {
   const double length = motion->path->Length();
   if (length <= 0) return {Outcome::Wait::kCycle, {}, 0};
-  // A given duration counts instead of speed and acceleration: a fifth of it to speed up, a fifth to slow
-  // down.
+  // A given duration counts instead of speed and acceleration: a fifth of it to speed up, a fifth
+  // to slow down.
   if (duration_s > 0) {
     speed = length / (0.8 * duration_s);
     acceleration = speed / (0.2 * duration_s);
@@ -89,8 +89,8 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
   if (!(speed > 0) || !(acceleration > 0)) throw ScriptError("speed and acceleration must be above 0");
   motion->speed = speed;
   motion->acceleration = acceleration;
-  // At a reduced speed scaling the same way is driven in stretched time: speed by s, acceleration by its
-  // square.
+  // At a reduced speed scaling the same way is driven in stretched time: speed by s, acceleration
+  // by its square.
   const double ramp = scaling_ > 0 ? acceleration * scaling_ * scaling_ : acceleration;
   motion->profile = std::make_unique<SpeedProfile>(now_s_, length, speed * scaling_, ramp, first_speed);
   if (const auto obstacle = motion->path->FirstObstacle(speed * scaling_, ramp)) {
@@ -103,14 +103,14 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
   if (motion_->line) {
     motion_->number = ++straight_motions_;
     if (tip_) {
-      StraightMotion told;
-      told.number = motion_->number;
-      told.start_s = now_s_;
-      told.from = motion_->line->from();
-      told.to = motion_->line->to();
-      told.speed_m_s = speed * scaling_ * motion_->line->MetresPerLength();
-      told.acceleration_m_s2 = ramp * motion_->line->MetresPerLength();
-      tip_->OnMotionBegan(told);
+      StraightMotion begun;
+      begun.number = motion_->number;
+      begun.start_s = now_s_;
+      begun.from = motion_->line->from();
+      begun.to = motion_->line->to();
+      begun.speed_m_s = speed * scaling_ * motion_->line->MetresPerLength();
+      begun.acceleration_m_s2 = ramp * motion_->line->MetresPerLength();
+      tip_->OnMotionBegan(begun);
     }
   }
   return {Outcome::Wait::kRest, {}, 0};

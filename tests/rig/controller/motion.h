@@ -1,5 +1,5 @@
-// One motion of the arm: a straight line of the tip, or a line in joint space. Where it is at any time,
-// exactly.
+// One motion of the arm: a straight line of the tip, or a line in joint space. Where it is at
+// any time, exactly.
 #pragma once
 
 #include <memory>

@@ -33,7 +33,7 @@ void SpeedProfile::Plan(double now_s, double from, double first_speed, double sp
     end_s_ = kNever;
     return;
   }
-  // Too fast to come to rest in what is left: brakes harder than told, but never goes beyond the end.
+  // Too fast to come to rest in what is left: brakes harder than commanded, but never goes beyond the end.
   if (first_speed * first_speed > 2 * acceleration * left) {
     const double braking = first_speed * first_speed / (2 * left);
     Add(first_speed / braking, -braking);

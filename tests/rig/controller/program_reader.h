@@ -8,8 +8,8 @@ namespace touchstone::rig {
 
 class ProgramReader {
  public:
-  // Takes what has come; returns the programs that are complete: from `def` or `sec` to its `end`, or single
-  // lines.
+  // Takes what has come; returns the programs that are complete: from `def` or `sec` to its `end`,
+  // or single lines.
   std::vector<std::string> Feed(const std::string& bytes);
 
  private:

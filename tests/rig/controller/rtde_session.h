@@ -48,7 +48,7 @@ class RtdeSession {
   std::map<int, std::vector<Input>> inputs_;
 };
 
-// The message of RIG.md: u16 size | u8 type | payload.
+// One message of UR's Real-Time Data Exchange: u16 size (of all) | u8 type | payload, big-endian.
 std::string RtdeMessage(uint8_t type, std::string_view payload);
 
 }  // namespace touchstone::rig

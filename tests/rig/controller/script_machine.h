@@ -1,5 +1,5 @@
-// Runs a compiled script: cooperative threads that go on until each waits for time, a motion, or another
-// thread.
+// Runs a compiled script: cooperative threads that go on until each waits for time, a motion,
+// or another thread.
 #pragma once
 
 #include <functional>
@@ -44,8 +44,8 @@ class ScriptMachine {
     std::string what;
     int line, column;
   };
-  // Lets every thread that may go on do so at `now_s`; false once the program has ended. Failure(): it ended
-  // so.
+  // Lets every thread that may go on do so at `now_s`; false once the program has ended. Failure():
+  // it ended so.
   bool Run(double now_s);
   const std::optional<Failure>& failure() const { return failure_; }
   // When a thread waits for a time: the earliest. Infinite: none does.

@@ -39,8 +39,8 @@ struct CameraView {
 
 class EmulatedCamera {
  public:
-  // `look` is asked for every picture, from the camera's thread. Faults: stale_frame, camera_unplug. Throws
-  // std::runtime_error.
+  // `look` is asked for every picture, from the camera's thread. Faults: stale_frame,
+  // camera_unplug. Throws std::runtime_error.
   EmulatedCamera(const CameraOptions& options, std::function<CameraView()> look, const Faults* faults);
   ~EmulatedCamera();
 
@@ -51,8 +51,8 @@ class EmulatedCamera {
   void Run();
   std::string Picture();
   void Serve(LineConnection& connection);
-  // The first picture after number *number, which is then its number; empty: it ends, or the camera is
-  // unplugged.
+  // The first picture after number *number, which is then its number; empty: it ends, or the
+  // camera is unplugged.
   std::string Next(uint64_t* number);
 
   const CameraOptions options_;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/geometry/pose.h"
 #include "tests/rig/world/placement.h"
 
 namespace touchstone::rig {
@@ -110,10 +111,8 @@ std::optional<Eigen::Affine3d> Fingers::BaseFromMesh() const {
   for (const hidden::Hidden& hidden : scenario_.hidden) {
     if (hidden.effect != "object_pose") continue;
     const double* six = hidden.values.data() + (hidden.values.size() > 6 ? 6 * object : 0);
-    const Vec turn = Vec(six[3], six[4], six[5]) * (M_PI / 180);
     object_from_mesh.translation() = Vec(six[0], six[1], six[2]) * 1e-3;
-    if (turn.norm() > 0)
-      object_from_mesh.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    object_from_mesh.linear() = RotationFromVector(Vec(six[3], six[4], six[5]) * (M_PI / 180));
   }
   object_from_mesh.linear() *= 1 + session_.rig.Value("object_scale");
   return Eigen::Affine3d(BaseFromObject()) * object_from_mesh;

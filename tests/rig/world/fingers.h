@@ -1,8 +1,8 @@
 // The fingers of the emulated end effector, and the object that they run into: when each makes contact while
 // the arm moves, and when its sensor says so. The physics is the oracle's of tests/hidden_effects/generator
-// (double precision, written from the table of DESIGN 5), which shares nothing with server/touch.
+// (double precision, written from the catalogue's definitions), which shares nothing with server/touch.
 //
-// A straight motion along the tool's own z is an approach. The oracle tells the time t_i of finger i's
+// A straight motion along the tool's own z is an approach. The oracle gives the time t_i of finger i's
 // contact at the commanded speed; the contact happens when the arm has in fact come speed * t_i far, so that
 // ramps, stops and speed scaling act as they would. Latency, slip, drift, hysteresis and noise then shift the
 // sensor's edge, to before the contact if need be; clock_skew multiplies the time since the approach began,
@@ -26,8 +26,8 @@
 
 namespace touchstone::rig {
 
-// What really happened in one approach; simulated seconds. NaN where a finger made no contact, or reported
-// none.
+// What really happened in one approach; simulated seconds. NaN where a finger made no contact,
+// or reported none.
 struct TouchTruth {
   uint64_t number = 0;  // counts approaches with a contact, from 1
   std::string object, placement;
@@ -43,9 +43,9 @@ struct TouchTruth {
   bool ended = false;
 };
 
-// A change of a finger's sensor. `at_s` is when the hardware captures it; it may be handed over from
-// `known_s` on, which is never before it was decided and late enough that edges come in the order of their
-// times.
+// A change of a finger's sensor. `at_s` is when the hardware captures it; it may be handed over
+// from `known_s` on, which is never before it was decided and late enough that edges come in the
+// order of their times.
 struct Edge {
   int finger = 0;
   bool pressed = false;

@@ -36,8 +36,8 @@ class Bench {
     EXPECT_EQ(fingers_->Mount("box", "+z"), "");
   }
 
-  // The tip at `at`, its z tilted by so much from straight down, about the base's y; x as the base's for no
-  // tilt.
+  // The tip at `at`, its z tilted by so much from straight down, about the base's y; x as the base's
+  // for no tilt.
   static Eigen::Isometry3d Tip(const Vec& at, double tilt_rad = 0) {
     Eigen::Isometry3d tip = Eigen::Isometry3d::Identity();
     tip.translation() = at;
@@ -46,8 +46,8 @@ class Bench {
     return tip;
   }
 
-  // A straight motion with a ramp from rest, in cycles of 2 ms; stops after `stop_m`. Returns the greatest
-  // push.
+  // A straight motion with a ramp from rest, in cycles of 2 ms; stops after `stop_m`. Returns
+  // the greatest push.
   double Move(const Eigen::Isometry3d& from, const Vec& way, double speed_m_s, double stop_m = 1e9) {
     constexpr double kAcceleration = 1.2;
     StraightMotion motion;

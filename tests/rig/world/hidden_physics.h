@@ -1,5 +1,5 @@
 // What is hidden in the emulated rig, as people write it on the command line: the names and units of
-// DESIGN 5.
+// the catalogue (touchstone effects).
 #pragma once
 
 #include <string>

@@ -14,8 +14,8 @@ namespace touchstone::rig {
 
 class Pins {
  public:
-  // Sinks for what the hardware captures; `at_s` is the simulated time of the capture, in order for each
-  // finger.
+  // Sinks for what the hardware captures; `at_s` is the simulated time of the capture, in order
+  // for each finger.
   struct Sink {
     std::function<void(int finger, bool level, double at_s)> edge;
     std::function<void(int finger, uint16_t value, double at_s)> sample;

@@ -1,5 +1,5 @@
-// How objects lie on the emulated fixture, written down a second time, independently of
-// server/gateway/calibration.
+// How objects lie on the emulated fixture, written down a second time,
+// independently of server/gateway/calibration.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace touchstone::rig {
 
-// The faces of an object's box that can be turned up: "+x", "-x", "+y", "-y", "+z" (as in the mesh file),
-// "-z".
+// The faces of an object's box that can be turned up: "+x", "-x", "+y", "-y", "+z" (as in the
+// mesh file), "-z".
 const std::vector<std::string>& PlacementNames();
 
 // base_from_object with that face up, from base_from_object at "+z": turned about the centre of the box by

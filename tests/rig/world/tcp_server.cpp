@@ -98,8 +98,8 @@ void TcpServer::Reap(bool all) {
         clients_.erase(clients_.begin() + k);
       }
   }
-  // The descriptor is closed here and nowhere else, so that DropAll never hits a number that was given away
-  // anew.
+  // The descriptor is closed here and nowhere else, so that DropAll never hits a number that was
+  // given away anew.
   for (auto& client : gone) {
     client->thread.join();
     close(client->fd);

@@ -1,5 +1,5 @@
-// A small TCP server for the emulator's camera and control port: a thread for each connection, few
-// connections.
+// A small TCP server for the emulator's camera and control port: a thread for each
+// connection, few connections.
 #pragma once
 
 #include <atomic>
