@@ -93,14 +93,15 @@ double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {
     }
   }
   double squares = 0;
-  size_t degrees = 0;
+  size_t degrees_of_freedom = 0;
   for (const auto& [pose, repeats] : poses) {
     if (repeats.count < 2) continue;
     for (size_t i = 0; i < repeats.sum.size(); ++i)
       squares += std::max(0.0, repeats.sum_of_squares[i] - repeats.sum[i] * repeats.sum[i] / repeats.count);
-    degrees += (repeats.count - 1) * (repeats.sum.size() - 1);
+    degrees_of_freedom += (repeats.count - 1) * (repeats.sum.size() - 1);
   }
-  return degrees > 0 ? std::sqrt(squares / degrees) : std::numeric_limits<double>::quiet_NaN();
+  return degrees_of_freedom > 0 ? std::sqrt(squares / degrees_of_freedom)
+                                : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace touchstone::cli

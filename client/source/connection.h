@@ -1,4 +1,4 @@
-// The way to a source: over the network to one of several equal servers, or to a virtual source inside this
+// A connection to a source: over the network to one of several equal servers, or to a virtual source inside this
 // process. Both are gRPC channels, so whatever runs over one runs over the other and gives the same bytes.
 #pragma once
 

@@ -179,7 +179,7 @@ absl::StatusOr<DatasetManifest> ParseManifest(const std::string& text, const std
   DatasetManifest manifest;
   const uint64_t shard_size = json["shard_size"];
   for (const Json& item : json["shards"]) {
-    ShardFacts shard;
+    FinishedShard shard;
     shard.name = item.value("name", "");
     shard.first_index = item.value("first_index", uint64_t{0});
     shard.samples = item.value("samples", uint64_t{0});

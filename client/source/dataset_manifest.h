@@ -19,7 +19,7 @@ inline constexpr char kManifestFormat[] = "dataset/1";
 struct DatasetManifest {
   // Everything that decides the bytes: specification, model, meshes, columns, shards' size, versions.
   nlohmann::ordered_json identity;
-  std::map<uint64_t, ShardFacts> shards;  // by number: the finished ones
+  std::map<uint64_t, FinishedShard> shards;  // by number: the finished ones
 };
 
 // The identity of a dataset from what the user asked for and what the source resolved.

@@ -108,7 +108,7 @@ std::string DatasetWriter::ManifestPath() const {
 }
 
 absl::Status DatasetWriter::Run() {
-  if (job_.shard_size == 0) return absl::InvalidArgumentError("--shard-size: 0; at least 1 sample a shard");
+  if (job_.shard_size == 0) return absl::InvalidArgumentError("--shard-size: 0; at least 1 sample per shard");
   if (job_.job_count == 0 || job_.job_index >= job_.job_count)
     return absl::InvalidArgumentError(absl::StrCat("--shards: ", job_.job_index, "/", job_.job_count,
                                                    "; the first number goes from 0 to the second less one"));
@@ -213,7 +213,7 @@ absl::Status DatasetWriter::Resolve() {
 absl::Status DatasetWriter::FindFinishedShards() {
   // Every manifest in the folder must be of this very dataset.
   bool any_manifest = false;
-  std::map<uint64_t, ShardFacts> listed;
+  std::map<uint64_t, FinishedShard> listed;
   for (const fs::path& path : ListFolder(job_.folder)) {
     if (!IsWholeManifest(path)) continue;
     const absl::StatusOr<std::string> text = ReadFile(path.string(), kMaxManifestBytes);
@@ -251,7 +251,7 @@ absl::Status DatasetWriter::FindFinishedShards() {
     if (same_size) {
       manifest_.shards[shard] = known->second;
     } else {
-      TOUCHSTONE_ASSIGN_OR_RETURN(manifest_.shards[shard], ReadShardFacts(layout_, shard));
+      TOUCHSTONE_ASSIGN_OR_RETURN(manifest_.shards[shard], ReadFinishedShard(layout_, shard));
     }
     progress_.samples_done += layout_.SamplesIn(shard);
     ++result_.shards_found;

@@ -25,10 +25,10 @@ bool StandsInCsv(const FileColumn& column, bool times_are_contact_times) {
 class FolderWriter : public ShardWriter {
  public:
   FolderWriter(const DatasetLayout& layout, uint64_t shard) : layout_(layout) {
-    facts_.name = layout.ShardName(shard);
-    facts_.first_index = layout.FirstIndex(shard);
-    facts_.samples = layout.SamplesIn(shard);
-    path_ = layout.folder + "/" + facts_.name;
+    finished_.name = layout.ShardName(shard);
+    finished_.first_index = layout.FirstIndex(shard);
+    finished_.samples = layout.SamplesIn(shard);
+    path_ = layout.folder + "/" + finished_.name;
     part_ = path_ + kPartSuffix;
   }
 
@@ -50,7 +50,7 @@ class FolderWriter : public ShardWriter {
     for (const FileColumn& column : layout_.columns) {
       std::unique_ptr<SyncedFile> file;
       if (column.type != v1::DATA_TYPE_BYTES && !StandsInCsv(column, contact_times)) {
-        std::vector<uint64_t> shape = {facts_.samples};
+        std::vector<uint64_t> shape = {finished_.samples};
         shape.insert(shape.end(), column.shape.begin(), column.shape.end());
         TOUCHSTONE_ASSIGN_OR_RETURN(
             file, SyncedFile::Create(absl::StrCat(part_, "/", column.name, ".npy"), Durability::kInFolder));
@@ -81,7 +81,7 @@ class FolderWriter : public ShardWriter {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<ShardFacts> Finish() override {
+  absl::StatusOr<FinishedShard> Finish() override {
     TOUCHSTONE_RETURN_IF_ERROR(Commit(csv_.get(), "touches.csv"));
     for (size_t c = 0; c < arrays_.size(); ++c)
       if (arrays_[c] != nullptr)
@@ -89,8 +89,8 @@ class FolderWriter : public ShardWriter {
     TOUCHSTONE_RETURN_IF_ERROR(SyncFileSystem(part_));
     TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(part_, path_));
     finished_ = true;
-    facts_.sha256 = Sha256Hex(FolderListing(files_));
-    return facts_;
+    finished_.sha256 = Sha256Hex(FolderListing(files_));
+    return finished_;
   }
 
  private:
@@ -105,14 +105,14 @@ class FolderWriter : public ShardWriter {
   }
 
   absl::Status Commit(SyncedFile* file, const std::string& name) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const FileFacts facts, file->Commit());
-    facts_.bytes += facts.bytes;
-    files_.emplace_back(name, facts.sha256);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const FileDigest digest, file->Commit());
+    finished_.bytes += digest.bytes;
+    files_.emplace_back(name, digest.sha256);
     return absl::OkStatus();
   }
 
   const DatasetLayout& layout_;
-  ShardFacts facts_;
+  FinishedShard finished_;
   std::string path_;
   std::string part_;
   std::unique_ptr<SyncedFile> csv_;

@@ -93,29 +93,29 @@ std::string FolderListing(const std::vector<std::pair<std::string, std::string>>
   return listing;
 }
 
-absl::StatusOr<ShardFacts> ReadShardFacts(const DatasetLayout& layout, uint64_t shard) {
-  ShardFacts facts;
-  facts.name = layout.ShardName(shard);
-  facts.first_index = layout.FirstIndex(shard);
-  facts.samples = layout.SamplesIn(shard);
-  const std::filesystem::path path = std::filesystem::path(layout.folder) / facts.name;
+absl::StatusOr<FinishedShard> ReadFinishedShard(const DatasetLayout& layout, uint64_t shard) {
+  FinishedShard finished;
+  finished.name = layout.ShardName(shard);
+  finished.first_index = layout.FirstIndex(shard);
+  finished.samples = layout.SamplesIn(shard);
+  const std::filesystem::path path = std::filesystem::path(layout.folder) / finished.name;
   std::error_code error;
   if (layout.format != ShardFormat::kFolder) {
-    facts.bytes = std::filesystem::file_size(path, error);
+    finished.bytes = std::filesystem::file_size(path, error);
     if (error) return absl::NotFoundError(absl::StrCat(path.string(), ": ", error.message()));
-    TOUCHSTONE_ASSIGN_OR_RETURN(facts.sha256, Sha256HexOfFile(path.string()));
-    return facts;
+    TOUCHSTONE_ASSIGN_OR_RETURN(finished.sha256, Sha256HexOfFile(path.string()));
+    return finished;
   }
   std::vector<std::pair<std::string, std::string>> files;
   for (std::filesystem::directory_iterator entry(path, error), end; !error && entry != end;
        entry.increment(error)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::string sha256, Sha256HexOfFile(entry->path().string()));
-    facts.bytes += std::filesystem::file_size(entry->path(), error);
+    finished.bytes += std::filesystem::file_size(entry->path(), error);
     files.emplace_back(entry->path().filename().string(), std::move(sha256));
   }
   if (error) return absl::NotFoundError(absl::StrCat(path.string(), ": ", error.message()));
-  facts.sha256 = Sha256Hex(FolderListing(files));
-  return facts;
+  finished.sha256 = Sha256Hex(FolderListing(files));
+  return finished;
 }
 
 }  // namespace touchstone::client

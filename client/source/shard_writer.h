@@ -39,7 +39,7 @@ struct DatasetLayout {
   const FileColumn* FindColumn(const std::string& wire_name) const;
 };
 
-struct ShardFacts {
+struct FinishedShard {
   std::string name;
   uint64_t first_index = 0;
   uint64_t samples = 0;
@@ -55,7 +55,7 @@ class ShardWriter {
   // Adds samples first_row .. first_row + rows - 1 of a batch.
   virtual absl::Status Append(const Batch& batch, uint64_t first_row, uint64_t rows) = 0;
   // Syncs and renames into place.
-  virtual absl::StatusOr<ShardFacts> Finish() = 0;
+  virtual absl::StatusOr<FinishedShard> Finish() = 0;
 };
 
 // `layout` must outlive the writer.
@@ -65,8 +65,8 @@ absl::StatusOr<std::unique_ptr<ShardWriter>> CreateWebDatasetWriter(const Datase
 absl::StatusOr<std::unique_ptr<ShardWriter>> CreateFolderWriter(const DatasetLayout& layout, uint64_t shard);
 absl::StatusOr<std::unique_ptr<ShardWriter>> CreateHdf5Writer(const DatasetLayout& layout, uint64_t shard);
 
-// Facts of a shard that already stands, read from its bytes; the writers' Finish gives the same.
-absl::StatusOr<ShardFacts> ReadShardFacts(const DatasetLayout& layout, uint64_t shard);
+// A shard that was written before, read from its bytes; the writers' Finish gives the same.
+absl::StatusOr<FinishedShard> ReadFinishedShard(const DatasetLayout& layout, uint64_t shard);
 
 // The lines that a folder's hash is taken of.
 std::string FolderListing(const std::vector<std::pair<std::string, std::string>>& name_and_sha256);

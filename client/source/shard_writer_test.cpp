@@ -91,7 +91,7 @@ class ShardWriterTest : public ::testing::Test {
   }
 
   // Writes shard 1 (samples 10 .. 19) in batches of the given size.
-  ShardFacts Write(const DatasetLayout& layout, uint64_t batch_size) {
+  FinishedShard Write(const DatasetLayout& layout, uint64_t batch_size) {
     auto writer = CreateShardWriter(layout, 1);
     EXPECT_TRUE(writer.ok()) << writer.status();
     for (uint64_t i = 10; i < 20; i += batch_size) {
@@ -101,9 +101,9 @@ class ShardWriterTest : public ::testing::Test {
       const absl::Status status = (*writer)->Append(batch, 2, rows);
       EXPECT_TRUE(status.ok()) << status;
     }
-    const auto facts = (*writer)->Finish();
-    EXPECT_TRUE(facts.ok()) << facts.status();
-    return facts.value_or(ShardFacts());
+    const auto finished = (*writer)->Finish();
+    EXPECT_TRUE(finished.ok()) << finished.status();
+    return finished.value_or(FinishedShard());
   }
 
   TestFolder folder_;
@@ -129,13 +129,13 @@ std::map<std::string, std::string> ReadTar(const std::string& path) {
 
 TEST_F(ShardWriterTest, WebDatasetMembersFollowTheConvention) {
   const DatasetLayout layout = Layout(ShardFormat::kWebDataset, "tar");
-  const ShardFacts facts = Write(layout, 4);
-  EXPECT_EQ(facts.name, "shard-000001.tar");
-  EXPECT_EQ(facts.first_index, 10u);
-  EXPECT_EQ(facts.samples, 10u);
-  const std::string path = layout.folder + "/" + facts.name;
-  EXPECT_EQ(facts.bytes, fs::file_size(path));
-  EXPECT_EQ(facts.sha256, *Sha256HexOfFile(path));
+  const FinishedShard finished = Write(layout, 4);
+  EXPECT_EQ(finished.name, "shard-000001.tar");
+  EXPECT_EQ(finished.first_index, 10u);
+  EXPECT_EQ(finished.samples, 10u);
+  const std::string path = layout.folder + "/" + finished.name;
+  EXPECT_EQ(finished.bytes, fs::file_size(path));
+  EXPECT_EQ(finished.sha256, *Sha256HexOfFile(path));
   const auto members = ReadTar(path);
   EXPECT_EQ(members.size(), 30u);
   EXPECT_EQ(members.at("000013.image.png"), "png of 13");
@@ -154,8 +154,8 @@ TEST_F(ShardWriterTest, WebDatasetMembersFollowTheConvention) {
 TEST_F(ShardWriterTest, TheCutIntoBatchesChangesNoByte) {
   for (const ShardFormat format : {ShardFormat::kWebDataset, ShardFormat::kFolder, ShardFormat::kHdf5}) {
     const std::string name = ShardFormatName(format);
-    const ShardFacts one = Write(Layout(format, name + "1"), 1);
-    const ShardFacts all = Write(Layout(format, name + "10"), 10);
+    const FinishedShard one = Write(Layout(format, name + "1"), 1);
+    const FinishedShard all = Write(Layout(format, name + "10"), 10);
     EXPECT_EQ(one.sha256, all.sha256) << name;
     EXPECT_EQ(one.bytes, all.bytes) << name;
   }
@@ -164,8 +164,8 @@ TEST_F(ShardWriterTest, TheCutIntoBatchesChangesNoByte) {
 TEST_F(ShardWriterTest, FactsReadFromDiskAreTheWritersOwn) {
   for (const ShardFormat format : {ShardFormat::kWebDataset, ShardFormat::kFolder, ShardFormat::kHdf5}) {
     const DatasetLayout layout = Layout(format, ShardFormatName(format));
-    const ShardFacts written = Write(layout, 3);
-    const auto read = ReadShardFacts(layout, 1);
+    const FinishedShard written = Write(layout, 3);
+    const auto read = ReadFinishedShard(layout, 1);
     ASSERT_TRUE(read.ok()) << read.status();
     EXPECT_EQ(read->sha256, written.sha256);
     EXPECT_EQ(read->bytes, written.bytes);
@@ -189,8 +189,8 @@ TEST_F(ShardWriterTest, AFoldersTableIsAMeasurementFile) {
 
 TEST_F(ShardWriterTest, Hdf5HoldsColumnsWithUnits) {
   const DatasetLayout layout = Layout(ShardFormat::kHdf5, "hdf5");
-  const ShardFacts facts = Write(layout, 3);
-  const hid_t file = H5Fopen((layout.folder + "/" + facts.name).c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const FinishedShard finished = Write(layout, 3);
+  const hid_t file = H5Fopen((layout.folder + "/" + finished.name).c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   ASSERT_GE(file, 0);
   const hid_t dataset = H5Dopen2(file, "descriptor_us", H5P_DEFAULT);
   ASSERT_GE(dataset, 0);

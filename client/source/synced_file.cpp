@@ -110,7 +110,7 @@ absl::Status SyncedFile::Flush() {
   return absl::OkStatus();
 }
 
-absl::StatusOr<FileFacts> SyncedFile::Commit() {
+absl::StatusOr<FileDigest> SyncedFile::Commit() {
   TOUCHSTONE_RETURN_IF_ERROR(Flush());
   if (durability_ == Durability::kAlone && ::fsync(descriptor_) != 0)
     return FileError(errno, path_, "cannot be synced");
@@ -118,7 +118,7 @@ absl::StatusOr<FileFacts> SyncedFile::Commit() {
   descriptor_ = -1;
   if (closed != 0) return FileError(errno, path_, "closing failed");
   if (durability_ == Durability::kAlone) TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(written_path_, path_));
-  return FileFacts{bytes_, hash_->Hex()};
+  return FileDigest{bytes_, hash_->Hex()};
 }
 
 }  // namespace touchstone::client

@@ -13,7 +13,7 @@ namespace touchstone::client {
 
 inline constexpr char kPartSuffix[] = ".part";
 
-struct FileFacts {
+struct FileDigest {
   uint64_t bytes = 0;
   std::string sha256;  // 64 hexadecimal digits
 };
@@ -34,7 +34,7 @@ class SyncedFile {
   absl::Status Write(absl::string_view data);
 
   // Flushes, syncs, renames into place and syncs the folder.
-  absl::StatusOr<FileFacts> Commit();
+  absl::StatusOr<FileDigest> Commit();
 
  private:
   SyncedFile() = default;
