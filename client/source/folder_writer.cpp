@@ -25,10 +25,10 @@ bool StandsInCsv(const FileColumn& column, bool times_are_contact_times) {
 class FolderWriter : public ShardWriter {
  public:
   FolderWriter(const DatasetLayout& layout, uint64_t shard) : layout_(layout) {
-    finished_.name = layout.ShardName(shard);
-    finished_.first_index = layout.FirstIndex(shard);
-    finished_.samples = layout.SamplesIn(shard);
-    path_ = layout.folder + "/" + finished_.name;
+    record_.name = layout.ShardName(shard);
+    record_.first_index = layout.FirstIndex(shard);
+    record_.samples = layout.SamplesIn(shard);
+    path_ = layout.folder + "/" + record_.name;
     part_ = path_ + kPartSuffix;
   }
 
@@ -50,7 +50,7 @@ class FolderWriter : public ShardWriter {
     for (const FileColumn& column : layout_.columns) {
       std::unique_ptr<SyncedFile> file;
       if (column.type != v1::DATA_TYPE_BYTES && !StandsInCsv(column, contact_times)) {
-        std::vector<uint64_t> shape = {finished_.samples};
+        std::vector<uint64_t> shape = {record_.samples};
         shape.insert(shape.end(), column.shape.begin(), column.shape.end());
         TOUCHSTONE_ASSIGN_OR_RETURN(
             file, SyncedFile::Create(absl::StrCat(part_, "/", column.name, ".npy"), Durability::kInFolder));
@@ -89,8 +89,8 @@ class FolderWriter : public ShardWriter {
     TOUCHSTONE_RETURN_IF_ERROR(SyncFileSystem(part_));
     TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(part_, path_));
     finished_ = true;
-    finished_.sha256 = Sha256Hex(FolderListing(files_));
-    return finished_;
+    record_.sha256 = Sha256Hex(FolderListing(files_));
+    return record_;
   }
 
  private:
@@ -106,13 +106,13 @@ class FolderWriter : public ShardWriter {
 
   absl::Status Commit(SyncedFile* file, const std::string& name) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const FileDigest digest, file->Commit());
-    finished_.bytes += digest.bytes;
+    record_.bytes += digest.bytes;
     files_.emplace_back(name, digest.sha256);
     return absl::OkStatus();
   }
 
   const DatasetLayout& layout_;
-  FinishedShard finished_;
+  FinishedShard record_;
   std::string path_;
   std::string part_;
   std::unique_ptr<SyncedFile> csv_;

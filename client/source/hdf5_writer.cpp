@@ -58,9 +58,9 @@ class Hdf5Writer : public ShardWriter {
  public:
   Hdf5Writer(const DatasetLayout& layout, uint64_t shard)
       : layout_(layout), path_(layout.folder + "/" + layout.ShardName(shard)), part_(path_ + kPartSuffix) {
-    finished_.name = layout.ShardName(shard);
-    finished_.first_index = layout.FirstIndex(shard);
-    finished_.samples = layout.SamplesIn(shard);
+    record_.name = layout.ShardName(shard);
+    record_.first_index = layout.FirstIndex(shard);
+    record_.samples = layout.SamplesIn(shard);
   }
 
   ~Hdf5Writer() override {
@@ -112,12 +112,12 @@ class Hdf5Writer : public ShardWriter {
     for (Handle& dataset : datasets_) closed = dataset.Close() && closed;
     if (!file_.Close() || !closed) return Failed("closing failed");
     TOUCHSTONE_RETURN_IF_ERROR(SyncPath(part_));
-    TOUCHSTONE_ASSIGN_OR_RETURN(finished_.sha256, Sha256HexOfFile(part_));
+    TOUCHSTONE_ASSIGN_OR_RETURN(record_.sha256, Sha256HexOfFile(part_));
     std::error_code error;
-    finished_.bytes = std::filesystem::file_size(part_, error);
+    record_.bytes = std::filesystem::file_size(part_, error);
     TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(part_, path_));
     finished_ = true;
-    return finished_;
+    return record_;
   }
 
  private:
@@ -126,12 +126,12 @@ class Hdf5Writer : public ShardWriter {
     if (type < 0)
       return absl::InvalidArgumentError(absl::StrCat("HDF5 holds pixels, not PNG or JPEG files: column '",
                                                      column.name, "' needs --encoding raw"));
-    std::vector<hsize_t> size = {finished_.samples};
+    std::vector<hsize_t> size = {record_.samples};
     size.insert(size.end(), column.shape.begin(), column.shape.end());
     // One image a chunk, so that a random sample is one read; a few thousand rows of small columns.
     const uint64_t sample_bytes = std::max<uint64_t>(1, column.Values() * BytesPerValue(column.type));
     std::vector<hsize_t> chunk = size;
-    chunk[0] = std::clamp<uint64_t>(kChunkBytes / sample_bytes, 1, finished_.samples);
+    chunk[0] = std::clamp<uint64_t>(kChunkBytes / sample_bytes, 1, record_.samples);
     Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     H5Pset_obj_track_times(creation, false);
     H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data());
@@ -153,7 +153,7 @@ class Hdf5Writer : public ShardWriter {
   const DatasetLayout& layout_;
   std::string path_;
   std::string part_;
-  FinishedShard finished_;
+  FinishedShard record_;
   Handle file_{-1, H5Fclose};
   std::vector<Handle> datasets_;
   uint64_t written_ = 0;

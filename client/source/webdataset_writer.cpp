@@ -18,9 +18,9 @@ namespace {
 class WebDatasetWriter : public ShardWriter {
  public:
   WebDatasetWriter(const DatasetLayout& layout, uint64_t shard) : layout_(layout) {
-    finished_.name = layout.ShardName(shard);
-    finished_.first_index = layout.FirstIndex(shard);
-    finished_.samples = layout.SamplesIn(shard);
+    record_.name = layout.ShardName(shard);
+    record_.first_index = layout.FirstIndex(shard);
+    record_.samples = layout.SamplesIn(shard);
   }
 
   ~WebDatasetWriter() override {
@@ -31,7 +31,7 @@ class WebDatasetWriter : public ShardWriter {
   }
 
   absl::Status Open() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(file_, SyncedFile::Create(layout_.folder + "/" + finished_.name));
+    TOUCHSTONE_ASSIGN_OR_RETURN(file_, SyncedFile::Create(layout_.folder + "/" + record_.name));
     archive_ = archive_write_new();
     entry_ = archive_entry_new();
     archive_write_set_format_ustar(archive_);
@@ -68,9 +68,9 @@ class WebDatasetWriter : public ShardWriter {
   absl::StatusOr<FinishedShard> Finish() override {
     if (archive_write_close(archive_) != ARCHIVE_OK) return ArchiveError();
     TOUCHSTONE_ASSIGN_OR_RETURN(const FileDigest file, file_->Commit());
-    finished_.bytes = file.bytes;
-    finished_.sha256 = file.sha256;
-    return finished_;
+    record_.bytes = file.bytes;
+    record_.sha256 = file.sha256;
+    return record_;
   }
 
  private:
@@ -103,11 +103,11 @@ class WebDatasetWriter : public ShardWriter {
     if (!write_status_.ok()) return write_status_;
     const char* text = archive_error_string(archive_);
     return absl::InternalError(
-        absl::StrCat(finished_.name, ": ", text == nullptr ? "unknown error of libarchive" : text));
+        absl::StrCat(record_.name, ": ", text == nullptr ? "unknown error of libarchive" : text));
   }
 
   const DatasetLayout& layout_;
-  FinishedShard finished_;
+  FinishedShard record_;
   std::unique_ptr<SyncedFile> file_;
   archive* archive_ = nullptr;
   archive_entry* entry_ = nullptr;

@@ -2,6 +2,6 @@
 
 namespace touchstone {
 
-const char kVersion[] = TOUCHSTONE_VERSION;
+const char* const kVersion = TOUCHSTONE_VERSION;
 
 }  // namespace touchstone

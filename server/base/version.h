@@ -4,6 +4,6 @@
 namespace touchstone {
 
 // For instance "0.2.0": the version of the CMake project.
-extern const char kVersion[];
+extern const char* const kVersion;
 
 }  // namespace touchstone
