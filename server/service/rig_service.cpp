@@ -21,6 +21,64 @@ v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   return message;
 }
 
+v1::ArmStatus ArmStatusOf(const Arm& arm, double time_scale) {
+  v1::ArmStatus status;
+  status.set_model(arm.Model());
+  status.set_address(arm.Address());
+  status.set_version(arm.Version());
+  status.set_rate_hz(arm.StateRateHz());
+  const absl::StatusOr<ArmState> now = arm.State();
+  status.set_connected(now.ok());
+  if (now.ok()) {
+    status.set_robot_mode(static_cast<v1::RobotMode>(now->robot_mode));
+    status.set_safety_mode(static_cast<v1::SafetyMode>(now->safety_mode));
+    status.set_state_age_s(HostNowS() - now->host_time_s);
+    *status.mutable_base_from_tip() = PoseToProto(now->base_from_tip);
+    for (const double q : now->joints_rad) status.add_joints_rad(q);
+    status.set_program_id(now->program_id);
+    status.set_phase(static_cast<v1::MotionPhase>(now->phase));
+    status.set_speed_scaling(now->speed_scaling);
+  }
+  if (const ClockEstimate clock = arm.ControllerClock(); clock.valid) {
+    status.set_clock_drift(clock.rate / time_scale - 1);
+    status.set_clock_uncertainty_s(clock.offset_uncertainty_s);
+  }
+  return status;
+}
+
+v1::EffectorStatus EffectorStatusOf(const Rig& rig) {
+  const EffectorState effector = rig.effector().State();
+  const double time_scale = rig.options().time_scale;
+  v1::EffectorStatus status;
+  status.set_connected(effector.connected);
+  status.set_port(rig.options().effector_port);
+  status.set_firmware(effector.firmware);
+  status.set_fingers(rig.options().fingers);
+  for (const bool pressed : effector.pressed) status.add_pressed(pressed);
+  if (const ClockEstimate clock = rig.effector().Clock(); clock.valid) {
+    status.set_clock_drift(clock.rate / time_scale - 1);
+    status.set_clock_drift_uncertainty(clock.rate_uncertainty / time_scale);
+    status.set_clock_uncertainty_s(clock.offset_uncertainty_s);
+    status.set_round_trips(clock.round_trips);
+    status.set_shortest_round_trip_s(clock.shortest_round_trip_s);
+  }
+  status.set_bad_frames(effector.bad_frames);
+  status.set_repeated_events(effector.repeated_events);
+  status.set_reconnections(effector.reconnections);
+  return status;
+}
+
+v1::CameraStatus CameraStatusOf(const CameraDevice& camera, const SourceStatus& source) {
+  v1::CameraStatus status;
+  status.set_connected(true);
+  status.set_description(camera.Description());
+  status.set_width(source.image_width);
+  status.set_height(source.image_height);
+  status.set_frames(camera.frames());
+  status.set_stale_frames(camera.stale_frames());
+  return status;
+}
+
 }  // namespace
 
 grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
@@ -78,68 +136,22 @@ grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1:
 }
 
 void RigService::Describe(v1::RigState* state) const {
-  const Arm& arm = rig_->arm();
-  v1::ArmStatus* a = state->mutable_arm();
-  a->set_model(arm.Model());
-  a->set_address(arm.Address());
-  a->set_version(arm.Version());
-  a->set_rate_hz(arm.StateRateHz());
-  const absl::StatusOr<ArmState> now = arm.State();
-  a->set_connected(now.ok());
-  if (now.ok()) {
-    a->set_robot_mode(static_cast<v1::RobotMode>(now->robot_mode));
-    a->set_safety_mode(static_cast<v1::SafetyMode>(now->safety_mode));
-    a->set_state_age_s(HostNowS() - now->host_time_s);
-    *a->mutable_base_from_tip() = PoseToProto(now->base_from_tip);
-    for (const double q : now->joints_rad) a->add_joints_rad(q);
-    a->set_program_id(now->program_id);
-    a->set_phase(static_cast<v1::MotionPhase>(now->phase));
-    a->set_speed_scaling(now->speed_scaling);
-  }
-  const double scale = rig_->options().time_scale;
-  if (const ClockEstimate clock = arm.ControllerClock(); clock.valid) {
-    a->set_clock_drift(clock.rate / scale - 1);
-    a->set_clock_uncertainty_s(clock.offset_uncertainty_s);
-  }
-
-  const EffectorState effector = rig_->effector().State();
-  v1::EffectorStatus* e = state->mutable_effector();
-  e->set_connected(effector.connected);
-  e->set_port(rig_->options().effector_port);
-  e->set_firmware(effector.firmware);
-  e->set_fingers(rig_->options().fingers);
-  for (const bool pressed : effector.pressed) e->add_pressed(pressed);
-  if (const ClockEstimate clock = rig_->effector().Clock(); clock.valid) {
-    e->set_clock_drift(clock.rate / scale - 1);
-    e->set_clock_drift_uncertainty(clock.rate_uncertainty / scale);
-    e->set_clock_uncertainty_s(clock.offset_uncertainty_s);
-    e->set_round_trips(clock.round_trips);
-    e->set_shortest_round_trip_s(clock.shortest_round_trip_s);
-  }
-  e->set_bad_frames(effector.bad_frames);
-  e->set_repeated_events(effector.repeated_events);
-  e->set_reconnections(effector.reconnections);
-
-  if (const CameraDevice* camera = rig_->camera(); camera != nullptr) {
-    v1::CameraStatus* c = state->mutable_camera();
-    c->set_connected(true);
-    c->set_description(camera->Description());
-    c->set_width(rig_->Status().image_width);
-    c->set_height(rig_->Status().image_height);
-    c->set_frames(camera->frames());
-    c->set_stale_frames(camera->stale_frames());
-  }
   const SourceStatus status = rig_->Status();
+  *state->mutable_arm() = ArmStatusOf(rig_->arm(), rig_->options().time_scale);
+  *state->mutable_effector() = EffectorStatusOf(*rig_);
+  if (rig_->camera() != nullptr) *state->mutable_camera() = CameraStatusOf(*rig_->camera(), status);
+  const absl::StatusOr<ArmState> arm = rig_->arm().State();
+  const EffectorState effector = rig_->effector().State();
   state->set_object(status.object);
   if (const std::optional<UpFace> up_face = rig_->MountedUpFace(); up_face.has_value())
     state->set_up_face(static_cast<v1::UpFace>(*up_face));
   state->set_mounts_itself(!rig_->options().mount_command.empty());
   state->set_recovered_touches(status.recovered_touches);
   state->set_interrupted_touches(status.interrupted_touches);
-  state->set_last_error(!now.ok()             ? std::string(now.status().message())
+  state->set_last_error(!arm.ok()             ? std::string(arm.status().message())
                         : !effector.connected ? effector.why
                                               : status.last_error);
-  state->set_time_scale(scale);
+  state->set_time_scale(rig_->options().time_scale);
   state->set_fingers(rig_->fingers());
   state->set_spacing_m(rig_->spacing_m());
   state->set_provenance(rig_->Provenance());

@@ -78,11 +78,7 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
   record.effector_clock = parts_.effector->Clock();
   TOUCHSTONE_ASSIGN_OR_RETURN(JournalResult result, ResultOf(record));
   result.recovered = true;
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      result.session_time_s,
-      SessionTimeS(
-          session,
-          std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(result.session_time_s, SessionTimeS(session, UnixNowS()));
   return journal().Done(session, touch.id, result);
 }
 

@@ -142,6 +142,9 @@ class Rig : public RigDevice {
                          const std::function<absl::StatusOr<bool>(const ArmState&)>& done);
   void Remember(const absl::Status& status);
 
+  // The journal's fact of who stopped the rig and why; "" once it was reset.
+  static constexpr char kStopFact[] = "stop";
+
   const RigOptions options_;
   RigParts parts_;
   std::timed_mutex moving_;           // held by the one that moves

@@ -6,10 +6,9 @@
 #include <cstdint>
 #include <mutex>
 
-namespace touchstone {
+#include "server/gateway/timing/host_time.h"
 
-// Seconds of the host's steady clock: the time base of everything in the gateway.
-double HostNowS();
+namespace touchstone {
 
 // An event count: no lock is held while it waits, so that the woken thread may lock anything.
 class ChangeNotifier {

@@ -79,6 +79,15 @@ class ScriptMachine {
   void Begin(int function, std::vector<Value> arguments);
   bool MayGoOn(const Thread& thread, double now_s) const;
   void Execute(Thread& thread, double now_s);
+  // One instruction; false: the thread waits, has ended, or the program is halted.
+  bool Step(Thread& thread, const Instruction& code, double now_s);
+  void AccessVariable(Thread& thread, const Instruction& code);
+  void Call(Thread& thread, const Instruction& code);
+  bool CallBuiltin(Thread& thread, const Instruction& code, double now_s);
+  bool KillOrJoin(Thread& thread, Op op);
+  bool Return(Thread& thread);
+  void MakeList(Thread& thread, const Instruction& code);
+  void TakeItem(Thread& thread);
   void Calculate(Thread& thread, Op op);
   Value Pop(Thread& thread);
 

@@ -1,0 +1,11 @@
+// The clocks of this host.
+#pragma once
+
+namespace touchstone {
+
+// Seconds of the steady clock: the time base of everything in the gateway.
+double HostNowS();
+// Seconds since 1970 (UTC), for records; it may step.
+double UnixNowS();
+
+}  // namespace touchstone
