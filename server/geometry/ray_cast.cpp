@@ -124,24 +124,35 @@ Contact Surface::Search::CastExactly(const Line& line, double longest_m, double 
   return {best_travel, ToEigen(origin + direction * best_travel), ToEigen(NormalAgainst(best_hit)), best};
 }
 
+// kWidth lines on their way through Embree, coordinates by lane.
 template <int kWidth>
-void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions,
-                                 const uint32_t* lines, int count, double longest_m,
-                                 Contacts* contacts) const {
-  // Coordinates by lane; lanes beyond the last line repeat the first one.
+struct Surface::Search::Packet {
   alignas(64) double origin[3][kWidth], direction[3][kWidth];
-  for (int k = 0; k < kWidth; ++k) {
-    const uint32_t line = lines[k < count ? k : 0];
-    for (int axis = 0; axis < 3; ++axis) {
-      origin[axis][k] = origins_m[line][axis];
-      direction[axis][k] = directions[line][axis];
+  alignas(64) double start_m[kWidth];  // travel at which the ray starts
+  alignas(64) int valid[kWidth];       // as Embree wants it: -1 for rays to be cast, else 0
+  alignas(64) typename EmbreePacket<kWidth>::RayHit rays;
+
+  // Lanes beyond the last line repeat the first one.
+  [[gnu::always_inline]] void Load(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions,
+                                   const uint32_t* lines, int count) {
+    for (int k = 0; k < kWidth; ++k) {
+      const uint32_t line = lines[k < count ? k : 0];
+      for (int axis = 0; axis < 3; ++axis) {
+        origin[axis][k] = origins_m[line][axis];
+        direction[axis][k] = directions[line][axis];
+      }
     }
   }
 
-  // Rays start where the line enters a ball round the mesh: standing far away costs no precision.
-  alignas(64) typename EmbreePacket<kWidth>::RayHit rays;
-  alignas(64) int valid[kWidth];
-  alignas(64) double start_m[kWidth];  // travel at which the ray starts
+  bool Proposed(int k) const { return rays.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID; }
+};
+
+template <int kWidth>
+[[gnu::always_inline]] inline void Surface::Search::StartRays(int count, double longest_m,
+                                                              Packet<kWidth>* packet) const {
+  auto& rays = packet->rays;
+  const auto& origin = packet->origin;
+  const auto& direction = packet->direction;
   const double reach = 1.01 * reach_m_, reach2 = reach_m_ * reach_m_;
   const double centre[3] = {centre_m_.x(), centre_m_.y(), centre_m_.z()};
   const float farthest = static_cast<float>(2.1 * reach_m_);
@@ -153,10 +164,10 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     const double start = to_middle - reach;
     const double first = start > 0 ? start : 0;
     const double mx = cx - to_middle * dx, my = cy - to_middle * dy, mz = cz - to_middle * dz;
-    start_m[k] = first;
-    const bool may_meet =
+    packet->start_m[k] = first;
+    const bool may_hit =
         (mx * mx + my * my + mz * mz <= reach2) & (to_middle > -reach) & (first <= longest_m);
-    valid[k] = may_meet ? -1 : 0;
+    packet->valid[k] = may_hit ? -1 : 0;
     rays.ray.org_x[k] = static_cast<float>(ox + first * dx);
     rays.ray.org_y[k] = static_cast<float>(oy + first * dy);
     rays.ray.org_z[k] = static_cast<float>(oz + first * dz);
@@ -172,66 +183,78 @@ void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::
     rays.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.primID[k] = 0;
   }
-  for (int k = count; k < kWidth; ++k) valid[k] = 0;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RunTogether<kWidth>(direction) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                                 : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-  EmbreePacket<kWidth>::Intersect(valid, scene_, &context, &rays);
+  for (int k = count; k < kWidth; ++k) packet->valid[k] = 0;
+}
 
-  // The corners of the proposed triangles, by lane.
-  alignas(64) double corner[9][kWidth];
-  for (int k = 0; k < kWidth; ++k) {
-    LoadCorners(rays.hit.primID[k], k, corner);
-  }
-
-  // Four lanes at a time: the contact, and whether the line stays clear of the triangle's border.
-  const auto load = [](const double(*from)[kWidth], int k) {
+template <int kWidth>
+[[gnu::always_inline]] inline void Surface::Search::ResolveLanes(const Packet<kWidth>& packet,
+                                                                 const double (&corner)[9][kWidth], int k,
+                                                                 int count, double longest_m,
+                                                                 const uint32_t* lines,
+                                                                 Contacts* contacts) const {
+  const auto load = [&](const double(*from)[kWidth]) {
     return Triple<Double4>{LoadLanes<Double4>(from[0] + k), LoadLanes<Double4>(from[1] + k),
                            LoadLanes<Double4>(from[2] + k)};
   };
   const Double4 clear = Double4{} + 2 * rounding_m_;
-  for (int k = 0; k < count; k += 4) {
-    const Triple<Double4> from = load(origin, k), along = load(direction, k);
-    const Triple<Double4> a = load(corner, k) - from, b = load(corner + 3, k) - from,
-                          c = load(corner + 6, k) - from;
-    const LineTriangle<Double4> hit = IntersectTriangle(along, a, b, c);
-    const Double4 side = hit.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
-    const auto clears = [&](int i) {
-      const Double4 inwards = hit.moment[i] * side;
-      return (inwards > 0) & (inwards * inwards > clear * clear * Dot(hit.edge[i], hit.edge[i]));
-    };
-    const Mask4 certain =
-        clears(0) & clears(1) & clears(2) & (hit.travel_m > clear) & (hit.travel_m <= longest_m);
-    const Triple<Double4> normal = NormalAgainst(hit);
-    const Triple<Double4> point = from + along * hit.travel_m;
-    const uint32_t certain_bits = BitsOf(certain);
-    for (int lane = 0; lane < std::min(4, count - k); ++lane) {
-      const uint32_t triangle = rays.hit.primID[k + lane];
-      const uint32_t to = lines[k + lane];
-      if (valid[k + lane] == 0) {
-        Store(NoContact(), to, contacts);
-      } else if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID && (certain_bits >> lane & 1) &&
-                 !NearCoincident(triangle)) {
-        contacts->travel_m[to] = hit.travel_m[lane];
-        contacts->point_m[to] = {point.x[lane], point.y[lane], point.z[lane]};
-        contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
-        contacts->triangle[to] = triangle;
-      } else {
-        // A proposal bounds the search from below: the inflated surface that Embree sees is met no later than
-        // the real one, but for a little that matters only at flat angles.
-        double earliest_m = 0;
-        if (rays.hit.geomID[k + lane] != RTC_INVALID_GEOMETRY_ID) {
-          const double cosine = std::abs(normal.x[lane] * along.x[lane] + normal.y[lane] * along.y[lane] +
-                                         normal.z[lane] * along.z[lane]);
-          if (cosine > kFlatCosine)
-            earliest_m =
-                start_m[k + lane] + static_cast<double>(rays.ray.tfar[k + lane]) - kSlackOfReach * reach_m_;
-        }
-        Store(CastExactly({origins_m[to], directions[to]}, longest_m, earliest_m), to, contacts);
+  const Triple<Double4> from = load(packet.origin), along = load(packet.direction);
+  const Triple<Double4> a = load(corner) - from, b = load(corner + 3) - from, c = load(corner + 6) - from;
+  const LineTriangle<Double4> hit = IntersectTriangle(along, a, b, c);
+  const Double4 side = hit.facing > 0 ? Double4{} + 1.0 : Double4{} - 1.0;
+  const auto clears = [&](int i) {
+    const Double4 inwards = hit.moment[i] * side;
+    return (inwards > 0) & (inwards * inwards > clear * clear * Dot(hit.edge[i], hit.edge[i]));
+  };
+  const Mask4 certain =
+      clears(0) & clears(1) & clears(2) & (hit.travel_m > clear) & (hit.travel_m <= longest_m);
+  const Triple<Double4> normal = NormalAgainst(hit);
+  const Triple<Double4> point = from + along * hit.travel_m;
+  const uint32_t certain_bits = BitsOf(certain);
+  for (int lane = 0; lane < std::min(4, count - k); ++lane) {
+    const uint32_t triangle = packet.rays.hit.primID[k + lane];
+    const uint32_t to = lines[k + lane];
+    if (packet.valid[k + lane] == 0) {
+      Store(NoContact(), to, contacts);
+    } else if (packet.Proposed(k + lane) && (certain_bits >> lane & 1) && !NearCoincident(triangle)) {
+      contacts->travel_m[to] = hit.travel_m[lane];
+      contacts->point_m[to] = {point.x[lane], point.y[lane], point.z[lane]};
+      contacts->normal[to] = {normal.x[lane], normal.y[lane], normal.z[lane]};
+      contacts->triangle[to] = triangle;
+    } else {
+      // A proposal bounds the search from below: the inflated surface that Embree sees is hit no later than
+      // the real one, but for a little that matters only at flat angles.
+      double earliest_m = 0;
+      if (packet.Proposed(k + lane)) {
+        const double cosine = std::abs(normal.x[lane] * along.x[lane] + normal.y[lane] * along.y[lane] +
+                                       normal.z[lane] * along.z[lane]);
+        if (cosine > kFlatCosine)
+          earliest_m = packet.start_m[k + lane] + static_cast<double>(packet.rays.ray.tfar[k + lane]) -
+                       kSlackOfReach * reach_m_;
       }
+      const Line line = {
+          {packet.origin[0][k + lane], packet.origin[1][k + lane], packet.origin[2][k + lane]},
+          {packet.direction[0][k + lane], packet.direction[1][k + lane], packet.direction[2][k + lane]}};
+      Store(CastExactly(line, longest_m, earliest_m), to, contacts);
     }
   }
+}
+
+template <int kWidth>
+void Surface::Search::CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions,
+                                 const uint32_t* lines, int count, double longest_m,
+                                 Contacts* contacts) const {
+  Packet<kWidth> packet;
+  packet.Load(origins_m, directions, lines, count);
+  StartRays(count, longest_m, &packet);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RunTogether<kWidth>(packet.direction) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                        : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  EmbreePacket<kWidth>::Intersect(packet.valid, scene_, &context, &packet.rays);
+
+  alignas(64) double corner[9][kWidth];  // of the proposed triangles, by lane
+  for (int k = 0; k < kWidth; ++k) LoadCorners(packet.rays.hit.primID[k], k, corner);
+  for (int k = 0; k < count; k += 4) ResolveLanes(packet, corner, k, count, longest_m, lines, contacts);
 }
 
 template <int kWidth>

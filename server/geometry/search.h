@@ -69,7 +69,7 @@ class Surface::Search {
   // `earliest_m`: no contact comes before this travel.
   Contact CastExactly(const Line& line, double longest_m, double earliest_m = 0) const;
 
-  // First contact of a ball whose centre starts at line.origin_m; travel is the centre's and at most
+  // First contact of a sphere whose centre starts at line.origin_m; travel is the centre's and at most
   // longest_m. `travel_bound_m`: some contact is known to come no later (infinity: none known); `likely` is
   // the triangle of that one, or kNoTriangle.
   Contact SweepExactly(const Line& line, double radius_m, double longest_m, double travel_bound_m,
@@ -86,11 +86,24 @@ class Surface::Search {
 
  private:
   template <int kWidth>
+  struct Packet;
+
+  template <int kWidth>
   void CastPackets(absl::Span<const Eigen::Vector3d> origins_m, absl::Span<const Eigen::Vector3d> directions,
                    double longest_m, Contacts* contacts) const;
   template <int kWidth>
   void CastPacket(const Eigen::Vector3d* origins_m, const Eigen::Vector3d* directions, const uint32_t* lines,
                   int count, double longest_m, Contacts* contacts) const;
+  // Rays start where the lines enter a sphere round the mesh, so that standing far away costs no precision.
+  // Lanes from `count` on, and lines that pass the sphere by, are not valid.
+  template <int kWidth>
+  void StartRays(int count, double longest_m, Packet<kWidth>* packet) const;
+  // The contacts of lanes k to k + 3 once Embree has proposed triangles, whose corners are given: the
+  // proposal's where the line stays clear of the triangle's border and no other sheet is near, else by the
+  // exact search.
+  template <int kWidth>
+  void ResolveLanes(const Packet<kWidth>& packet, const double (&corner)[9][kWidth], int k, int count,
+                    double longest_m, const uint32_t* lines, Contacts* contacts) const;
 
   // Puts a triangle's coordinates into lane k: corner[3 * corner + axis][k].
   template <size_t kWidth>
@@ -109,7 +122,7 @@ class Surface::Search {
 
   const TriangleMesh& mesh_;
   const Eigen::Vector3d centre_m_;
-  double reach_m_ = 0;     // radius of a ball round centre_m_ that holds the mesh
+  double reach_m_ = 0;     // radius of a sphere round centre_m_ that holds the mesh
   double rounding_m_ = 0;  // what single precision may be off, anywhere near the mesh
   std::vector<Eigen::Vector3f> inflated_vertices_m_;  // what Embree sees: see InflateVertices
   RTCScene scene_ = nullptr;
@@ -126,7 +139,7 @@ class Surface::Search {
 RTCDevice EmbreeDevice();
 int EmbreePacketWidth();
 
-// Mean curvature at every vertex, 1/m, positive where convex; 0 on borders and where it cannot be told.
+// Mean curvature at every vertex, 1/m, positive where convex; 0 on borders and where it cannot be determined.
 std::vector<float> VertexMeanCurvaturePerM(const TriangleMesh& mesh);
 
 }  // namespace touchstone

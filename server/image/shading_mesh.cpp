@@ -74,6 +74,43 @@ uint32_t NextCorner(uint32_t corner) {
   return corner % 3 == 2 ? corner - 2 : corner + 1;
 }
 
+// Every half edge of the mesh, those of the same two vertices side by side.
+std::vector<HalfEdge> SortedHalfEdges(const TriangleMesh& mesh, const std::vector<uint32_t>& welded) {
+  std::vector<HalfEdge> edges(3 * mesh.triangles.size());
+  for (uint32_t corner = 0; corner < edges.size(); ++corner) {
+    const uint32_t next = NextCorner(corner);
+    const uint32_t from = welded[mesh.triangles[corner / 3][corner % 3]];
+    const uint32_t to = welded[mesh.triangles[next / 3][next % 3]];
+    edges[corner] = {std::min(from, to), std::max(from, to), corner, from < to};
+  }
+  std::sort(edges.begin(), edges.end());
+  return edges;
+}
+
+// Joins the corners on both sides of every edge that is no crease. Returns whether the mesh is closed and consistently
+// wound: whether every edge has two triangles that run through it in opposite directions.
+bool JoinSmoothEdges(const std::vector<HalfEdge>& edges, const std::vector<Eigen::Vector3d>& normals,
+                     CornerGroups* groups) {
+  bool closed = true;
+  const double crease_cosine = std::cos(kCreaseRad);
+  for (size_t i = 0; i < edges.size();) {
+    size_t end = i + 1;
+    while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
+    if (end - i == 2 && edges[i].forward != edges[i + 1].forward) {
+      const uint32_t a = edges[i].first, b = edges[i + 1].first;
+      const Eigen::Vector3d &na = normals[a / 3], &nb = normals[b / 3];
+      if (na.dot(nb) > crease_cosine * na.norm() * nb.norm()) {
+        groups->Join(a, NextCorner(b));
+        groups->Join(NextCorner(a), b);
+      }
+    } else {
+      closed = false;
+    }
+    i = end;
+  }
+  return closed;
+}
+
 // Whether any ray from outside meets a back face first: inverted parts, walls that cross each other. Rays
 // between random points of the bounding sphere and of the sphere inside it; the same ones for every mesh.
 bool ShowsBackFaces(const Surface& surface, double sign) {
@@ -120,35 +157,8 @@ ShadingMesh MakeShadingMesh(const Surface& surface) {
     volume += (a - centre_m).dot(normals[t]);
   }
 
-  // Edges: join what is smooth, see whether the mesh is closed and wound alike everywhere.
-  std::vector<HalfEdge> edges(3 * triangles);
-  for (uint32_t corner = 0; corner < edges.size(); ++corner) {
-    const uint32_t next = NextCorner(corner);
-    const uint32_t from = welded[mesh.triangles[corner / 3][corner % 3]];
-    const uint32_t to = welded[mesh.triangles[next / 3][next % 3]];
-    edges[corner] = {std::min(from, to), std::max(from, to), corner, from < to};
-  }
-  std::sort(edges.begin(), edges.end());
-  CornerGroups groups(edges.size());
-  bool closed = true;
-  const double crease_cosine = std::cos(kCreaseRad);
-  for (size_t i = 0; i < edges.size();) {
-    size_t end = i + 1;
-    while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
-    if (end - i == 2 && edges[i].forward != edges[i + 1].forward) {
-      const uint32_t a = edges[i].first, b = edges[i + 1].first;
-      const Eigen::Vector3d &na = normals[a / 3], &nb = normals[b / 3];
-      if (na.dot(nb) > crease_cosine * na.norm() * nb.norm()) {
-        groups.Join(a, NextCorner(b));
-        groups.Join(NextCorner(a), b);
-      }
-    } else {
-      closed = false;
-    }
-    i = end;
-  }
-  edges.clear();
-  edges.shrink_to_fit();
+  CornerGroups groups(3 * triangles);
+  const bool closed = JoinSmoothEdges(SortedHalfEdges(mesh, welded), normals, &groups);
 
   // Area-weighted sums over the groups.
   std::vector<uint32_t> vertex_of_root(3 * triangles, kNone);
