@@ -14,7 +14,7 @@ set(touchstone_protocol_headers
   <touchstone/v1/types.pb.h> <touchstone/v1/source.grpc.pb.h> <touchstone/v1/control.grpc.pb.h>
   <touchstone/v1/models.grpc.pb.h> <touchstone/v1/sessions.grpc.pb.h> <touchstone/v1/diagnosis.grpc.pb.h>
   <touchstone/v1/rig.grpc.pb.h> <grpcpp/grpcpp.h> <google/protobuf/util/json_util.h>
-  <CLI/CLI.hpp> <nlohmann/json.hpp>)
+  <nlohmann/json.hpp>)
 set(touchstone_test_headers <gmock/gmock.h> <gtest/gtest.h>)
 
 # touchstone_header_set(NAME headers...): the target touchstone_headers_NAME that others reuse.
@@ -66,7 +66,7 @@ function(touchstone_precompile)
     target_link_libraries(touchstone_headers_${set} PRIVATE GTest::gmock GTest::gtest)
   endforeach()
   foreach(set protocol protocol_test)
-    target_link_libraries(touchstone_headers_${set} PRIVATE touchstone_proto CLI11::CLI11 nlohmann_json::nlohmann_json)
+    target_link_libraries(touchstone_headers_${set} PRIVATE touchstone_proto nlohmann_json::nlohmann_json)
   endforeach()
   get_property(targets GLOBAL PROPERTY TOUCHSTONE_TARGETS)
   foreach(target ${targets})
