@@ -124,6 +124,9 @@ def test_a_list_of_touches_is_a_dataset(client):
 def test_the_catalogue_and_the_store_are_readable(client, tmp_path):
     effects = {e.name: e for e in client.effects()}
     assert effects["tip_radius"].parameters[0].unit == "mm" and effects["tip_radius"].stage == "contact"
+    assert {e.stage for e in effects.values()} == {"pose", "contact", "motion", "sensor"}
+    assert [effects[name].parameters[0].arity for name in ("tip_radius", "object_pose", "finger_length")] == [
+        "scalar", "vector3", "finger"]
     nominal = client.model()
     assert nominal.fingers == 3 and nominal.name in {m.name for m in client.models()}
     path = tmp_path / "round.yaml"
