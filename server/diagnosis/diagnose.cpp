@@ -9,9 +9,9 @@
 #include "server/base/status.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/report/residuals_messages.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/residuals/slices.h"
 #include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone {
@@ -66,10 +66,9 @@ void Describe(const Study& study, const std::vector<double>& before, const Predi
               const std::vector<double>& after, v1::Report* report) {
   const Observations& o = *study.observations;
   const double sigma_s = report->noise_floor_us() * 1e-6;
-  for (v1::Slice& slice : FindSlices(o, study.nominal, before, sigma_s))
-    *report->add_where() = std::move(slice);
-  DescribeResiduals(o, study.nominal, improved, before, after,
-                    {sigma_s, study.input.model->spacing_m, study.input.seed}, report);
+  WriteResiduals(DescribeResiduals(o, study.nominal, improved, before, after,
+                                   {sigma_s, study.input.model->spacing_m, study.input.seed}),
+                 o.fingers, report);
 }
 
 // Touches that would tell what fits alike apart. Always asked for by Propose; Diagnose asks only where

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/readable_time.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/distributions/compatible_effects.h"
 #include "server/diagnosis/distributions/pose_free_report.h"
-#include "server/diagnosis/residuals/slices.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone {

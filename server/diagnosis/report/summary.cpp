@@ -8,7 +8,7 @@
 #include <cmath>
 #include <set>
 
-#include "server/diagnosis/residuals/slices.h"
+#include "server/base/readable_time.h"
 
 namespace touchstone {
 namespace {

@@ -11,9 +11,9 @@
 namespace touchstone {
 namespace {
 
-// Whether two used touches differ in it.
+// Whether any two used touches differ in the covariate.
 bool Varies(const Observations& observations, const ResidualCovariate& covariate) {
-  double least = INFINITY, most = -INFINITY;
+  double min = INFINITY, max = -INFINITY;
   // Every touch of a small set; of a large one enough to see any difference that could matter.
   const int step = std::max(1, observations.size() / 20000);
   for (int k = 0; k < observations.size(); k += step) {
@@ -21,17 +21,18 @@ bool Varies(const Observations& observations, const ResidualCovariate& covariate
     for (int finger = 0; finger < observations.fingers; ++finger) {
       const double value = covariate.value(k, finger);
       if (std::isnan(value)) continue;
-      least = std::min(least, value);
-      most = std::max(most, value);
+      min = std::min(min, value);
+      max = std::max(max, value);
     }
   }
-  return most - least > 1e-9 * std::max(std::abs(most), std::abs(least));
+  return max - min > 1e-9 * std::max(std::abs(max), std::abs(min));
 }
 
-std::vector<std::string> Numbers(const std::vector<int>& values, int* least) {
+// Labels of every whole number from the lowest to the highest value; none if they are too many.
+std::vector<std::string> Numbers(const std::vector<int>& values, int* lowest) {
   std::vector<std::string> labels;
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  *least = *low;
+  *lowest = *low;
   if (*high - *low >= 200) return labels;  // no category that a person could picture
   for (int value = *low; value <= *high; ++value) labels.push_back(absl::StrCat(value));
   return labels;
@@ -61,15 +62,15 @@ std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observ
     add("incidence_deg", "incidence", "deg", [&prediction, fingers](int k, int i) {
       return std::acos(std::min(1.0, prediction.cos_incidence[size_t(k) * fingers + i])) / kRadiansPerDegree;
     });
-  add_cell("travel_mm", "travel", "mm", prediction.travel_m, 1e3);
+  add_cell("travel_mm", "travel", "mm", prediction.travel_m, kMillimetresPerMetre);
   add_cell("curvature_per_m", "curvature", "1/m", prediction.curvature_per_m, 1);
-  add_cell("previous_press_mm", "previous press", "mm", prediction.previous_press_m, 1e3);
+  add_cell("previous_press_mm", "previous press", "mm", prediction.previous_press_m, kMillimetresPerMetre);
   static const char* const kContact[3][2] = {
       {"contact_x_mm", "contact x"}, {"contact_y_mm", "contact y"}, {"contact_z_mm", "contact z"}};
   if (prediction.contact_m.size() == cells)
     for (int axis = 0; axis < 3; ++axis)
       add(kContact[axis][0], kContact[axis][1], "mm", [&prediction, fingers, axis](int k, int i) {
-        return 1e3 * prediction.contact_m[size_t(k) * fingers + i][axis];
+        return kMillimetresPerMetre * prediction.contact_m[size_t(k) * fingers + i][axis];
       });
   if (fingers > 1 && prediction.first_finger.size() == size_t(observations.size())) {
     add("first", "first finger", "", [&prediction](int k, int i) {
@@ -87,7 +88,8 @@ std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observ
   for (int axis = 0; axis < 3; ++axis)
     add(kDirections[1][axis], kDirections[1][axis], "",
         [&set, &row, axis](int k, int) { return set.lateral[row[k]][axis]; });
-  add("speed_mm_s", "speed", "mm/s", [&set, &row](int k, int) { return 1e3 * set.speed_m_s[row[k]]; });
+  add("speed_mm_s", "speed", "mm/s",
+      [&set, &row](int k, int) { return kMillimetresPerMetre * set.speed_m_s[row[k]]; });
 
   // Where in the session, and what else was written down.
   if (set.has_session_time)
@@ -106,10 +108,10 @@ std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observ
   for (const auto& [name, values] :
        {std::make_pair("face", &set.face), std::make_pair("round", &set.round)}) {
     if (values->empty()) continue;
-    int least = 0;
-    std::vector<std::string> labels = Numbers(*values, &least);
+    int lowest = 0;
+    std::vector<std::string> labels = Numbers(*values, &lowest);
     const std::vector<int>& column = *values;
-    add(name, name, "", [&column, &row, least](int k, int) { return double(column[row[k]] - least); });
+    add(name, name, "", [&column, &row, lowest](int k, int) { return double(column[row[k]] - lowest); });
     list.back().labels = std::move(labels);
   }
 

@@ -1,4 +1,4 @@
-// What a residual may hang on, in words and units that people use: one list for slices and for curves.
+// What a residual may depend on, in the words and units that people use: one list for slices and for curves.
 #pragma once
 
 #include <functional>
@@ -21,19 +21,21 @@ struct ResidualCovariate {
   bool is_category() const { return !labels.empty(); }
 };
 
-// Everything that set and prediction know, without what is the same everywhere. Both must outlive the list.
+// Every covariate that the set and the prediction have values for, without those that never vary. Both must
+// outlive the list.
 std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observations,
                                                       const Prediction& prediction);
 
-// At most `limit` of the touches that take part (used, with a residual), in order: whole poses, the same ones
-// at every call.
+// At most about `limit` of the touches that take part (used, with a residual), in order: whole poses, the same
+// ones at every call.
 std::vector<int> ThinnedTouches(const Observations& observations, const std::vector<double>& residuals,
                                 int limit);
 
-// How many fingers of touch k have a residual.
+// The number of fingers of touch k that have a residual.
 int FingersCompared(const Observations& observations, const std::vector<double>& residuals, int k);
 
-// What noise of sigma adds to the square of one finger's residual, in a touch with that many fingers.
+// What noise of sigma_s contributes on average to the square of one finger's residual (s^2), in a touch with that
+// many compared fingers: removing the touch's mean takes away one part in n.
 inline double NoiseShare(double sigma_s, int fingers_compared) {
   return sigma_s * sigma_s * (1 - 1.0 / fingers_compared);
 }

@@ -1,37 +1,36 @@
-// What the pictures of a report show: errors by group, residuals over covariates, histograms, parity, points
-// on the surfaces (DESIGN 8 and 9).
+// What the pictures and tables of a report show of the residuals: where the model is wrong, errors by group,
+// residuals over covariates, histograms, parity, points on the surfaces.
 #pragma once
 
 #include <vector>
 
-#include "server/diagnosis/touches/observations.h"
-#include "server/diagnosis/touches/prediction.h"
-#include "touchstone/v1/diagnosis.pb.h"
+#include "server/diagnosis/residuals/curves.h"
+#include "server/diagnosis/residuals/groups.h"
+#include "server/diagnosis/residuals/histograms.h"
+#include "server/diagnosis/residuals/outlines.h"
+#include "server/diagnosis/residuals/parity.h"
+#include "server/diagnosis/residuals/slices.h"
+#include "server/diagnosis/residuals/surface_points.h"
+#include "server/diagnosis/residuals/worst_touches.h"
 
 namespace touchstone {
 
-struct ResidualScale {
-  double sigma_s = 0;        // of one finger's time
-  double spacing_m = 0.030;  // between fingers, for the local curvature
-  uint64_t seed = 0;         // of permutations and of the noise that is added to simulated times
+// Each part is documented at its type. Fingers are numbered, 0 is the first.
+struct ResidualSummary {
+  std::vector<ErrorSlice> slices;
+  GroupedErrors grouped;
+  std::vector<WorstTouch> worst_touches;
+  std::vector<ResidualCurve> curves;
+  std::vector<ComparedHistogram> histograms;
+  std::vector<ParityPoint> parity;
+  std::vector<SurfaceResidual> surface_points;
+  std::vector<DrawableObject> outlines;
 };
 
-// Fills groups, worst_touches, finger_bias_us, curves, histograms, parity, surface_points and outlines.
-// `before` and `after` are the residuals of the predictions `initial` and `improved`, which may be the same.
-// Deterministic. Permutations read at most 20,000 poses' worth of touches, curves at most 60,000 touches;
-// everything else reads all.
-void DescribeResiduals(const Observations& observations, const Prediction& initial,
-                       const Prediction& improved, const std::vector<double>& before,
-                       const std::vector<double>& after, const ResidualScale& scale, v1::Report* report);
-
-// Its parts, a file each.
-void DescribeGroups(const Observations& observations, const std::vector<double>& residuals, double sigma_s,
-                    v1::Report* report);  // groups.cpp: also worst touches and bias
-void DescribeCurves(const Observations& observations, const Prediction& initial,
-                    const std::vector<double>& before, const std::vector<double>& after, uint64_t seed,
-                    v1::Report* report);  // curves.cpp
-void DescribeHistograms(const Observations& observations, const Prediction& initial,
-                        const Prediction& improved, const ResidualScale& scale,
-                        v1::Report* report);  // histograms.cpp
+// `before` and `after` are the residuals of the predictions `initial` and `improved`, which may be the same:
+// [k * fingers + finger], seconds, NaN where a finger takes no part. Deterministic.
+ResidualSummary DescribeResiduals(const Observations& observations, const Prediction& initial,
+                                  const Prediction& improved, const std::vector<double>& before,
+                                  const std::vector<double>& after, const ResidualScale& scale);
 
 }  // namespace touchstone

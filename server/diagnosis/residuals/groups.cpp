@@ -1,71 +1,32 @@
-// Errors by object, face, finger, round, time and speed; the worst touches; the bias of each finger.
+#include "server/diagnosis/residuals/groups.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
-#include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/covariates.h"
-#include "server/diagnosis/residuals/describe_residuals.h"
 
 namespace touchstone {
 namespace {
 
 constexpr int kTimeBins = 8;
 constexpr size_t kMaxGroups = 200;  // of one kind
-constexpr size_t kWorstTouches = 10;
 
-struct Group {
+struct GroupSums {
   std::string name;
-  double touches = 0, fingers = 0, degrees = 0, sum = 0, squares = 0, excess = 0;
+  double touches = 0, fingers = 0, dof = 0, sum = 0, squares = 0, excess = 0;  // of residuals: s, s^2
 };
 
-class Groups {
- public:
-  explicit Groups(double sigma_s) : sigma_s_(sigma_s) {}
-
-  void Add(Group* group, const double* residuals, int fingers, int compared, int only_finger = -1) const {
-    ++group->touches;
-    // A finger's share of a touch's degrees of freedom: so its RMSE compares with the whole set's.
-    const double degrees_a_finger = 1 - 1.0 / compared;
-    for (int i = 0; i < fingers; ++i) {
-      if (std::isnan(residuals[i]) || (only_finger >= 0 && i != only_finger)) continue;
-      group->fingers += 1;
-      group->degrees += degrees_a_finger;
-      group->sum += residuals[i];
-      group->squares += residuals[i] * residuals[i];
-      group->excess += residuals[i] * residuals[i] - NoiseShare(sigma_s_, compared);
-    }
-  }
-
-  void Report(const std::string& kind, const std::vector<Group>& groups, double all_excess,
-              v1::Report* report) const {
-    if (groups.size() > kMaxGroups) return;
-    for (const Group& group : groups) {
-      if (group.touches == 0 || group.degrees == 0) continue;
-      v1::GroupError* message = report->add_groups();
-      message->set_kind(kind);
-      message->set_name(group.name);
-      message->set_touches(static_cast<uint32_t>(group.touches));
-      message->set_rmse_us(std::sqrt(group.squares / group.degrees) * 1e6);
-      message->set_mean_residual_us(group.sum / group.fingers * 1e6);
-      message->set_share_of_excess_error(all_excess > 0 ? std::clamp(group.excess / all_excess, 0.0, 1.0)
-                                                        : 0);
-    }
-  }
-
- private:
-  const double sigma_s_;
-};
-
-// Index of every number among the distinct ones, in their order.
-std::vector<Group> Levels(const std::vector<double>& values, std::vector<int>* level,
-                          const std::function<std::string(double)>& name) {
+// Index of every number among the distinct ones, in their order; returns an empty group for each.
+std::vector<GroupSums> Levels(const std::vector<double>& values, std::vector<int>* level,
+                              const std::function<std::string(double)>& name) {
   std::vector<double> distinct = values;
   std::sort(distinct.begin(), distinct.end());
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  std::vector<Group> groups(distinct.size());
+  std::vector<GroupSums> groups(distinct.size());
   for (size_t g = 0; g < distinct.size(); ++g) groups[g].name = name(distinct[g]);
   level->resize(values.size());
   for (size_t k = 0; k < values.size(); ++k)
@@ -74,104 +35,151 @@ std::vector<Group> Levels(const std::vector<double>& values, std::vector<int>* l
   return groups;
 }
 
-}  // namespace
+std::string WholeNumber(double value) {
+  return absl::StrCat(static_cast<int>(value));
+}
 
-void DescribeGroups(const Observations& observations, const std::vector<double>& residuals, double sigma_s,
-                    v1::Report* report) {
-  const MeasurementSet& set = *observations.set;
-  const int fingers = observations.fingers, size = observations.size();
-  const Groups tally(sigma_s);
+class ErrorGrouper {
+ public:
+  ErrorGrouper(const Observations& observations, const std::vector<double>& residuals, double sigma_s);
+  GroupedErrors Group();
 
-  // The touches that count, and how many fingers of each.
-  std::vector<int> touches, compared;
-  for (int k = 0; k < size; ++k) {
+ private:
+  void Add(size_t n, int only_finger, GroupSums* group) const;
+  void Report(ErrorGroupKind kind, const std::vector<GroupSums>& groups);
+  // Every counted touch n goes into groups[level[n]].
+  void ByLevel(ErrorGroupKind kind, std::vector<GroupSums> groups, const std::vector<int>& level);
+  void ByNumber(ErrorGroupKind kind, const std::vector<double>& values,
+                const std::function<std::string(double)>& name);
+  std::vector<GroupSums> ByFinger();
+  void ByTime();
+  // A value of every counted touch, from its row of the set.
+  template <typename Value>
+  std::vector<double> Column(Value value) const {
+    std::vector<double> values(touches_.size());
+    for (size_t n = 0; n < touches_.size(); ++n) values[n] = value(observations_.row[touches_[n]]);
+    return values;
+  }
+
+  const Observations& observations_;
+  const std::vector<double>& residuals_;
+  const double sigma_s_;
+  std::vector<int> touches_, compared_;  // the touches that count, and how many fingers of each
+  double all_excess_ = 0;
+  GroupedErrors result_;
+};
+
+ErrorGrouper::ErrorGrouper(const Observations& observations, const std::vector<double>& residuals,
+                           double sigma_s)
+    : observations_(observations), residuals_(residuals), sigma_s_(sigma_s) {
+  for (int k = 0; k < observations.size(); ++k) {
     const int count = FingersCompared(observations, residuals, k);
     if (!observations.used[k] || count < 2) continue;
-    touches.push_back(k);
-    compared.push_back(count);
+    touches_.push_back(k);
+    compared_.push_back(count);
   }
+}
 
-  // By finger first: their sum is the whole excess.
-  std::vector<Group> by_finger(fingers);
-  double all_excess = 0;
-  for (int i = 0; i < fingers; ++i) {
-    by_finger[i].name = FingerName(i, fingers);
-    for (size_t n = 0; n < touches.size(); ++n) {
-      const double* residual = &residuals[size_t(touches[n]) * fingers];
-      if (!std::isnan(residual[i])) tally.Add(&by_finger[i], residual, fingers, compared[n], i);
-    }
-    all_excess += by_finger[i].excess;
-    report->add_finger_bias_us(by_finger[i].fingers ? by_finger[i].sum / by_finger[i].fingers * 1e6 : 0);
+void ErrorGrouper::Add(size_t n, int only_finger, GroupSums* group) const {
+  const double* const residual_s = &residuals_[size_t(touches_[n]) * observations_.fingers];
+  ++group->touches;
+  // A finger's share of a touch's degrees of freedom, so that the group's RMSE compares with the whole set's.
+  const double dof_per_finger = 1 - 1.0 / compared_[n];
+  for (int i = 0; i < observations_.fingers; ++i) {
+    if (std::isnan(residual_s[i]) || (only_finger >= 0 && i != only_finger)) continue;
+    group->fingers += 1;
+    group->dof += dof_per_finger;
+    group->sum += residual_s[i];
+    group->squares += residual_s[i] * residual_s[i];
+    group->excess += residual_s[i] * residual_s[i] - NoiseShare(sigma_s_, compared_[n]);
   }
+}
 
-  const auto by_level = [&](const std::string& kind, std::vector<Group> groups,
-                            const std::vector<int>& level) {
-    for (size_t n = 0; n < touches.size(); ++n)
-      tally.Add(&groups[level[n]], &residuals[size_t(touches[n]) * fingers], fingers, compared[n]);
-    tally.Report(kind, groups, all_excess, report);
-  };
-  const auto by_number = [&](const std::string& kind, const std::vector<double>& values,
-                             const std::function<std::string(double)>& name) {
-    std::vector<int> level;
-    std::vector<Group> groups = Levels(values, &level, name);
-    by_level(kind, std::move(groups), level);
-  };
-  const auto column = [&](auto value) {
-    std::vector<double> values(touches.size());
-    for (size_t n = 0; n < touches.size(); ++n) values[n] = value(observations.row[touches[n]]);
-    return values;
-  };
-  const auto whole = [](double value) { return absl::StrCat(static_cast<int>(value)); };
-
-  std::vector<Group> objects(observations.objects.size());
-  std::vector<int> object(touches.size());
-  for (size_t o = 0; o < objects.size(); ++o) objects[o].name = observations.objects[o];
-  for (size_t n = 0; n < touches.size(); ++n) object[n] = observations.object[touches[n]];
-  by_level("object", std::move(objects), object);
-  if (!set.face.empty()) by_number("face", column([&](int row) { return set.face[row]; }), whole);
-  tally.Report("finger", by_finger, all_excess, report);
-  if (!set.round.empty()) by_number("round", column([&](int row) { return set.round[row]; }), whole);
-
-  // Time in parts of equal length.
-  if (set.has_session_time && !touches.empty()) {
-    const std::vector<double> time_s = column([&](int row) { return set.session_time_s[row]; });
-    const auto [begin, end] = std::minmax_element(time_s.begin(), time_s.end());
-    const double part_s = (*end - *begin) / kTimeBins;
-    if (part_s > 0) {
-      std::vector<Group> parts(kTimeBins);
-      for (int p = 0; p < kTimeBins; ++p)
-        parts[p].name = absl::StrCat(std::lround((*begin + p * part_s) / 60), " to ",
-                                     std::lround((*begin + (p + 1) * part_s) / 60), " min");
-      std::vector<int> part(touches.size());
-      for (size_t n = 0; n < touches.size(); ++n)
-        part[n] = std::min(kTimeBins - 1, static_cast<int>((time_s[n] - *begin) / part_s));
-      by_level("time", std::move(parts), part);
-    }
+void ErrorGrouper::Report(ErrorGroupKind kind, const std::vector<GroupSums>& groups) {
+  if (groups.size() > kMaxGroups) return;
+  for (const GroupSums& group : groups) {
+    if (group.touches == 0 || group.dof == 0) continue;
+    ErrorGroup reported;
+    reported.kind = kind;
+    reported.name = group.name;
+    reported.touches = static_cast<int>(group.touches);
+    reported.rmse_s = std::sqrt(group.squares / group.dof);
+    reported.mean_residual_s = group.sum / group.fingers;
+    reported.share_of_excess_error = all_excess_ > 0 ? std::clamp(group.excess / all_excess_, 0.0, 1.0) : 0;
+    result_.groups.push_back(std::move(reported));
   }
-  by_number("speed", column([&](int row) { return std::round(set.speed_m_s[row] * 1e9) * 1e-6; }),
-            [](double mm_s) { return absl::StrCat(mm_s, " mm/s"); });
+}
 
-  // The worst touches, largest first.
-  std::vector<double> norm2(touches.size(), 0);
-  std::vector<int> order(touches.size());
-  for (size_t n = 0; n < touches.size(); ++n) {
-    order[n] = static_cast<int>(n);
-    for (int i = 0; i < fingers; ++i) {
-      const double residual_s = residuals[size_t(touches[n]) * fingers + i];
-      if (!std::isnan(residual_s)) norm2[n] += residual_s * residual_s;
-    }
+void ErrorGrouper::ByLevel(ErrorGroupKind kind, std::vector<GroupSums> groups,
+                           const std::vector<int>& level) {
+  for (size_t n = 0; n < touches_.size(); ++n) Add(n, -1, &groups[level[n]]);
+  Report(kind, groups);
+}
+
+void ErrorGrouper::ByNumber(ErrorGroupKind kind, const std::vector<double>& values,
+                            const std::function<std::string(double)>& name) {
+  std::vector<int> level;
+  std::vector<GroupSums> groups = Levels(values, &level, name);
+  ByLevel(kind, std::move(groups), level);
+}
+
+// The fingers' excess adds up to the whole set's.
+std::vector<GroupSums> ErrorGrouper::ByFinger() {
+  std::vector<GroupSums> fingers(observations_.fingers);
+  for (int i = 0; i < observations_.fingers; ++i) {
+    fingers[i].name = FingerName(i, observations_.fingers);
+    for (size_t n = 0; n < touches_.size(); ++n)
+      if (!std::isnan(residuals_[size_t(touches_[n]) * observations_.fingers + i])) Add(n, i, &fingers[i]);
+    all_excess_ += fingers[i].excess;
+    result_.finger_bias_s.push_back(fingers[i].fingers ? fingers[i].sum / fingers[i].fingers : 0);
   }
-  const size_t worst = std::min(kWorstTouches, order.size());
-  std::partial_sort(order.begin(), order.begin() + worst, order.end(),
-                    [&](int a, int b) { return norm2[a] != norm2[b] ? norm2[a] > norm2[b] : a < b; });
-  for (size_t n = 0; n < worst; ++n) {
-    const int k = touches[order[n]];
-    v1::TouchError* message = report->add_worst_touches();
-    message->set_touch(set.touch[observations.row[k]]);
-    message->set_object(observations.objects[observations.object[k]]);
-    message->set_norm_us(std::sqrt(norm2[order[n]]) * 1e6);
-    for (int i = 0; i < fingers; ++i) message->add_residual_us(residuals[size_t(k) * fingers + i] * 1e6);
-  }
+  return fingers;
+}
+
+// Parts of the session of equal length.
+void ErrorGrouper::ByTime() {
+  if (!observations_.set->has_session_time || touches_.empty()) return;
+  const std::vector<double> time_s = Column([&](int row) { return observations_.set->session_time_s[row]; });
+  const auto [begin, end] = std::minmax_element(time_s.begin(), time_s.end());
+  const double part_s = (*end - *begin) / kTimeBins;
+  if (!(part_s > 0)) return;
+  std::vector<GroupSums> parts(kTimeBins);
+  for (int p = 0; p < kTimeBins; ++p)
+    parts[p].name = absl::StrCat(std::lround((*begin + p * part_s) / 60), " to ",
+                                 std::lround((*begin + (p + 1) * part_s) / 60), " min");
+  std::vector<int> part(touches_.size());
+  for (size_t n = 0; n < touches_.size(); ++n)
+    part[n] = std::min(kTimeBins - 1, static_cast<int>((time_s[n] - *begin) / part_s));
+  ByLevel(ErrorGroupKind::kTime, std::move(parts), part);
+}
+
+GroupedErrors ErrorGrouper::Group() {
+  const MeasurementSet& set = *observations_.set;
+  const std::vector<GroupSums> fingers = ByFinger();
+
+  std::vector<GroupSums> objects(observations_.objects.size());
+  std::vector<int> object(touches_.size());
+  for (size_t o = 0; o < objects.size(); ++o) objects[o].name = observations_.objects[o];
+  for (size_t n = 0; n < touches_.size(); ++n) object[n] = observations_.object[touches_[n]];
+  ByLevel(ErrorGroupKind::kObject, std::move(objects), object);
+  if (!set.face.empty())
+    ByNumber(ErrorGroupKind::kFace, Column([&](int row) { return set.face[row]; }), WholeNumber);
+  Report(ErrorGroupKind::kFinger, fingers);
+  if (!set.round.empty())
+    ByNumber(ErrorGroupKind::kRound, Column([&](int row) { return set.round[row]; }), WholeNumber);
+  ByTime();
+  // Speeds that differ by less than a nanometre per second are one; the groups' names are in mm/s.
+  ByNumber(ErrorGroupKind::kSpeed,
+           Column([&](int row) { return std::round(set.speed_m_s[row] * 1e9) * 1e-6; }),
+           [](double mm_s) { return absl::StrCat(mm_s, " mm/s"); });
+  return std::move(result_);
+}
+
+}  // namespace
+
+GroupedErrors GroupErrors(const Observations& observations, const std::vector<double>& residuals,
+                          double sigma_s) {
+  return ErrorGrouper(observations, residuals, sigma_s).Group();
 }
 
 }  // namespace touchstone

@@ -13,7 +13,7 @@ std::vector<double> HistogramEdges(std::vector<double> pooled) {
   const double low = quantile(0.001), high = quantile(0.999);
   const double size = std::max(std::abs(low), std::abs(high));
   if (high - low <= 1e-12 * size) {
-    const double half = size > 0 ? 1e-3 * size : 0.5;  // all alike: one bin around the value
+    const double half = size > 0 ? 1e-3 * size : 0.5;  // all values equal: one bin around them
     return {low - half, high + half};
   }
   double width = 2 * (quantile(0.75) - quantile(0.25)) / std::cbrt(static_cast<double>(pooled.size()));

@@ -6,7 +6,9 @@
 namespace touchstone {
 namespace {
 
-// `cells` along the longest side of the box.
+constexpr int kOutlineTriangles = 400;
+
+// One vertex for each occupied cell of a grid with `cells` cells along the longest side of the box.
 TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells) {
   const double size_m = (bounds.max_m - bounds.min_m).maxCoeff() / cells * (1 + 1e-9);
   constexpr uint32_t kNone = 0xFFFFFFFFu;
@@ -50,7 +52,7 @@ TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells
 TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles) {
   if (static_cast<int>(mesh.triangles.size()) <= max_triangles) return mesh;
   const Bounds bounds = ComputeBounds(mesh);
-  // Up from the coarsest: those are cheap. A closed surface has about 12 cells^2 triangles.
+  // From the coarsest grid upwards, since coarse ones are cheap. A closed surface has about 12 cells^2 triangles.
   TriangleMesh best;
   for (int cells = 2; cells <= 64; ++cells) {
     TriangleMesh coarse = Clustered(mesh, bounds, cells);
@@ -58,6 +60,15 @@ TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles) {
     best = std::move(coarse);
   }
   return best;
+}
+
+std::vector<DrawableObject> MakeOutlines(const Observations& observations) {
+  std::vector<DrawableObject> outlines;
+  for (size_t o = 0; o < observations.objects.size(); ++o)
+    if (observations.surfaces[o])
+      outlines.push_back(
+          {observations.objects[o], Decimated(observations.surfaces[o]->mesh(), kOutlineTriangles)});
+  return outlines;
 }
 
 }  // namespace touchstone

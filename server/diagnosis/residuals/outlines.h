@@ -1,12 +1,24 @@
-// A coarse copy of a mesh, for drawing.
+// Coarse copies of the objects' meshes, for drawing.
 #pragma once
 
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/touches/observations.h"
 #include "server/geometry/mesh.h"
 
 namespace touchstone {
 
-// At most `max_triangles` triangles that follow the mesh: vertices in one cell of the finest grid that is
-// coarse enough become one, at their mean (Rossignac and Borrel 1993).
+// At most `max_triangles` triangles that follow the mesh: vertices in one cell of the finest grid that is coarse
+// enough become one, at their mean (Rossignac and Borrel 1993).
 TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles);
+
+struct DrawableObject {
+  std::string object;
+  TriangleMesh mesh;  // at most 400 triangles, object frame
+};
+
+// Every object that has a surface.
+std::vector<DrawableObject> MakeOutlines(const Observations& observations);
 
 }  // namespace touchstone

@@ -11,10 +11,10 @@
 namespace touchstone {
 namespace {
 
-constexpr int kThresholds = 14;  // about so many for a number
-constexpr int kFewLevels = 8;    // so many distinct numbers are levels ("speed = 20 mm/s"), not a scale
+constexpr int kThresholds = 14;  // about so many per continuous covariate
+constexpr int kFewLevels = 8;    // up to so many distinct numbers are levels ("speed = 20 mm/s"), not a scale
 
-// The least of 1, 2 or 5 times a power of ten that is at least `step`.
+// The smallest of 1, 2 or 5 times a power of ten that is at least `step`.
 double ReadableStep(double step) {
   const double power = std::pow(10, std::floor(std::log10(step)));
   for (const double factor : {1.0, 2.0, 5.0})
@@ -38,8 +38,9 @@ std::vector<std::pair<int, int>> Ranges(const SliceBins& bins) {
   return ranges;
 }
 
-// A second condition must earn its place.
+// A second condition multiplies the score by this, so that it must gain more than it costs to read.
 constexpr double kWorthOfSecondCondition = 0.85;
+// A simpler slice replaces one that scores at most 1 / 0.75 of it.
 constexpr double kScoreThatOneConditionKeeps = 0.75;
 
 }  // namespace
@@ -125,82 +126,117 @@ std::string SliceBins::Words(int low, int high) const {
   return absl::StrCat(Number(thresholds_[low - 1]), " < ", words, " < ", Number(thresholds_[high]));
 }
 
-std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
-                                         const std::vector<int>& live, int min_cells, int most) {
-  Sums all;
-  for (const int cell : live) all += {1, cells.excess_s2[cell], cells.residual_s[cell]};
-  if (all.count == 0) return {};
-  const int covariates = static_cast<int>(bins.size());
-  std::vector<SliceCandidate> found;
-  const auto score = [&](const Sums& sums) -> double {
+namespace {
+
+Sums SumOf(const SliceCells& cells, int cell) {
+  return {1, cells.excess_s2[cell], cells.residual_s[cell]};
+}
+
+// Scores parts of the cells listed in `live`; those that leave too little inside or outside are out.
+class LiveCells {
+ public:
+  LiveCells(const SliceCells& cells, const std::vector<int>& live, int min_cells)
+      : cells_(cells), live_(live), min_cells_(min_cells) {
+    for (const int cell : live) all_ += SumOf(cells, cell);
+  }
+
+  double Score(const Sums& part) const {
     // What is left outside must be a part of its own, too.
-    if (sums.count < min_cells || all.count - sums.count < min_cells) return -HUGE_VAL;
-    return SliceScore(sums, all);
-  };
-  const auto keep = [&](SliceCandidate* best) {
-    if (!best->conditions.empty()) found.push_back(std::move(*best));
-  };
-
-  // One condition, or a range of one number.
-  for (int c = 0; c < covariates; ++c) {
-    std::array<Sums, SliceBins::kMax + 1> below{};  // below[b]: of all bins before b
-    for (const int cell : live) {
-      const uint8_t bin = cells.bin[c][cell];
-      if (bin != SliceBins::kUnknown) below[bin + 1] += {1, cells.excess_s2[cell], cells.residual_s[cell]};
-    }
-    for (int b = 0; b < bins[c].count(); ++b) below[b + 1] += below[b];
-    SliceCandidate best;
-    const auto consider = [&](int low, int high, double worth) {
-      const double value = worth * score(below[high + 1] - below[low]);
-      if (value > best.score) best = {{{c, static_cast<uint8_t>(low), static_cast<uint8_t>(high)}}, value};
-    };
-    for (const auto& [low, high] : Ranges(bins[c])) consider(low, high, 1);
-    if (!bins[c].category())
-      for (int low = 1; low < bins[c].count() - 1; ++low)
-        for (int high = low; high < bins[c].count() - 1; ++high) consider(low, high, kWorthOfSecondCondition);
-    keep(&best);
+    if (part.count < min_cells_ || all_.count - part.count < min_cells_) return -HUGE_VAL;
+    return SliceScore(part, all_);
   }
+  SliceCandidate BestOfOne(const std::vector<SliceBins>& bins, int covariate) const;
+  SliceCandidate BestOfTwo(const std::vector<SliceBins>& bins, int a, int b) const;
+  bool empty() const { return all_.count == 0; }
 
-  // Two conditions on two covariates.
-  std::vector<Sums> below;
-  for (int a = 0; a < covariates; ++a) {
-    const auto ranges_a = Ranges(bins[a]);
-    for (int b = a + 1; b < covariates; ++b) {
-      const int width = bins[b].count() + 1;
-      below.assign(static_cast<size_t>(bins[a].count() + 1) * width, Sums());
-      for (const int cell : live) {
-        const uint8_t row = cells.bin[a][cell], column = cells.bin[b][cell];
-        if (row == SliceBins::kUnknown || column == SliceBins::kUnknown) continue;
-        below[(row + 1) * width + column + 1] += {1, cells.excess_s2[cell], cells.residual_s[cell]};
-      }
-      for (int row = 1; row <= bins[a].count(); ++row) {
-        Sums in_row;
-        for (int column = 1; column < width; ++column) {
-          in_row += below[row * width + column];
-          below[row * width + column] = below[(row - 1) * width + column];
-          below[row * width + column] += in_row;
-        }
-      }
-      SliceCandidate best;
-      const auto ranges_b = Ranges(bins[b]);
-      for (const auto& [low_a, high_a] : ranges_a) {
-        const Sums* const after = &below[(high_a + 1) * width];
-        const Sums* const before = &below[low_a * width];
-        for (const auto& [low_b, high_b] : ranges_b) {
-          const double value = kWorthOfSecondCondition * score((after[high_b + 1] - after[low_b]) -
-                                                               (before[high_b + 1] - before[low_b]));
-          if (value > best.score)
-            best = {{{a, static_cast<uint8_t>(low_a), static_cast<uint8_t>(high_a)},
-                     {b, static_cast<uint8_t>(low_b), static_cast<uint8_t>(high_b)}},
-                    value};
-        }
-      }
-      keep(&best);
+ private:
+  // Sums over the cells whose bin of covariate a is below the row and of b below the column; (bins of a + 1) rows,
+  // (bins of b + 1) columns.
+  std::vector<Sums> CumulativeTable(const std::vector<SliceBins>& bins, int a, int b) const;
+
+  const SliceCells& cells_;
+  const std::vector<int>& live_;
+  const int min_cells_;
+  Sums all_;
+};
+
+// One condition, or a range of one number.
+SliceCandidate LiveCells::BestOfOne(const std::vector<SliceBins>& bins, int c) const {
+  std::array<Sums, SliceBins::kMax + 1> below{};  // below[b]: of all bins before b
+  for (const int cell : live_) {
+    const uint8_t bin = cells_.bin[c][cell];
+    if (bin != SliceBins::kUnknown) below[bin + 1] += SumOf(cells_, cell);
+  }
+  for (int b = 0; b < bins[c].count(); ++b) below[b + 1] += below[b];
+  SliceCandidate best;
+  const auto consider = [&](int low, int high, double worth) {
+    const double value = worth * Score(below[high + 1] - below[low]);
+    if (value > best.score) best = {{{c, static_cast<uint8_t>(low), static_cast<uint8_t>(high)}}, value};
+  };
+  for (const auto& [low, high] : Ranges(bins[c])) consider(low, high, 1);
+  if (!bins[c].category())
+    for (int low = 1; low < bins[c].count() - 1; ++low)
+      for (int high = low; high < bins[c].count() - 1; ++high) consider(low, high, kWorthOfSecondCondition);
+  return best;
+}
+
+std::vector<Sums> LiveCells::CumulativeTable(const std::vector<SliceBins>& bins, int a, int b) const {
+  const int width = bins[b].count() + 1;
+  std::vector<Sums> below(static_cast<size_t>(bins[a].count() + 1) * width);
+  for (const int cell : live_) {
+    const uint8_t row = cells_.bin[a][cell], column = cells_.bin[b][cell];
+    if (row == SliceBins::kUnknown || column == SliceBins::kUnknown) continue;
+    below[(row + 1) * width + column + 1] += SumOf(cells_, cell);
+  }
+  for (int row = 1; row <= bins[a].count(); ++row) {
+    Sums in_row;
+    for (int column = 1; column < width; ++column) {
+      in_row += below[row * width + column];
+      below[row * width + column] = below[(row - 1) * width + column];
+      below[row * width + column] += in_row;
     }
   }
+  return below;
+}
+
+// Two conditions on two covariates.
+SliceCandidate LiveCells::BestOfTwo(const std::vector<SliceBins>& bins, int a, int b) const {
+  const int width = bins[b].count() + 1;
+  const std::vector<Sums> below = CumulativeTable(bins, a, b);
+  SliceCandidate best;
+  const auto ranges_b = Ranges(bins[b]);
+  for (const auto& [low_a, high_a] : Ranges(bins[a])) {
+    const Sums* const after = &below[(high_a + 1) * width];
+    const Sums* const before = &below[low_a * width];
+    for (const auto& [low_b, high_b] : ranges_b) {
+      const double value = kWorthOfSecondCondition *
+                           Score((after[high_b + 1] - after[low_b]) - (before[high_b + 1] - before[low_b]));
+      if (value > best.score)
+        best = {{{a, static_cast<uint8_t>(low_a), static_cast<uint8_t>(high_a)},
+                 {b, static_cast<uint8_t>(low_b), static_cast<uint8_t>(high_b)}},
+                value};
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
+                                         const std::vector<int>& live, int min_cells, int max_slices) {
+  const LiveCells live_cells(cells, live, min_cells);
+  if (live_cells.empty()) return {};
+  std::vector<SliceCandidate> found;
+  const auto keep = [&](SliceCandidate best) {
+    if (!best.conditions.empty()) found.push_back(std::move(best));
+  };
+  const int covariates = static_cast<int>(bins.size());
+  for (int c = 0; c < covariates; ++c) keep(live_cells.BestOfOne(bins, c));
+  for (int a = 0; a < covariates; ++a)
+    for (int b = a + 1; b < covariates; ++b) keep(live_cells.BestOfTwo(bins, a, b));
   std::stable_sort(found.begin(), found.end(),
                    [](const SliceCandidate& x, const SliceCandidate& y) { return x.score > y.score; });
-  if (static_cast<int>(found.size()) > most) found.resize(most);
+  if (static_cast<int>(found.size()) > max_slices) found.resize(max_slices);
   return found;
 }
 
@@ -220,7 +256,7 @@ SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& 
   const auto score = [&](const SliceCandidate& candidate) {
     Sums all, inside;
     for (const int cell : live) {
-      const Sums one{1, cells.excess_s2[cell], cells.residual_s[cell]};
+      const Sums one = SumOf(cells, cell);
       all += one;
       bool holds = true;
       for (const SliceCondition& condition : candidate.conditions)

@@ -21,8 +21,8 @@ class SliceBins {
   SliceBins(const ResidualCovariate* covariate, std::vector<double> values);
 
   const ResidualCovariate& covariate() const { return *covariate_; }
-  int count() const { return count_; }  // 1: cannot be cut
-  bool category() const { return category_; }
+  int count() const { return count_; }         // 1: cannot be cut
+  bool category() const { return category_; }  // bins are labels or few distinct levels
   uint8_t Bin(double value) const;
   // The condition that a bin from `low` to `high` (inclusive) stands for; empty if that is all of them.
   std::string Words(int low, int high) const;
@@ -49,28 +49,29 @@ struct SliceCandidate {
   double score = 0;
 };
 
-// The cells that are searched, one an observed finger.
+// The cells that are searched; a cell is one observed finger of one touch.
 struct SliceCells {
   std::vector<std::vector<uint8_t>> bin;  // [covariate][cell]
   std::vector<double> residual_s, excess_s2;
   size_t size() const { return residual_s.size(); }
 };
 
-// The score of a part of the cells: its excess beyond that of an average part of its size, plus what the
-// difference of its mean from all cells' mean would explain.
+// Sums over a part of the cells: their number, excess error (s^2) and residuals (s).
 struct SliceSums {
   double count = 0, excess = 0, residual = 0;
   void operator+=(const SliceSums& other);
   SliceSums operator-(const SliceSums& other) const;
 };
+// The score of a part (s^2): its excess error beyond that of an average part of its size, plus what the difference
+// between its mean and the mean of all cells would explain.
 double SliceScore(const SliceSums& slice, const SliceSums& all);
 
-// The best slices of at least `min_cells` of the cells listed in `live`, best first, at most one for each
-// set of covariates, at most `most`.
+// The best slices of at least `min_cells` of the cells listed in `live`, best first: at most one for each set of
+// covariates, at most `max_slices` in all.
 std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
-                                         const std::vector<int>& live, int min_cells, int most);
+                                         const std::vector<int>& live, int min_cells, int max_slices);
 
-// Without the condition that hardly matters: a person pictures one condition sooner than two.
+// The slice without a condition that hardly matters: one condition is easier to picture than two.
 SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& cells,
                           const std::vector<int>& live, const SliceCandidate& slice);
 

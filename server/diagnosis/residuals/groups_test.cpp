@@ -1,0 +1,76 @@
+#include "server/diagnosis/residuals/groups.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "server/diagnosis/residuals/worst_touches.h"
+#include "server/diagnosis/touches/made_up_test_set.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kSigmaS = 0.005;
+
+// Contacts come early by 1 ms per degree of incidence, on every finger.
+MadeUpSet EarlyOnSlopes() {
+  MadeUpSet set(5, 48, 4, kSigmaS, 1);
+  for (int k = 0; k < set.size(); ++k)
+    for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
+  set.Finish();
+  return set;
+}
+
+GroupedErrors Group(const MadeUpSet& set) {
+  return GroupErrors(set.observations, set.residuals, kSigmaS);
+}
+
+TEST(ErrorGroups, EveryKindAddsUpToAllTouchesAndToTheWholeExcess) {
+  const GroupedErrors grouped = Group(EarlyOnSlopes());
+  std::map<ErrorGroupKind, std::pair<int, double>> sums;
+  for (const ErrorGroup& group : grouped.groups) {
+    sums[group.kind].first += group.touches;
+    sums[group.kind].second += group.share_of_excess_error;
+  }
+  ASSERT_EQ(sums.size(), 6u);
+  for (const auto& [kind, sum] : sums) {
+    EXPECT_EQ(sum.first, kind == ErrorGroupKind::kFinger ? 3 * 960 : 960) << static_cast<int>(kind);
+    EXPECT_NEAR(sum.second, 1, 1e-9) << static_cast<int>(kind);
+  }
+}
+
+TEST(ErrorGroups, OfNoiseHaveTheRmseSigma) {
+  const GroupedErrors grouped = Group(MadeUpSet(5, 48, 4, kSigmaS, 2));
+  for (const ErrorGroup& group : grouped.groups)
+    EXPECT_NEAR(group.rmse_s, kSigmaS, group.touches > 500 ? 0.0004 : 0.0011) << group.name;
+}
+
+TEST(ErrorGroups, OfALateFingerHaveTwoThirdsOfItAsItsBias) {
+  MadeUpSet set(2, 48, 4, kSigmaS, 3);
+  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 2] += 0.03;
+  set.observations.time_s[77 * 3] -= 1;
+  set.observations.time_s[99 * 3] -= 2;
+  set.observations.used[99] = 0;
+  set.Finish();
+  EXPECT_THAT(Group(set).finger_bias_s,
+              testing::ElementsAre(testing::Lt(-0.009), testing::Lt(-0.008), testing::Gt(0.019)));
+}
+
+TEST(WorstTouches, AreThoseThatCountWithTheLargestFirst) {
+  MadeUpSet set(2, 48, 4, kSigmaS, 3);
+  set.observations.time_s[77 * 3] -= 1;
+  set.observations.time_s[99 * 3] -= 2;
+  set.observations.used[99] = 0;
+  set.Finish();
+  const auto worst = FindWorstTouches(set.observations, set.residuals);
+  ASSERT_EQ(worst.size(), 10u);
+  EXPECT_EQ(worst[0].touch, 77u);
+  EXPECT_THAT(worst[0].residual_s, testing::ElementsAre(testing::DoubleEq(set.residuals[77 * 3]),
+                                                        testing::DoubleEq(set.residuals[77 * 3 + 1]),
+                                                        testing::DoubleEq(set.residuals[77 * 3 + 2])));
+  EXPECT_GT(worst[0].norm_s, worst[1].norm_s);
+}
+
+}  // namespace
+}  // namespace touchstone

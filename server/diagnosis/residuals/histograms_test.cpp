@@ -1,0 +1,60 @@
+#include "server/diagnosis/residuals/histograms.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/touches/made_up_test_set.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kSigmaS = 0.005;
+
+std::vector<ComparedHistogram> Histograms(const MadeUpSet& set, uint64_t seed = 0) {
+  return MakeHistograms(set.observations, set.prediction, set.prediction, {kSigmaS, 0.03, seed});
+}
+
+TEST(ResidualHistograms, OfARightModelAgree) {
+  const MadeUpSet set(5, 48, 4, kSigmaS, 5);
+  const auto right = Histograms(set);
+  EXPECT_EQ(right.size(), 12u);  // two quantities, five objects and all
+  int small = 0;
+  for (const ComparedHistogram& histogram : right) {
+    EXPECT_LE(histogram.measured.size(), 60u);
+    EXPECT_EQ(histogram.edges.size(), histogram.measured.size() + 1);
+    small += histogram.p_simulated < 0.02;
+    double integral = 0;
+    for (const double density : histogram.measured) integral += density;
+    EXPECT_NEAR(integral * (histogram.edges[1] - histogram.edges[0]), 1, 0.01);
+  }
+  EXPECT_LE(small, 2);
+}
+
+TEST(ResidualHistograms, SeeAShiftOfTheMiddleFingerInTheCurvature) {
+  MadeUpSet set(5, 48, 4, kSigmaS, 6);
+  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] -= 20 * kSigmaS;
+  set.Finish();
+  MadeUpSet true_set = set;
+  for (int k = 0; k < set.size(); ++k) true_set.prediction.time_s[k * 3 + 1] -= 20 * kSigmaS;
+  true_set.Finish();
+  const auto histograms =
+      MakeHistograms(set.observations, set.prediction, true_set.prediction, {kSigmaS, 0.03, 0});
+  for (const ComparedHistogram& histogram : histograms) {
+    if (histogram.quantity != HistogramQuantity::kCurvature || !histogram.object.empty()) continue;
+    EXPECT_LT(histogram.p_simulated, 1e-3);
+    EXPECT_GT(histogram.p_improved, 0.01);
+  }
+}
+
+TEST(ResidualHistograms, AreCalibrated) {
+  int small = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    const auto made = Histograms(MadeUpSet(1, 48, 4, kSigmaS, 300 + seed), seed);
+    for (const ComparedHistogram& histogram : made) small += histogram.p_simulated < 0.1;
+  }
+  EXPECT_GE(small, 2);  // 120 tests at 0.1: 12 are expected
+  EXPECT_LE(small, 24);
+}
+
+}  // namespace
+}  // namespace touchstone
