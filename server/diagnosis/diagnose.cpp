@@ -7,8 +7,10 @@
 #include <mutex>
 
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/report/design_messages.h"
 #include "server/diagnosis/report/residuals_messages.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
@@ -17,7 +19,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMaxRivals = 4;
+constexpr int kMaxCompetingModels = 4;
 constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is ambiguous
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
@@ -75,33 +77,34 @@ void Describe(const Study& study, const std::vector<double>& before, const Predi
 // something is ambiguous.
 absl::Status AddNextTouches(const Study& study, const Explained& explained, const Ladder& ladder, int touches,
                             bool always, v1::Report* report) {
-  std::vector<std::shared_ptr<const Model>> rivals = {std::make_shared<const Model>(ladder.improved)};
-  std::vector<std::string> names = {"the model as it is"};
-  // The step with the nearest rival decides what is asked.
+  std::vector<CompetingModel> models = {
+      {"the model as it is", std::make_shared<const Model>(ladder.improved)}};
+  // The step with the closest competing effect decides what is asked.
   const ExplainedStep* closest = nullptr;
   for (const ExplainedStep& step : explained.steps) {
     if (step.rivals.empty() || !(always || step.rivals[0].equivalent)) continue;
     if (closest == nullptr || step.rivals[0].evidence > closest->rivals[0].evidence) closest = &step;
   }
   if (closest != nullptr) {
-    names[0] = NameOf(*explained.fit.model.base().effects[closest->effect].effect);
+    models[0].name = NameOf(*explained.fit.model.base().effects[closest->effect].effect);
     for (const Rival& rival : closest->rivals) {
-      if (!rival.equivalent && rivals.size() > 1) break;
-      if (static_cast<int>(rivals.size()) == kMaxRivals) break;
-      rivals.push_back(std::make_shared<const Model>(rival.model));
-      names.push_back(rival.name);
+      if (!rival.equivalent && models.size() > 1) break;
+      if (static_cast<int>(models.size()) == kMaxCompetingModels) break;
+      models.push_back({rival.name, std::make_shared<const Model>(rival.model)});
     }
   } else if (!always) {
     return absl::OkStatus();
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<v1::ProposedTouch> proposed,
-                              ProposeTouches(*study.searched, rivals, names, report->noise_floor_us() * 1e-6,
-                                             touches, study.input.seed, study.context.pool));
-  for (const v1::ProposedTouch& touch : proposed) *report->add_next_touches() = touch;
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const std::vector<ProposedTouch> proposed,
+      ProposeTouches(*study.searched, models, report->noise_floor_us() * kSecondsPerMicrosecond, touches,
+                     study.input.seed, study.context.pool));
+  for (const ProposedTouch& touch : proposed) WriteProposedTouch(touch, report);
   if (always && proposed.empty())
-    report->add_warnings(closest == nullptr ? "No touch would tell more than those at hand."
-                                            : "No touch of this rig tells " + names[0] + " from " + names[1] +
-                                                  ": " + DecidedBy({names[0], names[1]}));
+    report->add_warnings(closest == nullptr
+                             ? "No touch would tell more than those at hand."
+                             : "No touch of this rig tells " + models[0].name + " from " + models[1].name +
+                                   ": " + DecidedBy({models[0].name, models[1].name}));
   return absl::OkStatus();
 }
 

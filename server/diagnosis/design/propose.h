@@ -1,4 +1,4 @@
-// Which touches to make next: those that tell explanations apart that fit the present data alike.
+// Which touches to make next: those that discriminate between explanations that fit the present data equally well.
 #pragma once
 
 #include <memory>
@@ -9,23 +9,40 @@
 
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
-#include "touchstone/v1/diagnosis.pb.h"
+#include "server/touch/commanded_touch.h"
 
 namespace touchstone {
 
-// At most `touches` touches, in the order of their worth. `rivals` are fitted models, best first, `names`
-// what people call them.
+// A fitted model that explains the present data, and what people call it ("tip_radius").
+struct CompetingModel {
+  std::string name;
+  std::shared_ptr<const Model> model;
+};
+
+struct ProposedTouch {
+  std::string object;
+  CommandedTouch touch;           // no stroke limit
+  bool has_session_time = false;  // whether touch.session_time_s matters: the set has one, or a model drifts
+  std::string purpose;            // "tells tip_radius from oblique_slip", "learns the values of tip_radius"
+  // In standard deviations of the noise: the expected difference between the two models of the purpose; for one
+  // model what its values leave open about this touch.
+  double separation_sigmas = 0;
+};
+
+// At most `max_touches` touches, most informative first. `models` are fitted to the observations, best first.
 //
-// T-optimal (Atkinson and Fedorov 1975), one touch after the other: a touch is worth what the best
-// explanation and a rival predict differently *after* the rival has been fitted again to all data, the new
-// touches included; both ways round. A touch that all rivals can follow is worth nothing. Candidates come
-// from all faces of all objects, with tilts up to 40 deg, any turn, and half, once and twice the set's speed;
-// touches that end within 1 mm of a sharp edge are left out, since there a small error of the pose decides.
+// T-optimal (Atkinson and Fedorov 1975), one touch after the other: a touch is worth what the best model and a
+// competing one predict differently *after* the latter has been fitted again to all data, the new touches included;
+// both ways round. A touch that every model can follow is worth nothing. Candidates come from all faces of all
+// objects, with tilts up to 40 deg, any turn, and half, once and twice the set's speed; touches that end within 1 mm
+// of a sharp edge are left out, since there a small error of the pose decides.
 //
-// With one rival: where its values would be learnt best (D-optimal). Empty if no touch would tell: then only
+// With one model: where its values would be learnt best (D-optimal). Empty if no touch would discriminate: then only
 // another kind of measurement does. What a touch leaves to the next one (return_hysteresis) is not planned.
-absl::StatusOr<std::vector<v1::ProposedTouch>> ProposeTouches(
-    const Observations& observations, const std::vector<std::shared_ptr<const Model>>& rivals,
-    const std::vector<std::string>& names, double sigma_s, int touches, uint64_t seed, ThreadPool* pool);
+// sigma_s: noise of one finger's time. Deterministic for a seed, whatever the pool.
+absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const Observations& observations,
+                                                          const std::vector<CompetingModel>& models,
+                                                          double sigma_s, int max_touches, uint64_t seed,
+                                                          ThreadPool* pool);
 
 }  // namespace touchstone

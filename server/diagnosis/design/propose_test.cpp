@@ -18,7 +18,7 @@ using Effects = std::vector<std::pair<std::string, std::vector<std::string>>>;
 
 constexpr double kSigmaS = 0.002;
 
-std::shared_ptr<const Model> Rival(const Effects& effects) {
+std::shared_ptr<const Model> ModelWith(const Effects& effects) {
   return std::make_shared<const Model>(WithEffects(NominalModel(), effects));
 }
 
@@ -30,14 +30,10 @@ Observations Present() {
   return *std::move(observations);
 }
 
-std::vector<v1::ProposedTouch> Proposed(const std::vector<Effects>& rivals, int touches, uint64_t seed = 1) {
-  std::vector<std::shared_ptr<const Model>> models;
-  std::vector<std::string> names;
-  for (const Effects& effects : rivals) {
-    models.push_back(Rival(effects));
-    names.push_back(effects.back().first);
-  }
-  auto proposed = ProposeTouches(Present(), models, names, kSigmaS, touches, seed, nullptr);
+std::vector<ProposedTouch> Proposed(const std::vector<Effects>& competing, int touches, uint64_t seed = 1) {
+  std::vector<CompetingModel> models;
+  for (const Effects& effects : competing) models.push_back({effects.back().first, ModelWith(effects)});
+  auto proposed = ProposeTouches(Present(), models, kSigmaS, touches, seed, nullptr);
   EXPECT_TRUE(proposed.ok()) << proposed.status();
   return *std::move(proposed);
 }
@@ -49,11 +45,11 @@ TEST(ProposeTouches, LengthAndLatencyAreToldApartByAnotherSpeedOnly) {
   const auto proposed = Proposed({kLength, kLatency}, 12);
   ASSERT_EQ(proposed.size(), 12u);
   std::set<std::string> objects;
-  for (const v1::ProposedTouch& touch : proposed) {
-    EXPECT_GT(std::abs(touch.touch().speed_m_s() - 0.02), 0.005);
-    EXPECT_EQ(touch.purpose(), "tells finger_length from channel_latency");
-    EXPECT_GT(touch.separation(), 0);
-    objects.insert(touch.object());
+  for (const ProposedTouch& touch : proposed) {
+    EXPECT_GT(std::abs(touch.touch.speed_m_s - 0.02), 0.005);
+    EXPECT_EQ(touch.purpose, "tells finger_length from channel_latency");
+    EXPECT_GT(touch.separation_sigmas, 0);
+    objects.insert(touch.object);
   }
   EXPECT_GE(objects.size(), 2u);
 }
@@ -72,12 +68,12 @@ TEST(ProposeTouches, TellMoreThanTouchesAtRandom) {
   const auto proposed = Proposed({radius, allowed}, 12);
   ASSERT_EQ(proposed.size(), 12u);
   double designed = 0;
-  for (const v1::ProposedTouch& touch : proposed) designed += touch.separation() * touch.separation();
+  for (const ProposedTouch& touch : proposed) designed += touch.separation_sigmas * touch.separation_sigmas;
 
   // The mean square difference of the two at touches of the set, even without a refit that makes it smaller.
   const Observations present = Present();
-  const auto a = Predict(present, *Rival(radius), false, false, nullptr);
-  const auto b = Predict(present, *Rival(allowed), false, false, nullptr);
+  const auto a = Predict(present, *ModelWith(radius), false, false, nullptr);
+  const auto b = Predict(present, *ModelWith(allowed), false, false, nullptr);
   double random = 0;
   int count = 0;
   for (int k = 0; k < present.size(); ++k) {
@@ -96,16 +92,15 @@ TEST(ProposeTouches, TellMoreThanTouchesAtRandom) {
 TEST(ProposeTouches, ForOneExplanationLearnItsValues) {
   const auto proposed = Proposed({{{"tip_radius", {"radius_mm=1.5"}}}}, 8);
   ASSERT_EQ(proposed.size(), 8u);
-  for (const v1::ProposedTouch& touch : proposed)
-    EXPECT_EQ(touch.purpose(), "learns the values of tip_radius");
-  // What is learnt first is worth most.
-  EXPECT_GE(proposed.front().separation(), proposed.back().separation());
+  for (const ProposedTouch& touch : proposed) EXPECT_EQ(touch.purpose, "learns the values of tip_radius");
+  // The first touch teaches most.
+  EXPECT_GE(proposed.front().separation_sigmas, proposed.back().separation_sigmas);
 }
 
-TEST(ProposeTouches, EveryOneOfSeveralRivalsIsToldFromTheBest) {
+TEST(ProposeTouches, EachOfSeveralModelsIsToldFromTheBest) {
   const auto proposed = Proposed({kLength, kLatency, {{"tool_tilt", {"angle_deg=0.3"}}}}, 12);
   std::set<std::string> purposes;
-  for (const v1::ProposedTouch& touch : proposed) purposes.insert(touch.purpose());
+  for (const ProposedTouch& touch : proposed) purposes.insert(touch.purpose);
   EXPECT_THAT(purposes, testing::UnorderedElementsAre("tells finger_length from channel_latency",
                                                       "tells finger_length from tool_tilt"));
 }
@@ -113,8 +108,14 @@ TEST(ProposeTouches, EveryOneOfSeveralRivalsIsToldFromTheBest) {
 TEST(ProposeTouches, TheSameSeedProposesTheSame) {
   const auto once = Proposed({kLength, kLatency}, 5), twice = Proposed({kLength, kLatency}, 5),
              other = Proposed({kLength, kLatency}, 5, 2);
-  for (int n = 0; n < 5; ++n) EXPECT_EQ(once[n].SerializeAsString(), twice[n].SerializeAsString());
-  EXPECT_NE(once[0].SerializeAsString(), other[0].SerializeAsString());
+  for (int n = 0; n < 5; ++n) {
+    EXPECT_EQ(once[n].object, twice[n].object);
+    EXPECT_EQ(once[n].touch.target_m, twice[n].touch.target_m);
+    EXPECT_EQ(once[n].touch.approach, twice[n].touch.approach);
+    EXPECT_EQ(once[n].touch.speed_m_s, twice[n].touch.speed_m_s);
+    EXPECT_EQ(once[n].separation_sigmas, twice[n].separation_sigmas);
+  }
+  EXPECT_NE(once[0].touch.target_m, other[0].touch.target_m);
 }
 
 TEST(TouchCandidates, EndOnSmoothSurfacesAndKeepUnitVectors) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSpread = 0.8;
 constexpr double kNearEdgeM = 0.001;
-constexpr double kMaxTurnOfNormal = 15 * kPi / 180;  // within kNearEdgeM; more is an edge
+constexpr double kMaxTurnOfNormalRad = 15 * kRadiansPerDegree;  // within kNearEdgeM; more is an edge
 constexpr double kSpeedFactors[] = {1, 0.5, 2};
 
 double Median(std::vector<double> values) {
@@ -23,7 +23,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// An experiment without touches on the same objects.
+// The same objects without touches.
 Observations Blank(const Observations& like) {
   Observations blank;
   blank.fingers = like.fingers;
@@ -57,18 +57,82 @@ void Number(const std::shared_ptr<const MeasurementSet>& set, Observations* obse
   observations->time_s.assign(static_cast<size_t>(count) * observations->fingers, 0);
 }
 
-// Whether the fingers of touch k end where a step of 1 mm to any side ends, but for a smooth change.
-bool Steady(const Prediction& here, const Prediction& beside, int k) {
+// Whether no finger of touch k meets an edge when the touch moves aside by kNearEdgeM: normal and travel change
+// smoothly.
+bool AwayFromEdges(const Prediction& here, const Prediction& beside, int k) {
   for (int i = 0; i < here.fingers; ++i) {
     const size_t at = size_t(k) * here.fingers + i;
     if (std::isnan(beside.time_s[at])) return false;
-    if (here.normal[at].dot(beside.normal[at]) < std::cos(kMaxTurnOfNormal)) return false;
-    // On a slope of incidence the travel may change by the step times its tangent, and a little more.
+    if (here.normal[at].dot(beside.normal[at]) < std::cos(kMaxTurnOfNormalRad)) return false;
+    // The travel may change by the step times the tangent of the incidence, and a little more.
     const double tangent =
         std::sqrt(std::max(0.0, 1 / std::max(1e-3, std::pow(here.cos_incidence[at], 2)) - 1));
     if (std::abs(here.travel_m[at] - beside.travel_m[at]) > kNearEdgeM * (1 + 1.5 * tangent)) return false;
   }
   return true;
+}
+
+// Poses of all faces of all objects, each at every speed.
+std::shared_ptr<const MeasurementSet> DrawSet(const Observations& observations,
+                                              const CandidateChoice& choice) {
+  const MeasurementSet& old = *observations.set;
+  const double speed_m_s = Median(old.speed_m_s), standoff_m = Median(old.standoff_m);
+  const double last_s = *std::max_element(old.session_time_s.begin(), old.session_time_s.end());
+  const int objects = static_cast<int>(observations.objects.size());
+  const int speeds = static_cast<int>(std::size(kSpeedFactors));
+  auto set = std::make_shared<MeasurementSet>();
+  set->origin = "candidates";
+  set->fingers = observations.fingers;
+  set->has_poses = true;
+  set->has_session_time = old.has_session_time || choice.different_times;
+  set->objects = observations.objects;
+  Plan plan;
+  plan.kind = Plan::Kind::kFaces;
+  plan.faces.max_tilt_rad = choice.max_tilt_rad;
+  plan.faces.spread = kSpread;
+  plan.faces.standoff_m = standoff_m;
+  plan.faces.rounds = 1;
+  plan.faces.samples_per_face = std::clamp(choice.max_candidates / (6 * speeds * objects), 4, 60);
+  for (int o = 0; o < objects; ++o) {
+    const auto generator =
+        MakePoseGenerator(plan, observations.surfaces[o]->bounds(), choice.seed * 1000 + o);
+    std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
+    std::iota(numbers.begin(), numbers.end(), 0);
+    std::vector<TouchPose> poses(numbers.size());
+    generator->Draw(numbers, 0, poses.data());
+    for (size_t n = 0; n < poses.size(); ++n) {
+      // Cold at the beginning of a new session, or long warm: where drifts differ most.
+      const double time_s = choice.different_times && n % 2 ? std::max(3600.0, 2 * last_s)
+                            : choice.different_times        ? 0
+                                                            : last_s;
+      for (const double factor : kSpeedFactors) Append(poses[n], o, factor * speed_m_s, time_s, set.get());
+    }
+  }
+  for (const auto& [name, values] : old.covariates) set->covariates[name].assign(set->size(), Median(values));
+  return set;
+}
+
+// Which candidates every finger completes away from edges; `here` is the prediction for them.
+absl::StatusOr<std::vector<char>> CompletedAwayFromEdges(const Observations& candidates,
+                                                         const Prediction& here, const Model& model,
+                                                         ThreadPool* pool) {
+  std::vector<char> good(candidates.size(), 1);
+  for (int k = 0; k < candidates.size(); ++k)
+    for (int i = 0; i < candidates.fingers; ++i)
+      good[k] &= !std::isnan(here.time_s[size_t(k) * candidates.fingers + i]);
+  for (const int direction : {0, 1, 2, 3}) {
+    auto moved = std::make_shared<MeasurementSet>(*candidates.set);
+    for (int k = 0; k < moved->size(); ++k) {
+      const Eigen::Vector3d side =
+          direction < 2 ? moved->lateral[k] : moved->approach[k].cross(moved->lateral[k]).eval();
+      moved->target_m[k] += (direction % 2 ? -kNearEdgeM : kNearEdgeM) * side;
+    }
+    Observations beside = Blank(candidates);
+    Number(moved, &beside);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction there, Predict(beside, model, true, false, pool));
+    for (int k = 0; k < candidates.size(); ++k) good[k] = good[k] && AwayFromEdges(here, there, k);
+  }
+  return good;
 }
 
 }  // namespace
@@ -95,63 +159,11 @@ Observations PartOf(const Observations& observations, const std::vector<int>& ke
 
 absl::StatusOr<Observations> MakeCandidates(const Observations& observations, const Model& model,
                                             const CandidateChoice& choice, ThreadPool* pool) {
-  const MeasurementSet& old = *observations.set;
-  const double speed_m_s = Median(old.speed_m_s), standoff_m = Median(old.standoff_m);
-  const double last_s = *std::max_element(old.session_time_s.begin(), old.session_time_s.end());
-  const int objects = static_cast<int>(observations.objects.size());
-  const int speeds = static_cast<int>(std::size(kSpeedFactors));
-
-  // Poses of all faces of all objects, each at every speed.
-  auto set = std::make_shared<MeasurementSet>();
-  set->origin = "candidates";
-  set->fingers = observations.fingers;
-  set->has_poses = true;
-  set->has_session_time = old.has_session_time || choice.different_times;
-  set->objects = observations.objects;
-  Plan plan;
-  plan.kind = Plan::Kind::kFaces;
-  plan.faces.max_tilt_rad = choice.max_tilt_rad;
-  plan.faces.spread = kSpread;
-  plan.faces.standoff_m = standoff_m;
-  plan.faces.rounds = 1;
-  plan.faces.samples_per_face = std::clamp(choice.most / (6 * speeds * objects), 4, 60);
-  for (int o = 0; o < objects; ++o) {
-    const auto generator =
-        MakePoseGenerator(plan, observations.surfaces[o]->bounds(), choice.seed * 1000 + o);
-    std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
-    std::iota(numbers.begin(), numbers.end(), 0);
-    std::vector<TouchPose> poses(numbers.size());
-    generator->Draw(numbers, 0, poses.data());
-    for (size_t n = 0; n < poses.size(); ++n) {
-      // Cold at the beginning of a new session, or warm: for what drifts, the longest lever.
-      const double time_s = choice.different_times && n % 2 ? std::max(3600.0, 2 * last_s)
-                            : choice.different_times        ? 0
-                                                            : last_s;
-      for (const double factor : kSpeedFactors) Append(poses[n], o, factor * speed_m_s, time_s, set.get());
-    }
-  }
-  for (const auto& [name, values] : old.covariates) set->covariates[name].assign(set->size(), Median(values));
   Observations candidates = Blank(observations);
-  Number(set, &candidates);
+  Number(DrawSet(observations, choice), &candidates);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction here, Predict(candidates, model, true, false, pool));
-
-  // Without those that miss or end beside an edge.
-  std::vector<char> good(candidates.size(), 1);
-  for (int k = 0; k < candidates.size(); ++k)
-    for (int i = 0; i < candidates.fingers; ++i)
-      good[k] &= !std::isnan(here.time_s[size_t(k) * candidates.fingers + i]);
-  for (const int direction : {0, 1, 2, 3}) {
-    auto moved = std::make_shared<MeasurementSet>(*set);
-    for (int k = 0; k < moved->size(); ++k) {
-      const Eigen::Vector3d side =
-          direction < 2 ? moved->lateral[k] : moved->approach[k].cross(moved->lateral[k]).eval();
-      moved->target_m[k] += (direction % 2 ? -kNearEdgeM : kNearEdgeM) * side;
-    }
-    Observations beside = Blank(observations);
-    Number(moved, &beside);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction there, Predict(beside, model, true, false, pool));
-    for (int k = 0; k < candidates.size(); ++k) good[k] = good[k] && Steady(here, there, k);
-  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<char> good,
+                              CompletedAwayFromEdges(candidates, here, model, pool));
   std::vector<int> keep;
   for (int k = 0; k < candidates.size(); ++k)
     if (good[k]) keep.push_back(k);

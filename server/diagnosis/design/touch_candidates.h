@@ -9,18 +9,18 @@
 namespace touchstone {
 
 struct CandidateChoice {
-  int most = 1500;               // candidates
+  int max_candidates = 1500;     // about, all objects and speeds together
   double max_tilt_rad = 0.7;     // between the approach and a face of the bounding box
-  bool different_times = false;  // also at the beginning of a session, for what drifts
+  bool different_times = false;  // also at the beginning of a session, for models that drift
   uint64_t seed = 0;
 };
 
-// An experiment of touches that every finger of `model` completes, none within 1 mm of a sharp edge; times
-// are unknown. Speeds: half, once and twice the median of `observations`.
+// Observations of touches that every finger of `model` completes, none within 1 mm of a sharp edge; their times are
+// unknown (0). Speeds: half, once and twice the median of `observations`.
 absl::StatusOr<Observations> MakeCandidates(const Observations& observations, const Model& model,
                                             const CandidateChoice& choice, ThreadPool* pool);
 
-// Part of an experiment: touches `keep`, in their order. Previous touches outside of it are forgotten.
+// The touches `keep` of `observations`, in that order. A previous touch that is not kept becomes none.
 Observations PartOf(const Observations& observations, const std::vector<int>& keep);
 
 }  // namespace touchstone

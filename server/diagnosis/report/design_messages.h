@@ -1,0 +1,12 @@
+// Proposed touches as parts of the wire message.
+#pragma once
+
+#include "server/diagnosis/design/propose.h"
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone {
+
+// Appends to next_touches.
+void WriteProposedTouch(const ProposedTouch& proposed, v1::Report* report);
+
+}  // namespace touchstone
