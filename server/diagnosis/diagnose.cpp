@@ -11,6 +11,7 @@
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/report/design_messages.h"
+#include "server/diagnosis/report/distributions_messages.h"
 #include "server/diagnosis/report/residuals_messages.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
@@ -115,10 +116,16 @@ v1::Report Begin(const DiagnosisInput& input) {
   return report;
 }
 
+absl::StatusOr<v1::Report> ReportWithoutPoses(const DiagnosisInput& input, const DiagnosisContext& context,
+                                              bool diagnose) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PoseFreeComparison comparison, ComparePoseFree(input, context, diagnose));
+  return PoseFreeReport(input, comparison);
+}
+
 }  // namespace
 
 absl::StatusOr<v1::Report> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
-  if (!input.set->has_poses) return CompareUnposed(input, context, false);
+  if (!input.set->has_poses) return ReportWithoutPoses(input, context, false);
   const double began = Now();
   Gate gate(context);
   DiagnosisContext gated = context;
@@ -150,7 +157,7 @@ namespace {
 // `always`: Propose, which names touches even where nothing is ambiguous.
 absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touches, bool always,
                                          const DiagnosisContext& context) {
-  if (!input.set->has_poses) return CompareUnposed(input, context, true);
+  if (!input.set->has_poses) return ReportWithoutPoses(input, context, true);
   const double began = Now();
   Gate gate(context);
   DiagnosisContext gated = context;

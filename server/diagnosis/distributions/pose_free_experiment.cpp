@@ -13,22 +13,23 @@
 namespace touchstone {
 namespace {
 
-constexpr int kMeasuredTouches = 1500;  // at most, all objects together
-// About, all objects together. Distances among an object's own grow with their square.
-constexpr int kReferenceTouches = 1200, kMaxReferenceAnObject = 600;
-constexpr int kQuickTouches = 480, kMaxQuickAnObject = 360;
+constexpr int kMaxMeasuredTouches = 1500;  // all objects together
+// About, all objects together; the cost of distances within one object grows with the square of its touches.
+constexpr int kReferenceTouches = 1200, kMaxReferencePerObject = 600;
+constexpr int kQuickTouches = 480, kMaxQuickPerObject = 360;
+constexpr double kMinNoiseChange = 3;   // standard errors, for the model's noise to be replaced
 constexpr uint64_t kReferenceSeed = 1;  // sets are 2, 3, ...
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<UnposedCase>> UnposedCase::Create(const DiagnosisInput& input,
-                                                                 const DiagnosisContext& context) {
-  std::unique_ptr<UnposedCase> made(new UnposedCase(input, context));
+absl::StatusOr<std::unique_ptr<PoseFreeExperiment>> PoseFreeExperiment::Create(
+    const DiagnosisInput& input, const DiagnosisContext& context) {
+  std::unique_ptr<PoseFreeExperiment> made(new PoseFreeExperiment(input, context));
   TOUCHSTONE_RETURN_IF_ERROR(made->Prepare());
   return made;
 }
 
-absl::Status UnposedCase::Prepare() {
+absl::Status PoseFreeExperiment::Prepare() {
   if (set.size() == 0) return absl::InvalidArgumentError(absl::StrCat(set.origin, ": holds no touch"));
   if (set.fingers != input.model->fingers)
     return absl::InvalidArgumentError(absl::StrCat(set.origin, ": has times of ", set.fingers,
@@ -49,24 +50,24 @@ absl::Status UnposedCase::Prepare() {
       return absl::InvalidArgumentError(absl::StrCat(set.origin, ": object '", set.objects[o],
                                                      "' has no mesh: give --mesh ", set.objects[o], "=FILE"));
     objects.push_back(
-        SupposePlan(set, o, surface->second, speed_m_s, std::max(24, kMeasuredTouches / count)));
+        AssumePlan(set, o, surface->second, speed_m_s, std::max(24, kMaxMeasuredTouches / count)));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CompareSizes());
   if (size_ratio == 1) EstimateNoise();
   for (int o = 0; o < count; ++o)
-    measured.push_back(MakeUnposedSample(MeasuredTimes(o), set.fingers, speed_m_s, model->spacing_m));
+    measured.push_back(MakePoseFreeSample(MeasuredTimes(o), set.fingers, speed_m_s, model->spacing_m));
   return absl::OkStatus();
 }
 
-// Times that no speed could give are in another unit than they should be; noise is not to make up for that.
-absl::Status UnposedCase::CompareSizes() {
+// Times that no speed could give are in another unit than they should be; noise must not make up for that.
+absl::Status PoseFreeExperiment::CompareSizes() {
   double here = 0, simulated = 0;
   for (size_t o = 0; o < objects.size(); ++o) {
     const auto spread = [&](const std::vector<double>& time_s) {
       return TouchStatistics(time_s, set.fingers, speed_m_s, model->spacing_m)[0].Mean();
     };
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> time_s,
-                                TimesOfSet(model, static_cast<int>(o), SupposedPoses(), kReferenceSeed));
+                                TimesOfSet(model, static_cast<int>(o), AssumedPoses(), kReferenceSeed));
     here += spread(MeasuredTimes(static_cast<int>(o)));
     simulated += spread(time_s);
   }
@@ -74,17 +75,17 @@ absl::Status UnposedCase::CompareSizes() {
   return absl::OkStatus();
 }
 
-// What repeats of a pose scatter needs no pose to be known.
-void UnposedCase::EstimateNoise() {
-  scatter_s = ScatterAmongRounds(set, objects, &degrees);
-  if (degrees < kFewDegrees || scatter_s == 0) return;
+// The scatter among repeats of a pose can be measured without knowing the pose.
+void PoseFreeExperiment::EstimateNoise() {
+  scatter = ScatterAmongRounds(set, objects);
+  if (!noise_is_known() || scatter.sigma_s == 0) return;
   auto noisy = std::make_shared<Model>(*input.model);
   for (EffectInstance& instance : noisy->effects) {
     if (instance.effect->name != "gaussian_noise") continue;
     const double sigma_s = instance.ValuesFor(set.objects[0])[0];
-    // Three standard errors off.
-    if (std::abs(scatter_s - sigma_s) < 3 * scatter_s / std::sqrt(2 * degrees)) return;
-    instance.values[0] = scatter_s;
+    const double std_error_s = scatter.sigma_s / std::sqrt(2 * scatter.degrees_of_freedom);
+    if (std::abs(scatter.sigma_s - sigma_s) < kMinNoiseChange * std_error_s) return;
+    instance.values[0] = scatter.sigma_s;
     instance.object_values.clear();
     noise_changed = true;
     noise_is_new = sigma_s == 0;
@@ -93,31 +94,31 @@ void UnposedCase::EstimateNoise() {
   }
   EffectInstance noise;
   noise.effect = Catalogue().Find("gaussian_noise");
-  noise.values = {scatter_s};
+  noise.values = {scatter.sigma_s};
   noisy->effects.push_back(std::move(noise));
   noise_changed = noise_is_new = true;
   model = noisy;
 }
 
-std::vector<double> UnposedCase::MeasuredTimes(int object) const {
+std::vector<double> PoseFreeExperiment::MeasuredTimes(int object) const {
   std::vector<double> time_s;
   for (const int row : objects[object].rows)
     for (int i = 0; i < set.fingers; ++i) time_s.push_back(set.TimeS(row, i));
   return time_s;
 }
-absl::StatusOr<std::vector<double>> UnposedCase::TimesOfSet(const std::shared_ptr<const Model>& of,
-                                                            int object, const SupposedPoses& poses,
-                                                            uint64_t number) const {
-  const UnposedObject& like = objects[object];
+absl::StatusOr<std::vector<double>> PoseFreeExperiment::TimesOfSet(const std::shared_ptr<const Model>& of,
+                                                                   int object, const AssumedPoses& poses,
+                                                                   uint64_t number) const {
+  const PoseFreeObject& like = objects[object];
   // Every object of every set has poses of its own.
   const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, number, object, 7)[0];
-  return SimulateUnposed(of, like.surface, WithPoses(like.plan, poses), like.number, seed);
+  return SimulatePlan(of, like.surface, WithPoses(like.plan, poses), like.number, seed);
 }
 
-// The poses are those that the model as it is reaches, whatever model touches them then: so the distances of
-// two models differ by the models alone.
-absl::StatusOr<std::shared_ptr<const UnposedTouches>> UnposedCase::TouchesOfReference(
-    int object, const SupposedPoses& poses, ReferenceSize size) const {
+// The poses are those that the given model (with its noise) reaches, whatever model then simulates them, so that the
+// distances of two models differ because of the models alone.
+absl::StatusOr<std::shared_ptr<const PlannedTouches>> PoseFreeExperiment::TouchesOfReference(
+    int object, const AssumedPoses& poses, ReferenceSize size) const {
   const auto key = std::make_tuple(object, poses.max_tilt_rad, poses.spread, size);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -125,37 +126,39 @@ absl::StatusOr<std::shared_ptr<const UnposedTouches>> UnposedCase::TouchesOfRefe
     if (found != touches_.end()) return found->second;
   }
   const bool quick = size == ReferenceSize::kQuick;
-  const int most = quick ? kMaxQuickAnObject : kMaxReferenceAnObject,
-            together = quick ? kQuickTouches : kReferenceTouches;
+  const int max_touches = quick ? kMaxQuickPerObject : kMaxReferencePerObject,
+            all_touches = quick ? kQuickTouches : kReferenceTouches;
   Plan plan = WithPoses(objects[object].plan, poses);
   plan.faces.rounds = 1;
-  plan.faces.samples_per_face = std::clamp(together / 6 / static_cast<int>(set.objects.size()), 10, most / 6);
+  plan.faces.samples_per_face =
+      std::clamp(all_touches / 6 / static_cast<int>(set.objects.size()), 10, max_touches / 6);
   std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
   for (size_t n = 0; n < numbers.size(); ++n) numbers[n] = n;
   const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, kReferenceSeed, object, 7)[0];
-  TOUCHSTONE_ASSIGN_OR_RETURN(UnposedTouches touches,
-                              DrawUnposed(model, objects[object].surface, plan, numbers, seed));
-  auto shared = std::make_shared<const UnposedTouches>(std::move(touches));
+  TOUCHSTONE_ASSIGN_OR_RETURN(PlannedTouches touches,
+                              DrawPlannedTouches(model, objects[object].surface, plan, numbers, seed));
+  auto shared = std::make_shared<const PlannedTouches>(std::move(touches));
   const std::lock_guard<std::mutex> lock(mutex_);
   return touches_.emplace(key, shared).first->second;
 }
 
-absl::StatusOr<UnposedSamples> UnposedCase::MakeReference(const std::shared_ptr<const Model>& of,
-                                                          const SupposedPoses& poses,
-                                                          ReferenceSize size) const {
-  UnposedSamples samples;
+absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeReference(const std::shared_ptr<const Model>& of,
+                                                                  const AssumedPoses& poses,
+                                                                  ReferenceSize size) const {
+  PoseFreeSamples samples;
   for (size_t o = 0; o < objects.size(); ++o) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches, TouchesOfReference(static_cast<int>(o), poses, size));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> time_s,
-                                PlayUnposed(of, objects[o].surface, *touches));
-    samples.push_back(MakeUnposedSample(time_s, set.fingers, speed_m_s, of->spacing_m));
+                                SimulatePlannedTouches(of, objects[o].surface, *touches));
+    samples.push_back(MakePoseFreeSample(time_s, set.fingers, speed_m_s, of->spacing_m));
   }
   return samples;
 }
 
-absl::StatusOr<UnposedSamples> UnposedCase::MakeSet(const std::shared_ptr<const Model>& of,
-                                                    const SupposedPoses& poses, uint64_t number) const {
-  UnposedSamples samples;
+absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeSet(const std::shared_ptr<const Model>& of,
+                                                            const AssumedPoses& poses,
+                                                            uint64_t number) const {
+  PoseFreeSamples samples;
   for (size_t o = 0; o < objects.size(); ++o) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> time_s,
                                 TimesOfSet(of, static_cast<int>(o), poses, kReferenceSeed + 1 + number));
@@ -163,7 +166,7 @@ absl::StatusOr<UnposedSamples> UnposedCase::MakeSet(const std::shared_ptr<const 
     const std::vector<double> reported = MeasuredTimes(static_cast<int>(o));
     for (size_t t = 0; t < time_s.size(); ++t)
       if (std::isnan(reported[t])) time_s[t] = NAN;
-    samples.push_back(MakeUnposedSample(time_s, set.fingers, speed_m_s, of->spacing_m));
+    samples.push_back(MakePoseFreeSample(time_s, set.fingers, speed_m_s, of->spacing_m));
   }
   return samples;
 }

@@ -1,4 +1,4 @@
-// A measured set without poses, what is supposed about how it was made, and sets made alike by a model.
+// A measured set without poses, what is assumed about how it was made, and sets that a model makes in the same way.
 #pragma once
 
 #include <map>
@@ -8,63 +8,70 @@
 #include <vector>
 
 #include "server/diagnosis/distributions/assumed_plan.h"
+#include "server/diagnosis/distributions/planned_touches.h"
 #include "server/diagnosis/distributions/pose_free_distances.h"
 #include "server/diagnosis/input.h"
 
 namespace touchstone {
 
-// One entry an object. A reference is a large sample that sets are compared with; a quick one a small sample,
-// for looking at many models. Sets are like the measured one.
-using UnposedSamples = std::vector<UnposedSample>;
+// One sample per object, in the order of the set's objects.
+using PoseFreeSamples = std::vector<PoseFreeSample>;
+// A reference is a simulated sample that sets are compared with: a large one, or a small one for looking at many
+// models.
 enum class ReferenceSize { kFull, kQuick };
 
-class UnposedCase {
+class PoseFreeExperiment {
  public:
-  // Checks the input; estimates the repeats, the noise where the set goes in rounds, and absurd sizes.
-  // Both arguments must outlive the case.
-  static absl::StatusOr<std::unique_ptr<UnposedCase>> Create(const DiagnosisInput& input,
-                                                             const DiagnosisContext& context);
+  // Checks the input; finds repeats, the noise where the set goes in rounds, and absurd sizes of the times. Both
+  // arguments must outlive the experiment. Errors: no touch, an object without a mesh, other numbers of fingers.
+  static absl::StatusOr<std::unique_ptr<PoseFreeExperiment>> Create(const DiagnosisInput& input,
+                                                                    const DiagnosisContext& context);
 
-  // Pure functions of their arguments; callable from several threads.
-  absl::StatusOr<UnposedSamples> MakeReference(const std::shared_ptr<const Model>& model,
-                                               const SupposedPoses& poses, ReferenceSize size) const;
-  absl::StatusOr<UnposedSamples> MakeSet(const std::shared_ptr<const Model>& model,
-                                         const SupposedPoses& poses, uint64_t number) const;
+  // Pure functions of their arguments; callable from several threads. A set is like the measured one: as many
+  // touches and rounds of each object, the same fingers missing.
+  absl::StatusOr<PoseFreeSamples> MakeReference(const std::shared_ptr<const Model>& model,
+                                                const AssumedPoses& poses, ReferenceSize size) const;
+  absl::StatusOr<PoseFreeSamples> MakeSet(const std::shared_ptr<const Model>& model,
+                                          const AssumedPoses& poses, uint64_t number) const;
 
+  // False: cancelled.
   bool Progress(const std::string& stage, double done) const {
     return !context.progress || context.progress(stage, done);
   }
+  // Whether the rounds are enough to know the noise.
+  bool noise_is_known() const { return scatter.degrees_of_freedom >= kMinDegreesOfFreedom; }
 
   const DiagnosisInput& input;
   const DiagnosisContext& context;
   const MeasurementSet& set;
-  double speed_m_s = kDefaultSpeedMS;
-  std::vector<UnposedObject> objects;
-  double size_ratio = 1;               // of measured to simulated times, where it is absurd
-  double scatter_s = 0, degrees = 0;   // among rounds
-  std::shared_ptr<const Model> model;  // with the noise that the rounds show
-  bool noise_changed = false, noise_is_new = false;
-  UnposedSamples measured;
-
-  // Fewer degrees of freedom do not tell the noise.
-  static constexpr double kFewDegrees = 20;
+  double speed_m_s = kDefaultSpeedMS;  // median of the set's, where it has speeds
+  std::vector<PoseFreeObject> objects;
+  double size_ratio = 1;               // of measured to simulated times, where it is absurd; else 1
+  RoundScatter scatter;                // of one finger's time among rounds
+  std::shared_ptr<const Model> model;  // the given one, with the noise that the rounds show
+  bool noise_changed = false;          // `model` has another noise than the given one ...
+  bool noise_is_new = false;           // ... which had none
+  PoseFreeSamples measured;
 
  private:
-  UnposedCase(const DiagnosisInput& i, const DiagnosisContext& c)
+  // Fewer degrees of freedom leave the noise unknown.
+  static constexpr double kMinDegreesOfFreedom = 20;
+
+  PoseFreeExperiment(const DiagnosisInput& i, const DiagnosisContext& c)
       : input(i), context(c), set(*i.set), model(i.model) {}
   absl::Status Prepare();
   absl::Status CompareSizes();
   void EstimateNoise();
   std::vector<double> MeasuredTimes(int object) const;
   absl::StatusOr<std::vector<double>> TimesOfSet(const std::shared_ptr<const Model>& of, int object,
-                                                 const SupposedPoses& poses, uint64_t number) const;
-  absl::StatusOr<std::shared_ptr<const UnposedTouches>> TouchesOfReference(int object,
-                                                                           const SupposedPoses& poses,
+                                                 const AssumedPoses& poses, uint64_t number) const;
+  absl::StatusOr<std::shared_ptr<const PlannedTouches>> TouchesOfReference(int object,
+                                                                           const AssumedPoses& poses,
                                                                            ReferenceSize size) const;
 
-  // Many models are asked about the same touches.
+  // Many models simulate the same touches.
   mutable std::mutex mutex_;
-  mutable std::map<std::tuple<int, double, double, ReferenceSize>, std::shared_ptr<const UnposedTouches>>
+  mutable std::map<std::tuple<int, double, double, ReferenceSize>, std::shared_ptr<const PlannedTouches>>
       touches_;
 };
 

@@ -9,11 +9,11 @@
 namespace touchstone {
 namespace {
 
-constexpr int kEnough = 10;     // as large ones: no more sets are needed to know that p is not small
-constexpr int kPortion = 8;     // sets between two looks at progress
-constexpr int kDoubtSets = 39;  // until p is roughly known
+constexpr int kEnough = 10;     // sets at least as far off: no more are needed to know that p is not small
+constexpr int kPortion = 8;     // sets between two reports of progress
+constexpr int kFirstSets = 39;  // until p is roughly known
 constexpr int kSomeSets = 99;
-constexpr int kSmallPSets = 219;  // the least that show p < 0.005
+constexpr int kSmallPSets = 219;  // the fewest that can show p < 0.005
 constexpr int kAllSets = 499;
 
 }  // namespace
@@ -27,86 +27,87 @@ double SequentialP(const std::vector<double>& simulated, double measured, int k)
   return (1.0 + as_large) / (1.0 + simulated.size());
 }
 
-UnposedNull UnposedRank::Null(size_t object) const {
+PoseFreeNull PoseFreeRank::Null(size_t object) const {
   std::vector<std::vector<double>> distances;
   for (const auto& set : sets_) distances.push_back(set[object]);
-  return UnposedNull(std::move(distances));
+  return PoseFreeNull(std::move(distances));
 }
 
-absl::StatusOr<UnposedRank> UnposedRank::Make(const UnposedCase& the_case,
-                                              const std::shared_ptr<const Model>& model,
-                                              const SupposedPoses& poses, bool doubt_only, double from,
-                                              double to) {
-  UnposedRank rank;
+absl::StatusOr<PoseFreeRank> PoseFreeRank::Make(const PoseFreeExperiment& experiment,
+                                                const std::shared_ptr<const Model>& model,
+                                                const AssumedPoses& poses, bool coarse, double from,
+                                                double to) {
+  PoseFreeRank rank;
   rank.poses_ = poses;
-  TOUCHSTONE_ASSIGN_OR_RETURN(rank.reference_, the_case.MakeReference(model, poses, ReferenceSize::kFull));
-  rank.distances_ = UnposedDistances(the_case.measured, rank.reference_);
+  TOUCHSTONE_ASSIGN_OR_RETURN(rank.reference_, experiment.MakeReference(model, poses, ReferenceSize::kFull));
+  rank.distances_ = PoseFreeDistances(experiment.measured, rank.reference_);
 
-  const size_t objects = the_case.objects.size();
-  const int most = doubt_only ? kSomeSets : kAllSets;
-  std::vector<absl::Status> status(most);
+  const size_t objects = experiment.objects.size();
+  const int max_sets = coarse ? kSomeSets : kAllSets;
+  std::vector<absl::Status> status(max_sets);
   const auto make = [&](int begin, int end) {
     for (int n = begin; n < end; ++n) {
-      const auto set = the_case.MakeSet(model, poses, n);
+      const auto set = experiment.MakeSet(model, poses, n);
       if (!set.ok()) {
         status[n] = set.status();
         continue;
       }
       for (size_t o = 0; o < objects; ++o)
-        rank.sets_[n].push_back(UnposedDistances((*set)[o], rank.reference_[o]));
-      rank.sets_[n].push_back(UnposedDistances(*set, rank.reference_));
+        rank.sets_[n].push_back(PoseFreeDistances((*set)[o], rank.reference_[o]));
+      rank.sets_[n].push_back(PoseFreeDistances(*set, rank.reference_));
     }
   };
-  for (const int until : {kDoubtSets, kSomeSets, kSmallPSets, kAllSets}) {
-    if (until > most) break;
+  for (const int until : {kFirstSets, kSomeSets, kSmallPSets, kAllSets}) {
+    if (until > max_sets) break;
     for (int begin = static_cast<int>(rank.sets_.size()); begin < until; begin += kPortion) {
-      if (!the_case.Progress("simulating sets", from + (to - from) * begin / most))
+      if (!experiment.Progress("simulating sets", from + (to - from) * begin / max_sets))
         return absl::CancelledError("cancelled");
       const int end = std::min(until, begin + kPortion);
       rank.sets_.resize(end);
-      if (the_case.context.pool)
-        the_case.context.pool->ParallelFor(end - begin, 1, [&](int a, int b) { make(begin + a, begin + b); });
+      if (experiment.context.pool)
+        experiment.context.pool->ParallelFor(end - begin, 1,
+                                             [&](int a, int b) { make(begin + a, begin + b); });
       else
         make(begin, end);
       for (int n = begin; n < end; ++n) TOUCHSTONE_RETURN_IF_ERROR(status[n]);
     }
-    const UnposedNull null = rank.Null(objects);
+    const PoseFreeNull null = rank.Null(objects);
     std::vector<double> simulated;
-    for (const auto& set : rank.sets_) simulated.push_back(null.Largest(set[objects]));
-    const double measured = null.Largest(rank.distances_);
+    for (const auto& set : rank.sets_) simulated.push_back(null.LargestStandardised(set[objects]));
+    const double measured = null.LargestStandardised(rank.distances_);
     const auto as_large = std::count_if(simulated.begin(), simulated.end(),
                                         [&](double value) { return value >= measured - 1e-12; });
     rank.p_ = SequentialP(simulated, measured, kEnough);
     if (as_large >= kEnough) break;
-    if (doubt_only && rank.p_ <= 0.1) break;
+    if (coarse && rank.p_ <= 0.1) break;
     if (until == kSmallPSets && as_large == 0) break;
   }
   return rank;
 }
 
-absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const UnposedRank& rank, double from,
-                                       double to) {
-  const UnposedNull null = rank.Null(the_case.objects.size());
-  SupposedPoses best;
-  double least = HUGE_VAL;
+absl::StatusOr<AssumedPoses> FitPoses(const PoseFreeExperiment& experiment, const PoseFreeRank& rank,
+                                      double from, double to) {
+  const PoseFreeNull null = rank.Null(experiment.objects.size());
+  AssumedPoses best;
+  double best_misfit = HUGE_VAL;
   int tried = 0;
   const auto attempt = [&](double tilt_deg, double spread, ReferenceSize size) -> absl::Status {
-    if (!the_case.Progress("fitting the poses' spread", from + (to - from) * tried++ / 33))
+    if (!experiment.Progress("fitting the poses' spread", from + (to - from) * tried++ / 33))
       return absl::CancelledError("cancelled");
-    const SupposedPoses poses{tilt_deg * kRadiansPerDegree, spread};
-    TOUCHSTONE_ASSIGN_OR_RETURN(const UnposedSamples reference,
-                                the_case.MakeReference(the_case.model, poses, size));
-    const double apart = null.Together(UnposedDistances(the_case.measured, reference));
-    if (apart < least) least = apart, best = poses;
+    const AssumedPoses poses{tilt_deg * kRadiansPerDegree, spread};
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PoseFreeSamples reference,
+                                experiment.MakeReference(experiment.model, poses, size));
+    const double misfit = null.Misfit(PoseFreeDistances(experiment.measured, reference));
+    if (misfit < best_misfit) best_misfit = misfit, best = poses;
     return absl::OkStatus();
   };
   for (const double tilt_deg : {5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0})
     for (const double spread : {0.4, 0.6, 0.8})
       TOUCHSTONE_RETURN_IF_ERROR(attempt(tilt_deg, spread, ReferenceSize::kQuick));
-  const SupposedPoses coarse = best;
-  // Never worse than the poses that one supposes without looking.
+  const AssumedPoses coarse = best;
+  // Never worse than the poses that are assumed by default.
   best = rank.poses();
-  least = null.Together(rank.distances());
+  best_misfit = null.Misfit(rank.distances());
   for (const double tilt_deg : {-2.5, 0.0, 2.5})
     for (const double spread : {-0.1, 0.0, 0.1})
       TOUCHSTONE_RETURN_IF_ERROR(attempt(coarse.max_tilt_rad / kRadiansPerDegree + tilt_deg,

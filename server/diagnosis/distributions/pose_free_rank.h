@@ -1,44 +1,43 @@
-// How unusual a set without poses is among sets that a model makes, and the poses that suit it best.
+// Monte Carlo test of a set without poses: its rank among sets that a model makes; and the poses that suit it best.
 #pragma once
 
 #include "server/diagnosis/distributions/pose_free_experiment.h"
 
 namespace touchstone {
 
-// p of `measured` among values of simulated sets in the order in which they were made: of the k-th that is at
-// least as large, k / its place; if there are fewer than k, (1 + as large) / (1 + all). Exact although one
-// stops making sets at the k-th (Besag and Clifford 1991).
+// p of `measured` among the values of simulated sets, in the order in which they were made: if the k-th that is at
+// least as large stands at place m, k / m; with fewer than k of them, (1 + number as large) / (1 + number). Exact
+// although no more sets are made after the k-th (Besag and Clifford 1991).
 double SequentialP(const std::vector<double>& simulated, double measured, int k);
 
 // The rank of the measured set among sets that a model makes.
-class UnposedRank {
+class PoseFreeRank {
  public:
-  // `doubt_only`: sets are made until it is clear whether p is above 0.1, no more. `from` and `to`: progress.
-  // Returns CANCELLED if progress says so.
-  static absl::StatusOr<UnposedRank> Make(const UnposedCase& the_case,
-                                          const std::shared_ptr<const Model>& model,
-                                          const SupposedPoses& poses, bool doubt_only, double from,
-                                          double to);
+  // `coarse`: sets are made only until it is clear whether p is above 0.1. `from` and `to`: the part of the progress
+  // that this takes. Returns CANCELLED if the progress callback says so.
+  static absl::StatusOr<PoseFreeRank> Make(const PoseFreeExperiment& experiment,
+                                           const std::shared_ptr<const Model>& model,
+                                           const AssumedPoses& poses, bool coarse, double from, double to);
 
-  // Of all measures together.
+  // p of all distance measures together.
   double p() const { return p_; }
-  const SupposedPoses& poses() const { return poses_; }
-  const UnposedSamples& reference() const { return reference_; }
+  const AssumedPoses& poses() const { return poses_; }
+  const PoseFreeSamples& reference() const { return reference_; }
   const std::vector<double>& distances() const { return distances_; }  // of the measured set
-  // Of the object, or of all together: the number of objects.
-  UnposedNull Null(size_t object) const;
+  // The null distribution of one object, or, with the number of objects, of all together.
+  PoseFreeNull Null(size_t object) const;
 
  private:
-  SupposedPoses poses_;
-  UnposedSamples reference_;
+  AssumedPoses poses_;
+  PoseFreeSamples reference_;
   std::vector<double> distances_;
   std::vector<std::vector<std::vector<double>>> sets_;  // [set][object; the last: all][measure]
   double p_ = 1;
 };
 
-// The poses under which the model's sets are most like the measured one, from `rank`'s: what another tilt or
-// spread explains is no error of the model. That makes p too large rather than too small.
-absl::StatusOr<SupposedPoses> FitPoses(const UnposedCase& the_case, const UnposedRank& rank, double from,
-                                       double to);
+// The poses under which the model's sets are most like the measured one, starting from those of `rank`: what another
+// tilt or spread explains is no error of the model. That makes p too large rather than too small.
+absl::StatusOr<AssumedPoses> FitPoses(const PoseFreeExperiment& experiment, const PoseFreeRank& rank,
+                                      double from, double to);
 
 }  // namespace touchstone

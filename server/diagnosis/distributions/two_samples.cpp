@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/units.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone {
@@ -39,7 +40,7 @@ double MeanDistance(const TimePoints& a, const TimePoints& b) {
   std::vector<double> column(b.value.size()), squares(count);
   for (int n = 0; n < count; ++n)
     for (int d = 0; d < dimensions; ++d) column[size_t(d) * count + n] = b.value[size_t(n) * dimensions + d];
-  // Among a sample's own every pair comes twice.
+  // Within one sample every pair counts twice.
   const bool own = &a == &b;
   double sum = 0;
   for (int m = 0; m < a.size(); ++m) {
@@ -62,15 +63,15 @@ double EnergyDistance(const TimePoints& a, const TimePoints& b, double within_b)
 
 double KolmogorovDistance(const std::vector<double>& a, const std::vector<double>& b) {
   if (a.empty() || b.empty()) return 0;
-  double most = 0;
+  double largest = 0;
   size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {
     const double at = std::min(a[i], b[j]);
     while (i < a.size() && a[i] <= at) ++i;
     while (j < b.size() && b[j] <= at) ++j;
-    most = std::max(most, std::abs(double(i) / a.size() - double(j) / b.size()));
+    largest = std::max(largest, std::abs(double(i) / a.size() - double(j) / b.size()));
   }
-  return most;
+  return largest;
 }
 
 double TouchStatistic::Mean() const {
@@ -84,7 +85,7 @@ std::vector<TouchStatistic> TouchStatistics(const std::vector<double>& time_s, i
   std::vector<TouchStatistic> list;
   list.push_back({"spread", "us", {}});
   const bool three = fingers == 3;
-  if (three) list.push_back({"curvature_per_m", "1/m", {}});
+  if (three) list.push_back({kCurvatureStatistic, "1/m", {}});
   list.push_back(
       {absl::StrCat(FingerName(fingers - 1, fingers), " after ", FingerName(0, fingers)), "us", {}});
   if (fingers > 2) list.push_back({"second after first", "us", {}});
@@ -99,10 +100,10 @@ std::vector<TouchStatistic> TouchStatistics(const std::vector<double>& time_s, i
     sorted.assign(t, t + fingers);
     std::sort(sorted.begin(), sorted.end());
     size_t s = 0;
-    list[s++].sorted.push_back((sorted.back() - sorted.front()) * 1e6);
+    list[s++].sorted.push_back((sorted.back() - sorted.front()) * kMicrosecondsPerSecond);
     if (three) list[s++].sorted.push_back(speed_m_s * (t[0] - 2 * t[1] + t[2]) / (spacing_m * spacing_m));
-    list[s++].sorted.push_back((t[fingers - 1] - t[0]) * 1e6);
-    if (fingers > 2) list[s++].sorted.push_back((sorted[1] - sorted[0]) * 1e6);
+    list[s++].sorted.push_back((t[fingers - 1] - t[0]) * kMicrosecondsPerSecond);
+    if (fingers > 2) list[s++].sorted.push_back((sorted[1] - sorted[0]) * kMicrosecondsPerSecond);
     for (int i = 0; i < fingers; ++i) list[fractions + i].sorted.push_back(t[i] == sorted[0]);
   }
   for (TouchStatistic& statistic : list) std::sort(statistic.sorted.begin(), statistic.sorted.end());

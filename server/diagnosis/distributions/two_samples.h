@@ -6,9 +6,9 @@
 
 namespace touchstone {
 
-// Touches as points: only differences between a touch's times are known, so n times are n - 1 numbers, the
-// orthonormal contrasts (Helmert's). Euclidean distances between points are those between the times less
-// their means.
+// Touches as points: only differences between a touch's times are known, so n times become n - 1 numbers, their
+// orthonormal contrasts (Helmert's). Euclidean distances between points are those between the times less their
+// means.
 struct TimePoints {
   int dimensions = 0;
   std::vector<double> value;  // [point * dimensions + d], s
@@ -29,10 +29,14 @@ double EnergyDistance(const TimePoints& a, const TimePoints& b, double within_b)
 // Largest gap between the cumulative distributions of two sorted samples, 0 to 1.
 double KolmogorovDistance(const std::vector<double>& sorted_a, const std::vector<double>& sorted_b);
 
-// A number that people can picture, of every touch.
+// The name of the statistic of local curvature.
+inline constexpr char kCurvatureStatistic[] = "curvature_per_m";
+
+// A number that people can picture, of every complete touch of a sample.
 struct TouchStatistic {
-  std::string name, unit;
-  std::vector<double> sorted;  // one a complete touch
+  std::string name;
+  std::string unit;            // of the values: "us", "1/m", or empty for yes (1) and no (0)
+  std::vector<double> sorted;  // ascending
   double Mean() const;
 };
 

@@ -1,0 +1,100 @@
+#include "server/diagnosis/distributions/effect_variation.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace touchstone {
+
+std::shared_ptr<const Model> Varied(const Model& model, const EffectDirection& direction,
+                                    const std::vector<double>& amounts) {
+  auto varied = std::make_shared<Model>(model);
+  EffectInstance* instance = nullptr;
+  for (EffectInstance& candidate : varied->effects)
+    if (candidate.effect->name == direction.effect->name && !direction.effect->formula) instance = &candidate;
+  if (!instance) {
+    EffectInstance added;
+    added.effect = direction.effect;
+    added.per_object = direction.effect->always_per_object;
+    added.values = direction.effect->NeutralValues(model.fingers);
+    // The other parameters of the effect (the length of a bump) at their typical size.
+    int offset = 0;
+    for (size_t p = 0; p < direction.effect->parameters.size(); ++p) {
+      const ParameterInfo& info = direction.effect->parameters[p];
+      if (info.arity == Arity::kScalar && static_cast<int>(p) != direction.parameter && info.typical != 0 &&
+          info.neutral != 0)
+        added.values[offset] = ToSi(info.unit, info.typical);
+      offset += info.Count(model.fingers);
+    }
+    varied->effects.push_back(std::move(added));
+    instance = &varied->effects.back();
+  }
+  const ParameterInfo& info = direction.effect->parameters[direction.parameter];
+  const int count = info.Count(model.fingers);
+  const auto vary = [&](std::vector<double>* values) {
+    if (static_cast<int>(values->size()) < direction.offset + count) return false;
+    double* value = values->data() + direction.offset;
+    double sum = 0;
+    for (int i = 0; i < count; ++i) {
+      sum += amounts[i];
+      if (info.neutral == info.upper && info.neutral != 0 && amounts[i] != 0)
+        value[i] = amounts[i];  // an acceleration, degrees of freedom: less is more
+      else
+        value[i] += amounts[i];
+    }
+    if (info.sum_zero)
+      for (int i = 0; i < count; ++i) value[i] -= sum / count;
+    for (int i = 0; i < count; ++i)
+      if (value[i] < ToSi(info.unit, info.lower) || value[i] > ToSi(info.unit, info.upper)) return false;
+    return true;
+  };
+  if (!vary(&instance->values)) return nullptr;
+  for (auto& [object, values] : instance->object_values)
+    if (!vary(&values)) return nullptr;
+  return varied;
+}
+
+std::string VariationInWords(const Model& model, const EffectDirection& direction,
+                             const std::vector<double>& amounts) {
+  const ParameterInfo& info = direction.effect->parameters[direction.parameter];
+  double mean = 0;
+  if (info.sum_zero)
+    for (const double amount : amounts) mean += amount / amounts.size();
+  std::vector<std::string> values;
+  for (const double amount : amounts)
+    values.push_back(absl::StrFormat("%.3g", FromSi(info.unit, amount - mean)));
+  const auto model_has =
+      std::any_of(model.effects.begin(), model.effects.end(),
+                  [&](const EffectInstance& e) { return e.effect->name == direction.effect->name; });
+  return absl::StrCat(info.name, model_has && info.neutral == 0 ? " changed by " : " = ",
+                      values.size() == 1 ? values[0] : absl::StrCat("[", absl::StrJoin(values, ", "), "]"));
+}
+
+bool VisibleWithoutPoses(const Effect& effect, bool noise_is_known) {
+  if (noise_is_known && absl::EndsWith(effect.name, "_noise")) return false;
+  return effect.name != "missed_contact" && effect.name != "formula" && !effect.parameters.empty() &&
+         effect.needs.covariates.empty();
+}
+
+std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const Effect>& effect, int fingers) {
+  std::vector<EffectDirection> directions;
+  int offset = 0;
+  for (size_t p = 0; p < effect->parameters.size(); ++p) {
+    const ParameterInfo& info = effect->parameters[p];
+    const int count = info.Count(fingers);
+    // Others (the length of bumps) describe the shape of the effect, not its strength.
+    if (p == 0 || info.neutral == 0)
+      for (int entry = 0; entry < count; ++entry)
+        directions.push_back({effect, static_cast<int>(p), entry, offset});
+    offset += count;
+  }
+  return directions;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,106 @@
+#include "server/diagnosis/report/distributions_messages.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/effects/all_effects.h"
+
+namespace touchstone {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+std::shared_ptr<const Model> NoisyModel() {
+  auto model = ParseModel(
+      "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+      "effects:\n  - gaussian_noise: {sigma_us: 5000}\n",
+      "test", Catalogue());
+  EXPECT_TRUE(model.ok()) << model.status();
+  return std::make_shared<const Model>(*std::move(model));
+}
+
+DiagnosisInput Input() {
+  auto set = std::make_shared<MeasurementSet>();
+  set->origin = "test.csv";
+  set->fingers = 3;
+  set->objects = {"wedge"};
+  set->object.assign(72, 0);
+  DiagnosisInput input;
+  input.set = set;
+  input.model = NoisyModel();
+  return input;
+}
+
+// A model that the rounds show to be right.
+PoseFreeComparison Adequate() {
+  PoseFreeComparison comparison;
+  comparison.rows.compared = 72;
+  comparison.noise_is_known = true;
+  comparison.noise = RoundNoise{0.005, 0.0001, 0.0048, 0.0052, 96};
+  comparison.model = NoisyModel();
+  comparison.model_has_noise = true;
+  comparison.p_value = 0.4;
+  comparison.energy_distance_s = 0.002;
+  comparison.plan = "faces of the bounding box";
+  comparison.diagnosed = true;
+  return comparison;
+}
+
+TEST(PoseFreeReport, SaysWhatCannotBeKnown) {
+  const v1::Report report = PoseFreeReport(Input(), Adequate());
+  EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE);
+  EXPECT_THAT(report.warnings(), Contains(HasSubstr("cannot be known")));
+  EXPECT_THAT(report.warnings(), Contains(HasSubstr("faces of the bounding box")));
+  EXPECT_EQ(report.touches(), 72u);
+  EXPECT_DOUBLE_EQ(report.noise_floor_us(), 5000);
+  EXPECT_DOUBLE_EQ(report.distributions().energy_distance(), 2000);
+}
+
+TEST(PoseFreeReport, NamesCompatibleEffectsAndNoCulprit) {
+  PoseFreeComparison comparison = Adequate();
+  comparison.compatible = false;
+  comparison.compatible_effects = {{"finger_length", "offset_mm = [1, -0.5, -0.5]", 0.6},
+                                   {"channel_latency", "latency_us = [5e+04, 0, 0]", 0.4}};
+  const v1::Report report = PoseFreeReport(Input(), comparison);
+  EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED);
+  EXPECT_EQ(report.steps_size(), 0);
+  EXPECT_EQ(report.distributions().compatible_effects_size(), 2);
+  EXPECT_THAT(report.summary(), HasSubstr("finger_length (offset_mm = [1, -0.5, -0.5])"));
+  EXPECT_THAT(report.summary(), HasSubstr("write down the poses"));
+}
+
+TEST(PoseFreeReport, MakesNewNoiseAStepAndChangedNoiseARefit) {
+  PoseFreeComparison comparison = Adequate();
+  comparison.noise_change = NoiseChange::kNewEffect;
+  v1::Report report = PoseFreeReport(Input(), comparison);
+  EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
+  ASSERT_EQ(report.steps_size(), 1);
+  EXPECT_EQ(report.steps(0).effect(), "gaussian_noise");
+  EXPECT_DOUBLE_EQ(report.steps(0).parameters(0).value(), 5000);
+  EXPECT_THAT(report.improved_model_yaml(), HasSubstr("gaussian_noise"));
+
+  comparison.noise_change = NoiseChange::kNewValue;
+  report = PoseFreeReport(Input(), comparison);
+  EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE);
+  ASSERT_EQ(report.refitted_size(), 1);
+  EXPECT_DOUBLE_EQ(report.refitted(0).parameters(0).std_error(), 100);
+}
+
+TEST(PoseFreeReport, AsksForTheUnitOfTimesOfAnAbsurdSize) {
+  PoseFreeComparison comparison = Adequate();
+  comparison.size_ratio = 1000;
+  EXPECT_THAT(PoseFreeReport(Input(), comparison).warnings(), Contains(HasSubstr("is their unit us")));
+}
+
+TEST(PoseFreeReport, WithoutADiagnosisHasNoVerdict) {
+  PoseFreeComparison comparison = Adequate();
+  comparison.diagnosed = false;
+  const v1::Report report = PoseFreeReport(Input(), comparison);
+  EXPECT_EQ(report.verdict(), v1::Report::VERDICT_UNSPECIFIED);
+  EXPECT_EQ(report.summary(),
+            "As distributions, the measured times do not differ from the model's (p = 0.4).");
+}
+
+}  // namespace
+}  // namespace touchstone
