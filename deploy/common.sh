@@ -58,7 +58,7 @@ install_python_package() {
 programs=()
 
 # start_program NAME LOG READY [argument ...]: starts a program of the build with its output in LOG, waits until a line
-# says READY, and sets `told` to the word that follows. It is stopped by stop_programs, at the latest when the script
+# says READY, and sets `announced` to the word that follows. It is stopped by stop_programs, at the latest when the script
 # ends.
 start_program() {
   local name=$1 log=$2 ready=$3 pid tries=0
@@ -69,7 +69,7 @@ start_program() {
   "$bin/$name" "$@" > "$log" 2>&1 < /dev/null &
   pid=$!
   programs+=("$pid $name")
-  until told=$(sed -nE "/$ready /{s/.*$ready ([^ ]+).*/\\1/p;q}" "$log") && [[ -n $told ]]; do
+  until announced=$(sed -nE "/$ready /{s/.*$ready ([^ ]+).*/\\1/p;q}" "$log") && [[ -n $announced ]]; do
     if ! kill -0 "$pid" 2> /dev/null || ((++tries > 600)); then
       echo "$name did not start; its log, $log:" >&2
       tail -n 20 "$log" >&2
@@ -100,7 +100,7 @@ stop_programs() {
 # start_server LOG [flag ...]: touchstone-server on a free port; sets server_address when its health check says SERVING.
 start_server() {
   start_program touchstone-server "$1" 'listening on' --listen 127.0.0.1:0 "${@:2}" || return
-  server_address=$told
+  server_address=$announced
   "$python" deploy/wait-until-serving "$server_address" 30
 }
 
@@ -111,7 +111,7 @@ start_emulated_rig() {
   mkdir -p "$folder" || return
   start_program touchstone-rig-emulator "$folder/emulator.out" 'ready' --dir "$folder" --speedup "$speedup" \
     "${@:3}" || return
-  start_program touchstone-gateway "$folder/gateway.log" 'listening on' --config "$told" --listen 127.0.0.1:0 || return
-  gateway_address=$told
+  start_program touchstone-gateway "$folder/gateway.log" 'listening on' --config "$announced" --listen 127.0.0.1:0 || return
+  gateway_address=$announced
   "$python" deploy/wait-until-serving "$gateway_address" 60
 }

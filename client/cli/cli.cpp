@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 
 #include "client/cli/common.h"
@@ -13,6 +14,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
+#include "server/geometry/mesh_file.h"
 
 namespace touchstone::cli {
 namespace {
@@ -187,9 +189,14 @@ absl::Status Cli::CheckFiles(const CLI::App* command) {
   for (const CLI::Option* option : files.inputs)
     for (const std::string& path : option->results()) inputs.push_back(path);
   std::error_code error;
-  if (!source_.mesh_folder.empty())
-    for (const auto& entry : std::filesystem::directory_iterator(source_.mesh_folder, error))
-      inputs.push_back(entry.path().string());
+  if (!source_.mesh_folder.empty()) {
+    const std::vector<std::string> formats = MeshFormatNames();
+    for (const auto& entry : std::filesystem::directory_iterator(source_.mesh_folder, error)) {
+      const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
+      for (const std::string& format : formats)
+        if (extension == "." + format) inputs.push_back(entry.path().string());
+    }
+  }
   // A journal has two files beside it while it is open.
   for (size_t i = inputs.size(); i-- > 0;)
     if (absl::EndsWith(inputs[i], ".db"))
