@@ -299,7 +299,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     std::vector<MeshSource> meshes) const {
   client::ConnectionOptions options;
   options.servers = SplitCommas(source_.servers);
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, {"auto", "egl", "cpu"}).status());
+  TOUCHSTONE_RETURN_IF_ERROR(Renderer().status());
   if (!options.servers.empty()) {
     const char* embedded_only = source_.threads != 0      ? "--threads"
                                 : source_.egl_device >= 0 ? "--egl-device"
@@ -320,11 +320,20 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     return absl::InvalidArgumentError(
         absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one per core"));
   embedded.threads = source_.threads;
-  embedded.renderer.kind = source_.renderer == "egl"   ? RendererKind::kEgl
-                           : source_.renderer == "cpu" ? RendererKind::kCpu
-                                                       : RendererKind::kAuto;
-  embedded.renderer.egl_device = source_.egl_device;
+  TOUCHSTONE_ASSIGN_OR_RETURN(embedded.renderer, Renderer());
   return client::Connection::Open(std::move(options));
+}
+
+absl::StatusOr<RendererOptions> Cli::Renderer() const {
+  static const std::map<std::string, RendererKind> kinds = {
+      {"auto", RendererKind::kAuto}, {"egl", RendererKind::kEgl}, {"cpu", RendererKind::kCpu}};
+  std::vector<std::string> names;
+  for (const auto& [name, kind] : kinds) names.push_back(name);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, names).status());
+  RendererOptions options;
+  options.kind = kinds.at(source_.renderer);
+  options.egl_device = source_.egl_device;
+  return options;
 }
 
 void Cli::Log(absl::string_view line) const {

@@ -81,6 +81,8 @@ class Cli {
   // server has its own, and the caller may send these along.
   absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(std::vector<MeshSource> meshes) const;
   const SourceOptions& source() const { return source_; }
+  // What --renderer and --egl-device say; INVALID_ARGUMENT for an unknown kind.
+  absl::StatusOr<RendererOptions> Renderer() const;
   const OutputOptions& output() const { return output_; }
 
   // A line to stderr: Log unless --quiet, Detail only with --verbose.

@@ -115,11 +115,8 @@ class Doctor {
   }
 
   void CheckRenderers() {
-    RendererOptions options;
-    options.egl_device = cli_.source().egl_device;
-    options.kind = cli_.source().renderer == "egl"   ? RendererKind::kEgl
-                   : cli_.source().renderer == "cpu" ? RendererKind::kCpu
-                                                     : RendererKind::kAuto;
+    // An unknown kind is refused where the source is connected.
+    const RendererOptions options = cli_.Renderer().value_or(RendererOptions());
     const absl::StatusOr<std::shared_ptr<Renderer>> chosen = CreateRenderer(options);
     Json devices = Json::array();
     for (const EglDevice& device : ListEglDevices()) {
