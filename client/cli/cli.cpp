@@ -183,7 +183,7 @@ absl::Status Cli::CheckFiles(const CLI::App* command) {
   const CommandFiles& files = files_[command];
   std::vector<std::string> inputs = source_.meshes;
   for (std::string& mesh : inputs) {
-    const absl::StatusOr<MeshSource> source = ParseMeshSource(mesh);
+    const absl::StatusOr<MeshSpec> source = ParseMeshSpec(mesh);
     mesh = source.ok() ? source->path : "";  // what is wrong with it is said where it is read
   }
   for (const CLI::Option* option : files.inputs)
@@ -278,12 +278,12 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
     if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
     return ConnectWithMeshes({});
   }
-  std::vector<MeshSource> meshes;
+  std::vector<MeshSpec> meshes;
   if (!source_.mesh_folder.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshSourcesOfFolder(source_.mesh_folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshSpecsOfFolder(source_.mesh_folder));
   }
   for (const std::string& text : source_.meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource mesh, ParseMeshSource(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec mesh, ParseMeshSpec(text));
     meshes.push_back(std::move(mesh));
   }
   return ConnectWithMeshes(std::move(meshes));
@@ -296,7 +296,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
 }
 
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
-    std::vector<MeshSource> meshes) const {
+    std::vector<MeshSpec> meshes) const {
   client::ConnectionOptions options;
   options.servers = SplitCommas(source_.servers);
   TOUCHSTONE_RETURN_IF_ERROR(Renderer().status());

@@ -11,6 +11,7 @@
 #include <iostream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 
@@ -22,6 +23,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/evidence.h"
+#include "server/service/measured_set_message.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone::cli {
@@ -35,19 +37,21 @@ constexpr size_t kPiece = 1 << 20;
 constexpr int kWidthOfNoTerminal = 110;
 constexpr int kMinWidth = 60, kMaxWidth = 160;
 
-// A set as the user names it: its file's text, or the name of a session that the server keeps.
-struct SetText {
+// A set as the user names it: its file's text, the name of a session that the server keeps, or what a rig's journal
+// holds.
+struct NamedSet {
   std::string csv, session;
+  std::optional<MeasurementSet> measured;
 };
-absl::StatusOr<SetText> ReadSet(const Cli& cli, const std::string& text) {
-  SetText set;
+absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
+  NamedSet set;
   if (text == "-") {
     set.csv.assign(std::istreambuf_iterator<char>(std::cin), {});
     return set;
   }
   // A rig's journal with one session is as good as its measurement file.
   if (IsJournalPath(text)) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(text, ""));
+    TOUCHSTONE_ASSIGN_OR_RETURN(set.measured, JournalSet(text));
     return set;
   }
   std::error_code error;
@@ -63,7 +67,7 @@ absl::StatusOr<SetText> ReadSet(const Cli& cli, const std::string& text) {
 // The mesh files of these objects in --mesh-dir; other files there are left alone.
 absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
                                const std::vector<std::string>& objects,
-                               std::map<std::string, MeshSource>* meshes) {
+                               std::map<std::string, MeshSpec>* meshes) {
   const std::vector<std::string> formats = MeshFormatNames();
   std::map<std::string, std::string> paths;
   std::set<std::string> twice;
@@ -91,7 +95,7 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
     cli.Log(absl::StrCat("note: --mesh-dir: several files are named '", name, "'; ", paths[name],
                          " is taken (--mesh ", name, "=FILE takes another)"));
   for (const auto& [name, path] : paths) {
-    MeshSource source;
+    MeshSpec source;
     source.name = name;
     source.path = path;
     meshes->emplace(name, source);  // --mesh comes first
@@ -100,10 +104,10 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
 }
 
 // The meshes that the set's objects need, of those that the options name.
-absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vector<std::string>& objects) {
-  std::map<std::string, MeshSource> meshes;
+absl::StatusOr<std::vector<MeshSpec>> MeshesOf(const Cli& cli, const std::vector<std::string>& objects) {
+  std::map<std::string, MeshSpec> meshes;
   for (const std::string& text : cli.source().meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const MeshSource source, ParseMeshSource(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const MeshSpec source, ParseMeshSpec(text));
     if (!meshes.emplace(source.name, source).second)
       return absl::InvalidArgumentError(
           absl::StrCat("--mesh: two are named '", source.name, "'; one per object was expected"));
@@ -115,7 +119,7 @@ absl::StatusOr<std::vector<MeshSource>> MeshesOf(const Cli& cli, const std::vect
   }
   if (!cli.source().mesh_folder.empty())
     TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, &meshes));
-  std::vector<MeshSource> list;
+  std::vector<MeshSpec> list;
   for (const auto& [name, source] : meshes) list.push_back(source);
   return list;
 }
@@ -185,18 +189,25 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     TOUCHSTONE_RETURN_IF_ERROR(ParseModel(AsModelFile(text), path, Catalogue()).status());
     evidence.add_also_yaml(text);
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(SetText set, ReadSet(cli, options.set));
+  TOUCHSTONE_ASSIGN_OR_RETURN(NamedSet set, ReadSet(cli, options.set));
   const bool served = !cli.source().servers.empty();
-  std::vector<MeshSource> meshes;
+  std::vector<MeshSpec> meshes;
   if (set.session.empty()) {
     evidence.set_origin(options.set == "-" ? "stdin" : options.set);
     if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet read, ParseMeasurementSet(set.csv, evidence.origin()));
-      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, read.objects));
+      std::vector<std::string> objects;
+      if (set.measured.has_value()) {
+        objects = set.measured->objects;
+      } else {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet read,
+                                    ParseMeasurementSet(set.csv, evidence.origin()));
+        objects = read.objects;
+      }
+      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects));
     }
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(comparison->connection_,
-                              cli.ConnectWithMeshes(served ? std::vector<MeshSource>() : meshes));
+                              cli.ConnectWithMeshes(served ? std::vector<MeshSpec>() : meshes));
   if (!set.session.empty()) {
     evidence.set_session(set.session);
     v1::GetSessionRequest request;
@@ -212,6 +223,11 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
   if (!set.session.empty()) return comparison;
+  if (set.measured.has_value()) {
+    *evidence.mutable_set() = ToProto(*set.measured);
+    if (evidence.set().ByteSizeLong() <= kMaxInline) return comparison;
+    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(options.set, ""));
+  }
   if (set.csv.size() > kMaxInline)
     TOUCHSTONE_RETURN_IF_ERROR(comparison->SendAhead(set.csv));
   else
@@ -230,14 +246,14 @@ Comparison::~Comparison() {
         absl::StrCat("session ", sent_ahead_, " is left at the server: ", deleted.status().message()));
 }
 
-absl::Status Comparison::SendMeshes(const std::vector<MeshSource>& meshes) {
+absl::Status Comparison::SendMeshes(const std::vector<MeshSpec>& meshes) {
   if (meshes.empty()) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
                               client::Connection::Call(&v1::Source::Stub::ListObjects, connection_->source(),
                                                        v1::ListObjectsRequest()));
   std::map<std::string, std::string> hashes;
   for (const v1::Object& object : served.objects()) hashes[object.name()] = object.mesh_hash();
-  for (const MeshSource& source : meshes) {
+  for (const MeshSpec& source : meshes) {
     MeshImport import;
     import.unit = source.unit;
     import.up = source.up;

@@ -163,7 +163,7 @@ class Doctor {
     const std::string where =
         (*connection)->embedded() ? "in this process" : "at " + (*connection)->address();
     Add("Source", true,
-        absl::StrCat(d.kind(), " source ", where, ", version ", d.version(),
+        absl::StrCat(client::SourceKindName(d.kind()), " source ", where, ", version ", d.version(),
                      d.default_model().empty() ? ""
                                                : ", default model " + d.default_model() + " (hash " +
                                                      d.default_model_hash().substr(0, 12) + ")"));
@@ -179,7 +179,7 @@ class Doctor {
                      " fingers"));
     json_["source"] = {{"reachable", true},
                        {"address", (*connection)->address()},
-                       {"kind", d.kind()},
+                       {"kind", client::SourceKindName(d.kind())},
                        {"version", d.version()},
                        {"plans", std::vector<std::string>(d.plans().begin(), d.plans().end())},
                        {"default_model", d.default_model()},

@@ -42,6 +42,15 @@ absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& jour
   return SessionMeasurements(journal, session);
 }
 
+absl::StatusOr<MeasurementSet> JournalSet(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, ""));
+  if (found.done == 0)
+    return absl::FailedPreconditionError(
+        absl::StrCat(path, ": session '", found.name, "' has no touch that is done"));
+  return SessionMeasurementSet(*journal, found.name, path);
+}
+
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
   TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));

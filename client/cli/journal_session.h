@@ -9,6 +9,7 @@
 
 #include "client/source/measurement_csv.h"
 #include "server/session/journal.h"
+#include "server/session/measurement_set.h"
 
 namespace touchstone::cli {
 
@@ -25,6 +26,8 @@ absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::st
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& journal,
                                                              const std::string& session);
 
+// What the journal's only session measured; `path` is its origin.
+absl::StatusOr<MeasurementSet> JournalSet(const std::string& path);
 // The measurement file of a session.
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session);
 

@@ -22,9 +22,9 @@ absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
   TOUCHSTONE_ASSIGN_OR_RETURN(
       rig.source,
       client::Connection::Call(&v1::Source::Stub::Describe, rig.connection->source(), v1::DescribeRequest()));
-  if (rig.source.kind() != "physical")
+  if (rig.source.kind() != v1::SOURCE_KIND_PHYSICAL)
     return absl::FailedPreconditionError(
-        absl::StrCat(rig.connection->address(), " is a ", rig.source.kind(),
+        absl::StrCat(rig.connection->address(), " is a ", client::SourceKindName(rig.source.kind()),
                      " source, which has no rig; touchstone touch --plan makes a plan's touches there"));
   return rig;
 }

@@ -194,7 +194,8 @@ absl::Status RunList(const Cli& cli, const Options& options) {
   Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "HASH", "OBJECTS"});
   for (const v1::Session& session : response.sessions())
     table.Add({session.name(), std::to_string(session.touches()), std::to_string(session.fingers()),
-               session.has_poses() ? "yes" : "no", session.hash().substr(0, 12),
+               session.has_poses() ? "yes" : "no",
+               session.hash().empty() ? "-" : session.hash().substr(0, 12),
                absl::StrJoin(session.objects(), ", ")});
   return cli.Print(table.Text());
 }

@@ -23,6 +23,13 @@
 
 namespace touchstone::client {
 
+// "virtual" or "physical", as people and scripts read it.
+inline const char* SourceKindName(v1::SourceKind kind) {
+  return kind == v1::SOURCE_KIND_PHYSICAL  ? "physical"
+         : kind == v1::SOURCE_KIND_VIRTUAL ? "virtual"
+                                           : "unknown";
+}
+
 // The largest message that a client accepts: a batch of images goes well beyond gRPC's 4 MiB.
 inline constexpr int kMaxMessageBytes = 256 << 20;
 

@@ -123,7 +123,7 @@ class FakeRig : public v1::Control::Service {
     explicit Touches(FakeRig* rig) : rig_(rig) {}
     grpc::Status Describe(grpc::ServerContext*, const v1::DescribeRequest*,
                           v1::DescribeResponse* response) override {
-      response->set_kind("physical");
+      response->set_kind(v1::SOURCE_KIND_PHYSICAL);
       response->set_lease_required(true);
       response->set_max_touches_per_request(100);
       return grpc::Status::OK;

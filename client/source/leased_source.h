@@ -29,7 +29,7 @@ class LeasedSource {
                                                             LeasedSourceOptions options = {});
 
   const v1::DescribeResponse& description() const { return description_; }
-  bool physical() const { return description_.kind() == "physical"; }
+  bool physical() const { return description_.kind() == v1::SOURCE_KIND_PHYSICAL; }
   // Touches to send in one request: one where each takes seconds, so that each is seen when it is done.
   size_t touches_per_request() const;
 

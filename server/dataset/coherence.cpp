@@ -12,7 +12,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kBitsADimension = 8;
+constexpr int kBitsPerDimension = 8;
 constexpr int kDimensions = 8;  // start, target: x y z each; lateral: octahedral u v
 
 // Bit b of `value` to bit b * 8 of the result.
@@ -21,7 +21,7 @@ inline uint64_t Spread(uint64_t value) {
   return _pdep_u64(value, 0x0101010101010101ull);
 #else
   uint64_t spread = 0;
-  for (int bit = 0; bit < kBitsADimension; ++bit) spread |= ((value >> bit) & 1) << (bit * kDimensions);
+  for (int bit = 0; bit < kBitsPerDimension; ++bit) spread |= ((value >> bit) & 1) << (bit * kDimensions);
   return spread;
 #endif
 }
@@ -49,15 +49,15 @@ inline uint64_t CoherentOrder::Range::Quantise(double value) const {
 void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
   keys_.clear();
   for (int axis = 0; axis < 3; ++axis) {
-    double start_least = INFINITY, start_most = -INFINITY, target_least = INFINITY, target_most = -INFINITY;
+    double start_min = INFINITY, start_max = -INFINITY, target_min = INFINITY, target_max = -INFINITY;
     for (const TouchPose& pose : sample) {
       const double start = pose.target_m[axis] - pose.approach[axis] * pose.standoff_m;
-      start_least = std::min(start_least, start), start_most = std::max(start_most, start);
-      target_least = std::min(target_least, pose.target_m[axis]);
-      target_most = std::max(target_most, pose.target_m[axis]);
+      start_min = std::min(start_min, start), start_max = std::max(start_max, start);
+      target_min = std::min(target_min, pose.target_m[axis]);
+      target_max = std::max(target_max, pose.target_m[axis]);
     }
-    start_[axis] = {start_least, start_most > start_least ? 255.999 / (start_most - start_least) : 0};
-    target_[axis] = {target_least, target_most > target_least ? 255.999 / (target_most - target_least) : 0};
+    start_[axis] = {start_min, start_max > start_min ? 255.999 / (start_max - start_min) : 0};
+    target_[axis] = {target_min, target_max > target_min ? 255.999 / (target_max - target_min) : 0};
   }
 }
 
@@ -86,18 +86,19 @@ absl::Span<const uint32_t> CoherentOrder::Sort() {
   for (uint64_t key : keys_) varying |= key ^ keys_[0];
   const int bits = __builtin_popcountll(varying);
   const int used = std::min(bits, 32);
-  constexpr int kPasses = 3, kBitsAPass = 11, kBuckets = 1 << kBitsAPass;
+  constexpr int kPasses = 3, kBitsPerPass = 11, kBuckets = 1 << kBitsPerPass;
   std::array<std::array<uint32_t, kBuckets>, kPasses> begin{};
   for (size_t k = 0; k < n; ++k) {
     const uint64_t key = Compress(keys_[k], varying) >> (bits - used);
-    for (int pass = 0; pass < kPasses; ++pass) ++begin[pass][(key >> (kBitsAPass * pass)) % kBuckets];
+    for (int pass = 0; pass < kPasses; ++pass) ++begin[pass][(key >> (kBitsPerPass * pass)) % kBuckets];
     keys_[k] = key << 32 | k;
   }
   keys_swap_.resize(n);
-  for (int pass = 0; kBitsAPass * pass < used; ++pass) {
+  for (int pass = 0; kBitsPerPass * pass < used; ++pass) {
     uint32_t sum = 0;
     for (uint32_t& count : begin[pass]) sum += std::exchange(count, sum);
-    for (uint64_t key : keys_) keys_swap_[begin[pass][(key >> (32 + kBitsAPass * pass)) % kBuckets]++] = key;
+    for (uint64_t key : keys_)
+      keys_swap_[begin[pass][(key >> (32 + kBitsPerPass * pass)) % kBuckets]++] = key;
     keys_.swap(keys_swap_);
   }
   order_.resize(n);

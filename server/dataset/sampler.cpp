@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/touch/batch_row.h"
 
 namespace touchstone {
 namespace {
@@ -25,13 +26,18 @@ TouchSampler::TouchSampler(const DatasetSpecification& specification)
   for (const auto& object : specification.objects)
     generators_.push_back(MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
   plan_ends_ = generators_[0]->Count() != 0;
+  const std::vector<CommandedTouch>& list = specification.plan.list;
+  if (specification.plan.kind == Plan::Kind::kList)
+    for (const std::string& name : simulator_.needed_covariates())
+      if (std::all_of(list.begin(), list.end(),
+                      [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; }))
+        list_covariates_.push_back(name);
 }
 
 TouchSampler::~TouchSampler() = default;
 
-// A plan that ends goes through its touches for each object; a random one numbers its draws by the sample.
 uint64_t TouchSampler::NumberOf(uint64_t index) const {
-  return plan_ends_ ? index / specification_.objects.size() : index;
+  return PlanNumber(index, specification_.objects.size(), plan_ends_);
 }
 
 absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std::atomic<bool>& cancelled,
@@ -131,9 +137,8 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
   FillBatch(object, indices, previous_press_m, workspace);
   TouchBatch& batch = workspace->batch;
   TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
-  const bool can_redraw = generators_[object]->CanRedraw();
   workspace->accepted.assign(batch.size(), 1);
-  if (can_redraw)
+  if (!generators_[object]->Accepts(false))
     for (int finger = 0; finger < batch.fingers(); ++finger)
       for (int touch = 0; touch < batch.size(); ++touch)
         workspace->accepted[touch] &= !std::isnan(batch.travel_m[batch.At(finger, touch)]);
@@ -152,27 +157,17 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
   for (size_t k = 0; k < block.size(); ++k) {
     const TouchPose& pose = workspace->poses[k];
     const uint32_t slot = block[k];
-    batch.index[k] = indices[slot];
-    batch.target_m[k] = pose.target_m;
-    batch.approach[k] = pose.approach;
-    batch.lateral[k] = pose.lateral;
-    batch.standoff_m[k] = pose.standoff_m;
-    batch.speed_m_s[k] = plan.speed_m_s;
-    batch.session_time_s[k] = plan.touch_interval_s * indices[slot];
+    if (plan.kind == Plan::Kind::kList)
+      SetTouch(plan.list[NumberOf(indices[slot]) % plan.list.size()], indices[slot], k, &batch);
+    else
+      SetTouch(pose, plan.speed_m_s, plan.touch_interval_s * indices[slot], indices[slot], k, &batch);
   }
-  if (plan.kind == Plan::Kind::kList) {
-    for (const std::string& name : simulator_.needed_covariates()) {
-      const bool everywhere =
-          std::all_of(plan.list.begin(), plan.list.end(),
-                      [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; });
-      if (everywhere) batch.covariates[name].resize(block.size());
-    }
-    for (size_t k = 0; k < block.size(); ++k) {
-      const CommandedTouch& touch = plan.list[NumberOf(batch.index[k]) % plan.list.size()];
-      batch.speed_m_s[k] = touch.speed_m_s;
-      batch.session_time_s[k] = touch.session_time_s;
-      for (auto& [name, values] : batch.covariates) values[k] = touch.covariates.at(name);
-    }
+  // A covariate that some touch of the list lacks stays out: the simulation says that it is missing.
+  for (const std::string& name : list_covariates_) {
+    std::vector<double>& values = batch.covariates[name];
+    values.resize(block.size());
+    for (size_t k = 0; k < block.size(); ++k)
+      values[k] = plan.list[NumberOf(batch.index[k]) % plan.list.size()].covariates.at(name);
   }
   if (!previous_press_m.empty())
     for (int finger = 0; finger < batch.fingers(); ++finger)
@@ -204,15 +199,11 @@ absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t fi
     generators_[object]->Draw({&number, 1}, attempt, &pose);
     simulator_.Prepare(1, &batch);
     batch.surface = specification_.objects[object];
-    batch.target_m[0] = pose.target_m;
-    batch.approach[0] = pose.approach;
-    batch.lateral[0] = pose.lateral;
-    batch.standoff_m[0] = pose.standoff_m;
-    batch.speed_m_s[0] = specification_.plan.speed_m_s;
+    SetTouch(pose, specification_.plan.speed_m_s, 0, 0, 0, &batch);
     TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &touch_workspace));
     bool complete = true;
     for (double travel_m : batch.travel_m) complete &= !std::isnan(travel_m);
-    if (complete) return absl::OkStatus();
+    if (generators_[object]->Accepts(complete)) return absl::OkStatus();
   }
   return Hopeless(object, index);
 }

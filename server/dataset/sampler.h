@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -71,8 +72,9 @@ class TouchSampler {
 
   const DatasetSpecification& specification_;
   const TouchSimulator simulator_;
-  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one an object
+  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one per object
   bool plan_ends_ = false;
+  std::vector<std::string> list_covariates_;  // that the model needs and every touch of a list carries
 };
 
 }  // namespace touchstone

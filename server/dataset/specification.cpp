@@ -23,7 +23,7 @@ constexpr ColumnName kColumnNames[] = {
     {"image", &ColumnChoice::image},
 };
 
-absl::Status ValidateImage(const DatasetImage& image) {
+absl::Status ValidateImage(const DatasetImage& image, ImageOrigin origin) {
   // Any camera will do: sizes and the field of view are what is checked here.
   Camera camera;
   camera.eye_m = {1, 0, 0};
@@ -32,7 +32,7 @@ absl::Status ValidateImage(const DatasetImage& image) {
   if (image.jpeg_quality < 1 || image.jpeg_quality > 100)
     return absl::InvalidArgumentError(
         absl::StrCat("image.jpeg_quality = ", image.jpeg_quality, ": must be from 1 to 100"));
-  if (image.renderer == nullptr)
+  if (image.renderer == nullptr && origin == ImageOrigin::kRendered)
     return absl::FailedPreconditionError(
         "images were asked for, but this source has no renderer: see `touchstone doctor`");
   return absl::OkStatus();
@@ -59,7 +59,7 @@ absl::StatusOr<ColumnChoice> ColumnChoice::FromNames(const std::vector<std::stri
   return choice;
 }
 
-absl::Status ValidateDataset(DatasetSpecification* specification) {
+absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin images) {
   if (specification->objects.empty())
     return absl::InvalidArgumentError(
         "objects is empty: name at least one object (`touchstone objects` lists them)");
@@ -67,7 +67,7 @@ absl::Status ValidateDataset(DatasetSpecification* specification) {
     return absl::InvalidArgumentError(
         absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
   TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&specification->plan));
-  if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image));
+  if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image, images));
   if (specification->max_draws < 1 || specification->max_draws > 1'000'000)
     return absl::InvalidArgumentError(
         absl::StrCat("max_draws = ", specification->max_draws, ": must be from 1 to 1000000"));
@@ -109,8 +109,11 @@ size_t ColumnInfo::BytesPerSample() const {
 }
 
 std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification) {
-  const ColumnChoice& choice = specification.columns;
-  const uint32_t fingers = specification.model->fingers;
+  return ColumnsOf(specification.columns, specification.image, specification.model->fingers);
+}
+
+std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int finger_count) {
+  const uint32_t fingers = finger_count;
   std::vector<ColumnInfo> columns;
   if (choice.index) columns.push_back({"index", ColumnType::kUint64, {}});
   if (choice.object) columns.push_back({"object", ColumnType::kInt32, {}});
@@ -128,7 +131,6 @@ std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification) {
     columns.push_back({"normal", ColumnType::kFloat32, {fingers, 3}});
   }
   if (choice.image) {
-    const DatasetImage& image = specification.image;
     const uint32_t width = image.options.width, height = image.options.height;
     const uint32_t channels = image.options.format == PixelFormat::kRgb ? 3 : 1;
     columns.push_back({"image",

@@ -24,7 +24,8 @@ struct DatasetImage {
   ImageEncoding encoding = ImageEncoding::kRaw;
   int jpeg_quality = 90;
   double vertical_fov_rad = 0.78539816339744831;
-  std::shared_ptr<Renderer> renderer;
+  RendererKind renderer_kind = RendererKind::kAuto;  // asked for
+  std::shared_ptr<Renderer> renderer;                // that renders; null where a camera takes the images
 };
 
 // Which groups of columns a batch carries.
@@ -52,8 +53,19 @@ struct DatasetSpecification {
   uint32_t max_draws = 1000;  // for one index, before the stream fails
 };
 
-// Checks every field and fills in `samples`; errors name the field and what would be right.
-absl::Status ValidateDataset(DatasetSpecification* specification);
+// Where the images of a dataset come from.
+enum class ImageOrigin { kRendered, kPhotographed };
+
+// Checks every field and fills in `samples`; errors name the field and what would be right. Rendered images need
+// image.renderer.
+absl::Status ValidateDataset(DatasetSpecification* specification,
+                             ImageOrigin images = ImageOrigin::kRendered);
+
+// Which touch of the plan sample `index` is: a plan that ends goes through its touches for each object in turn; a
+// random one numbers its draws by the sample.
+inline uint64_t PlanNumber(uint64_t index, size_t objects, bool plan_ends) {
+  return plan_ends ? index / objects : index;
+}
 
 // One column of a batch: little endian, packed, C order; the first dimension is the sample.
 enum class ColumnType { kFloat32, kUint8, kInt32, kUint64, kBytes };
@@ -66,6 +78,7 @@ struct ColumnInfo {
 };
 
 // The columns of every batch, in their order.
-std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification);
+std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int fingers);
+std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification);  // with the model's fingers
 
 }  // namespace touchstone

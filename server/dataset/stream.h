@@ -14,6 +14,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/base/thread_pool.h"
+#include "server/dataset/batch_columns.h"
 #include "server/dataset/sampler.h"
 #include "server/dataset/specification.h"
 
@@ -26,19 +27,6 @@ struct DatasetPart {
   uint32_t batch_size = 0;    // 0: 4096, or 64 with images
   uint32_t batch_stride = 1;  // after each batch, stride - 1 batches are left out
 };
-
-// One batch: samples start_index .. start_index + rows - 1.
-struct DatasetBatch {
-  uint64_t start_index = 0;
-  uint32_t rows = 0;
-  std::vector<std::string> data;               // one a column, as ColumnsOf tells them
-  std::vector<std::vector<uint64_t>> offsets;  // one a column: rows + 1 entries for kBytes, else empty
-};
-
-// Appends what a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
-// values, or an encoded file and the offset of its end, the first one after a 0.
-absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
-                           std::string* data, std::vector<uint64_t>* offsets);
 
 // Fills one contiguous run of batches, by the calling thread alone. Sample i is the same in whatever run.
 class BatchMaker {
@@ -53,8 +41,8 @@ class BatchMaker {
                     TouchSampler::Workspace* workspace) const;
 
  private:
-  absl::Status MakeImages(absl::Span<DatasetBatch> batches, absl::Span<const TouchPose> poses,
-                          const std::atomic<bool>& cancelled) const;
+  absl::Status MakeImages(absl::Span<DatasetBatch> batches, const BatchColumns& columns,
+                          absl::Span<const TouchPose> poses, const std::atomic<bool>& cancelled) const;
 
   std::shared_ptr<const DatasetSpecification> specification_;
   std::vector<ColumnInfo> columns_;

@@ -13,6 +13,7 @@
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/service/convert.h"
+#include "server/service/measured_set_message.h"
 
 namespace touchstone {
 namespace {
@@ -31,10 +32,12 @@ absl::StatusOr<MeasurementSet> ReadSet(const v1::Evidence& message, const Resour
     }
     case v1::Evidence::kCsv:
       return ParseMeasurementSet(message.csv(), origin);
+    case v1::Evidence::kSet:
+      return FromProto(message.set(), origin);
     case v1::Evidence::MEASUREMENTS_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("evidence.measurements is empty: set session or csv");
+  return absl::InvalidArgumentError("evidence.measurements is empty: set session, csv or set");
 }
 
 absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const v1::MeshFile& file) {

@@ -118,11 +118,11 @@ absl::Status TakeList(const std::vector<double>& list, double si_per_unit, const
 absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   GatewayOptions& o = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSource> sources, MeshSourcesOfFolder(folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSpec> sources, MeshSpecsOfFolder(folder));
     o.common.meshes.insert(o.common.meshes.end(), sources.begin(), sources.end());
   }
   for (const std::string& text : raw.mesh) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource source, ParseMeshSource(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec source, ParseMeshSpec(text));
     o.common.meshes.push_back(std::move(source));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(raw.fingers, 1, 8, "effector.fingers"));

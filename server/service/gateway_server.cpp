@@ -4,13 +4,13 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/all_effects.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/rig/rig.h"
 #include "server/service/journal_sessions_service.h"
-#include "server/service/physical_source_service.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
+#include "server/service/source_service.h"
+#include "server/source/physical_source.h"
 #include "server/source/recorded_rig.h"
 
 namespace touchstone {
@@ -63,23 +63,14 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   return Rig::Create(std::move(rig), std::move(parts));
 }
 
-// Only its fingers count: datasets know the shape of their columns from a model.
-absl::StatusOr<std::shared_ptr<const Model>> ModelOfFingers(const RigDevice& source) {
-  const std::string text =
-      absl::StrCat("touchstone: model/1\nname: rig\nend_effector: {fingers: ", source.fingers(),
-                   ", spacing_mm: ", ShortestNumber(source.spacing_m() * 1000), "}\neffects: []\n");
-  TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(text, "rig", Catalogue()));
-  return std::make_shared<const Model>(std::move(model));
-}
-
 }  // namespace
 
 struct GatewayServer::Parts {
   Resources resources;
-  std::unique_ptr<RigDevice> source;
-  Rig* rig = nullptr;  // the source, if it is one
+  std::unique_ptr<PhysicalSource> source;
+  Rig* rig = nullptr;  // the source's device, if it is one
   std::unique_ptr<LeaseBook> leases;
-  std::unique_ptr<PhysicalSourceService> source_service;
+  std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<RigService> rig_service;
   std::unique_ptr<JournalSessionsService> sessions;
@@ -96,25 +87,28 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   Resources& resources = parts.resources;
   resources.options = options.common;
   resources.pool = std::make_unique<ThreadPool>(0);
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.objects, ObjectStore::Load(options.common, resources.pool.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      resources.objects,
+      ObjectStore::Load(options.common.meshes, options.common.supershape_triangles, resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(""));
   Journal* journal = nullptr;
+  std::unique_ptr<RigDevice> device;
   if (options.replay.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<Rig> rig, OpenRig(options));
     parts.rig = rig.get();
     journal = &rig->journal();
-    parts.source = std::move(rig);
+    device = std::move(rig);
   } else {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedRig> recorded, RecordedRig::Open(options.replay));
     journal = &recorded->journal();
-    parts.source = std::move(recorded);
+    device = std::move(recorded);
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model, ModelOfFingers(*parts.source));
-
-  parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, parts.source->moves());
-  parts.source_service =
-      std::make_unique<PhysicalSourceService>(&resources, parts.leases.get(), parts.source.get());
-  parts.sessions = std::make_unique<JournalSessionsService>(journal, parts.source->moves());
+  const bool moves = device->moves();
+  parts.source = std::make_unique<PhysicalSource>(&resources.objects, options.common.Limits(),
+                                                  std::move(device), Rectify);
+  parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
+  parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
+  parts.sessions = std::make_unique<JournalSessionsService>(journal, moves);
   std::vector<ServedService> services = {{"touchstone.v1.Source", parts.source_service.get()},
                                          {"touchstone.v1.Sessions", parts.sessions.get()}};
   if (parts.rig != nullptr) {
@@ -142,8 +136,8 @@ int GatewayServer::port() const {
   return parts_->port;
 }
 
-RigDevice& GatewayServer::source() {
-  return *parts_->source;
+RigDevice& GatewayServer::device() {
+  return parts_->source->device();
 }
 
 void GatewayServer::Drain() {

@@ -19,10 +19,10 @@ class GatewayServer {
   ~GatewayServer();
 
   int port() const;
-  // For tests: what is served.
-  RigDevice& source();
-  // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s
-  // for running calls.
+  // For tests: the rig, or the recording.
+  RigDevice& device();
+  // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s for running
+  // calls.
   void Drain();
 
  private:

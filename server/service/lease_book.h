@@ -27,6 +27,8 @@ class LeaseBook {
   // source, which needs no lease; at a physical one that is refused too.
   absl::Status Check(const std::string& token, Clock::time_point now = Clock::now()) const;
 
+  // Whether nobody may act without a lease.
+  bool required() const { return required_; }
   // Who holds it; empty if nobody.
   std::string Holder(Clock::time_point now = Clock::now()) const;
   uint64_t epoch() const;

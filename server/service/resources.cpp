@@ -8,80 +8,9 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/source/request_checks.h"
 
 namespace touchstone {
-namespace {
-
-constexpr char kBuiltIn[] = "built-in supershape";
-
-absl::StatusOr<ServedObject> Serve(const std::string& name, TriangleMesh mesh, const std::string& origin) {
-  ServedObject object;
-  object.closed = InspectMesh(mesh).closed();
-  object.origin = origin;
-  TOUCHSTONE_ASSIGN_OR_RETURN(object.surface, Surface::Create(name, std::move(mesh)));
-  return object;
-}
-
-absl::StatusOr<ServedObject> MakeBuiltIn(const std::string& name, int triangles) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const SupershapeParameters parameters, NamedSupershape(name));
-  TOUCHSTONE_ASSIGN_OR_RETURN(TriangleMesh mesh, MakeSupershape(parameters, triangles));
-  return Serve(name, std::move(mesh), kBuiltIn);
-}
-
-absl::StatusOr<ServedObject> ReadObject(const MeshSource& source) {
-  MeshImport import;
-  import.unit = source.unit;
-  import.up = source.up;
-  import.scale = source.scale;
-  if (source.fit_mm > 0) import.fit_mm = source.fit_mm;
-  auto mesh = ReadMeshFile(source.path, import);
-  if (!mesh.ok()) return mesh.status();
-  auto object = Serve(source.name, *std::move(mesh), std::filesystem::path(source.path).filename().string());
-  if (!object.ok())
-    return absl::Status(object.status().code(), absl::StrCat(source.path, ": ", object.status().message()));
-  return object;
-}
-
-}  // namespace
-
-absl::StatusOr<ObjectStore> ObjectStore::Load(const ServerOptions& options, ThreadPool* pool) {
-  const std::vector<std::string> shapes = SupershapeNames();
-  const int count = static_cast<int>(shapes.size() + options.meshes.size());
-  std::vector<absl::StatusOr<ServedObject>> loaded(count, absl::UnknownError("not loaded"));
-  pool->ParallelFor(count, 1, [&](int begin, int end) {
-    for (int k = begin; k < end; ++k) {
-      if (k >= static_cast<int>(shapes.size())) {
-        loaded[k] = ReadObject(options.meshes[k - shapes.size()]);
-        continue;
-      }
-      loaded[k] = MakeBuiltIn(shapes[k], options.supershape_triangles);
-    }
-  });
-  ObjectStore store;
-  for (auto& object : loaded) {
-    if (!object.ok()) return object.status();
-    const std::string name = object->surface->name();
-    // A file may take the place of a built-in shape, but two files may not share a name.
-    const bool replaces_builtin = store.objects_.count(name) && store.objects_[name].origin == kBuiltIn;
-    if (store.objects_.count(name) && !replaces_builtin)
-      return absl::InvalidArgumentError(
-          absl::StrCat("two meshes are named '", name, "': give each a name of its own, --mesh NAME=FILE"));
-    store.objects_[name] = *std::move(object);
-  }
-  return store;
-}
-
-absl::StatusOr<const ServedObject*> ObjectStore::Find(const std::string& name,
-                                                      const std::string& field) const {
-  const auto found = objects_.find(name);
-  if (found != objects_.end()) return &found->second;
-  std::vector<std::string> names;
-  for (const auto& [known, object] : objects_) names.push_back(known);
-  return absl::NotFoundError(
-      absl::StrCat(field, ": no object is named '", name, "'", DidYouMean(name, names)));
-}
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& folder) {
   auto store = std::make_unique<ModelStore>();
@@ -145,16 +74,6 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::s
       absl::StrCat("model.hash: no model has the hash '", prefix, "'", DidYouMean(prefix, known)));
 }
 
-absl::Status CheckResourceName(const std::string& name, const std::string& field) {
-  const bool plain =
-      !name.empty() && name.size() <= 64 && name[0] != '.' &&
-      name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
-          std::string::npos;
-  if (plain) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      field, " = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
-}
-
 absl::Status ModelStore::CheckName(const std::string& name) {
   return CheckResourceName(name, "model.name");
 }
@@ -185,17 +104,6 @@ std::vector<std::shared_ptr<const Model>> ModelStore::All() const {
   std::vector<std::shared_ptr<const Model>> all;
   for (const auto& [name, model] : models_) all.push_back(model);
   return all;
-}
-
-absl::StatusOr<std::shared_ptr<Renderer>> Resources::RendererFor(RendererKind kind) {
-  std::lock_guard<std::mutex> lock(renderer_mutex_);
-  if (kind == RendererKind::kAuto) kind = options.renderer.kind;
-  std::shared_ptr<Renderer>& renderer = renderers_[kind];
-  if (renderer != nullptr) return renderer;
-  RendererOptions renderer_options = options.renderer;
-  renderer_options.kind = kind;
-  TOUCHSTONE_ASSIGN_OR_RETURN(renderer, CreateRenderer(renderer_options));
-  return renderer;
 }
 
 }  // namespace touchstone

@@ -1,4 +1,4 @@
-// What the services share: objects, models, the renderer, the thread pool, the limits, the counters.
+// What the services share: objects, models, the thread pool, the limits, the counters.
 #pragma once
 
 #include <atomic>
@@ -13,35 +13,12 @@
 
 #include "server/base/thread_pool.h"
 #include "server/base/version.h"
-#include "server/geometry/surface.h"
-#include "server/image/renderer.h"
 #include "server/model/model.h"
 #include "server/service/server_options.h"
 #include "server/service/session_store.h"
+#include "server/source/object_store.h"
 
 namespace touchstone {
-
-// 1 to 64 letters, digits, '_', '-' or '.', not '.' first. `field` is named in the error.
-absl::Status CheckResourceName(const std::string& name, const std::string& field);
-
-struct ServedObject {
-  std::shared_ptr<const Surface> surface;
-  bool closed = false;
-  std::string origin;  // "built-in supershape", or the file's name
-};
-
-// The objects by name; fixed once loaded.
-class ObjectStore {
- public:
-  // The built-in supershapes and the given files, read in parallel.
-  static absl::StatusOr<ObjectStore> Load(const ServerOptions& options, ThreadPool* pool);
-  const std::map<std::string, ServedObject>& all() const { return objects_; }
-  // `field` is named in the error, which suggests near names.
-  absl::StatusOr<const ServedObject*> Find(const std::string& name, const std::string& field) const;
-
- private:
-  std::map<std::string, ServedObject> objects_;
-};
 
 // Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so
 // that replicas that share it serve the same ones.
@@ -72,9 +49,6 @@ struct Resources {
   std::unique_ptr<SessionStore> sessions;
   std::shared_ptr<const Model> default_model;
 
-  // Made at the first use, so that a server is ready before a driver is.
-  absl::StatusOr<std::shared_ptr<Renderer>> RendererFor(RendererKind kind);
-
   std::atomic<bool> draining{false};
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
   std::atomic<uint32_t> running_requests{0};
@@ -83,10 +57,6 @@ struct Resources {
   std::atomic<uint64_t> touches{0};
   std::atomic<uint64_t> images{0};
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
-
- private:
-  std::mutex renderer_mutex_;
-  std::map<RendererKind, std::shared_ptr<Renderer>> renderers_;
 };
 
 // Counts a running call while it lives.

@@ -8,8 +8,8 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
+#include "server/service/call_guard.h"
 #include "server/service/convert.h"
-#include "server/service/permit.h"
 
 namespace touchstone {
 namespace {
@@ -173,10 +173,7 @@ grpc::Status RigService::CheckTouches(grpc::ServerContext*, const v1::CheckTouch
 absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
-  const int most = resources_->options.max_touches_per_request;
-  if (request.touches_size() > most)
-    return absl::InvalidArgumentError(
-        absl::StrCat("touches has ", request.touches_size(), ": at most ", most, " a request"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouchCount(request.touches_size(), resources_->options.Limits(), 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(ArmState from, rig_->arm().State());
   const Bounds bounds = object->surface->bounds();
   for (int k = 0; k < request.touches_size(); ++k) {

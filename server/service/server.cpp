@@ -14,6 +14,7 @@
 #include "server/service/serving.h"
 #include "server/service/sessions_service.h"
 #include "server/service/source_service.h"
+#include "server/source/virtual_source.h"
 
 namespace touchstone {
 namespace {
@@ -43,7 +44,8 @@ absl::StatusOr<std::shared_ptr<const Model>> DefaultModel(const std::string& nam
 struct Server::Parts {
   Resources resources;
   std::unique_ptr<LeaseBook> leases;
-  std::unique_ptr<SourceService> source;
+  std::unique_ptr<Source> source;
+  std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<ModelsService> models;
   std::unique_ptr<SessionsService> sessions;
@@ -61,20 +63,24 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   Resources& resources = parts.resources;
   resources.options = options;
   resources.pool = std::make_unique<ThreadPool>(options.threads);
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.objects, ObjectStore::Load(options, resources.pool.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      resources.objects,
+      ObjectStore::Load(options.meshes, options.supershape_triangles, resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(options.models_dir));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.sessions, SessionStore::Open(options));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
                               DefaultModel(options.default_model, resources.models.get()));
   parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
-  parts.source = std::make_unique<SourceService>(&resources, parts.leases.get());
+  parts.source = std::make_unique<VirtualSource>(
+      &resources.objects, options.Limits(), resources.default_model, options.renderer, resources.pool.get());
+  parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   parts.models = std::make_unique<ModelsService>(&resources);
   parts.sessions = std::make_unique<SessionsService>(&resources);
   parts.diagnosis = std::make_unique<DiagnosisService>(&resources);
 
   TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
-                              StartServing(options, {{"touchstone.v1.Source", parts.source.get()},
+                              StartServing(options, {{"touchstone.v1.Source", parts.source_service.get()},
                                                      {"touchstone.v1.Control", parts.control.get()},
                                                      {"touchstone.v1.Models", parts.models.get()},
                                                      {"touchstone.v1.Sessions", parts.sessions.get()},

@@ -59,11 +59,11 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
 absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
   ServerOptions& options = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSource> sources, MeshSourcesOfFolder(folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSpec> sources, MeshSpecsOfFolder(folder));
     options.meshes.insert(options.meshes.end(), sources.begin(), sources.end());
   }
   for (const std::string& text : raw.mesh) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSource source, ParseMeshSource(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec source, ParseMeshSpec(text));
     options.meshes.push_back(std::move(source));
   }
   if (raw.renderer == "egl") {

@@ -8,29 +8,21 @@
 #include <absl/status/statusor.h>
 
 #include "server/image/renderer.h"
+#include "server/source/object_store.h"
+#include "server/source/request_checks.h"
 
 namespace touchstone {
 
-// A mesh file to serve under a name, with what the file does not say.
-struct MeshSource {
-  std::string name;  // [A-Za-z0-9_.-]{1,64}
-  std::string path;
-  std::string unit = "mm";  // "mm", "cm", "m", "inch"
-  std::string up = "z";     // which axis of the file points up: "x", "y", "z"
-  double scale = 1;         // further factor on the coordinates
-  double fit_mm = 0;        // > 0: scale so that the longest side of the bounding box is this long
-};
-
 // "lat10=lat10.off", or with what the file does not say "cup=cup.off,fit_mm=150,up=y,unit=m,scale=2".
 // Errors say what was found and what would be right.
-absl::StatusOr<MeshSource> ParseMeshSource(const std::string& text);
+absl::StatusOr<MeshSpec> ParseMeshSpec(const std::string& text);
 
 // Every readable mesh file of a folder, sorted, named by its stem.
-absl::StatusOr<std::vector<MeshSource>> MeshSourcesOfFolder(const std::string& folder);
+absl::StatusOr<std::vector<MeshSpec>> MeshSpecsOfFolder(const std::string& folder);
 
 struct ServerOptions {
   std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
-  std::vector<MeshSource> meshes;          // besides the five built-in supershapes
+  std::vector<MeshSpec> meshes;            // besides the five built-in supershapes
   int supershape_triangles = 20000;        // about; of each built-in
   std::string models_dir;                  // where models are kept; empty: in memory
   std::string sessions_dir;                // where sessions are kept; empty: in memory
@@ -49,6 +41,8 @@ struct ServerOptions {
   int max_proposed_touches = 1000;
   double lease_window_s = 2;
   double drain_s = 10;  // what running calls get after SIGTERM
+
+  SourceLimits Limits() const { return {max_touches_per_request, max_images_per_request, max_batch_size}; }
 };
 
 }  // namespace touchstone

@@ -12,8 +12,8 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(MeshSource, ReadsNameFileAndWhatTheFileDoesNotSay) {
-  const auto source = ParseMeshSource("cup=models/cup.off,fit_mm=150,up=y");
+TEST(MeshSpec, ReadsNameFileAndWhatTheFileDoesNotSay) {
+  const auto source = ParseMeshSpec("cup=models/cup.off,fit_mm=150,up=y");
   ASSERT_TRUE(source.ok());
   EXPECT_EQ(source->name, "cup");
   EXPECT_EQ(source->path, "models/cup.off");
@@ -21,12 +21,12 @@ TEST(MeshSource, ReadsNameFileAndWhatTheFileDoesNotSay) {
   EXPECT_EQ(source->up, "y");
 }
 
-TEST(MeshSource, RefusesMistakesWithAHint) {
-  EXPECT_THAT(std::string(ParseMeshSource("cup.off").status().message()), HasSubstr("NAME=FILE"));
-  EXPECT_THAT(std::string(ParseMeshSource("cup=cup.off,fit=3").status().message()),
+TEST(MeshSpec, RefusesMistakesWithAHint) {
+  EXPECT_THAT(std::string(ParseMeshSpec("cup.off").status().message()), HasSubstr("NAME=FILE"));
+  EXPECT_THAT(std::string(ParseMeshSpec("cup=cup.off,fit=3").status().message()),
               HasSubstr("did you mean 'fit_mm'"));
-  EXPECT_THAT(std::string(ParseMeshSource("cup=cup.off,scale=-1").status().message()), HasSubstr("above 0"));
-  EXPECT_THAT(std::string(ParseMeshSource("c/up=cup.off").status().message()), HasSubstr("letters, digits"));
+  EXPECT_THAT(std::string(ParseMeshSpec("cup=cup.off,scale=-1").status().message()), HasSubstr("above 0"));
+  EXPECT_THAT(std::string(ParseMeshSpec("c/up=cup.off").status().message()), HasSubstr("letters, digits"));
 }
 
 TEST(ServerFlags, FlagsWinOverTheFile) {

@@ -14,6 +14,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/measurement_set.h"
+#include "server/source/request_checks.h"
 
 namespace touchstone {
 namespace {
@@ -58,13 +59,7 @@ absl::Status SessionStore::Upload::Append(absl::string_view piece) {
 }
 
 absl::Status SessionStore::CheckName(const std::string& name) {
-  const bool plain =
-      !name.empty() && name.size() <= 64 && name[0] != '.' &&
-      name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") ==
-          std::string::npos;
-  if (plain) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("name = '", name, "': must be 1 to 64 letters, digits, '_', '-' or '.', not '.' first"));
+  return CheckResourceName(name, "name");
 }
 
 absl::StatusOr<v1::Session> SessionStore::Describe(const std::string& name, absl::string_view csv,

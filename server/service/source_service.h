@@ -1,15 +1,17 @@
-// touchstone.v1.Source of the virtual source.
+// touchstone.v1.Source over any source: converts, calls, converts.
 #pragma once
 
-#include "server/service/control_service.h"
+#include "server/service/lease_book.h"
 #include "server/service/resources.h"
+#include "server/source/source.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
 namespace touchstone {
 
-class SourceService : public v1::Source::Service {
+class SourceService final : public v1::Source::Service {
  public:
-  SourceService(Resources* resources, LeaseBook* leases) : resources_(resources), leases_(leases) {}
+  SourceService(Resources* resources, LeaseBook* leases, Source* source)
+      : resources_(resources), leases_(leases), source_(source) {}
 
   grpc::Status Describe(grpc::ServerContext*, const v1::DescribeRequest*, v1::DescribeResponse*) override;
   grpc::Status ListObjects(grpc::ServerContext*, const v1::ListObjectsRequest*,
@@ -22,17 +24,15 @@ class SourceService : public v1::Source::Service {
                              grpc::ServerWriter<v1::StreamDatasetResponse>*) override;
 
  private:
-  absl::Status DoTouch(grpc::ServerContext* context, const v1::TouchRequest& request,
-                       v1::TouchResponse* response);
-  absl::Status DoCapture(grpc::ServerContext* context, const v1::CaptureRequest& request,
-                         v1::CaptureResponse* response);
-  absl::Status DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& request,
+  absl::StatusOr<v1::TouchResponse> DoTouch(grpc::ServerContext* context, const v1::TouchRequest& message);
+  absl::StatusOr<v1::CaptureResponse> DoCapture(grpc::ServerContext* context,
+                                                const v1::CaptureRequest& message);
+  absl::Status DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& message,
                         grpc::ServerWriter<v1::StreamDatasetResponse>* writer);
-  absl::Status Ready(uint64_t stops_before) const;
 
- protected:
   Resources* resources_;
   LeaseBook* leases_;
+  Source* source_;
 };
 
 }  // namespace touchstone

@@ -15,6 +15,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/session/measurement_columns.h"
 
@@ -25,17 +26,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kLongestName = 256;
 constexpr size_t kMaxColumns = 4096;
 constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
-
-// Vectors a thousandth away from unit length or from the right angle are made exact, as the simulation does;
-// those that are exact to rounding stay as they are, so that what is written is read back bit for bit.
-constexpr double kVectorTolerance = 1e-3;
-constexpr double kRounding = 4e-16;
-
-// What touch/commanded_touch.h accepts, told in the units of files.
-constexpr double kFarthestM = 100;
-constexpr double kLongestStandoffM = 10;
-constexpr double kFastestMS = 10;
-constexpr double kLongestSessionS = 1e9;
 
 // Valid UTF-8 without control characters: names go into messages and reports.
 bool IsText(absl::string_view text) {
@@ -162,21 +152,21 @@ class RowReader {
       case ColumnKind::kSpeed: {
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
         set_.speed_m_s.push_back(ToSi(Unit::kMillimetrePerSecond, value));
-        if (!(set_.speed_m_s.back() > 0 && set_.speed_m_s.back() <= kFastestMS))
+        if (!(set_.speed_m_s.back() > 0 && set_.speed_m_s.back() <= kMaxSpeedMS))
           return OutOfRange(i, "a speed above 0 and at most 10000 mm/s was expected");
         break;
       }
       case ColumnKind::kStandoff: {
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
         set_.standoff_m.push_back(ToSi(Unit::kMillimetre, value));
-        if (!(set_.standoff_m.back() >= 0 && set_.standoff_m.back() <= kLongestStandoffM))
+        if (!(set_.standoff_m.back() >= 0 && set_.standoff_m.back() <= kMaxStandoffM))
           return OutOfRange(i, "a distance from 0 to 10000 mm was expected");
         break;
       }
       case ColumnKind::kTarget: {
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
         set_.target_m[row][column.index] = ToSi(Unit::kMillimetre, value);
-        if (!(std::abs(set_.target_m[row][column.index]) <= kFarthestM))
+        if (!(std::abs(set_.target_m[row][column.index]) <= kMaxTargetM))
           return OutOfRange(i, "a coordinate within 100000 mm of the object's origin was expected");
         break;
       }
@@ -198,7 +188,7 @@ class RowReader {
       }
       case ColumnKind::kSessionTime: {
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
-        if (!(value >= 0 && value <= kLongestSessionS))
+        if (!(value >= 0 && value <= kMaxSessionTimeS))
           return OutOfRange(i, "seconds from 0 to 1e9 since the session began were expected");
         set_.session_time_s.push_back(value);
         break;
@@ -266,21 +256,24 @@ class RowReader {
   absl::Status MakeExact(size_t row) {
     Eigen::Vector3d& approach = set_.approach[row];
     Eigen::Vector3d& lateral = set_.lateral[row];
-    for (const auto& [vector, name] : {std::pair(&approach, "approach"), std::pair(&lateral, "lateral")}) {
-      const double length = vector->norm();
-      if (!(std::abs(length - 1) <= kVectorTolerance))
-        return Wrong(absl::StrCat("columns ", name, "_x, ", name, "_y, ", name, "_z: ", Text(*vector),
-                                  " has length ", ShortestNumber(length),
-                                  "; a unit vector was expected (within 0.001)"));
-      if (std::abs(length - 1) > kRounding) *vector /= length;
+    const auto not_unit = [&](const Eigen::Vector3d& vector, const char* name) {
+      return Wrong(absl::StrCat("columns ", name, "_x, ", name, "_y, ", name, "_z: ", Text(vector),
+                                " has length ", ShortestNumber(vector.norm()),
+                                "; a unit vector was expected (within 0.001)"));
+    };
+    switch (MakeOrthonormal(&approach, &lateral)) {
+      case VectorFlaw::kNone:
+        break;
+      case VectorFlaw::kApproachLength:
+        return not_unit(approach, "approach");
+      case VectorFlaw::kLateralLength:
+        return not_unit(lateral, "lateral");
+      case VectorFlaw::kNotPerpendicular:
+        return Wrong(absl::StrCat("columns lateral_x, lateral_y, lateral_z: ", Text(lateral),
+                                  " is not perpendicular to the approach ", Text(approach),
+                                  ": their dot product is ", ShortestNumber(approach.dot(lateral)),
+                                  "; 0 was expected (within 0.001)"));
     }
-    const double cosine = approach.dot(lateral);
-    if (!(std::abs(cosine) <= kVectorTolerance))
-      return Wrong(absl::StrCat("columns lateral_x, lateral_y, lateral_z: ", Text(lateral),
-                                " is not perpendicular to the approach ", Text(approach),
-                                ": their dot product is ", ShortestNumber(cosine),
-                                "; 0 was expected (within 0.001)"));
-    if (std::abs(cosine) > kRounding) lateral = (lateral - cosine * approach).normalized();
     return absl::OkStatus();
   }
 

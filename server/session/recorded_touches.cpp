@@ -12,9 +12,8 @@
 namespace touchstone {
 namespace {
 
-constexpr double kTolerance = 1e-9;  // of every number, SI
-constexpr double kCellM =
-    1e-6;  // of the grid that similar targets are looked up in; well above the tolerance
+// Of the grid that similar targets are looked up in; well above the tolerance.
+constexpr double kCellM = 1e-6;
 
 std::string ExactKey(const std::string& object, const std::string& bytes) {
   return absl::StrCat(object, absl::string_view("\0", 1), bytes);
@@ -27,21 +26,6 @@ int64_t CellOf(double coordinate_m) {
 
 std::string CellKey(const std::string& object, int64_t x, int64_t y, int64_t z) {
   return absl::StrCat(object, absl::string_view("\0", 1), x, ",", y, ",", z);
-}
-
-bool Near(double a, double b) {
-  return std::abs(a - b) <= kTolerance;
-}
-
-bool Near(const v1::Vector3& a, const v1::Vector3& b) {
-  return Near(a.x(), b.x()) && Near(a.y(), b.y()) && Near(a.z(), b.z());
-}
-
-bool Near(const v1::CommandedTouch& a, const v1::CommandedTouch& b) {
-  return Near(a.target_m(), b.target_m()) && Near(a.approach(), b.approach()) &&
-         Near(a.lateral(), b.lateral()) && Near(a.standoff_m(), b.standoff_m()) &&
-         Near(a.speed_m_s(), b.speed_m_s()) && a.has_stroke_m() == b.has_stroke_m() &&
-         Near(a.stroke_m(), b.stroke_m());
 }
 
 }  // namespace
@@ -88,7 +72,7 @@ void RecordedTouches::Add(JournalTouch touch) {
     const v1::Vector3& target = command->target_m();
     auto& cell = by_cell_[CellKey(touch.object, CellOf(target.x()), CellOf(target.y()), CellOf(target.z()))];
     const auto same = std::find_if(cell.begin(), cell.end(),
-                                   [&](const Recorded& other) { return Near(other.command, *command); });
+                                   [&](const Recorded& other) { return SamePath(other.command, *command); });
     if (same == cell.end())
       cell.push_back({*command, {row}});
     else
@@ -111,7 +95,8 @@ const RecordedTouches::Rows* RecordedTouches::FindRows(const std::string& object
   // The neighbour's cell too, where the target lies at the border of one.
   const v1::Vector3& target = command.target_m();
   const auto cells = [](double coordinate_m) {
-    std::vector<int64_t> both = {CellOf(coordinate_m - kTolerance), CellOf(coordinate_m + kTolerance)};
+    std::vector<int64_t> both = {CellOf(coordinate_m - kCommandTolerance),
+                                 CellOf(coordinate_m + kCommandTolerance)};
     if (both[0] == both[1]) both.pop_back();
     return both;
   };
@@ -121,7 +106,7 @@ const RecordedTouches::Rows* RecordedTouches::FindRows(const std::string& object
         const auto cell = by_cell_.find(CellKey(object, x, y, z));
         if (cell == by_cell_.end()) continue;
         for (const Recorded& recorded : cell->second)
-          if (Near(recorded.command, command)) return &recorded.rows;
+          if (SamePath(recorded.command, command)) return &recorded.rows;
       }
   return nullptr;
 }

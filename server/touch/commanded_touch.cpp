@@ -7,28 +7,22 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/touch_limits.h"
 
 namespace touchstone {
 namespace {
-
-constexpr double kVectorTolerance = 1e-3;
-constexpr double kFarthestM = 100;
 
 std::string Text(const Eigen::Vector3d& v) {
   return absl::StrCat("(", ShortestNumber(v.x()), ", ", ShortestNumber(v.y()), ", ", ShortestNumber(v.z()),
                       ")");
 }
 
-absl::Status MakeUnit(Eigen::Vector3d* vector, const std::string& field) {
-  if (!vector->allFinite())
-    return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(*vector), ": must be finite numbers"));
-  const double length = vector->norm();
-  if (std::abs(length - 1) > kVectorTolerance)
-    return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(*vector), " has length ",
-                                                   ShortestNumber(length),
-                                                   ": must be a unit vector (within 0.001)"));
-  *vector /= length;
-  return absl::OkStatus();
+absl::Status NotUnit(const Eigen::Vector3d& vector, const std::string& field) {
+  if (!vector.allFinite())
+    return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(vector), ": must be finite numbers"));
+  return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(vector), " has length ",
+                                                 ShortestNumber(vector.norm()),
+                                                 ": must be a unit vector (within 0.001)"));
 }
 
 absl::Status CheckRange(double value, double lower, double upper, bool open_below, const std::string& field) {
@@ -43,23 +37,28 @@ absl::Status CheckRange(double value, double lower, double upper, bool open_belo
 
 absl::Status MakeExact(CommandedTouch* touch, const std::string& where) {
   const std::string prefix = where.empty() ? "" : absl::StrCat(where, ".");
-  if (!touch->target_m.allFinite() || touch->target_m.cwiseAbs().maxCoeff() > kFarthestM)
+  if (!touch->target_m.allFinite() || touch->target_m.cwiseAbs().maxCoeff() > kMaxTargetM)
     return absl::InvalidArgumentError(
         absl::StrCat(prefix, "target_m = ", Text(touch->target_m),
                      ": must be finite and within 100 m of the object's origin"));
-  TOUCHSTONE_RETURN_IF_ERROR(MakeUnit(&touch->approach, prefix + "approach"));
-  TOUCHSTONE_RETURN_IF_ERROR(MakeUnit(&touch->lateral, prefix + "lateral"));
-  const double cosine = touch->approach.dot(touch->lateral);
-  if (std::abs(cosine) > kVectorTolerance)
-    return absl::InvalidArgumentError(
-        absl::StrCat(prefix, "lateral = ", Text(touch->lateral),
-                     " is not perpendicular to approach = ", Text(touch->approach), ": their dot product is ",
-                     ShortestNumber(cosine), " and must be 0 (within 0.001)"));
-  touch->lateral = (touch->lateral - cosine * touch->approach).normalized();
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->standoff_m, 0, 10, false, prefix + "standoff_m"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->speed_m_s, 0, 10, true, prefix + "speed_m_s"));
+  switch (MakeOrthonormal(&touch->approach, &touch->lateral)) {
+    case VectorFlaw::kNone:
+      break;
+    case VectorFlaw::kApproachLength:
+      return NotUnit(touch->approach, prefix + "approach");
+    case VectorFlaw::kLateralLength:
+      return NotUnit(touch->lateral, prefix + "lateral");
+    case VectorFlaw::kNotPerpendicular:
+      return absl::InvalidArgumentError(absl::StrCat(
+          prefix, "lateral = ", Text(touch->lateral),
+          " is not perpendicular to approach = ", Text(touch->approach), ": their dot product is ",
+          ShortestNumber(touch->approach.dot(touch->lateral)), " and must be 0 (within 0.001)"));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->standoff_m, 0, kMaxStandoffM, false, prefix + "standoff_m"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->speed_m_s, 0, kMaxSpeedMS, true, prefix + "speed_m_s"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->stroke_m, 0, kNoStrokeLimitM, true, prefix + "stroke_m"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->session_time_s, 0, 1e9, false, prefix + "session_time_s"));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckRange(touch->session_time_s, 0, kMaxSessionTimeS, false, prefix + "session_time_s"));
   for (const auto& [name, value] : touch->covariates) {
     if (!absl::StartsWith(name, "cov_") || !std::isfinite(value))
       return absl::InvalidArgumentError(

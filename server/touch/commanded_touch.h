@@ -27,9 +27,8 @@ struct CommandedTouch : TouchPose {
   std::map<std::string, double> covariates;  // names begin with "cov_"
 };
 
-// Checks every field and makes the vectors exactly unit and perpendicular: within 1e-3 they are corrected
-// (the approach is kept, the lateral is turned), beyond it is an error. Errors begin with `where`
-// ("touches[3]") and name field, value and what would be right.
+// Checks every field and makes the vectors exactly unit and perpendicular (base/touch_limits.h). Errors begin
+// with `where` ("touches[3]") and name field, value and what would be right.
 absl::Status MakeExact(CommandedTouch* touch, const std::string& where);
 
 }  // namespace touchstone

@@ -56,6 +56,8 @@ class PoseGenerator {
   virtual uint64_t Count() const = 0;
   // Whether a missed touch may be drawn again. Explicit touches may not.
   virtual bool CanRedraw() const = 0;
+  // The one rule for a drawn touch: it stands if every finger hit, or if there is no other draw.
+  bool Accepts(bool every_finger_hit) const { return every_finger_hit || !CanRedraw(); }
 };
 
 // `bounds` of the object that is touched; `plan` must be valid and outlive the generator.

@@ -7,6 +7,7 @@
 
 #include "server/base/check.h"
 #include "server/base/status.h"
+#include "server/touch/batch_row.h"
 
 namespace touchstone {
 namespace {
@@ -73,16 +74,8 @@ absl::Status TouchSimulator::Run(TouchBatch* batch, TouchWorkspace* workspace) c
 }
 
 bool Descriptor(const TouchBatch& batch, int touch, double* descriptor_s) {
-  double first = INFINITY;
-  bool complete = true;
-  for (int finger = 0; finger < batch.fingers(); ++finger) {
-    const double time = batch.reported_time_s[batch.At(finger, touch)];
-    descriptor_s[finger] = time;
-    if (time < first) first = time;
-    complete &= !std::isnan(time);
-  }
-  for (int finger = 0; finger < batch.fingers(); ++finger) descriptor_s[finger] -= first;
-  return complete;
+  return ForDescriptor(batch.reported_time_s.data() + touch, batch.size(), batch.fingers(),
+                       [&](int finger, double relative_s) { descriptor_s[finger] = relative_s; });
 }
 
 }  // namespace touchstone

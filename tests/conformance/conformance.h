@@ -38,7 +38,7 @@ class Conformance : public testing::Test {
     grpc::Status status;
   };
   Streamed Stream(v1::StreamDatasetRequest request);
-  bool IsVirtual() const { return description_.kind() == "virtual"; }
+  bool IsVirtual() const { return description_.kind() == v1::SOURCE_KIND_VIRTUAL; }
   // Where the source wants one: a lease, kept alive until the test ends, as every client has it. Else empty.
   std::string LeaseToken();
 

@@ -29,7 +29,7 @@ class SourceConformance : public Conformance {
 };
 
 TEST_F(SourceConformance, DescribesItsKindVersionPlansAndLimits) {
-  EXPECT_THAT(description_.kind(), testing::AnyOf("virtual", "physical"));
+  EXPECT_THAT(description_.kind(), testing::AnyOf(v1::SOURCE_KIND_VIRTUAL, v1::SOURCE_KIND_PHYSICAL));
   EXPECT_FALSE(description_.version().empty());
   EXPECT_GT(description_.plans_size(), 0);
   EXPECT_GT(description_.max_touches_per_request(), 0u);

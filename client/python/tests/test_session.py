@@ -46,7 +46,7 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
         return control_pb2.Lease(token=f"token{self.epoch}", holder=self.holder, epoch=self.epoch, window_s=self.window_s)
 
     def Describe(self, request, context):
-        return source_pb2.DescribeResponse(kind="physical", version="0", lease_required=True)
+        return source_pb2.DescribeResponse(kind=source_pb2.SOURCE_KIND_PHYSICAL, version="0", lease_required=True)
 
     def AcquireLease(self, request, context):
         if self.holder and not request.take and not self.stale:

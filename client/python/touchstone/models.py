@@ -13,6 +13,14 @@ from .errors import InvalidRequest
 from .v1 import models_pb2, source_pb2, types_pb2
 
 
+_SOURCE_KINDS = {source_pb2.SOURCE_KIND_VIRTUAL: "virtual", source_pb2.SOURCE_KIND_PHYSICAL: "physical"}
+
+
+def source_kind(kind: int) -> str:
+    """ "virtual" or "physical"; "unknown" from a newer source."""
+    return _SOURCE_KINDS.get(kind, "unknown")
+
+
 @dataclasses.dataclass(frozen=True)
 class Description:
     """What a source is and what it can do; limits are 0 where a method is not offered."""
@@ -36,7 +44,7 @@ class Description:
     @classmethod
     def from_proto(cls, m: source_pb2.DescribeResponse) -> Description:
         return cls(
-            m.kind, m.version, tuple(m.plans), m.default_model, m.default_model_hash,
+            source_kind(m.kind), m.version, tuple(m.plans), m.default_model, m.default_model_hash,
             images.renderer_name(m.renderer), m.renderer_description, m.max_touches_per_request,
             m.max_images_per_request, m.max_image_side, m.max_batch_size, m.max_fingers, m.lease_required,
             m.touch_duration_s, units.lab_value("clock_uncertainty_s", m.clock_uncertainty_s),

@@ -40,7 +40,7 @@ absl::Status Overhead::Open() {
   if (!flags.ok()) return flags.status();
   const GatewayOptions& options = flags->options;
   ThreadPool pool(0);
-  auto objects = ObjectStore::Load(options.common, &pool);
+  auto objects = ObjectStore::Load(options.common.meshes, options.common.supershape_triangles, &pool);
   if (!objects.ok()) return objects.status();
   auto object = objects->Find("lat00", "object");
   if (!object.ok()) return object.status();

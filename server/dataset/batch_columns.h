@@ -1,0 +1,69 @@
+// Batches of samples, and the one table of what their columns hold: simulated or measured, the same way.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/types/span.h>
+
+#include "server/dataset/sampler.h"
+#include "server/dataset/specification.h"
+
+namespace touchstone {
+
+// One batch: samples start_index .. start_index + rows - 1.
+struct DatasetBatch {
+  uint64_t start_index = 0;
+  uint32_t rows = 0;
+  std::vector<std::string> data;               // one per column, as ColumnsOf describes them
+  std::vector<std::vector<uint64_t>> offsets;  // one per column: rows + 1 entries for kBytes, else empty
+};
+
+class BatchColumns {
+ public:
+  // Sizes the columns of `batches`, whose start_index and rows are set (only the last may have fewer rows), and
+  // fills those that the index alone decides. `columns` and `batches` must outlive this.
+  BatchColumns(const std::vector<ColumnInfo>& columns, size_t objects, absl::Span<DatasetBatch> batches);
+
+  // The accepted touches of a block, whose slots count the samples from the first batch on.
+  void PutTouches(const TouchSampler::Block& block) const;
+
+  // What a picture gives to the columns of images: called sample after sample.
+  absl::Status AppendPicture(const Image& picture, const DatasetImage& image, DatasetBatch* batch) const;
+
+  // Writes numbers of one column at the row of a sample, whichever of the batches it falls into.
+  class Writer {
+   public:
+    Writer(absl::Span<DatasetBatch> batches, size_t column, size_t bytes_per_sample);
+    char* At(uint32_t slot) const { return begin_[slot / batch_size_] + (slot % batch_size_) * bytes_; }
+    template <typename T>
+    void Put(uint32_t slot, size_t k, T value) const {
+      std::memcpy(At(slot) + k * sizeof(T), &value, sizeof(T));
+    }
+    void PutVector(uint32_t slot, size_t k, const Eigen::Vector3d& v) const {
+      for (int i = 0; i < 3; ++i) Put(slot, 3 * k + i, static_cast<float>(v[i]));
+    }
+
+   private:
+    std::vector<char*> begin_;
+    uint32_t batch_size_;
+    size_t bytes_;
+  };
+  // What a column takes from a block of touches.
+  using PutColumn = void (*)(const Writer&, const TouchSampler::Block&);
+
+ private:
+  const std::vector<ColumnInfo>& columns_;
+  std::vector<std::pair<Writer, PutColumn>> puts_;
+};
+
+// Appends what a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
+// values, or an encoded file and the offset of its end, the first one after a 0.
+absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
+                           std::string* data, std::vector<uint64_t>* offsets);
+
+}  // namespace touchstone

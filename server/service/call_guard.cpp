@@ -1,0 +1,28 @@
+#include "server/service/call_guard.h"
+
+#include "server/base/status.h"
+
+namespace touchstone {
+
+MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
+                    const std::string& lease_token) {
+  return [=]() -> absl::Status {
+    if (context->IsCancelled())
+      return absl::CancelledError("the client is gone, or the call's deadline has passed");
+    if (!leases->required()) return absl::OkStatus();
+    if (resources->draining) return absl::UnavailableError("the gateway is being shut down");
+    return leases->Check(lease_token);
+  };
+}
+
+MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
+                             const LeaseBook* leases, const std::string& lease_token) {
+  return [resources, stops_before = resources->stop_count.load(),
+          guard = GuardOf(context, resources, leases, lease_token)]() -> absl::Status {
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    if (resources->stop_count != stops_before) return absl::AbortedError("stopped: Control.Stop was called");
+    return absl::OkStatus();
+  };
+}
+
+}  // namespace touchstone

@@ -1,0 +1,23 @@
+// What a call on a source must still have, asked over and over while it is worked on.
+#pragma once
+
+#include <string>
+
+#include <grpcpp/server_context.h>
+
+#include "server/service/lease_book.h"
+#include "server/service/resources.h"
+#include "server/source/motion_guard.h"
+
+namespace touchstone {
+
+// The client is still there, and where a lease is needed, the process is not draining and the lease holds. All must
+// outlive the guard.
+MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
+                    const std::string& lease_token);
+
+// The same, and that nobody has called Control.Stop since the guard was made.
+MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
+                             const LeaseBook* leases, const std::string& lease_token);
+
+}  // namespace touchstone

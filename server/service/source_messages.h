@@ -1,0 +1,26 @@
+// Between the messages of touchstone.v1.Source and the requests and results of a source. Every function that reads
+// a message checks what the message alone can say; errors name the field. What depends on the source, its limits
+// and its objects, the source checks.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "server/service/resources.h"
+#include "server/source/source.h"
+#include "touchstone/v1/source.pb.h"
+
+namespace touchstone {
+
+absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
+absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
+absl::StatusOr<CaptureRequest> FromProto(const v1::CaptureRequest& message);
+absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message, const Resources& resources);
+
+v1::DescribeResponse ToProto(const SourceInfo& info, const SourceLimits& limits);
+v1::ListObjectsResponse ToProto(const ObjectStore& objects);
+v1::TouchResponse ToProto(const TouchResults& results);
+v1::CaptureResponse ToProto(CaptureResults results);
+v1::DatasetHeader ToProto(const SampleHeader& header);
+v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns);
+
+}  // namespace touchstone

@@ -1,0 +1,196 @@
+// Messages of touchstone.v1.Source to the requests of a source.
+#include <absl/strings/str_cat.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include <algorithm>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/service/convert.h"
+#include "server/service/source_messages.h"
+
+namespace touchstone {
+namespace {
+
+absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where) {
+  switch (view.view_case()) {
+    case v1::View::kTouch: {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(view.touch(), where + ".touch"));
+      return CameraOfTouch(touch.target_m, touch.approach, touch.lateral, touch.standoff_m);
+    }
+    case v1::View::kCamera: {
+      Camera camera;
+      camera.eye_m = FromProto(view.camera().eye_m());
+      camera.at_m = FromProto(view.camera().at_m());
+      camera.up = FromProto(view.camera().up());
+      camera.near_m = view.camera().near_m();
+      camera.far_m = view.camera().far_m();
+      return camera;
+    }
+    case v1::View::VIEW_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrCat(where, " is empty: set touch or camera"));
+}
+
+absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
+  Plan plan;
+  if (message.speed_m_s() != 0) plan.speed_m_s = message.speed_m_s();
+  plan.touch_interval_s = message.touch_interval_s();
+  switch (message.plan_case()) {
+    case v1::Plan::kSphere: {
+      plan.kind = Plan::Kind::kSphere;
+      const v1::SpherePlan& sphere = message.sphere();
+      if (sphere.step_angle_rad() != 0) plan.sphere.step_angle_rad = sphere.step_angle_rad();
+      plan.sphere.roll_step_rad = sphere.roll_step_rad();
+      if (sphere.radius_ratio() != 0) plan.sphere.radius_ratio = sphere.radius_ratio();
+      break;
+    }
+    case v1::Plan::kFaces: {
+      plan.kind = Plan::Kind::kFaces;
+      const v1::FacesPlan& faces = message.faces();
+      constexpr uint32_t kMax = 1'000'000;  // beyond, the plan's check refuses, whatever the number
+      if (faces.samples_per_face() != 0)
+        plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMax + 1);
+      if (faces.rounds() != 0) plan.faces.rounds = std::min(faces.rounds(), kMax + 1);
+      if (faces.has_max_tilt_rad()) plan.faces.max_tilt_rad = faces.max_tilt_rad();
+      if (faces.has_spread()) plan.faces.spread = faces.spread();
+      if (faces.standoff_m() != 0) plan.faces.standoff_m = faces.standoff_m();
+      break;
+    }
+    case v1::Plan::kList: {
+      plan.kind = Plan::Kind::kList;
+      for (int k = 0; k < message.list().touches_size(); ++k) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            CommandedTouch touch,
+            FromProto(message.list().touches(k), absl::StrCat("plan.list.touches[", k, "]")));
+        plan.list.push_back(std::move(touch));
+      }
+      break;
+    }
+    case v1::Plan::PLAN_NOT_SET:
+      return absl::InvalidArgumentError("plan is missing: set plan.sphere, plan.faces or plan.list");
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&plan));
+  return plan;
+}
+
+absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message) {
+  DatasetImage image;
+  // Out-of-range numbers reach the check as what they are: no wrap-around.
+  const auto side = [](uint32_t value) {
+    return value == 0 ? 224 : static_cast<int>(std::min<uint32_t>(value, 1u << 30));
+  };
+  image.options.width = side(message.width());
+  image.options.height = side(message.height());
+  image.options.format = message.format() == v1::PIXEL_FORMAT_RGB ? PixelFormat::kRgb : PixelFormat::kGrey;
+  image.options.shading_style = message.shading_style() == v1::SHADING_STYLE_DARK_ON_WHITE
+                                    ? ShadingStyle::kDarkOnWhite
+                                    : ShadingStyle::kShaded;
+  image.options.depth = message.depth();
+  image.options.mask = message.mask();
+  image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? ImageEncoding::kPng
+                   : message.encoding() == v1::IMAGE_ENCODING_JPEG ? ImageEncoding::kJpeg
+                                                                   : ImageEncoding::kRaw;
+  if (message.jpeg_quality() != 0)
+    image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
+  if (message.vertical_fov_rad() != 0) image.vertical_fov_rad = message.vertical_fov_rad();
+  for (const auto& [value, valid, name] :
+       {std::tuple<int, bool, const char*>(message.format(), v1::PixelFormat_IsValid(message.format()),
+                                           "format"),
+        {message.encoding(), v1::ImageEncoding_IsValid(message.encoding()), "encoding"},
+        {message.shading_style(), v1::ShadingStyle_IsValid(message.shading_style()), "shading_style"},
+        {message.renderer(), v1::RendererKind_IsValid(message.renderer()), "renderer"}})
+    if (!valid)
+      return absl::InvalidArgumentError(
+          absl::StrCat("image.", name, " = ", value, ": is no value of its enumeration"));
+  image.renderer_kind = message.renderer() == v1::RENDERER_KIND_EGL   ? RendererKind::kEgl
+                        : message.renderer() == v1::RENDERER_KIND_CPU ? RendererKind::kCpu
+                                                                      : RendererKind::kAuto;
+  return image;
+}
+
+// What decides the touches of a dataset (objects, plan, seed), as 16 hexadecimal digits; columns and images do not.
+std::string DatasetKey(const v1::DatasetSpec& spec) {
+  v1::DatasetSpec decisive;
+  *decisive.mutable_objects() = spec.objects();
+  *decisive.mutable_plan() = spec.plan();
+  decisive.set_seed(spec.seed());
+  // Maps in the order of their keys: equal specifications, equal bytes.
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    decisive.SerializeToCodedStream(&coded);
+  }
+  return Sha256Hex(bytes).substr(0, 16);
+}
+
+}  // namespace
+
+absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
+  PlanRequest request;
+  TOUCHSTONE_ASSIGN_OR_RETURN(request.plan, FromProto(message.plan()));
+  request.object = message.object();
+  request.seed = message.seed();
+  request.first_index = message.first_index();
+  request.count = message.count();
+  return request;
+}
+
+absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources) {
+  TouchRequest request;
+  request.object = message.object();
+  if (message.has_model()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
+  }
+  for (int k = 0; k < message.touches_size(); ++k) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch,
+                                FromProto(message.touches(k), absl::StrCat("touches[", k, "]")));
+    request.touches.push_back(std::move(touch));
+  }
+  request.seed = message.seed();
+  request.first_index = message.first_index();
+  request.session = message.session();
+  request.ids.assign(message.touch_ids().begin(), message.touch_ids().end());
+  return request;
+}
+
+absl::StatusOr<CaptureRequest> FromProto(const v1::CaptureRequest& message) {
+  CaptureRequest request;
+  request.object = message.object();
+  TOUCHSTONE_ASSIGN_OR_RETURN(request.image, FromProto(message.image()));
+  for (int k = 0; k < message.views_size(); ++k) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera, FromProto(message.views(k), absl::StrCat("views[", k, "]")));
+    camera.vertical_fov_rad = request.image.vertical_fov_rad;
+    request.cameras.push_back(camera);
+  }
+  return request;
+}
+
+absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message, const Resources& resources) {
+  const v1::DatasetSpec& spec = message.spec();
+  SampleRequest request;
+  request.objects.assign(spec.objects().begin(), spec.objects().end());
+  DatasetSpecification& specification = request.specification;
+  TOUCHSTONE_ASSIGN_OR_RETURN(specification.plan, FromProto(spec.plan()));
+  if (spec.has_model()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(specification.model, FromProto(spec.model(), resources));
+  }
+  specification.seed = spec.seed();
+  specification.samples = spec.samples();
+  TOUCHSTONE_ASSIGN_OR_RETURN(specification.columns,
+                              ColumnChoice::FromNames({spec.columns().begin(), spec.columns().end()}));
+  if (specification.columns.image) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(specification.image, FromProto(spec.image()));
+  }
+  if (spec.max_draws() != 0) specification.max_draws = spec.max_draws();
+  request.part = {message.start_index(), message.stop_index(), message.batch_size(), message.batch_stride()};
+  request.session = message.session();
+  request.key = DatasetKey(spec);
+  return request;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,39 @@
+// A dataset that a rig makes touch by touch.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/source/physical_source.h"
+
+namespace touchstone {
+
+class PhysicalSamples final : public SampleStream {
+ public:
+  // `device` must outlive the stream. Errors name the field of the request.
+  static absl::StatusOr<std::unique_ptr<SampleStream>> Create(const SampleRequest& request, RigDevice* device,
+                                                              Rectifier rectify);
+
+  const SampleHeader& header() const override { return header_; }
+  absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) override;
+
+ private:
+  PhysicalSamples() = default;
+  // The touch of a sample: drawn again, within bounds, while a finger misses.
+  absl::StatusOr<std::pair<TouchCommand, JournalTouch>> MakeTouch(uint64_t index,
+                                                                  const MotionGuard& guard) const;
+  // Fills the row of sample start_index + row.
+  absl::Status MakeSample(uint32_t row, const MotionGuard& guard, const BatchColumns& columns,
+                          DatasetBatch* batch) const;
+
+  SampleRequest request_;
+  RigDevice* device_ = nullptr;
+  Rectifier rectify_;
+  SampleHeader header_;
+  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one per object
+  uint64_t next_index_ = 0;
+};
+
+}  // namespace touchstone

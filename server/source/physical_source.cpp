@@ -1,0 +1,111 @@
+#include "server/source/physical_source.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <atomic>
+#include <chrono>
+#include <map>
+
+#include "server/base/status.h"
+#include "server/session/command_bytes.h"
+#include "server/source/physical_samples.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kUsualTouchDurationS = 8;  // until a rig has measured its own
+
+std::string NewTouchId() {
+  static std::atomic<uint64_t> count{0};
+  return absl::StrCat("touch-", std::chrono::system_clock::now().time_since_epoch().count(), "-", ++count);
+}
+
+}  // namespace
+
+absl::Status CheckPhotograph(const DatasetImage& wanted) {
+  if (wanted.options.depth || wanted.options.mask)
+    return absl::InvalidArgumentError(
+        "image.depth, image.mask: this source's camera sees colours only; ask for none");
+  if (wanted.options.shading_style != ShadingStyle::kShaded)
+    return absl::InvalidArgumentError(
+        "image.shading_style: this source's camera shows what it sees; leave it unspecified");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Image> TakePhotograph(RigDevice* device, const Rectifier& rectify, const ViewCommand& command,
+                                     const DatasetImage& wanted, const MotionGuard& guard) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, device->Photograph(command, guard));
+  const ImageOptions& options = wanted.options;
+  Image picture;
+  picture.width = options.width;
+  picture.height = options.height;
+  picture.channels = options.format == PixelFormat::kRgb ? 3 : 1;
+  picture.pixels = rectify(frame, device->IntrinsicsOf(frame), options.width, options.height,
+                           wanted.vertical_fov_rad, options.format == PixelFormat::kGrey);
+  return picture;
+}
+
+Eigen::Isometry3d ObjectFromCamera(const Camera& camera) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Eigen::Vector3d ahead = (camera.at_m - camera.eye_m).normalized();
+  const Eigen::Vector3d right = ahead.cross(camera.up).normalized();
+  pose.linear() << right, ahead.cross(right), ahead;
+  pose.translation() = camera.eye_m;
+  return pose;
+}
+
+SourceInfo PhysicalSource::Describe() const {
+  const SourceStatus status = device_->Status();
+  SourceInfo info;
+  info.kind = SourceKind::kPhysical;
+  info.plans = {Plan::Kind::kFaces, Plan::Kind::kList};
+  info.makes_images = device_->has_camera();
+  info.max_fingers = device_->fingers();
+  info.moves = device_->moves();
+  info.touch_duration_s =
+      info.moves && status.touch_duration_s == 0 ? kUsualTouchDurationS : status.touch_duration_s;
+  info.clock_uncertainty_s = status.clock_uncertainty_s;
+  return info;
+}
+
+absl::StatusOr<TouchResults> PhysicalSource::MakeTouches(const TouchRequest& request,
+                                                         const ServedObject& object,
+                                                         const MotionGuard& guard) {
+  TouchResults results;
+  results.fingers = device_->fingers();
+  TOUCHSTONE_ASSIGN_OR_RETURN(results.session, SessionName(request.session));
+  std::map<std::string, uint64_t> repeats;
+  for (size_t k = 0; k < request.touches.size(); ++k) {
+    TouchCommand command;
+    command.session = results.session;
+    command.id = request.ids.empty() ? NewTouchId() : request.ids[k];
+    command.object = request.object;
+    command.bounds = object.surface->bounds();
+    command.touch = request.touches[k];
+    command.bytes = CommandBytes(command.touch);
+    command.repeat = repeats[command.bytes]++;
+    TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, device_->Touch(command, guard));
+    for (const JournalFinger& finger : touch.result.fingers)
+      results.contact_time_s.push_back(finger.contact_time_s);
+    results.journalled.push_back(std::move(touch));
+  }
+  return results;
+}
+
+absl::Status PhysicalSource::MakePictures(const CaptureRequest& request, const ServedObject& object,
+                                          const MotionGuard& guard, const TakePicture& take) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPhotograph(request.image));
+  for (const Camera& camera : request.cameras) {
+    const ViewCommand command{"default", request.object, object.surface->bounds(), ObjectFromCamera(camera)};
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+                                TakePhotograph(device_.get(), rectify_, command, request.image, guard));
+    TOUCHSTONE_RETURN_IF_ERROR(take(picture));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSource::MakeStream(const SampleRequest& request) {
+  return PhysicalSamples::Create(request, device_.get(), rectify_);
+}
+
+}  // namespace touchstone

@@ -1,0 +1,53 @@
+// The physical source: what a rig, or the recording of one, makes touch by touch, as the protocol wants it.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "server/source/rig_device.h"
+#include "server/source/source.h"
+
+namespace touchstone {
+
+// Scales a photograph to width x height pixels of a vertical field of view (radians), without distortion, as a
+// virtual source renders it: rgb or grey.
+using Rectifier =
+    std::function<std::vector<uint8_t>(const Frame& frame, const Intrinsics& intrinsics, int width,
+                                       int height, double vertical_fov_rad, bool grey)>;
+
+class PhysicalSource final : public Source {
+ public:
+  // `objects` must outlive the source.
+  PhysicalSource(const ObjectStore* objects, const SourceLimits& limits, std::unique_ptr<RigDevice> device,
+                 Rectifier rectify)
+      : Source(objects, limits), device_(std::move(device)), rectify_(std::move(rectify)) {}
+
+  SourceInfo Describe() const override;
+  RigDevice& device() const { return *device_; }
+
+ protected:
+  // Every touch is checked before the first one moves anything.
+  absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
+                                           const MotionGuard& guard) override;
+  absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
+                            const MotionGuard& guard, const TakePicture& take) override;
+  // Sample i is journalled under the request's key and i, so that it is made once and given again whenever the
+  // dataset, or a part of it, is asked for in the same session.
+  absl::StatusOr<std::unique_ptr<SampleStream>> MakeStream(const SampleRequest& request) override;
+
+ private:
+  const std::unique_ptr<RigDevice> device_;
+  const Rectifier rectify_;
+};
+
+// The photograph from there, as an image specification asks for it.
+absl::StatusOr<Image> TakePhotograph(RigDevice* device, const Rectifier& rectify, const ViewCommand& command,
+                                     const DatasetImage& wanted, const MotionGuard& guard);
+
+// INVALID_ARGUMENT for what a camera does not have: depth, mask, another shading style.
+absl::Status CheckPhotograph(const DatasetImage& wanted);
+
+// Camera of the protocol (eye, at, up) as object_from_camera: z looks ahead, y down.
+Eigen::Isometry3d ObjectFromCamera(const Camera& camera);
+
+}  // namespace touchstone

@@ -1,0 +1,77 @@
+#include "server/source/recorded_rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/session/command_bytes.h"
+#include "server/source/test_source.h"
+
+namespace touchstone {
+namespace {
+
+class RecordedRigTest : public testing::Test {
+ protected:
+  RecordedRigTest() {
+    std::string folder = testing::TempDir() + "recorded_rig_XXXXXX";
+    folder_ = mkdtemp(folder.data());
+    auto journal = *Journal::Open(folder_ + "/rig.db", Journal::Mode::kCreateOrReadWrite);
+    JournalSession session;
+    session.name = "monday";
+    EXPECT_TRUE(journal->EnsureSession(session).ok());
+    std::vector<JournalTouch> touches;
+    for (int k = 0; k < 3; ++k) {  // the same touch three times
+      JournalTouch touch;
+      touch.id = "touch-" + std::to_string(k);
+      touch.object = "lat00";
+      touch.command = CommandBytes(FromAbove());
+      touch.stage = TouchStage::kDone;
+      for (int finger = 0; finger < 3; ++finger) touch.result.fingers.push_back({1.0 + k, {}, 0});
+      touches.push_back(touch);
+    }
+    EXPECT_TRUE(journal->AddFinished("monday", touches).ok());
+    journal.reset();
+    rig_ = *RecordedRig::Open(folder_ + "/rig.db");
+  }
+  ~RecordedRigTest() override {
+    rig_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  static TouchCommand Command(const std::string& id, const CommandedTouch& touch, uint64_t repeat = 0) {
+    TouchCommand command;
+    command.id = id;
+    command.object = "lat00";
+    command.touch = touch;
+    command.bytes = CommandBytes(touch);
+    command.repeat = repeat;
+    return command;
+  }
+
+  std::string folder_;
+  std::unique_ptr<RecordedRig> rig_;
+};
+
+TEST_F(RecordedRigTest, GivesATouchByItsIdOrItsRepeatsInTurn) {
+  EXPECT_EQ(rig_->Touch(Command("touch-2", FromAbove()), NoObjection)->id, "touch-2");
+  for (int repeat : {0, 1, 2, 3})
+    EXPECT_EQ(rig_->Touch(Command("new", FromAbove(), repeat), NoObjection)->id,
+              "touch-" + std::to_string(repeat % 3));
+}
+
+TEST_F(RecordedRigTest, AnIdStandsForItsTouchOnly) {
+  const auto other = rig_->Touch(Command("touch-1", FromAbove(0.01)), NoObjection);
+  EXPECT_EQ(other.status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RecordedRigTest, SaysWhatWasNotRecorded) {
+  EXPECT_FALSE(rig_->moves());
+  EXPECT_FALSE(rig_->has_camera());
+  ViewCommand view;
+  view.object = "lat00";
+  EXPECT_EQ(rig_->Photograph(view, NoObjection).status().code(), absl::StatusCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace touchstone

@@ -1,0 +1,154 @@
+// A source touches and photographs objects on request. Behind this interface stand the virtual source, which
+// simulates (virtual_source.h), and the physical one (physical_source.h): a rig, or the recording of one.
+//
+// A source keeps nothing of a request: what a request decides is in its arguments. Every function may be called
+// from several threads. SI units, object frame.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/dataset/batch_columns.h"
+#include "server/dataset/specification.h"
+#include "server/dataset/stream.h"
+#include "server/model/model.h"
+#include "server/session/journal.h"
+#include "server/source/motion_guard.h"
+#include "server/source/object_store.h"
+#include "server/source/request_checks.h"
+#include "server/touch/commanded_touch.h"
+#include "server/touch/plan.h"
+
+namespace touchstone {
+
+enum class SourceKind { kVirtual, kPhysical };  // the recording of a rig is a physical source too
+
+// What a source is.
+struct SourceInfo {
+  SourceKind kind = SourceKind::kVirtual;
+  std::vector<Plan::Kind> plans;               // that make sense here
+  std::shared_ptr<const Model> default_model;  // null: it simulates nothing
+  bool makes_images = false;
+  std::string renderer;              // "egl" or "cpu"; empty: none
+  std::string renderer_description;  // in words; also why there is none
+  int max_fingers = 0;
+  bool moves = false;              // something moves, so that a lease is needed
+  double touch_duration_s = 0;     // of one touch, about; 0: as fast as it computes
+  double clock_uncertainty_s = 0;  // of contact times, standard; 0: exact
+};
+
+// The touches of a plan around an object, without touching it.
+struct PlanRequest {
+  Plan plan;           // valid
+  std::string object;  // not needed by a list
+  uint64_t seed = 0;
+  uint64_t first_index = 0, count = 0;  // count 0: to the plan's end
+};
+
+struct TouchRequest {
+  std::string object;
+  std::vector<CommandedTouch> touches;  // made exact
+  std::shared_ptr<const Model> model;   // that simulates; null: the default
+  uint64_t seed = 0;
+  uint64_t first_index = 0;      // touch k draws the random numbers of index first_index + k
+  std::string session;           // that a physical source journals in; empty: "default"
+  std::vector<std::string> ids;  // one per touch, or none
+};
+
+// One row per touch, in order. Arrays per finger: entry touch * fingers + finger.
+struct TouchResults {
+  int fingers = 0;
+  std::vector<double> contact_time_s;  // reported, since the approach began; NaN: the finger reported nothing
+  // Of a virtual source; empty at a physical one.
+  std::vector<double> travel_m;
+  std::vector<Eigen::Vector3d> contact_m, normal;
+  std::shared_ptr<const Model> model;  // that simulated
+  // Of a physical source: how each was made. Empty at a virtual one.
+  std::string session;
+  std::vector<JournalTouch> journalled;
+
+  size_t size() const { return fingers == 0 ? 0 : contact_time_s.size() / fingers; }
+};
+
+struct CaptureRequest {
+  std::string object;
+  std::vector<Camera> cameras;  // one per photograph; each with the image's field of view
+  DatasetImage image;           // without its renderer
+};
+
+// One row per photograph.
+struct CaptureResults {
+  std::vector<ColumnInfo> columns;  // "image", and "depth_m", "mask" where asked for
+  DatasetBatch batch;
+};
+
+// A dataset, or a part of one.
+struct SampleRequest {
+  std::vector<std::string> objects;  // names
+  // What a dataset contains, but for its objects, the model's default and the renderer.
+  DatasetSpecification specification;
+  DatasetPart part;
+  std::string session;  // that a physical source journals in; empty: "default"
+  std::string key;      // of what decides the touches: a physical source journals sample i under it and i
+};
+
+// What a stream of samples contains.
+struct SampleHeader {
+  uint64_t samples = 0;                // in the whole dataset
+  std::shared_ptr<const Model> model;  // that simulates; null: none
+  std::vector<std::string> mesh_hashes;
+  int fingers = 0;
+  double spacing_m = 0;
+  std::vector<ColumnInfo> columns;
+  std::string renderer;  // "egl" or "cpu"; empty: none
+};
+
+// The batches of a dataset, in order. Not for several threads.
+class SampleStream {
+ public:
+  virtual ~SampleStream() = default;
+  virtual const SampleHeader& header() const = 0;
+  // Nothing at the end. The guard is asked at least once per batch.
+  virtual absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) = 0;
+};
+
+class Source {
+ public:
+  // `objects` must outlive the source.
+  Source(const ObjectStore* objects, const SourceLimits& limits) : objects_(*objects), limits_(limits) {}
+  virtual ~Source() = default;
+
+  const ObjectStore& objects() const { return objects_; }
+  const SourceLimits& limits() const { return limits_; }
+  virtual SourceInfo Describe() const = 0;
+  absl::StatusOr<std::vector<CommandedTouch>> ExpandPlan(const PlanRequest& request) const;
+
+  // Each checks its request against the limits and the objects before anything is computed or moved: INVALID_ARGUMENT
+  // or NOT_FOUND names the field. Beside that, errors are those of the guard and of the source.
+  absl::StatusOr<TouchResults> Touch(const TouchRequest& request, const MotionGuard& guard);
+  absl::StatusOr<CaptureResults> Capture(const CaptureRequest& request, const MotionGuard& guard);
+  // The stream may outlive the request, not the source.
+  absl::StatusOr<std::unique_ptr<SampleStream>> Stream(const SampleRequest& request);
+
+ protected:
+  // With requests that are checked.
+  virtual absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
+                                                   const MotionGuard& guard) = 0;
+  // Takes the pictures one after the other; take(k, picture) appends picture k to the results.
+  using TakePicture = std::function<absl::Status(const Image& picture)>;
+  virtual absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
+                                    const MotionGuard& guard, const TakePicture& take) = 0;
+  // specification.objects are filled in.
+  virtual absl::StatusOr<std::unique_ptr<SampleStream>> MakeStream(const SampleRequest& request) = 0;
+
+ private:
+  const ObjectStore& objects_;
+  const SourceLimits limits_;
+};
+
+}  // namespace touchstone

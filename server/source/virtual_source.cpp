@@ -1,0 +1,149 @@
+#include "server/source/virtual_source.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/base/status.h"
+#include "server/touch/batch_row.h"
+#include "server/touch/simulate.h"
+
+namespace touchstone {
+namespace {
+
+constexpr size_t kTouchBlock = 1024;
+
+// How many touches from `begin` on go through the simulation together. A model with history sees one touch after
+// the other; touches of different strokes never share a batch.
+size_t BlockSize(const std::vector<CommandedTouch>& touches, size_t begin, const TouchSimulator& simulator) {
+  size_t count = 1;
+  while (!simulator.needs_previous_press() && count < kTouchBlock && begin + count < touches.size() &&
+         touches[begin + count].stroke_m == touches[begin].stroke_m)
+    ++count;
+  return count;
+}
+
+void AppendRows(const TouchBatch& batch, TouchResults* results) {
+  for (int touch = 0; touch < batch.size(); ++touch)
+    for (int finger = 0; finger < batch.fingers(); ++finger) {
+      const int k = batch.At(finger, touch);
+      results->contact_time_s.push_back(batch.reported_time_s[k]);
+      results->travel_m.push_back(batch.travel_m[k]);
+      results->contact_m.push_back(batch.contact_m[k]);
+      results->normal.push_back(batch.normal[k]);
+    }
+}
+
+class VirtualSamples final : public SampleStream {
+ public:
+  VirtualSamples(SampleHeader header, std::unique_ptr<DatasetStream> stream)
+      : header_(std::move(header)), stream_(std::move(stream)) {}
+
+  const SampleHeader& header() const override { return header_; }
+  absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) override {
+    absl::Status ended;
+    auto batch = stream_->Next([&] { return !(ended = guard()).ok(); });
+    if (!ended.ok()) return ended;
+    return batch;
+  }
+
+ private:
+  const SampleHeader header_;
+  const std::unique_ptr<DatasetStream> stream_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Renderer>> VirtualSource::RendererFor(RendererKind kind) const {
+  std::lock_guard<std::mutex> lock(renderer_mutex_);
+  if (kind == RendererKind::kAuto) kind = renderer_options_.kind;
+  std::shared_ptr<Renderer>& renderer = renderers_[kind];
+  if (renderer != nullptr) return renderer;
+  RendererOptions options = renderer_options_;
+  options.kind = kind;
+  TOUCHSTONE_ASSIGN_OR_RETURN(renderer, CreateRenderer(options));
+  return renderer;
+}
+
+SourceInfo VirtualSource::Describe() const {
+  SourceInfo info;
+  info.kind = SourceKind::kVirtual;
+  info.plans = {Plan::Kind::kSphere, Plan::Kind::kFaces, Plan::Kind::kList};
+  info.default_model = default_model_;
+  const auto renderer = RendererFor(RendererKind::kAuto);
+  info.makes_images = renderer.ok();
+  if (renderer.ok()) info.renderer = (*renderer)->name();
+  info.renderer_description =
+      renderer.ok() ? (*renderer)->description() : absl::StrCat("none: ", renderer.status().message());
+  info.max_fingers = kMaxFingers;
+  return info;
+}
+
+absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& request,
+                                                        const ServedObject& object,
+                                                        const MotionGuard& guard) {
+  const std::shared_ptr<const Model> model = request.model != nullptr ? request.model : default_model_;
+  const TouchSimulator simulator(model);
+  TouchBatch batch;
+  TouchWorkspace workspace;
+  TouchResults results;
+  results.fingers = model->fingers;
+  results.model = model;
+  std::vector<double> press_m(model->fingers, 0.0);  // of the touch before
+  for (size_t begin = 0; begin < request.touches.size();) {
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    const int count = static_cast<int>(BlockSize(request.touches, begin, simulator));
+    simulator.Prepare(count, &batch);
+    batch.surface = object.surface;
+    batch.seed = request.seed;
+    batch.stroke_m = request.touches[begin].stroke_m;
+    for (int k = 0; k < count; ++k) {
+      const CommandedTouch& touch = request.touches[begin + k];
+      SetTouch(touch, request.first_index + begin + k, k, &batch);
+      if (!simulator.needed_covariates().empty())
+        TOUCHSTONE_RETURN_IF_ERROR(SetCovariates(simulator.needed_covariates(), touch,
+                                                 absl::StrCat("touches[", begin + k, "]"), k, &batch));
+    }
+    if (simulator.needs_previous_press()) batch.previous_press_m = press_m;  // one touch
+    TOUCHSTONE_RETURN_IF_ERROR(simulator.Run(&batch, &workspace));
+    for (int finger = 0; finger < model->fingers; ++finger)
+      press_m[finger] = batch.press_m[batch.At(finger, count - 1)];
+    AppendRows(batch, &results);
+    begin += count;
+  }
+  return results;
+}
+
+absl::Status VirtualSource::MakePictures(const CaptureRequest& request, const ServedObject& object,
+                                         const MotionGuard& guard, const TakePicture& take) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<Renderer> renderer,
+                              RendererFor(request.image.renderer_kind));
+  for (const Camera& camera : request.cameras) {
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+                                renderer->Render(object.surface, camera, request.image.options));
+    TOUCHSTONE_RETURN_IF_ERROR(take(picture));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<SampleStream>> VirtualSource::MakeStream(const SampleRequest& request) {
+  auto specification = std::make_shared<DatasetSpecification>(request.specification);
+  if (specification->model == nullptr) specification->model = default_model_;
+  if (specification->columns.image) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(specification->image.renderer,
+                                RendererFor(specification->image.renderer_kind));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(ValidateDataset(specification.get()));
+  SampleHeader header;
+  header.samples = specification->samples;
+  header.model = specification->model;
+  for (const auto& object : specification->objects) header.mesh_hashes.push_back(object->hash());
+  header.fingers = specification->model->fingers;
+  header.spacing_m = specification->model->spacing_m;
+  header.columns = ColumnsOf(*specification);
+  if (specification->columns.image) header.renderer = specification->image.renderer->name();
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<DatasetStream> stream,
+                              DatasetStream::Create(std::move(specification), request.part, pool_));
+  return std::make_unique<VirtualSamples>(std::move(header), std::move(stream));
+}
+
+}  // namespace touchstone

@@ -1,0 +1,43 @@
+// The virtual source: a model simulates touches, a renderer takes the photographs.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "server/base/thread_pool.h"
+#include "server/source/source.h"
+
+namespace touchstone {
+
+class VirtualSource final : public Source {
+ public:
+  // `objects` and `pool`, which datasets are computed with, must outlive the source.
+  VirtualSource(const ObjectStore* objects, const SourceLimits& limits,
+                std::shared_ptr<const Model> default_model, const RendererOptions& renderer, ThreadPool* pool)
+      : Source(objects, limits),
+        default_model_(std::move(default_model)),
+        renderer_options_(renderer),
+        pool_(pool) {}
+
+  SourceInfo Describe() const override;
+
+ protected:
+  absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
+                                           const MotionGuard& guard) override;
+  absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
+                            const MotionGuard& guard, const TakePicture& take) override;
+  absl::StatusOr<std::unique_ptr<SampleStream>> MakeStream(const SampleRequest& request) override;
+
+ private:
+  // Made at the first use, so that a source is ready before a driver is.
+  absl::StatusOr<std::shared_ptr<Renderer>> RendererFor(RendererKind kind) const;
+
+  const std::shared_ptr<const Model> default_model_;
+  const RendererOptions renderer_options_;
+  ThreadPool* const pool_;
+  mutable std::mutex renderer_mutex_;
+  mutable std::map<RendererKind, std::shared_ptr<Renderer>> renderers_;
+};
+
+}  // namespace touchstone

@@ -1,0 +1,152 @@
+#include "server/source/virtual_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "server/effects/all_effects.h"
+#include "server/source/test_source.h"
+
+namespace touchstone {
+namespace {
+
+using testing::HasSubstr;
+
+std::shared_ptr<const Model> ModelWith(const std::string& effects) {
+  auto model = ParseModel("touchstone: model/1\nname: test\nend_effector: {fingers: 3, spacing_mm: 10}\n" +
+                              (effects.empty() ? "" : "effects:\n" + effects),
+                          "test", Catalogue());
+  EXPECT_TRUE(model.ok()) << model.status();
+  return std::make_shared<const Model>(*std::move(model));
+}
+
+class VirtualSourceTest : public testing::Test {
+ protected:
+  VirtualSourceTest() : source_(&SmallObjects(), Limits(), ModelWith(""), RendererOptions(), &pool_) {}
+  static SourceLimits Limits() {
+    SourceLimits limits;
+    limits.max_touches_per_request = 100;
+    return limits;
+  }
+  static TouchRequest Request(int touches) {
+    TouchRequest request;
+    request.object = "lat00";
+    for (int k = 0; k < touches; ++k) request.touches.push_back(FromAbove(0.0005 * k));
+    return request;
+  }
+
+  ThreadPool pool_{2};
+  VirtualSource source_;
+};
+
+TEST_F(VirtualSourceTest, TouchesGiveOneRowEachAndSayWhatSimulatedThem) {
+  const auto results = source_.Touch(Request(5), NoObjection);
+  ASSERT_TRUE(results.ok()) << results.status();
+  EXPECT_EQ(results->fingers, 3);
+  EXPECT_EQ(results->size(), 5u);
+  EXPECT_EQ(results->travel_m.size(), 15u);
+  EXPECT_EQ(results->model->name, "test");
+  EXPECT_TRUE(results->journalled.empty());
+  for (size_t k = 0; k < 15; ++k)  // without effects: time = travel / speed
+    EXPECT_DOUBLE_EQ(results->contact_time_s[k], results->travel_m[k] / kDefaultSpeedMS);
+}
+
+TEST_F(VirtualSourceTest, ATouchDependsOnItsIndexAndNotOnItsPlaceInTheRequest) {
+  TouchRequest all = Request(6), tail = Request(6);
+  all.model = tail.model = ModelWith("  - gaussian_noise: {sigma_us: 5000}\n");
+  all.seed = tail.seed = 4;
+  tail.touches.erase(tail.touches.begin(), tail.touches.begin() + 2);
+  tail.first_index = 2;
+  const auto whole = source_.Touch(all, NoObjection), part = source_.Touch(tail, NoObjection);
+  ASSERT_TRUE(whole.ok() && part.ok());
+  EXPECT_EQ(std::vector<double>(whole->contact_time_s.begin() + 6, whole->contact_time_s.end()),
+            part->contact_time_s);
+}
+
+TEST_F(VirtualSourceTest, HysteresisSeesTheTouchBefore) {
+  TouchRequest request = Request(2);
+  request.touches[1] = request.touches[0];
+  request.touches[0].target_m.x() = request.touches[1].target_m.x() = 0.01;
+  request.model = ModelWith("  - return_hysteresis: {fraction: 0.1}\n");
+  const auto results = source_.Touch(request, NoObjection);
+  ASSERT_TRUE(results.ok()) << results.status();
+  const auto& t = results->contact_time_s;
+  const double last_s = std::max({t[0], t[1], t[2]});
+  for (int finger = 0; finger < 3; ++finger)
+    EXPECT_NEAR(t[3 + finger], t[finger] - 0.1 * (last_s - t[finger]), 1e-12);
+}
+
+TEST_F(VirtualSourceTest, AMissingCovariateIsNamedWithItsTouch) {
+  TouchRequest request = Request(3);
+  request.model = ModelWith(
+      "  - formula: {name: warm, adds: time_us, expression: 'k * cov_temperature', parameters: {k: {value: "
+      "1, "
+      "unit: us, min: -10, max: 10}}}\n");
+  for (int k : {0, 2}) request.touches[k].covariates["cov_temperature"] = 20;
+  const auto results = source_.Touch(request, NoObjection);
+  EXPECT_EQ(results.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(results.status().message()), HasSubstr("touches[1].covariates['cov_temperature']"));
+}
+
+TEST_F(VirtualSourceTest, RefusesWhatItsLimitsAndObjectsDoNotAllow) {
+  EXPECT_EQ(source_.Touch(Request(101), NoObjection).status().code(), absl::StatusCode::kInvalidArgument);
+  TouchRequest unknown = Request(1);
+  unknown.object = "lat0";
+  const absl::Status status = source_.Touch(unknown, NoObjection).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("did you mean 'lat00'?"));
+}
+
+TEST_F(VirtualSourceTest, TheGuardsErrorEndsTheWork) {
+  const auto stopped = [] { return absl::AbortedError("stopped"); };
+  EXPECT_EQ(source_.Touch(Request(1), stopped).status().code(), absl::StatusCode::kAborted);
+  CaptureRequest capture;
+  capture.object = "lat00";
+  capture.cameras.resize(1);
+  EXPECT_EQ(source_.Capture(capture, stopped).status().code(), absl::StatusCode::kAborted);
+}
+
+TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
+  TouchRequest touches = Request(7);
+  touches.seed = 3;
+  touches.model = ModelWith("  - tip_radius: {radius_mm: 2}\n  - gaussian_noise: {sigma_us: 2000}\n");
+  const auto touched = source_.Touch(touches, NoObjection);
+  ASSERT_TRUE(touched.ok()) << touched.status();
+  SampleRequest samples;
+  samples.objects = {"lat00"};
+  samples.specification.plan.kind = Plan::Kind::kList;
+  samples.specification.plan.list = touches.touches;
+  samples.specification.model = touches.model;
+  samples.specification.seed = 3;
+  samples.specification.columns = *ColumnChoice::FromNames({"contact_time"});
+  auto stream = source_.Stream(samples);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_EQ((*stream)->header().samples, 7u);
+  EXPECT_EQ((*stream)->header().fingers, 3);
+  const auto batch = (*stream)->Next(NoObjection);
+  ASSERT_TRUE(batch.ok() && batch->has_value());
+  std::vector<float> times_s(21);
+  ASSERT_EQ((*batch)->data[0].size(), sizeof(float) * times_s.size());
+  std::memcpy(times_s.data(), (*batch)->data[0].data(), (*batch)->data[0].size());
+  for (size_t k = 0; k < times_s.size(); ++k)
+    EXPECT_EQ(times_s[k], static_cast<float>(touched->contact_time_s[k]));
+  EXPECT_FALSE((*stream)->Next(NoObjection)->has_value());
+}
+
+TEST_F(VirtualSourceTest, ExpandsPlansInParts) {
+  PlanRequest request;
+  request.plan.kind = Plan::Kind::kFaces;
+  request.plan.faces.samples_per_face = 2;
+  request.plan.faces.rounds = 2;
+  request.object = "lat00";
+  EXPECT_EQ(source_.ExpandPlan(request)->size(), 24u);
+  request.first_index = 20;
+  request.count = 10;
+  EXPECT_EQ(source_.ExpandPlan(request)->size(), 4u);
+  request.first_index = 25;
+  EXPECT_EQ(source_.ExpandPlan(request).status().code(), absl::StatusCode::kOutOfRange);
+}
+
+}  // namespace
+}  // namespace touchstone
