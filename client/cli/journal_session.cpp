@@ -7,6 +7,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/session_files.h"
+#include "server/session/session_measurements.h"
 
 namespace touchstone::cli {
 

@@ -3,18 +3,17 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
-#include "server/session/session_files.h"
+#include "server/session/session_measurements.h"
 
 namespace touchstone {
 namespace {
 
 constexpr size_t kPiece = 1 << 20;
 
-v1::Session ToProto(const JournalSession& session, const std::string& csv) {
+// What the journal knows of a session; without the size and hash of its file.
+v1::Session SessionToProto(const JournalSession& session) {
   v1::Session message;
   message.set_name(session.name);
-  message.set_hash(Sha256Hex(csv));
-  message.set_bytes(csv.size());
   message.set_touches(session.done);
   message.set_fingers(session.fingers);
   for (const std::string& object : session.objects) message.add_objects(object);
@@ -43,11 +42,7 @@ grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1
                                                   v1::ListSessionsResponse* response) {
   const auto sessions = journal_->Sessions();
   if (!sessions.ok()) return ToGrpc(sessions.status());
-  for (const JournalSession& session : *sessions) {
-    const auto csv = Csv(*journal_, session.name);
-    if (!csv.ok()) return ToGrpc(csv.status());
-    *response->add_sessions() = ToProto(session, *csv);
-  }
+  for (const JournalSession& session : *sessions) *response->add_sessions() = SessionToProto(session);
   return grpc::Status::OK;
 }
 
@@ -57,7 +52,9 @@ grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::
   if (!session.ok()) return ToGrpc(session.status());
   const auto csv = Csv(*journal_, session->name);
   if (!csv.ok()) return ToGrpc(csv.status());
-  *response = ToProto(*session, *csv);
+  *response = SessionToProto(*session);
+  response->set_hash(Sha256Hex(*csv));
+  response->set_bytes(csv->size());
   return grpc::Status::OK;
 }
 

@@ -9,7 +9,7 @@
 namespace touchstone {
 namespace {
 
-v1::Column ToProto(const ColumnInfo& info) {
+v1::Column ColumnToProto(const ColumnInfo& info) {
   v1::Column column;
   column.set_name(info.name);
   switch (info.type) {
@@ -52,7 +52,7 @@ const char* PlanName(Plan::Kind kind) {
 }
 
 // How a physical source made a touch.
-v1::Measured ToProto(const JournalTouch& touch, const std::string& session) {
+v1::Measured MeasuredToProto(const JournalTouch& touch, const std::string& session) {
   v1::Measured measured;
   const JournalResult& result = touch.result;
   for (const JournalFinger& finger : result.fingers) {
@@ -132,7 +132,7 @@ v1::TouchResponse ToProto(const TouchResults& results) {
       }
     }
     if (!results.journalled.empty())
-      *result->mutable_measured() = ToProto(results.journalled[touch], results.session);
+      *result->mutable_measured() = MeasuredToProto(results.journalled[touch], results.session);
   }
   return message;
 }
@@ -156,7 +156,7 @@ v1::DatasetHeader ToProto(const SampleHeader& header) {
   for (const std::string& hash : header.mesh_hashes) message.add_mesh_hashes(hash);
   message.set_fingers(header.fingers);
   message.set_spacing_m(header.spacing_m);
-  for (const ColumnInfo& column : header.columns) *message.add_columns() = ToProto(column);
+  for (const ColumnInfo& column : header.columns) *message.add_columns() = ColumnToProto(column);
   message.set_renderer(RendererKindOf(header.renderer));
   message.set_version(kVersion);
   return message;
@@ -168,7 +168,7 @@ v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns) {
   message.set_rows(batch.rows);
   for (size_t k = 0; k < columns.size(); ++k) {
     v1::Column* column = message.add_columns();
-    *column = ToProto(columns[k]);
+    *column = ColumnToProto(columns[k]);
     column->set_data(std::move(batch.data[k]));
     column->mutable_offsets()->Add(batch.offsets[k].begin(), batch.offsets[k].end());
   }

@@ -11,6 +11,10 @@
 
 namespace touchstone {
 
+absl::StatusOr<Camera> FromProto(const v1::View& message, const std::string& where);
+absl::StatusOr<Plan> FromProto(const v1::Plan& message);
+absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message);  // with its defaults
+
 absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
 absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
 absl::StatusOr<CaptureRequest> FromProto(const v1::CaptureRequest& message);

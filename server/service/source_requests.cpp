@@ -11,8 +11,6 @@
 #include "server/service/source_messages.h"
 
 namespace touchstone {
-namespace {
-
 absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where) {
   switch (view.view_case()) {
     case v1::View::kTouch: {
@@ -110,6 +108,8 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message) {
                                                                       : RendererKind::kAuto;
   return image;
 }
+
+namespace {
 
 // What decides the touches of a dataset (objects, plan, seed), as 16 hexadecimal digits; columns and images do not.
 std::string DatasetKey(const v1::DatasetSpec& spec) {

@@ -82,7 +82,7 @@ std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns&
   return row + "\n";
 }
 
-std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches) {
+MeasurementColumns OptionalColumnsOf(const std::vector<MeasuredTouch>& touches) {
   MeasurementColumns columns;
   columns.round = columns.face = !touches.empty();
   std::set<std::string> names;
@@ -93,6 +93,11 @@ std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches) {
     for (const auto& [name, value] : touch.commanded.covariates()) names.insert(name);
   }
   columns.covariates.assign(names.begin(), names.end());
+  return columns;
+}
+
+std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches) {
+  const MeasurementColumns columns = OptionalColumnsOf(touches);
   const int fingers = touches.empty() ? 0 : static_cast<int>(touches[0].time_s.size());
   std::string text = MeasurementHeader(fingers, columns);
   for (const MeasuredTouch& touch : touches) text += MeasurementRow(touch, columns);

@@ -34,6 +34,10 @@ struct MeasurementColumns {
   std::vector<std::string> covariates;
 };
 
+// The optional columns that a file of these touches has: those that any of them has, but round and face only where
+// every touch has them.
+MeasurementColumns OptionalColumnsOf(const std::vector<MeasuredTouch>& touches);
+
 // The header line for `fingers` time columns (0: a plan).
 std::string MeasurementHeader(int fingers, const MeasurementColumns& columns);
 

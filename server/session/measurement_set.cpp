@@ -10,103 +10,21 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <numeric>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
+#include "server/session/csv_fields.h"
+#include "server/session/measurement_checks.h"
 #include "server/session/measurement_columns.h"
 
 namespace touchstone {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr size_t kLongestName = 256;
 constexpr size_t kMaxColumns = 4096;
 constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
-
-// Valid UTF-8 without control characters: names go into messages and reports.
-bool IsText(absl::string_view text) {
-  for (size_t i = 0; i < text.size();) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const int more = byte < 0x80         ? 0
-                     : (byte >> 5) == 6  ? 1
-                     : (byte >> 4) == 14 ? 2
-                     : (byte >> 3) == 30 ? 3
-                                         : -1;
-    if (more < 0 || byte < 0x20 || byte == 0x7F || i + more >= text.size() + (more == 0)) return false;
-    uint32_t code = more == 0 ? byte : byte & (0x3F >> more);
-    for (int k = 1; k <= more; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      if ((next >> 6) != 2) return false;
-      code = code << 6 | (next & 0x3F);
-    }
-    constexpr uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
-    if (code < kSmallest[more] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
-    i += more + 1;
-  }
-  return true;
-}
-
-// Cuts a line at its commas. A field in quotes may hold commas and doubled quotes (RFC 4180), but no line
-// end.
-class Fields {
- public:
-  // Views into `line`, or into this object where a field was quoted; they last until the next call.
-  absl::Status Cut(absl::string_view line) {
-    fields_.clear();
-    size_t quoted = 0;
-    for (size_t begin = 0;;) {
-      size_t start = begin;
-      while (start < line.size() && (line[start] == ' ' || line[start] == '\t')) ++start;
-      if (start < line.size() && line[start] == '"') {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const size_t end, CutQuoted(line, start, quoted++));
-        if (end == line.size()) break;
-        begin = end + 1;
-        continue;
-      }
-      const size_t comma = std::min(line.find(',', begin), line.size());
-      fields_.push_back(absl::StripAsciiWhitespace(line.substr(begin, comma - begin)));
-      if (comma == line.size()) break;
-      begin = comma + 1;
-    }
-    return absl::OkStatus();
-  }
-  const std::vector<absl::string_view>& all() const { return fields_; }
-
- private:
-  // Returns where the comma behind the field stands, or the end of the line.
-  absl::StatusOr<size_t> CutQuoted(absl::string_view line, size_t start, size_t number) {
-    if (number == unquoted_.size()) unquoted_.push_back(std::make_unique<std::string>());
-    std::string& text = *unquoted_[number];
-    text.clear();
-    size_t i = start + 1;
-    for (;; ++i) {
-      if (i >= line.size())
-        return absl::InvalidArgumentError(absl::StrCat(
-            "field ", fields_.size() + 1, " begins with a quote (\") and has no closing one on its line"));
-      if (line[i] != '"') {
-        text += line[i];
-      } else if (i + 1 < line.size() && line[i + 1] == '"') {
-        text += line[i++];
-      } else {
-        break;
-      }
-    }
-    const size_t comma = std::min(line.find(',', i + 1), line.size());
-    if (!absl::StripAsciiWhitespace(line.substr(i + 1, comma - i - 1)).empty())
-      return absl::InvalidArgumentError(
-          absl::StrCat("field ", fields_.size() + 1, " goes on after its closing quote with '",
-                       Shown(line.substr(i + 1, comma - i - 1)), "'; a comma was expected"));
-    fields_.push_back(absl::StripAsciiWhitespace(text));
-    return comma;
-  }
-
-  std::vector<absl::string_view> fields_;
-  std::vector<std::unique_ptr<std::string>> unquoted_;
-};
 
 // Reads rows into the columns of a set. One object a file.
 class RowReader {
@@ -215,8 +133,8 @@ class RowReader {
     // Rows of one object mostly follow each other.
     if (set_.object.empty() || set_.objects[set_.object.back()] != name) {
       if (name.empty()) return WrongField(i, "is empty; a name was expected");
-      if (name.size() > kLongestName || !IsText(name))
-        return WrongField(i, absl::StrCat("'", Shown(name), "' is no name: at most ", kLongestName,
+      if (name.size() > kMaxObjectNameBytes || !IsText(name))
+        return WrongField(i, absl::StrCat("'", Shown(name), "' is no name: at most ", kMaxObjectNameBytes,
                                           " bytes of UTF-8 without control characters were expected"));
       const auto [found, is_new] = objects_.try_emplace(std::string(name), static_cast<int>(objects_.size()));
       if (is_new) set_.objects.emplace_back(name);
@@ -301,27 +219,6 @@ class RowReader {
   int line_ = 0;
 };
 
-// A touch number that stands twice would make "touch 17" ambiguous, and hints at a file pasted twice.
-absl::Status CheckTouchNumbers(const MeasurementSet& set) {
-  bool increasing = true;
-  for (int k = 1; k < set.size() && increasing; ++k) increasing = set.touch[k - 1] < set.touch[k];
-  if (increasing) return absl::OkStatus();
-  std::vector<int> order(set.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return set.touch[a] < set.touch[b]; });
-  // The first line that repeats a number.
-  int repeated = set.size(), first = 0;
-  for (int k = 1; k < set.size(); ++k)
-    if (set.touch[order[k - 1]] == set.touch[order[k]] && order[k] < repeated) {
-      repeated = order[k];
-      first = order[k - 1];
-    }
-  if (repeated == set.size()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat(set.origin, ":", set.line[repeated], ": column touch: ", set.touch[repeated],
-                   " stands on line ", set.line[first], " already; every touch needs a number of its own"));
-}
-
 void Reserve(size_t rows, const Columns& columns, MeasurementSet* set) {
   set->line.reserve(rows);
   set->touch.reserve(rows);
@@ -356,7 +253,7 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
     csv.remove_prefix(std::min(end + 1, csv.size()));
     return line;
   };
-  Fields fields;
+  CsvFields fields;
   const absl::string_view header = next_line();
   if (absl::StripAsciiWhitespace(header).empty())
     return wrong(1, "a header line was expected (touch,object,...)");

@@ -1,6 +1,5 @@
 #include "server/session/session_files.h"
 
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
+#include "server/session/session_measurements.h"
 
 namespace touchstone {
 namespace {
@@ -17,40 +17,6 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
-
-absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
-                                                               const std::string& session) {
-  std::vector<MeasuredTouch> touches;
-  std::vector<uint64_t> ids;
-  absl::Status status;
-  TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session, [&](const JournalTouch& touch) {
-    if (touch.stage != TouchStage::kDone) return true;
-    const auto command = ParseCommandBytes(touch.command);
-    if (!command) {
-      status = absl::DataLossError(absl::StrCat("session '", session, "': the command of touch '", touch.id,
-                                                "' cannot be read; it is damaged"));
-      return false;
-    }
-    MeasuredTouch& measured = touches.emplace_back();
-    measured.touch = touch.number;
-    measured.object = touch.object;
-    measured.commanded = *command;
-    if (!std::isnan(touch.result.session_time_s))
-      measured.commanded.set_session_time_s(touch.result.session_time_s);
-    for (const JournalFinger& finger : touch.result.fingers) measured.time_s.push_back(finger.contact_time_s);
-    measured.round = touch.round;
-    measured.face = touch.face;
-    // "007" would not come back as it was.
-    uint64_t id = 0;
-    if (absl::SimpleAtoi(touch.id, &id) && std::to_string(id) == touch.id && id <= 1ull << 53)
-      ids.push_back(id);
-    return true;
-  }));
-  TOUCHSTONE_RETURN_IF_ERROR(status);
-  if (ids.size() == touches.size())
-    for (size_t i = 0; i < ids.size(); ++i) touches[i].touch = ids[i];
-  return touches;
-}
 
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches,

@@ -9,15 +9,8 @@
 #include <absl/status/statusor.h>
 
 #include "server/session/journal.h"
-#include "server/session/measurement_csv.h"
 
 namespace touchstone {
-
-// The touches that are done, in the order of their approaches, times since each approach began. `touch` is
-// the client's id where every id is a number of its own, else the number in the session; session_time_s is
-// the measured one where it is known. DATA_LOSS names a touch whose command cannot be read.
-absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
-                                                               const std::string& session);
 
 // The measurement file (format: proto/README.md); whole or absent. FAILED_PRECONDITION if no touch is done.
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path);

@@ -3,13 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
+#include <random>
 
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
+#include "server/session/session_measurements.h"
 
 namespace touchstone {
 namespace {
@@ -91,6 +95,96 @@ TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {
   // The ids are no numbers: the session's are taken.
   EXPECT_EQ((*touches)[0].touch, 1u);
   EXPECT_EQ((*touches)[1].touch, 2u);
+}
+
+// Every column, NaN where NaN is.
+void ExpectSame(const MeasurementSet& a, const MeasurementSet& b) {
+  const auto same = [](const std::vector<double>& x, const std::vector<double>& y) {
+    return std::equal(x.begin(), x.end(), y.begin(), y.end(),
+                      [](double p, double q) { return p == q || (std::isnan(p) && std::isnan(q)); });
+  };
+  EXPECT_EQ(a.origin, b.origin);
+  EXPECT_EQ(a.fingers, b.fingers);
+  EXPECT_EQ(a.has_poses, b.has_poses);
+  EXPECT_EQ(a.has_session_time, b.has_session_time);
+  EXPECT_EQ(a.objects, b.objects);
+  EXPECT_EQ(a.touch, b.touch);
+  EXPECT_EQ(a.object, b.object);
+  EXPECT_EQ(a.target_m, b.target_m);
+  EXPECT_EQ(a.approach, b.approach);
+  EXPECT_EQ(a.lateral, b.lateral);
+  EXPECT_EQ(a.standoff_m, b.standoff_m);
+  EXPECT_EQ(a.speed_m_s, b.speed_m_s);
+  EXPECT_EQ(a.session_time_s, b.session_time_s);
+  EXPECT_EQ(a.round, b.round);
+  EXPECT_EQ(a.face, b.face);
+  EXPECT_EQ(a.line, b.line);
+  EXPECT_TRUE(same(a.time_s, b.time_s));
+  ASSERT_EQ(a.covariates.size(), b.covariates.size());
+  for (const auto& [name, values] : a.covariates)
+    EXPECT_TRUE(b.covariates.count(name) == 1 && same(values, b.covariates.at(name))) << name;
+}
+
+TEST_F(SessionFiles, ASessionIsTheSetThatItsFileIsReadAs) {
+  Import(kCsv);
+  const auto file = ParseMeasurementSet(kCsv, "s");
+  const auto direct = SessionMeasurementSet(*journal_, "s", "s");
+  ASSERT_TRUE(file.ok() && direct.ok()) << direct.status();
+  ExpectSame(*direct, *file);
+}
+
+TEST_F(SessionFiles, WhatARigMeasuredIsTheSetThatItsFileIsReadAs) {
+  JournalSession session;
+  session.name = "rig";
+  ASSERT_TRUE(journal_->EnsureSession(session).ok());
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<JournalTouch> touches(200);
+  for (size_t k = 0; k < touches.size(); ++k) {
+    CommandedTouch commanded;  // numbers that no decimal of few digits is
+    commanded.target_m = {0.1 * uniform(random), 0.1 * uniform(random), 0.1 * uniform(random)};
+    commanded.approach = Eigen::Vector3d(uniform(random), uniform(random), uniform(random)).normalized();
+    commanded.lateral = commanded.approach.unitOrthogonal();
+    commanded.standoff_m = 0.05 + 0.01 * uniform(random);
+    commanded.speed_m_s = 0.02 + 0.01 * uniform(random);
+    if (k % 3 == 0) commanded.covariates["cov_temperature"] = 20 + uniform(random);
+    JournalTouch& touch = touches[k];
+    touch.id = "touch-" + std::to_string(k);
+    touch.object = k % 2 == 0 ? "cup" : "lat20";
+    touch.command = CommandBytes(commanded);
+    touch.stage = TouchStage::kDone;
+    touch.result.session_time_s = 8.1 * k + uniform(random) + 1;
+    for (int finger = 0; finger < 3; ++finger) {
+      JournalFinger& reported = touch.result.fingers.emplace_back();
+      reported.contact_time_s = finger == 1 && k % 7 == 0 ? std::nan("") : 2 + uniform(random);
+    }
+  }
+  ASSERT_TRUE(journal_->AddFinished("rig", touches).ok());
+  const std::string out = folder_ + "/rig.csv";
+  ASSERT_TRUE(ExportSessionCsv(*journal_, "rig", out).ok());
+  const auto file = ParseMeasurementSet(*ReadFile(out), "rig");
+  const auto direct = SessionMeasurementSet(*journal_, "rig", "rig");
+  ASSERT_TRUE(file.ok() && direct.ok()) << file.status() << direct.status();
+  ExpectSame(*direct, *file);
+}
+
+TEST_F(SessionFiles, ASetIsRefusedWhereItsFileWouldBe) {
+  const auto touches = ParseMeasurements(kCsv, "s");
+  ASSERT_TRUE(touches.ok());
+  const auto refusal = [&](const std::function<void(MeasuredTouch*)>& change) {
+    std::vector<MeasuredTouch> changed = *touches;
+    change(&changed[1]);
+    return std::string(MakeMeasurementSet(changed, "s").status().message());
+  };
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->time_s[0] = -1; }),
+              HasSubstr("s:3: touch 3: a contact time (-1)"));
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->touch = 7; }), HasSubstr("stands on line 2 already"));
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->commanded.set_speed_m_s(0); }),
+              HasSubstr("speed_m_s (0) is out of range"));
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->commanded.mutable_lateral()->set_z(0.5); }),
+              HasSubstr("the length of lateral"));
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->object.clear(); }), HasSubstr("an object's name"));
+  EXPECT_THAT(refusal([](MeasuredTouch* touch) { touch->time_s.pop_back(); }), HasSubstr("has 2 fingers"));
 }
 
 TEST_F(SessionFiles, ImportsAreWholeOrAbsent) {

@@ -47,7 +47,7 @@ class FakeDevice final : public RigDevice {
   double spacing_m() const override { return 0.03; }
   bool moves() const override { return true; }
   SourceStatus Status() const override { return {}; }
-  std::string State() const override { return "idle"; }
+  SourceState State() const override { return SourceState::kIdle; }
 
   std::vector<TouchCommand> commands;
   std::vector<ViewCommand> views;

@@ -55,10 +55,10 @@ Intrinsics RecordedRig::IntrinsicsOf(const Frame& frame) const {
 }
 
 SourceStatus RecordedRig::Status() const {
-  SourceStatus facts;
-  facts.touches = touches_->touches().size();
-  facts.images = images_.size();
-  return facts;
+  SourceStatus status;
+  status.touches = touches_->touches().size();
+  status.images = images_.size();
+  return status;
 }
 
 }  // namespace touchstone

@@ -1,0 +1,81 @@
+#include "server/session/csv_fields.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "server/base/status.h"
+#include "server/session/measurement_columns.h"
+
+namespace touchstone {
+
+bool IsText(absl::string_view text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const int more = byte < 0x80         ? 0
+                     : (byte >> 5) == 6  ? 1
+                     : (byte >> 4) == 14 ? 2
+                     : (byte >> 3) == 30 ? 3
+                                         : -1;
+    if (more < 0 || byte < 0x20 || byte == 0x7F || i + more >= text.size() + (more == 0)) return false;
+    uint32_t code = more == 0 ? byte : byte & (0x3F >> more);
+    for (int k = 1; k <= more; ++k) {
+      const auto next = static_cast<unsigned char>(text[i + k]);
+      if ((next >> 6) != 2) return false;
+      code = code << 6 | (next & 0x3F);
+    }
+    constexpr uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kSmallest[more] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
+absl::Status CsvFields::Cut(absl::string_view line) {
+  fields_.clear();
+  size_t quoted = 0;
+  for (size_t begin = 0;;) {
+    size_t start = begin;
+    while (start < line.size() && (line[start] == ' ' || line[start] == '\t')) ++start;
+    if (start < line.size() && line[start] == '"') {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const size_t end, CutQuoted(line, start, quoted++));
+      if (end == line.size()) break;
+      begin = end + 1;
+      continue;
+    }
+    const size_t comma = std::min(line.find(',', begin), line.size());
+    fields_.push_back(absl::StripAsciiWhitespace(line.substr(begin, comma - begin)));
+    if (comma == line.size()) break;
+    begin = comma + 1;
+  }
+  return absl::OkStatus();
+}
+absl::StatusOr<size_t> CsvFields::CutQuoted(absl::string_view line, size_t start, size_t number) {
+  if (number == unquoted_.size()) unquoted_.push_back(std::make_unique<std::string>());
+  std::string& text = *unquoted_[number];
+  text.clear();
+  size_t i = start + 1;
+  for (;; ++i) {
+    if (i >= line.size())
+      return absl::InvalidArgumentError(absl::StrCat(
+          "field ", fields_.size() + 1, " begins with a quote (\") and has no closing one on its line"));
+    if (line[i] != '"') {
+      text += line[i];
+    } else if (i + 1 < line.size() && line[i + 1] == '"') {
+      text += line[i++];
+    } else {
+      break;
+    }
+  }
+  const size_t comma = std::min(line.find(',', i + 1), line.size());
+  if (!absl::StripAsciiWhitespace(line.substr(i + 1, comma - i - 1)).empty())
+    return absl::InvalidArgumentError(
+        absl::StrCat("field ", fields_.size() + 1, " goes on after its closing quote with '",
+                     Shown(line.substr(i + 1, comma - i - 1)), "'; a comma was expected"));
+  fields_.push_back(absl::StripAsciiWhitespace(text));
+  return comma;
+}
+
+}  // namespace touchstone
