@@ -8,6 +8,7 @@
 
 #include "server/dataset/test_support.h"
 #include "server/image/encode.h"
+#include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
 namespace touchstone {
@@ -116,12 +117,7 @@ TEST(DatasetStream, ResultsAreThoseOfTouchesMadeOneByOne) {
       simulator.Prepare(1, &batch);
       batch.surface = surface;
       batch.seed = specification.seed;
-      batch.index[0] = index;
-      batch.target_m[0] = touch.target_m;
-      batch.approach[0] = touch.approach;
-      batch.lateral[0] = touch.lateral;
-      batch.standoff_m[0] = touch.standoff_m;
-      batch.speed_m_s[0] = touch.speed_m_s;
+      SetTouch(touch, index, 0, &batch);
       ASSERT_TRUE(simulator.Run(&batch, &workspace).ok());
       Descriptor(batch, 0, descriptor_s);
     }

@@ -12,7 +12,8 @@ namespace {
 using testing::HasSubstr;
 
 constexpr char kCsv[] =
-    "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
+    "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_"
+    "z,"
     "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us,session_time_s,round,face,cov_temperature\n"
     "7,lat20,20.1,60,-12.3,0.1,7,0,0,-1,1,0,0,1250000.0625,,1250002.5,3.5,0,1,21.25\n"
     "3,cup,10,60,0,0,0,0,0,-1,1,0,0,3000000,3000100,3000200.125,9.25,1,0,\n";

@@ -6,6 +6,7 @@
 
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"
+#include "server/touch/batch_row.h"
 #include "server/touch/plan.h"
 #include "server/touch/simulate.h"
 
@@ -33,13 +34,7 @@ std::vector<double> ReportedTimes(const Model& model) {
   batch.seed = 9;
   for (int k = 0; k < kTouches; ++k) {
     const CommandedTouch touch = TouchOfPlan(plan, *generator, k, 0);
-    batch.index[k] = k;
-    batch.target_m[k] = touch.target_m;
-    batch.approach[k] = touch.approach;
-    batch.lateral[k] = touch.lateral;
-    batch.standoff_m[k] = touch.standoff_m;
-    batch.speed_m_s[k] = touch.speed_m_s;
-    batch.session_time_s[k] = 10.0 * k;
+    SetTouch(touch, touch.speed_m_s, 10.0 * k, k, k, &batch);
     for (int finger = 0; finger < batch.fingers(); ++finger)
       batch.previous_press_m[batch.At(finger, k)] = 0.001 * finger;
   }

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "server/base/status.h"
+#include "server/touch/batch_row.h"
 
 namespace touchstone {
 namespace {
@@ -76,13 +77,8 @@ void Predictor::Fill(const Block& block, const TouchSimulator& simulator, TouchB
   batch->surface = observations_.surfaces[block.object];
   for (int t = 0; t < size; ++t) {
     const int row = observations_.row[block.touches[t]];
-    batch->index[t] = row;
-    batch->target_m[t] = set.target_m[row];
-    batch->approach[t] = set.approach[row];
-    batch->lateral[t] = set.lateral[row];
-    batch->standoff_m[t] = set.standoff_m[row];
-    batch->speed_m_s[t] = set.speed_m_s[row];
-    batch->session_time_s[t] = set.session_time_s[row];
+    const TouchPose pose = {set.target_m[row], set.approach[row], set.lateral[row], set.standoff_m[row]};
+    SetTouch(pose, set.speed_m_s[row], set.session_time_s[row], row, t, batch);
   }
   for (const std::string& name : simulator.needed_covariates()) {
     const auto found = set.covariates.find(name);

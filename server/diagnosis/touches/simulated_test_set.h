@@ -11,6 +11,7 @@
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"
+#include "server/touch/batch_row.h"
 #include "server/touch/plan.h"
 #include "server/touch/simulate.h"
 
@@ -73,13 +74,7 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
       simulator.Prepare(1, &batch);
       batch.surface = surface;
       batch.seed = rig.seed;
-      batch.index[0] = set->touch.size();
-      batch.target_m[0] = touch.target_m;
-      batch.approach[0] = touch.approach;
-      batch.lateral[0] = touch.lateral;
-      batch.standoff_m[0] = touch.standoff_m;
-      batch.speed_m_s[0] = touch.speed_m_s;
-      batch.session_time_s[0] = 9.0 * set->touch.size();
+      SetTouch(touch, touch.speed_m_s, 9.0 * set->touch.size(), set->touch.size(), 0, &batch);
       batch.previous_press_m = previous_press_m;
       EXPECT_TRUE(simulator.Run(&batch, &workspace).ok());
       previous_press_m = batch.press_m;

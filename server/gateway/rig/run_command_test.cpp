@@ -26,7 +26,7 @@ TEST(RunCommand, ArgumentsAreNotAShells) {
   EXPECT_TRUE(RunCommand({"test", "$(exit 1)", "=", "$(exit 1)"}, 60, nullptr).ok());
 }
 
-TEST(RunCommand, EndsWithThePermit) {
+TEST(RunCommand, EndsWithTheGuard) {
   const absl::Status status =
       RunCommand({"sleep", "600"}, 600, [] { return absl::AbortedError("the lease was lost"); });
   EXPECT_EQ(status.code(), absl::StatusCode::kAborted);
