@@ -54,7 +54,7 @@ std::string InWords(const v1::Session& session) {
 
 Json JournalSessionJson(const JournalSession& session) {
   return {{"name", session.name},
-          {"source", session.source},
+          {"source", session.provenance},
           {"created_unix_s", session.created_unix_s},
           {"fingers", session.fingers},
           {"spacing_mm", session.spacing_m * kMillimetresPerMetre},
@@ -103,7 +103,7 @@ absl::Status ShowJournal(const Cli& cli, const Options& options) {
       session.name, ": ", Counted(session.touches, "touch", "touches"), ", ", session.done, " done, ",
       session.failed, " failed, ", Counted(session.images, "picture", "pictures"), ", ",
       Counted(session.fingers, "finger", "fingers"), "\n  Objects   ", absl::StrJoin(session.objects, ", "),
-      "\n  Source    ", session.source, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
+      "\n  Source    ", session.provenance, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
 }
 
 absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {

@@ -13,8 +13,8 @@ namespace touchstone {
 class GatewayServer {
  public:
   // Opens journal, calibration, arm, end effector and camera, reconciles what was interrupted, and listens.
-  // Errors name the option or the file. An arm or end effector that does not answer yet is no error:
-  // GetState reports it.
+  // Errors name the option or the file. An arm or end effector that does not answer yet is no error: GetState
+  // shows it.
   static absl::StatusOr<std::unique_ptr<GatewayServer>> Start(GatewayOptions options);
   ~GatewayServer();
 

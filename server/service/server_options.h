@@ -27,7 +27,7 @@ struct ServerOptions {
   std::string models_dir;                  // where models are kept; empty: in memory
   std::string sessions_dir;                // where sessions are kept; empty: in memory
   std::string default_model = "nominal";
-  int threads = 0;  // that simulate; 0: one a core
+  int threads = 0;  // that simulate; 0: one per core
   RendererOptions renderer;
   // Limits: every one in this place.
   int max_batch_size = 65536;

@@ -24,7 +24,7 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
     return absl::InvalidArgumentError("the stream is empty: its first message gives name, all of them csv");
   const std::string name = request.name();
   const bool validate_only = request.validate_only();
-  // A name that cannot be is told before a gigabyte is sent.
+  // An invalid name is refused before a gigabyte is sent.
   if (!validate_only || !name.empty()) TOUCHSTONE_RETURN_IF_ERROR(SessionStore::CheckName(name));
   SessionStore::Upload upload(&store);
   do {

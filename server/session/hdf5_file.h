@@ -38,8 +38,8 @@ class Hdf5Handle {
   herr_t (*close_)(hid_t);
 };
 
-// Writes datasets one after the other; names may have groups ("/images/png"). The first thing that goes wrong
-// is told at the end. The file is whole or absent: it stands beside its place as NAME.part until Finish.
+// Writes datasets one after the other; names may have groups ("/images/png"). The first error is
+// reported at the end. The file is whole or absent: it stands beside its place as NAME.part until Finish.
 class Hdf5Columns {
  public:
   explicit Hdf5Columns(const std::string& path);

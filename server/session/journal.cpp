@@ -422,7 +422,7 @@ class JournalFile : public Journal {
     return Write([&] { return step(known, touch_id); });
   }
 
-  // Without the mutex while `each` runs: it may use this journal. What was there at the call is told as it is
+  // Without the mutex while `each` runs: it may use this journal. What was there at the call is passed on as it is
   // when its turn comes.
   template <typename Row, typename Ids, typename Read, typename Each>
   absl::Status ForEach(const std::string& session, Ids ids_of, Read read, const Each& each) const {

@@ -70,7 +70,7 @@ struct JournalSession {
   std::string name;
   double created_unix_s = 0;
   // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"; an emulator says that it is one.
-  std::string source;
+  std::string provenance;
   std::string calibration;  // the calibration file, whole
   int fingers = 3;
   double spacing_m = 0.03;

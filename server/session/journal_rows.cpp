@@ -62,7 +62,7 @@ absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& se
   SqliteStatement insert = file->Prepare(
       "INSERT INTO session(name, created_unix_s, source, calibration, fingers, spacing_m) VALUES(?, ?, ?, ?, "
       "?, ?)");
-  insert.Bind(session.name).Bind(session.created_unix_s).Bind(session.source).Bind(session.calibration);
+  insert.Bind(session.name).Bind(session.created_unix_s).Bind(session.provenance).Bind(session.calibration);
   insert.Bind(int64_t{session.fingers}).Bind(session.spacing_m);
   TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
   return file->Number("SELECT last_insert_rowid()");
@@ -234,7 +234,7 @@ absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id)
     if (!found) return Gone(*file, "session");
     session.name = row.Text(0);
     session.created_unix_s = row.Double(1);
-    session.source = row.Text(2);
+    session.provenance = row.Text(2);
     session.calibration = row.Text(3);
     session.fingers = static_cast<int>(row.Integer(4));
     session.spacing_m = row.Double(5);

@@ -3,8 +3,9 @@
 
 namespace touchstone {
 
-inline constexpr int kJournalApplicationId = 0x54736A31;  // "Tsj1": tells a journal from other SQLite files
-inline constexpr int kJournalVersion = 1;                 // PRAGMA user_version
+inline constexpr int kJournalApplicationId =
+    0x54736A31;                            // "Tsj1": distinguishes a journal from other SQLite files
+inline constexpr int kJournalVersion = 1;  // PRAGMA user_version
 
 inline constexpr char kJournalSchema[] = R"sql(
 CREATE TABLE session(

@@ -43,7 +43,7 @@ class JournalTest : public ::testing::Test {
     JournalSession session;
     session.name = name;
     session.created_unix_s = 1.7e9;
-    session.source = "emulated rig";
+    session.provenance = "emulated rig";
     session.calibration = "touchstone: calibration/1\n";
     return session;
   }
@@ -218,7 +218,7 @@ TEST_F(JournalTest, SessionsTellWhatTheyHold) {
   EXPECT_EQ(session->failed, 1u);
   EXPECT_EQ(session->images, 1u);
   EXPECT_THAT(session->objects, ElementsAre("mug", "cup"));
-  EXPECT_EQ(session->source, "emulated rig");
+  EXPECT_EQ(session->provenance, "emulated rig");
   EXPECT_EQ(session->calibration, "touchstone: calibration/1\n");
   ASSERT_TRUE(journal
                   ->ForEachImage("s",

@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kMaxShown = 48;
 
-// The columns that tell a touch's pose, in the order in which files are written. All or none.
+// The columns of a touch's pose, in the order in which files are written. All or none.
 struct PoseColumn {
   const char* name;
   ColumnKind kind;
@@ -125,7 +125,7 @@ absl::Status CheckComplete(const Columns& columns, const std::string& place) {
   };
   if (!has("object")) return missing("object", "; the first line must be the header (touch,object,...)");
   if (!any_pose && columns.fingers > 0) return absl::OkStatus();
-  // A set without any time and without any pose is told as one that lacks its poses.
+  // A set without any time and without any pose is reported as one that lacks its poses.
   if (!has("touch")) return missing("touch", "");
   for (const PoseColumn& pose : kPoseColumns)
     if (!has(pose.name))

@@ -57,7 +57,7 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
   JournalSession session;
   session.name = options.session;
   session.created_unix_s = options.created_unix_s;
-  session.source = options.source.empty() ? absl::StrCat("imported from ", path) : options.source;
+  session.provenance = options.provenance.empty() ? absl::StrCat("imported from ", path) : options.provenance;
   session.fingers = static_cast<int>(measured[0].time_s.size());
   session.spacing_m = options.spacing_m;
   TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));

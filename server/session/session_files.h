@@ -15,7 +15,7 @@ namespace touchstone {
 // The measurement file (format: proto/README.md); whole or absent. FAILED_PRECONDITION if no touch is done.
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path);
 
-// HDF5 in SI: a dataset a column with the attribute "unit", one row a touch that is done (contact_time_s is
+// HDF5 in SI: one dataset per column with the attribute "unit", one row per touch that is done (contact_time_s is
 // touches x fingers, base_from_tip_position_m touches x fingers x 3, NaN where unknown); pictures under
 // /images (PNG files end to end, png_offset says where each begins); what is known of the session under
 // /session. Whole or absent.
@@ -24,7 +24,7 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& sessio
 struct ImportOptions {
   std::string session;      // its name; must be new
   double spacing_m = 0.03;  // of the fingers; a measurement file does not say
-  std::string source;       // where the touches were made; default: "imported from FILE"
+  std::string provenance;   // where the touches were made; default: "imported from FILE"
   double created_unix_s = 0;
 };
 

@@ -56,7 +56,7 @@ TEST_F(SessionFiles, AMeasurementFileComesBackAsItWas) {
   const auto session = journal_->Session("s");
   EXPECT_EQ(session->done, 3u);
   EXPECT_EQ(session->fingers, 3);
-  EXPECT_THAT(session->source, HasSubstr("imported from " + csv_));
+  EXPECT_THAT(session->provenance, HasSubstr("imported from " + csv_));
 }
 
 TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {

@@ -201,7 +201,7 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, 
   Hdf5Columns columns(path);
   columns.Texts("session/format", {kFormat});
   columns.Texts("session/name", {session.name});
-  columns.Texts("session/source", {session.source});
+  columns.Texts("session/source", {session.provenance});
   columns.Texts("session/calibration", {session.calibration});
   columns.Numbers("session/created_unix_s", "s", {session.created_unix_s}, {1});
   columns.Numbers("session/spacing_m", "m", {session.spacing_m}, {1});
@@ -225,7 +225,7 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto spacing_m, file.Numbers("session/spacing_m", 1));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto counts, file.Whole("session/fingers_touches_images", 3));
   session.name = options.session.empty() ? name[0] : options.session;
-  session.source = options.source.empty() ? source[0] : options.source;
+  session.provenance = options.provenance.empty() ? source[0] : options.provenance;
   session.calibration = calibration[0];
   session.created_unix_s = created_unix_s[0];
   session.spacing_m = spacing_m[0];

@@ -83,7 +83,7 @@ absl::Status Rig::EnsureSession(const std::string& name) {
   JournalSession session;
   session.name = name;
   session.created_unix_s = UnixNowS();
-  session.source = Provenance();
+  session.provenance = Provenance();
   session.calibration = FormatCalibration(parts_.planner->calibration());
   session.fingers = options_.fingers;
   session.spacing_m = options_.spacing_m;
