@@ -85,9 +85,9 @@ class TheEmulator : public Emulator {
 
   std::vector<TouchTruth> Touches() const override { return fingers_->Touches(); }
   uint64_t touches() const override { return fingers_->touches(); }
-  std::string Mount(const std::string& object, const std::string& placement) override {
+  std::string Mount(const std::string& object, const std::string& up_face) override {
     if (controller_->Moving()) return "the emulated arm is moving; nobody reaches under it";
-    return fingers_->Mount(object, placement);
+    return fingers_->Mount(object, up_face);
   }
   std::string Tell(const std::string& line) override {
     const CommandHooks hooks{[this] { fingers_->RestartSession(); }, [this] { quit_ = true; },
@@ -160,7 +160,7 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   fingers_ = std::make_unique<Fingers>(scenario, options.seed, base_from_object, &faults_,
                                        [this](const Edge& edge) { device_->OnEdge(edge); });
   if (!options.object.empty())
-    if (const std::string error = fingers_->Mount(options.object, options.placement); !error.empty())
+    if (const std::string error = fingers_->Mount(options.object, options.up_face); !error.empty())
       throw std::invalid_argument(error);
 
   ControllerOptions controller;

@@ -26,9 +26,9 @@ struct EmulatorOptions {
   std::vector<std::string> unlisted;  // "lead_screw=0.3,4"
   double sigma_us = 5000;             // Gaussian noise of every finger's time
   uint64_t seed = 1;
-  std::vector<std::string> meshes;       // "NAME=FILE", mm; none: the five built-in supershapes
-  int supershape_triangles = 20'000;     // as the virtual source has them
-  std::string object, placement = "+z";  // mounted from the beginning; empty: nothing
+  std::vector<std::string> meshes;     // "NAME=FILE", mm; none: the five built-in supershapes
+  int supershape_triangles = 20'000;   // as the virtual source has them
+  std::string object, up_face = "+z";  // mounted from the beginning; empty: nothing
 
   double speedup = 1;  // simulated seconds in one of the host's
   int fingers = 3;
@@ -72,7 +72,7 @@ class Emulator {
   virtual std::vector<TouchTruth> Touches() const = 0;
   virtual uint64_t touches() const = 0;
   // An error text, or empty.
-  virtual std::string Mount(const std::string& object, const std::string& placement) = 0;
+  virtual std::string Mount(const std::string& object, const std::string& up_face) = 0;
   // What the control port answers to a line: "ok ..." or "error ...".
   virtual std::string Tell(const std::string& line) = 0;
   // Whether the control port was told to quit.

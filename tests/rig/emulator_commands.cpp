@@ -33,7 +33,7 @@ std::string Done(const std::string& error, const std::string& answer = "") {
 std::string TruthJson(const TouchTruth& truth) {
   nlohmann::ordered_json json = {{"number", truth.number},
                                  {"object", truth.object},
-                                 {"placement", truth.placement},
+                                 {"up_face", truth.up_face},
                                  {"start_s", truth.start_s},
                                  {"session_time_s", truth.session_time_s},
                                  {"speed_m_s", truth.speed_m_s},
@@ -58,8 +58,8 @@ std::string AnswerCommand(const std::string& line, Emulator* emulator, const Com
   };
 
   if (has("mount", 2, 3)) {
-    const std::string placement = words.size() > 2 ? words[2] : "+z";
-    return Done(emulator->Mount(words[1], placement), words[1] + " " + placement);
+    const std::string up_face = words.size() > 2 ? words[2] : "+z";
+    return Done(emulator->Mount(words[1], up_face), words[1] + " " + up_face);
   }
   if (has("unmount", 1, 1)) return Done(emulator->Mount("", "+z"));
   if (has("fault", 3, 3)) {

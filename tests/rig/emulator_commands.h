@@ -10,7 +10,7 @@
 namespace touchstone::rig {
 
 inline constexpr char kCommands[] =
-    "mount OBJECT [PLACEMENT] | unmount | fault NAME VALUE | faults | truth [NUMBER] | count [WHAT] | press "
+    "mount OBJECT [FACE] | unmount | fault NAME VALUE | faults | truth [NUMBER] | count [WHAT] | press "
     "| release | "
     "reset | session | ports | help | quit";
 

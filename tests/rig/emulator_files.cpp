@@ -77,7 +77,7 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
   text += absl::StrFormat("time_scale = %.9g\n", options.speedup);
   if (!addresses.program.empty())
     text += "mount_command = [" + Quoted(addresses.program) + ", \"tell\", " + Quoted(control) +
-            ", \"mount\", \"{object}\", \"{placement}\"]\n";
+            ", \"mount\", \"{object}\", \"{up_face}\"]\n";
   if (!options.meshes.empty()) {
     text += "mesh = [";
     for (size_t k = 0; k < options.meshes.size(); ++k)

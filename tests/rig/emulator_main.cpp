@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   app.add_option("--supershape-triangles", options.supershape_triangles,
                  "Of each built-in supershape, about");
   app.add_option("--object", options.object, "Object that is mounted from the beginning; default: none");
-  app.add_option("--placement", options.placement, "Its face that points up");
+  app.add_option("--up-face,--placement", options.up_face, "Its face that points up");
   app.add_option("--speedup", options.speedup, "Simulated seconds in one second");
   app.add_option("--fingers", options.fingers, "Number of fingers, 1 to 8");
   app.add_option("--spacing-mm", options.spacing_mm, "Between neighbouring fingers");
@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
       "tell", std::string("Tells a running emulator something: ") + touchstone::rig::kCommands);
   tell->add_option("where", where, "HOST:PORT of its control port (emulator.json)")->required();
   tell->add_option("words", words, "What to tell")->required();
-  // Placements begin with a sign: what is told is not looked at for options.
+  // Faces begin with a sign: these words are not searched for options.
   const bool telling = argc >= 4 && std::string(argv[1]) == "tell";
   if (telling) where = argv[2], words.assign(argv + 3, argv + argc);
   if (!telling) CLI11_PARSE(app, argc, argv);

@@ -80,7 +80,7 @@ TEST_F(EmulatorTest, IsToldThingsOverItsControlPort) {
   };
   EXPECT_EQ(tell("mount box -x"), "ok box -x");
   EXPECT_EQ(tell("mount ball +z").rfind("error there is no object 'ball'", 0), 0u);
-  EXPECT_EQ(tell("mount box up").rfind("error no placement", 0), 0u);
+  EXPECT_EQ(tell("mount box up").rfind("error no face", 0), 0u);
   EXPECT_EQ(tell("fault drop_bytes 0.25").rfind("ok", 0), 0u);
   EXPECT_EQ(emulator_->faults().Get("drop_bytes"), 0.25);
   EXPECT_NE(tell("faults").find("drop_bytes=0.25"), std::string::npos);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "server/geometry/pose.h"
-#include "tests/rig/world/placement.h"
+#include "tests/rig/world/resting_face.h"
 
 namespace touchstone::rig {
 namespace {
@@ -68,11 +68,11 @@ int Fingers::Object() const {
   return -1;
 }
 
-std::string Fingers::Mount(const std::string& object, const std::string& placement) {
+std::string Fingers::Mount(const std::string& object, const std::string& up_face) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const auto& names = PlacementNames();
-  if (std::find(names.begin(), names.end(), placement) == names.end())
-    return "no placement is called '" + placement + "'; there are +x, -x, +y, -y, +z, -z";
+  const auto& names = FaceNames();
+  if (std::find(names.begin(), names.end(), up_face) == names.end())
+    return "no face is called '" + up_face + "'; there are +x, -x, +y, -y, +z, -z";
   if (AnyPressed()) return "the fingers are on object '" + object_ + "'; retreat first";
   const std::string before = object_;
   object_ = object;
@@ -82,7 +82,7 @@ std::string Fingers::Mount(const std::string& object, const std::string& placeme
     for (const auto& each : scenario_.objects) known += (known.empty() ? "" : ", ") + each->name();
     return "there is no object '" + object + "'; there are " + known;
   }
-  placement_ = placement;
+  up_face_ = up_face;
   approach_.reset();
   return "";
 }
@@ -92,15 +92,15 @@ std::string Fingers::object() const {
   return object_;
 }
 
-std::string Fingers::placement() const {
+std::string Fingers::up_face() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return placement_;
+  return up_face_;
 }
 
 Eigen::Isometry3d Fingers::BaseFromObject() const {
   const hidden::Solid& solid = *scenario_.objects[Object()];
   return BaseFromPlacedObject(base_from_object_.at(object_), solid.low_mm() * 1e-3, solid.high_mm() * 1e-3,
-                              placement_);
+                              up_face_);
 }
 
 std::optional<Eigen::Affine3d> Fingers::BaseFromMesh() const {
@@ -145,7 +145,7 @@ bool Fingers::AnyPressed() const {
 Fingers::Approach Fingers::PlanApproach(const StraightMotion& motion, const Vec& axis) const {
   const Eigen::Isometry3d object_from_base = BaseFromObject().inverse();
   TouchTruth truth;
-  truth.object = object_, truth.placement = placement_;
+  truth.object = object_, truth.up_face = up_face_;
   truth.start_s = motion.start_s;
   truth.session_time_s = session_began_s_ ? motion.start_s - *session_began_s_ : 0;
   truth.speed_m_s = motion.speed_m_s;

@@ -30,7 +30,7 @@ namespace touchstone::rig {
 // or reported none.
 struct TouchTruth {
   uint64_t number = 0;  // counts approaches with a contact, from 1
-  std::string object, placement;
+  std::string object, up_face;
   double start_s = 0;                                           // when the approach began, SimClock
   double session_time_s = 0;                                    // since the first one
   double speed_m_s = 0;                                         // commanded
@@ -54,16 +54,16 @@ struct Edge {
 
 class Fingers : public TipListener {
  public:
-  // `base_from_object` is at placement "+z", by the names of scenario.objects. Throws std::invalid_argument
+  // `base_from_object` is that with face "+z" up, by the names of scenario.objects. Throws std::invalid_argument
   // for a hidden effect that does not exist. `sink` is called from the controller's thread.
   Fingers(const hidden::Scenario& scenario, uint64_t seed,
           std::map<std::string, Eigen::Isometry3d> base_from_object, const Faults* faults,
           std::function<void(const Edge&)> sink);
 
   // Puts an object on the fixture; an empty name takes it away. An error text, or empty.
-  std::string Mount(const std::string& object, const std::string& placement);
+  std::string Mount(const std::string& object, const std::string& up_face);
   std::string object() const;
-  std::string placement() const;
+  std::string up_face() const;
   // Where the mounted object's mesh truly is, hidden pose and size included; none if nothing is mounted.
   std::optional<Eigen::Affine3d> BaseFromMesh() const;
 
@@ -122,7 +122,7 @@ class Fingers : public TipListener {
   const std::function<void(const Edge&)> sink_;
 
   mutable std::mutex mutex_;
-  std::string object_, placement_ = "+z";
+  std::string object_, up_face_ = "+z";
   Session session_;
   std::optional<double> session_began_s_;
   std::optional<Approach> approach_;

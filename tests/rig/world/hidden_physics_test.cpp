@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "tests/rig/world/oscillator.h"
-#include "tests/rig/world/placement.h"
+#include "tests/rig/world/resting_face.h"
 
 namespace touchstone::rig {
 namespace {
@@ -51,7 +51,7 @@ TEST(Placement, TurnsEachFaceUpAndLeavesTheObjectOnItsPlate) {
   const Vec low(-0.01, 0.02, -0.03), high(0.05, 0.10, 0.04);
   const Eigen::Isometry3d plus_z(Eigen::Translation3d(0.3, 0.1, 0.2));
   for (size_t face = 0; face < 6; ++face) {
-    const Eigen::Isometry3d pose = BaseFromPlacedObject(plus_z, low, high, PlacementNames()[face]);
+    const Eigen::Isometry3d pose = BaseFromPlacedObject(plus_z, low, high, FaceNames()[face]);
     const Vec outward = (face % 2 == 0 ? 1 : -1) * Vec::Unit(face / 2);
     EXPECT_NEAR((pose.linear() * outward - Vec::UnitZ()).norm(), 0, 1e-12) << face;
     EXPECT_NEAR(pose.linear().determinant(), 1, 1e-12);

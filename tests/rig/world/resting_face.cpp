@@ -1,4 +1,4 @@
-#include "tests/rig/world/placement.h"
+#include "tests/rig/world/resting_face.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,19 +6,18 @@
 
 namespace touchstone::rig {
 
-const std::vector<std::string>& PlacementNames() {
+const std::vector<std::string>& FaceNames() {
   static const std::vector<std::string> names = {"+x", "-x", "+y", "-y", "+z", "-z"};
   return names;
 }
 
 Eigen::Isometry3d BaseFromPlacedObject(const Eigen::Isometry3d& base_from_object_at_plus_z,
                                        const Eigen::Vector3d& box_min_m, const Eigen::Vector3d& box_max_m,
-                                       const std::string& placement) {
-  const auto& names = PlacementNames();
-  const auto found = std::find(names.begin(), names.end(), placement);
+                                       const std::string& up_face) {
+  const auto& names = FaceNames();
+  const auto found = std::find(names.begin(), names.end(), up_face);
   if (found == names.end())
-    throw std::invalid_argument("no placement is called '" + placement +
-                                "'; there are +x, -x, +y, -y, +z, -z");
+    throw std::invalid_argument("no face is called '" + up_face + "'; there are +x, -x, +y, -y, +z, -z");
   const int axis = static_cast<int>(found - names.begin()) / 2;
   const double sign = (found - names.begin()) % 2 == 0 ? 1 : -1;
 
