@@ -49,8 +49,8 @@ std::vector<float> VertexMeanCurvaturePerM(const TriangleMesh& mesh) {
     // The Laplacian is -2 H n, and pull / (2 area) approximates it.
     const float value = -pull[v].dot(normal[v].stableNormalized()) / (4 * area[v]);
     // A mesh cannot show a radius much smaller than its triangles.
-    const float most = 4 / std::sqrt(area[v]);
-    if (std::isfinite(value)) curvature[v] = std::clamp(value, -most, most);
+    const float limit = 4 / std::sqrt(area[v]);
+    if (std::isfinite(value)) curvature[v] = std::clamp(value, -limit, limit);
   }
   return curvature;
 }

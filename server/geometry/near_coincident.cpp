@@ -22,14 +22,14 @@ Corners CornersOf(const TriangleMesh& mesh, uint32_t triangle) {
 // Whether all of `other` lies beyond `distance_m` on one side of the plane of `base`, leaving out the corners
 // that the two have in common.
 bool ClearOfPlane(const Corners& base, const Corners& other, const bool* common, double distance_m) {
-  double least = 1e300, most = -1e300;
+  double min_height = 1e300, max_height = -1e300;
   for (int c = 0; c < 3; ++c) {
     if (common[c]) continue;
     const double height = (other.at[c] - base.at[0]).dot(base.normal);
-    least = std::min(least, height);
-    most = std::max(most, height);
+    min_height = std::min(min_height, height);
+    max_height = std::max(max_height, height);
   }
-  return least > distance_m || most < -distance_m;
+  return min_height > distance_m || max_height < -distance_m;
 }
 
 // Whether, seen along the normal of `base`, all of `other` lies outside one of its edges, but for an overlap

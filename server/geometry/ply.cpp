@@ -38,15 +38,15 @@ class BodyReader {
  private:
   // Refuses elements that cannot be right before anything is read or allocated for them.
   absl::Status CheckElement(const Element& element) {
-    uint64_t least = 0;
+    uint64_t min_bytes = 0;
     for (const Property& property : element.properties)
-      least += rows_.MinBytes(property.is_list ? property.count_type : property.type);
-    if (least == 0 && element.count > 0)
+      min_bytes += rows_.MinBytes(property.is_list ? property.count_type : property.type);
+    if (min_bytes == 0 && element.count > 0)
       return reading_.ErrorAtLine(
           element.line, absl::StrCat("the element ", Quoted(element.name), " has rows but no property"));
     TOUCHSTONE_RETURN_IF_ERROR(reading_.CheckCount(element.line,
                                                    absl::StrCat("rows of ", Quoted(element.name)),
-                                                   element.count, least, rows_.bytes_left()));
+                                                   element.count, min_bytes, rows_.bytes_left()));
     list_ = -1;
     for (int& at : xyz_) at = -1;
     if (element.name == "vertex") {

@@ -54,13 +54,13 @@ template <int kWidth>
 bool RunTogether(const double (&direction)[3][kWidth]) {
   constexpr double kMaxSpread = 1.0 / 8;
   for (int axis = 0; axis < 3; ++axis) {
-    double least = direction[axis][0], most = least;
+    double min_component = direction[axis][0], max_component = min_component;
     for (int k = 1; k < kWidth; ++k) {
-      least = std::min(least, direction[axis][k]);
-      most = std::max(most, direction[axis][k]);
+      min_component = std::min(min_component, direction[axis][k]);
+      max_component = std::max(max_component, direction[axis][k]);
     }
-    const bool one_sign = least >= kMinComponent || most <= -kMinComponent;
-    if (!one_sign || most - least > kMaxSpread) return false;
+    const bool one_sign = min_component >= kMinComponent || max_component <= -kMinComponent;
+    if (!one_sign || max_component - min_component > kMaxSpread) return false;
   }
   return true;
 }

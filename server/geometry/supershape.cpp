@@ -83,9 +83,9 @@ double ArgMax(double lower, double upper, F f) {
   constexpr int kSamples = 7200;
   const double step = (upper - lower) / kSamples;
   int best = 0;
-  double most = f(lower);
+  double max_value = f(lower);
   for (int i = 1; i <= kSamples; ++i)
-    if (const double value = f(lower + i * step); value > most) most = value, best = i;
+    if (const double value = f(lower + i * step); value > max_value) max_value = value, best = i;
   double a = std::max(lower, lower + (best - 1) * step), b = std::min(upper, lower + (best + 1) * step);
   const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
   for (int i = 0; i < 60; ++i) {
@@ -94,7 +94,7 @@ double ArgMax(double lower, double upper, F f) {
   }
   const double refined = 0.5 * (a + b), sample = lower + best * step;
   // A maximum at a sample itself (an edge, the equator) stays exactly there.
-  return f(refined) > most * (1 + 1e-14) ? refined : sample;
+  return f(refined) > max_value * (1 + 1e-14) ? refined : sample;
 }
 
 // The latitude >= 0 where the surface is farthest from the axis.

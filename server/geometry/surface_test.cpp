@@ -119,7 +119,7 @@ TEST(CastLines, AgreesWithEricsonsSegmentOnEveryTriangle) {
       // They may differ only within 1e-9 m of a silhouette: then lines 1e-9 m to all sides of this one meet
       // the surface both before and behind what was found (or not at all).
       const Vector3d side = direction.unitOrthogonal(), up = direction.cross(side);
-      double least = expected, most = expected;
+      double min_travel = expected, max_travel = expected;
       std::vector<Vector3d> shifts;
       for (int turn = 0; turn < 64; ++turn) {
         const double angle = turn * 6.283185307 / 64;
@@ -132,12 +132,12 @@ TEST(CastLines, AgreesWithEricsonsSegmentOnEveryTriangle) {
       }
       for (const Vector3d& shift : shifts) {
         const double there = BruteForceLine(mesh, origin + 1e-9 * shift, direction, kLongestM);
-        least = std::min(least, there);
-        most = std::max(most, there);
+        min_travel = std::min(min_travel, there);
+        max_travel = std::max(max_travel, there);
       }
-      EXPECT_TRUE(least - 1e-6 <= found && found <= most + 1e-6)
-          << "line " << i << ": " << found << " m, expected " << expected << ", beside " << least << " to "
-          << most;
+      EXPECT_TRUE(min_travel - 1e-6 <= found && found <= max_travel + 1e-6)
+          << "line " << i << ": " << found << " m, expected " << expected << ", beside " << min_travel
+          << " to " << max_travel;
     }
     EXPECT_LT(worst, 1e-7);  // where surfaces are met at flat angles; 1e-12 elsewhere
   }

@@ -25,7 +25,7 @@ Vector3d NearestPointOfTriangle(const Vector3d& a, const Vector3d& b, const Vect
 }
 
 bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, const Vector3d& b,
-                   const Vector3d& c, double most, double* t, Vector3d* touch) {
+                   const Vector3d& c, double max_t, double* t, Vector3d* touch) {
   // Face: the centre comes within the radius of the plane, above the inside of the triangle. The edges are
   // not reached before that.
   Vector3d normal = (b - a).cross(c - a);
@@ -39,7 +39,7 @@ bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, 
   if (height > radius) {
     if (approach <= 0) return false;
     const double at = (height - radius) / approach;
-    if (at > most) return false;
+    if (at > max_t) return false;
     const Vector3d centre = at * direction;
     const Vector3d foot = centre + radius * normal;
     const Vector3d pa = a - foot, pb = b - foot, pc = c - foot;
@@ -60,7 +60,7 @@ bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, 
   }
 
   bool found = false;
-  double best = most;
+  double best = max_t;
   const Vector3d* const corners[3] = {&a, &b, &c};
   for (int i = 0; i < 3; ++i) {
     const Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];

@@ -91,13 +91,13 @@ uint32_t TriangleTree::Split(Primitive* primitives, const Range& range, int dept
   }
   Range right = Whole(nullptr, 0, 0);
   int best = -1;
-  float least = std::numeric_limits<float>::max();
+  float min_cost = std::numeric_limits<float>::max();
   for (int i = kBins - 1; i > 0; --i) {
     join(&right, bins[i]);
     if (right.end == 0 || right.end == range.size()) continue;
     const float cost = left_cost[i - 1] + right.HalfArea() * right.end;
-    if (cost < least) {
-      least = cost;
+    if (cost < min_cost) {
+      min_cost = cost;
       best = i;
     }
   }

@@ -11,10 +11,10 @@ namespace touchstone {
 namespace {
 
 // By value, unlike std::min: what the vectoriser understands.
-float Least(float a, float b) {
+float Min(float a, float b) {
   return a < b ? a : b;
 }
-float Most(float a, float b) {
+float Max(float a, float b) {
   return a > b ? a : b;
 }
 
@@ -89,8 +89,8 @@ void Shade(const CpuFrame& frame, Hits* hits) {
     const float qx = sy * e1z - sz * e1y, qy = sz * e1x - sx * e1z, qz = sx * e1y - sy * e1x;
     const float free_u = (sx * px + sy * py + sz * pz) * inverse;
     const float free_v = (dx * qx + dy * qy + dz * qz) * inverse;
-    const float u = Least(Most(free_u, 0.0f), 1.0f);
-    const float v = Least(Most(free_v, 0.0f), 1.0f - u);
+    const float u = Min(Max(free_u, 0.0f), 1.0f);
+    const float v = Min(Max(free_v, 0.0f), 1.0f - u);
     const float w = 1.0f - u - v;
 
     // Interpolated point and normal, turned with the face towards the viewer.
@@ -105,11 +105,11 @@ void Shade(const CpuFrame& frame, Hits* hits) {
     const float kx = key.x - x, ky = key.y - y, kz = key.z - z;
     const float fx = fill.x - x, fy = fill.y - y, fz = fill.z - z;
     const float key_cosine =
-        Most(nx * kx + ny * ky + nz * kz, 0.0f) / std::sqrt(nn * (kx * kx + ky * ky + kz * kz) + 1e-30f);
+        Max(nx * kx + ny * ky + nz * kz, 0.0f) / std::sqrt(nn * (kx * kx + ky * ky + kz * kz) + 1e-30f);
     const float fill_cosine =
-        Most(nx * fx + ny * fy + nz * fz, 0.0f) / std::sqrt(nn * (fx * fx + fy * fy + fz * fz) + 1e-30f);
+        Max(nx * fx + ny * fy + nz * fz, 0.0f) / std::sqrt(nn * (fx * fx + fy * fy + fz * fz) + 1e-30f);
     const float shade = kAmbient + kLights[0].strength * key_cosine + kLights[1].strength * fill_cosine;
-    hits->level[i] = static_cast<int>(Least(shade, 1.0f) * scale * 255.0f + 0.5f);
+    hits->level[i] = static_cast<int>(Min(shade, 1.0f) * scale * 255.0f + 0.5f);
 
     // Depth of that point beyond the origin: how far it lies along the ray.
     hits->depth[i] = ((x - ox) * dx + (y - oy) * dy + (z - oz) * dz) / (dx * dx + dy * dy + dz * dz);

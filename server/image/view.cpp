@@ -56,19 +56,19 @@ View MakeView(const Camera& camera, const Bounds& bounds, const ImageOptions& op
 
 PixelBox ProjectBounds(const View& view, const Bounds& bounds) {
   if (SmallestDepthM(view, bounds) < 0.5 * view.near_m) return {0, 0, view.width, view.height};
-  Eigen::Vector2d least = view.Project(CornerOf(bounds, 0));
-  Eigen::Vector2d most = least;
+  Eigen::Vector2d min_pixel = view.Project(CornerOf(bounds, 0));
+  Eigen::Vector2d max_pixel = min_pixel;
   for (int corner = 1; corner < 8; ++corner) {
     const Eigen::Vector2d pixel = view.Project(CornerOf(bounds, corner));
-    least = least.cwiseMin(pixel);
-    most = most.cwiseMax(pixel);
+    min_pixel = min_pixel.cwiseMin(pixel);
+    max_pixel = max_pixel.cwiseMax(pixel);
   }
   // One pixel more on each side: the projection above is rounded, a whole column must not depend on that.
   const auto clip = [](double value, int size) {
     return static_cast<int>(std::min<double>(size, std::max<double>(0.0, value)));
   };
-  return {clip(std::floor(least.x()) - 1, view.width), clip(std::floor(least.y()) - 1, view.height),
-          clip(std::ceil(most.x()) + 1, view.width), clip(std::ceil(most.y()) + 1, view.height)};
+  return {clip(std::floor(min_pixel.x()) - 1, view.width), clip(std::floor(min_pixel.y()) - 1, view.height),
+          clip(std::ceil(max_pixel.x()) + 1, view.width), clip(std::ceil(max_pixel.y()) + 1, view.height)};
 }
 
 bool SeesOnlyOutside(const View& view, const Bounds& bounds) {

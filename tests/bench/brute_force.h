@@ -6,12 +6,12 @@
 
 namespace touchstone::bench {
 
-// Least travel along the segment origin .. origin + length_m * direction; length_m if nothing is met.
+// Smallest travel along the segment origin .. origin + length_m * direction; length_m if nothing is met.
 inline float BruteForceTravel(const TriangleMesh& mesh, const Eigen::Vector3d& origin_m,
                               const Eigen::Vector3d& direction, float length_m) {
   const Eigen::Vector3f p = origin_m.cast<float>();
   const Eigen::Vector3f qp = -direction.cast<float>() * length_m;
-  float least = 1;
+  float min_fraction = 1;
   for (const auto& triangle : mesh.triangles) {
     const Eigen::Vector3f& a = mesh.vertices_m[triangle[0]];
     const Eigen::Vector3f ab = mesh.vertices_m[triangle[1]] - a;
@@ -21,15 +21,15 @@ inline float BruteForceTravel(const TriangleMesh& mesh, const Eigen::Vector3d& o
     if (d <= 0) continue;
     const Eigen::Vector3f ap = p - a;
     const float t = ap.dot(normal);
-    if (t < 0 || t > d * least) continue;
+    if (t < 0 || t > d * min_fraction) continue;
     const Eigen::Vector3f e = qp.cross(ap);
     const float v = ac.dot(e);
     if (v < 0 || v > d) continue;
     const float w = -ab.dot(e);
     if (w < 0 || v + w > d) continue;
-    least = t / d;
+    min_fraction = t / d;
   }
-  return least * length_m;
+  return min_fraction * length_m;
 }
 
 }  // namespace touchstone::bench

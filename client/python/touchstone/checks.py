@@ -10,14 +10,14 @@ from typing import Any, Iterable, Mapping
 from .errors import InvalidRequest
 
 
-def whole_number(name: str, value: Any, least: int, most: int) -> int:
+def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
     """The value as an int within bounds, or InvalidRequest naming both."""
     try:
         number = operator.index(value)
     except TypeError:
         raise InvalidRequest(f"{name} is {value!r}, not a whole number.") from None
-    if not least <= number <= most:
-        raise InvalidRequest(f"{name} is {number}; it must lie between {least} and {most}.")
+    if not minimum <= number <= maximum:
+        raise InvalidRequest(f"{name} is {number}; it must lie between {minimum} and {maximum}.")
     return number
 
 

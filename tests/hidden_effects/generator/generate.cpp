@@ -45,7 +45,7 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
     command.approach = (cosine * inward + std::sqrt(1 - cosine * cosine) * lean).normalized();
     const Vec p = (e - command.approach * command.approach.dot(e)).normalized();
     command.lateral = std::cos(roll) * p + std::sin(roll) * command.approach.cross(p);
-    double least = 1e300, most = -1e300;
+    double min_mm = 1e300, max_mm = -1e300;
     bool all = true;
     for (int i = 0; i < scenario.fingers && all; ++i) {
       const double x = (i - 0.5 * (scenario.fingers - 1)) * scenario.spacing_mm;
@@ -53,9 +53,9 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
           command.target_mm - command.approach * scenario.standoff_mm + command.lateral * x, command.approach,
           0);
       all = contact.hit;
-      least = std::min(least, contact.travel_mm), most = std::max(most, contact.travel_mm);
+      min_mm = std::min(min_mm, contact.travel_mm), max_mm = std::max(max_mm, contact.travel_mm);
     }
-    if (all && most - least < kMaxGapMm) return command;
+    if (all && max_mm - min_mm < kMaxGapMm) return command;
   }
   throw std::runtime_error("no pose found where all fingers hit " + solid.name());
 }
@@ -149,13 +149,13 @@ std::string Csv(const Scenario& scenario, const Protocol& protocol, const std::v
       csv += object;
     }
     // Relative to the first that reports, whole microseconds.
-    double least = 1e300;
+    double first_us = 1e300;
     for (int i = 0; i < fingers; ++i)
-      if (reported_us[k * fingers + i] < least) least = reported_us[k * fingers + i];
+      if (reported_us[k * fingers + i] < first_us) first_us = reported_us[k * fingers + i];
     for (int i = 0; i < fingers; ++i) {
       const double time_us = reported_us[k * fingers + i];
       csv += ',';
-      if (time_us == time_us) csv += std::to_string(std::llround(time_us - least));
+      if (time_us == time_us) csv += std::to_string(std::llround(time_us - first_us));
     }
     csv += '\n';
   }

@@ -128,13 +128,13 @@ void Solid::TryTriangle(uint32_t triangle, const Vec& centre, const Vec& directi
       const double t = (normal.dot(centre - p[0]) - radius) / towards;
       const Vec point = centre + t * direction - radius * normal;
       // Inside if the point is on the same side of all three edges.
-      double least = 1e300, most = -1e300;
+      double min_side = 1e300, max_side = -1e300;
       for (int k = 0; k < 3; ++k) {
         const double side = (p[(k + 1) % 3] - p[k]).cross(point - p[k]).dot(normal);
-        least = std::min(least, side), most = std::max(most, side);
+        min_side = std::min(min_side, side), max_side = std::max(max_side, side);
       }
       const double slack = 1e-12 * twice_area;
-      if (least >= -slack || most <= slack) take(t, point, normal);
+      if (min_side >= -slack || max_side <= slack) take(t, point, normal);
     }
   }
   if (radius <= 0) return;
