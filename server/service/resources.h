@@ -47,7 +47,7 @@ struct Resources {
   ObjectStore objects;
   std::unique_ptr<ModelStore> models;
   std::unique_ptr<SessionStore> sessions;
-  std::shared_ptr<const Model> default_model;
+  std::shared_ptr<const Model> default_model;  // null: this process simulates nothing
 
   std::atomic<bool> draining{false};
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare

@@ -111,6 +111,11 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message) {
 
 namespace {
 
+// A rig simulates nothing: the model that a request names is not looked up there.
+bool Simulates(const Resources& resources) {
+  return resources.default_model != nullptr;
+}
+
 // What decides the touches of a dataset (objects, plan, seed), as 16 hexadecimal digits; columns and images do not.
 std::string DatasetKey(const v1::DatasetSpec& spec) {
   v1::DatasetSpec decisive;
@@ -143,7 +148,7 @@ absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
 absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources) {
   TouchRequest request;
   request.object = message.object();
-  if (message.has_model()) {
+  if (message.has_model() && Simulates(resources)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
   }
   for (int k = 0; k < message.touches_size(); ++k) {
@@ -176,7 +181,7 @@ absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
   request.objects.assign(spec.objects().begin(), spec.objects().end());
   DatasetSpecification& specification = request.specification;
   TOUCHSTONE_ASSIGN_OR_RETURN(specification.plan, FromProto(spec.plan()));
-  if (spec.has_model()) {
+  if (spec.has_model() && Simulates(resources)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.model, FromProto(spec.model(), resources));
   }
   specification.seed = spec.seed();

@@ -13,6 +13,14 @@ bool Near(double a, double b) {
   return std::abs(a - b) <= kCommandTolerance;
 }
 
+// Fields of a later version, or bytes that only happen to parse.
+std::string UnknownBytes(v1::CommandedTouch command) {
+  command.clear_target_m(), command.clear_approach(), command.clear_lateral();
+  command.clear_standoff_m(), command.clear_speed_m_s(), command.clear_stroke_m();
+  command.clear_session_time_s(), command.clear_covariates();
+  return CommandBytes(command);
+}
+
 bool Near(const v1::Vector3& a, const v1::Vector3& b) {
   return Near(a.x(), b.x()) && Near(a.y(), b.y()) && Near(a.z(), b.z());
 }
@@ -69,6 +77,8 @@ bool SameCommand(const std::string& a, const std::string& b) {
   if (a == b) return true;
   const auto first = ParseCommandBytes(a), second = ParseCommandBytes(b);
   if (!first || !second || !SamePath(*first, *second)) return false;
+  // What this program does not know of a command must be the same bytes.
+  if (UnknownBytes(*first) != UnknownBytes(*second)) return false;
   if (first->has_session_time_s() != second->has_session_time_s() ||
       !Near(first->session_time_s(), second->session_time_s()) ||
       first->covariates_size() != second->covariates_size())

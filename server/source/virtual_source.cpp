@@ -39,7 +39,8 @@ class VirtualSamples final : public SampleStream {
 
   const SampleHeader& header() const override { return header_; }
   absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) override {
-    absl::Status ended;
+    absl::Status ended = guard();
+    if (!ended.ok()) return ended;
     auto batch = stream_->Next([&] { return !(ended = guard()).ok(); });
     if (!ended.ok()) return ended;
     return batch;

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "server/base/status.h"
+#include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
 namespace touchstone {
@@ -13,14 +14,7 @@ constexpr uint32_t kMaxAttempts = 64;
 
 void Fill(const std::vector<CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k, int t,
           TouchBatch* batch) {
-  const CommandedTouch& touch = touches[k];
-  batch->index[t] = numbers[k];
-  batch->target_m[t] = touch.target_m;
-  batch->approach[t] = touch.approach;
-  batch->lateral[t] = touch.lateral;
-  batch->standoff_m[t] = touch.standoff_m;
-  batch->speed_m_s[t] = touch.speed_m_s;
-  batch->session_time_s[t] = touch.session_time_s;
+  SetTouch(touches[k], numbers[k], t, batch);
 }
 
 }  // namespace
