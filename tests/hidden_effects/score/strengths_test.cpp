@@ -73,13 +73,13 @@ TEST(Arms, KnowEveryEffectOfTheCatalogueWithItsNumberOfValues) {
 }
 
 TEST(Arms, TuningAndSealedSeedsNeverMeet) {
-  uint64_t last_tuning = 0, first_sealed = ~uint64_t{0};
+  uint64_t last_tuning = 0, first_held_out = ~uint64_t{0};
   for (const Arm& arm : Arms()) {
     last_tuning = std::max(last_tuning, SeedOf(Seeds::kTuning, arm, 10 * arm.sets));
-    first_sealed = std::min(first_sealed, SeedOf(Seeds::kHeldOut, arm, 0));
+    first_held_out = std::min(first_held_out, SeedOf(Seeds::kHeldOut, arm, 0));
     EXPECT_GT(arm.sets, 0);
   }
-  EXPECT_LT(last_tuning, first_sealed);
+  EXPECT_LT(last_tuning, first_held_out);
 }
 
 TEST(Arms, LatencyAndLengthAreRivalsAtOneSpeedOnly) {
