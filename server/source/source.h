@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -139,7 +140,7 @@ class Source {
   // With requests that are checked.
   virtual absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                                    const MotionGuard& guard) = 0;
-  // Takes the pictures one after the other; take(k, picture) appends picture k to the results.
+  // Takes the pictures one after the other; take(picture) appends one to the results.
   using TakePicture = std::function<absl::Status(const Image& picture)>;
   virtual absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
                                     const MotionGuard& guard, const TakePicture& take) = 0;
