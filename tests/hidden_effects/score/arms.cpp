@@ -232,12 +232,12 @@ uint64_t SeedOf(Seeds seeds, const Arm& arm, int k) {
   return base + 1'000'000 * static_cast<uint64_t>(&arm - Arms().data()) + k;
 }
 
-std::vector<std::string> RivalsOf(const Hidden& truth, const Scenario& scenario) {
+std::vector<std::string> EquivalentEffects(const Hidden& truth, const Scenario& scenario) {
   const std::string& name = truth.effect;
-  std::vector<std::string> rivals;
+  std::vector<std::string> equivalents;
   const auto class_of = [&](std::vector<std::string> members) {
     for (const std::string& member : members)
-      if (member != name) rivals.push_back(member);
+      if (member != name) equivalents.push_back(member);
   };
   const auto is = [&](std::vector<std::string> members) {
     return std::count(members.begin(), members.end(), name) > 0;
@@ -250,8 +250,10 @@ std::vector<std::string> RivalsOf(const Hidden& truth, const Scenario& scenario)
   // Time can only be stretched by a brake, not shrunk.
   const bool shrunk =
       (name == "speed_error" && truth.values[0] > 0) || (name == "clock_skew" && truth.values[0] < 0);
-  if (shrunk) rivals.erase(std::remove(rivals.begin(), rivals.end(), "contact_slowdown"), rivals.end());
-  return rivals;
+  if (shrunk)
+    equivalents.erase(std::remove(equivalents.begin(), equivalents.end(), "contact_slowdown"),
+                      equivalents.end());
+  return equivalents;
 }
 
 }  // namespace touchstone::hidden

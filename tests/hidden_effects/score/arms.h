@@ -40,6 +40,6 @@ uint64_t SeedOf(Seeds seeds, const Arm& arm, int k);
 
 // Effects that fit alike whatever is touched at one speed (or at any speed). Of `truth` with these values, in
 // this scenario; without truth itself.
-std::vector<std::string> RivalsOf(const Hidden& truth, const Scenario& scenario);
+std::vector<std::string> EquivalentEffects(const Hidden& truth, const Scenario& scenario);
 
 }  // namespace touchstone::hidden

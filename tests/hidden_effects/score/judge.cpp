@@ -24,7 +24,8 @@ Names EquivalentsOf(const v1::Step& step) {
 // step says so.
 bool Names_(const v1::Step& step, const Hidden& truth, const Scenario& scenario) {
   if (step.effect() == truth.effect) return true;
-  return Contains(RivalsOf(truth, scenario), step.effect()) && Contains(EquivalentsOf(step), truth.effect);
+  return Contains(EquivalentEffects(truth, scenario), step.effect()) &&
+         Contains(EquivalentsOf(step), truth.effect);
 }
 
 // The hidden value that a parameter of the report estimates. False: there is none.
@@ -116,7 +117,7 @@ void JudgeEffects(const Arm& arm, const Scenario& truth, const v1::Report& repor
 
 void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
   const Hidden& hidden = truth.hidden.front();
-  Names wanted = RivalsOf(hidden, truth);
+  Names wanted = EquivalentEffects(hidden, truth);
   wanted.push_back(hidden.effect);
   bool said = false, decided = false;
   for (const v1::Step& step : report.steps()) {
@@ -217,9 +218,9 @@ std::vector<Mark> JudgeNames(const Arm& arm, const Scenario& truth, const Names&
   for (const std::string& name : names) {
     v1::Step* step = report.add_steps();
     step->set_effect(name);
-    // For methods that report no equivalents, exact ties count as right.
+    // For methods that report no equivalents, exact equivalents count as right.
     for (const Hidden& hidden : truth.hidden)
-      if (Contains(RivalsOf(hidden, truth), name)) step->add_equivalent(hidden.effect);
+      if (Contains(EquivalentEffects(hidden, truth), name)) step->add_equivalent(hidden.effect);
   }
   report.set_verdict(names.empty() ? v1::Report::ADEQUATE : v1::Report::MISSING_EFFECTS);
   std::vector<Mark> marks;

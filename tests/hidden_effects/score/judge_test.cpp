@@ -67,7 +67,7 @@ TEST(Judge, TheTruthIsRightByItsNameOrAsAnEquivalentOfItsOwnClass) {
   AddStep(&either, "oblique_slip", {"tip_radius"});
   EXPECT_EQ(Ask("right first", Judge(One(), Hiding({{"tip_radius", {2}}}), either, NAN)), false);
   EXPECT_EQ(Ask("truth named", Judge(One(), Hiding({{"tip_radius", {2}}}), either, NAN)), true);
-  // Exact ties: right if the report says so.
+  // Exact equivalents: right if the report says so.
   v1::Report clock, clock_alone;
   AddStep(&clock, "clock_skew", {"speed_error", "contact_slowdown"});
   AddStep(&clock_alone, "clock_skew");

@@ -72,7 +72,7 @@ TEST(Arms, KnowEveryEffectOfTheCatalogueWithItsNumberOfValues) {
   }
 }
 
-TEST(Arms, TuningAndSealedSeedsNeverMeet) {
+TEST(Arms, TuningAndHeldOutSeedsNeverMeet) {
   uint64_t last_tuning = 0, first_held_out = ~uint64_t{0};
   for (const Arm& arm : Arms()) {
     last_tuning = std::max(last_tuning, SeedOf(Seeds::kTuning, arm, 10 * arm.sets));
@@ -82,15 +82,15 @@ TEST(Arms, TuningAndSealedSeedsNeverMeet) {
   EXPECT_LT(last_tuning, first_held_out);
 }
 
-TEST(Arms, LatencyAndLengthAreRivalsAtOneSpeedOnly) {
+TEST(Arms, LatencyAndLengthAreEquivalentAtOneSpeedOnly) {
   Scenario scenario = SmallSet();
   const Hidden latency{"channel_latency", {1000, -2000, 1000}};
-  EXPECT_EQ(RivalsOf(latency, scenario), std::vector<std::string>{"finger_length"});
+  EXPECT_EQ(EquivalentEffects(latency, scenario), std::vector<std::string>{"finger_length"});
   scenario.speeds_mm_s = {20, 50};
-  EXPECT_TRUE(RivalsOf(latency, scenario).empty());
+  EXPECT_TRUE(EquivalentEffects(latency, scenario).empty());
   // A brake cannot make times shorter.
-  EXPECT_EQ(RivalsOf({"speed_error", {0.02}}, scenario), std::vector<std::string>{"clock_skew"});
-  EXPECT_EQ(RivalsOf({"speed_error", {-0.02}}, scenario).size(), 2u);
+  EXPECT_EQ(EquivalentEffects({"speed_error", {0.02}}, scenario), std::vector<std::string>{"clock_skew"});
+  EXPECT_EQ(EquivalentEffects({"speed_error", {-0.02}}, scenario).size(), 2u);
 }
 
 }  // namespace
