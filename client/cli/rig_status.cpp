@@ -144,6 +144,7 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
     arm["safety_mode"] = client::SafetyModeWord(rig.arm().safety_mode());
     arm["phase"] = client::MotionPhaseWord(rig.arm().phase());
   }
+  if (rig.has_camera()) json["rig"]["camera"]["kind"] = client::CameraKindWord(rig.camera().kind());
   PrintJson(json);
   return absl::OkStatus();
 }

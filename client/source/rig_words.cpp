@@ -32,6 +32,10 @@ std::string MotionPhaseWord(v1::MotionPhase phase) {
   return absl::AsciiStrToLower(Stripped(v1::MotionPhase_Name(phase), "MOTION_PHASE_", phase));
 }
 
+std::string CameraKindWord(v1::CameraKind kind) {
+  return absl::AsciiStrToLower(Stripped(v1::CameraKind_Name(kind), "CAMERA_KIND_", kind));
+}
+
 std::string UpFaceWord(v1::UpFace face) {
   return v1::UpFace_IsValid(face) ? kFaces[face] : "";
 }

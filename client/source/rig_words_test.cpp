@@ -9,6 +9,7 @@ TEST(RigWords, AreTheNamesWithoutThoseOfTheirEnums) {
   EXPECT_EQ(SourceStateWord(v1::SOURCE_STATE_SAFEGUARD_STOP), "safeguard_stop");
   EXPECT_EQ(RobotModeWord(v1::ROBOT_MODE_NO_CONTROLLER), "NO_CONTROLLER");
   EXPECT_EQ(SafetyModeWord(v1::SAFETY_MODE_NORMAL), "NORMAL");
+  EXPECT_EQ(CameraKindWord(v1::CAMERA_KIND_FOLDER), "folder");
   EXPECT_EQ(MotionPhaseWord(v1::MOTION_PHASE_APPROACH), "approach");
 }
 

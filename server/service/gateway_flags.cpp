@@ -71,7 +71,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"effector.reply_timeout_s", "Of one try of a request", &o.effector.reply_timeout_s},
       {"effector.silence_s", "Without a heartbeat for so long the line is lost", &o.effector.silence_s},
       {"effector.clock_query_s", "Between two queries of its clock", &o.effector.clock_query_s},
-      {"camera.source", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.source},
+      {"camera.source", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.uri},
       {"camera.width", "Asked of the camera; 0: as it comes", &o.camera.width},
       {"camera.height", "", &o.camera.height},
       {"camera.intrinsics", "OpenCV's calibration file; empty: the field of view below",

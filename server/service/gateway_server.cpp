@@ -43,7 +43,7 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   arm.script.watchdog_hz = options.arm.watchdog_hz;
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.changes.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector, Effector::Open(options.effector, parts.changes.get()));
-  if (!options.camera.source.empty()) {
+  if (!options.camera.uri.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(parts.camera, CameraDevice::Open(options.camera));
     parts.vertical_fov_rad = options.camera.vertical_fov_rad;
     if (!options.camera.intrinsics.empty()) {

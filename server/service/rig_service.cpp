@@ -71,6 +71,7 @@ v1::EffectorStatus EffectorStatusOf(const Rig& rig) {
 v1::CameraStatus CameraStatusOf(const CameraDevice& camera, const SourceStatus& source) {
   v1::CameraStatus status;
   status.set_connected(true);
+  status.set_kind(static_cast<v1::CameraKind>(camera.kind()));
   status.set_description(camera.Description());
   status.set_width(source.image_width);
   status.set_height(source.image_height);

@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <utility>
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
@@ -40,20 +39,19 @@ Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number) {
 
 absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOptions& options) {
   QuietOpenCv();
-  if (options.source.empty())
+  const CameraKind kind = CameraKindOf(options.uri);
+  if (kind == CameraKind::kNone)
     return absl::FailedPreconditionError(
-        "no camera: the source is empty; right is /dev/video0, folder:PATH, video:FILE or http://...");
+        "no camera: its address is empty; right is /dev/video0, folder:PATH, video:FILE or http://...");
   if (!(options.timeout_s > 0 && std::isfinite(options.timeout_s)))
     return absl::InvalidArgumentError(
         absl::StrCat("camera: timeout_s is ", options.timeout_s, "; right is above 0"));
   if (options.width < 0 || options.height < 0)
     return absl::InvalidArgumentError(absl::StrCat("camera: size ", options.width, " x ", options.height,
                                                    "; right is above 0, or 0 as it comes"));
-  for (const auto& [prefix, open] :
-       {std::pair<const char*, decltype(&OpenFolderCamera)>{"folder:", &OpenFolderCamera},
-        {"video:", &OpenVideoCamera}})
-    if (absl::StartsWith(options.source, prefix))
-      return open(options, options.source.substr(std::string(prefix).size()));
+  const std::string path = options.uri.substr(options.uri.find(':') + 1);
+  if (kind == CameraKind::kFolder) return OpenFolderCamera(options, path);
+  if (kind == CameraKind::kVideo) return OpenVideoCamera(options, path);
   return OpenStreamCamera(options);
 }
 

@@ -17,10 +17,18 @@ namespace touchstone {
 // OpenCV's YAML or XML file, as its calibration tools write it. Errors name the file and the field.
 absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path);
 
+// The numbers are those of v1::CameraKind.
+enum class CameraKind : int {
+  kNone = 0,
+  kUvc = 1,     // a USB camera, "/dev/video0" or "0"
+  kStream = 2,  // pictures over HTTP, "http://..."
+  kFolder = 3,  // the newest picture of a folder, in the order of names, "folder:PATH"
+  kVideo = 4,   // a recorded video, "video:FILE"
+};
+CameraKind CameraKindOf(const std::string& uri);  // "": none
+
 struct CameraOptions {
-  // "": none; "/dev/video0" or "0": UVC; "folder:PATH": the newest picture of a folder, in the order of
-  // names; "video:FILE" or "http://...": a stream.
-  std::string source;
+  std::string uri;            // of one of the kinds above; empty: none
   int width = 0, height = 0;  // asked of the camera; 0: as it comes
   std::string intrinsics;     // file; empty: the field of view below, no distortion
   double vertical_fov_rad = 0.7853981633974483;
@@ -35,6 +43,7 @@ class CameraDevice {
   // A picture that was exposed after `after_host_s`: older ones in the driver's queue are thrown away.
   // UNAVAILABLE if none comes in time, DATA_LOSS if the camera repeats one picture bit by bit (frozen).
   virtual absl::StatusOr<Frame> Take(double after_host_s) = 0;
+  virtual CameraKind kind() const = 0;
   virtual std::string Description() const = 0;
   virtual uint64_t frames() const = 0;
   virtual uint64_t stale_frames() const = 0;

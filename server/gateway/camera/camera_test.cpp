@@ -27,9 +27,9 @@ class CameraTest : public testing::Test {
   void Write(const std::string& name, int grey) const {
     cv::imwrite(folder_ + "/" + name, cv::Mat(12, 16, CV_8UC3, cv::Scalar(grey, grey, grey)));
   }
-  static CameraOptions Options(const std::string& source, double timeout_s = 20) {
+  static CameraOptions Options(const std::string& uri, double timeout_s = 20) {
     CameraOptions options;
-    options.source = source;
+    options.uri = uri;
     options.timeout_s = timeout_s;
     return options;
   }
@@ -45,6 +45,15 @@ class CameraTest : public testing::Test {
   const TestFolder test_folder_;
   const std::string& folder_ = test_folder_.path();
 };
+
+TEST(CameraKind, IsThatOfItsAddress) {
+  EXPECT_EQ(CameraKindOf(""), CameraKind::kNone);
+  EXPECT_EQ(CameraKindOf("0"), CameraKind::kUvc);
+  EXPECT_EQ(CameraKindOf("/dev/video0"), CameraKind::kUvc);
+  EXPECT_EQ(CameraKindOf("http://127.0.0.1:8080/"), CameraKind::kStream);
+  EXPECT_EQ(CameraKindOf("folder:/tmp/a:b"), CameraKind::kFolder);
+  EXPECT_EQ(CameraKindOf("video:a.mp4"), CameraKind::kVideo);
+}
 
 TEST_F(CameraTest, RefusesASourceThatIsNot) {
   const auto error = [](const std::string& source) {

@@ -67,6 +67,7 @@ class FolderCamera : public CameraDevice {
       std::this_thread::sleep_for(std::chrono::duration<double>(kLookS));
     }
   }
+  CameraKind kind() const override { return CameraKind::kFolder; }
   std::string Description() const override { return absl::StrCat("pictures in ", path_); }
   uint64_t frames() const override { return Locked(frames_); }
   uint64_t stale_frames() const override { return 0; }

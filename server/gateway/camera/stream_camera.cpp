@@ -8,7 +8,6 @@
 #include <mutex>
 #include <thread>
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
@@ -42,7 +41,7 @@ class StreamCamera : public CameraDevice {
   absl::Status Start() {
     if (!OpenStream())
       return absl::UnavailableError(
-          absl::StrCat("camera: ", options_.source,
+          absl::StrCat("camera: ", options_.uri,
                        " cannot be opened; is it there, is it a camera, and does nobody else use it?"));
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
@@ -62,12 +61,13 @@ class StreamCamera : public CameraDevice {
     if (has_result_) return std::move(result_);
     if (repeated_)
       return absl::DataLossError(absl::StrCat(
-          "camera ", options_.source, " repeats one picture bit by bit: it is frozen; plug it in anew"));
-    return absl::UnavailableError(absl::StrCat("camera ", options_.source, ": no picture in ",
+          "camera ", options_.uri, " repeats one picture bit by bit: it is frozen; plug it in anew"));
+    return absl::UnavailableError(absl::StrCat("camera ", options_.uri, ": no picture in ",
                                                options_.timeout_s, " s", why_.empty() ? "" : ": ", why_));
   }
 
-  std::string Description() const override { return absl::StrCat("camera ", options_.source); }
+  CameraKind kind() const override { return CameraKindOf(options_.uri); }
+  std::string Description() const override { return absl::StrCat("camera ", options_.uri); }
   uint64_t frames() const override {
     std::lock_guard<std::mutex> lock(mutex_);
     return frames_;
@@ -81,15 +81,15 @@ class StreamCamera : public CameraDevice {
   bool OpenStream() {
     try {
       stream_.release();
-      const std::string& source = options_.source;
-      if (absl::StrContains(source, "://")) {
+      const std::string& uri = options_.uri;
+      if (kind() == CameraKind::kStream) {
         const int timeout_ms = static_cast<int>(options_.timeout_s * 1000);
         if (!stream_.open(
-                source, cv::CAP_FFMPEG,
+                uri, cv::CAP_FFMPEG,
                 {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, timeout_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC, timeout_ms}))
           return false;
-      } else if (!(IsNumber(source) ? stream_.open(std::stoi(source), cv::CAP_V4L2)
-                                    : stream_.open(source, cv::CAP_V4L2))) {
+      } else if (!(IsNumber(uri) ? stream_.open(std::stoi(uri), cv::CAP_V4L2)
+                                 : stream_.open(uri, cv::CAP_V4L2))) {
         return false;
       }
       if (options_.width > 0) stream_.set(cv::CAP_PROP_FRAME_WIDTH, options_.width);

@@ -36,6 +36,7 @@ class VideoCamera : public CameraDevice {
       return absl::UnavailableError(absl::StrCat("camera: video ", path_, ": ", problem.err));
     }
   }
+  CameraKind kind() const override { return CameraKind::kVideo; }
   std::string Description() const override { return absl::StrCat("video ", path_); }
   uint64_t frames() const override {
     std::lock_guard<std::mutex> lock(mutex_);
