@@ -205,7 +205,7 @@ class Dataset:
         for what, value in before.items():
             if now[what] != value:
                 raise errors.SourceChanged(
-                    f"{self._connection.target} would go on with another dataset: its {what} is {now[what]}, not "
+                    f"{self._connection.target} would resume with another dataset: its {what} is {now[what]}, not "
                     f"{value}. Serve the same model and meshes there, or send the model as a file.",
                     "FAILED_PRECONDITION", self._connection.target,
                 )

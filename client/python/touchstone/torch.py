@@ -230,7 +230,7 @@ class TouchstoneDataset(IterableDataset):
         """The share of one worker, from where the iteration begins."""
         epoch, base, skip = self._begin.tolist()
         if skip and workers > 1:
-            raise Refused("The state was saved within a batch; go on with at most one worker.")
+            raise Refused("The state was saved within a batch; resume with at most one worker.")
         stop = self._stop(base)
         start = base + (self.rank + self.ranks * worker) * self.batch_size
         if start >= stop:
