@@ -203,16 +203,17 @@ class Run {
 
 void AddRigRun(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      cli->AddCommand(group, "run",
-                      "Makes the touches of a plan, object by object and face by face. "
-                      "Interrupted in whatever way, the same command resumes where it stopped: "
-                      "no touch is lost and none is made twice.",
-                      "touchstone plan lat00,lat20 --plan faces -o plan.csv\n"
-                      "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052\n"
-                      "touchstone rig run plan.csv -o monday.csv --session monday --server "
-                      "127.0.0.1:50052     also monday.db",
-                      [cli, options] { return Run(*cli, *options).Go(); });
+  CLI::App* command = cli->AddCommand(
+      group, "run",
+      "Makes the touches of a plan, object by object and face by face. "
+      "Interrupted in whatever way, the same command resumes where it stopped: "
+      "no touch is lost and none is made twice. Ctrl-C stops the rig, which holds until touchstone "
+      "rig reset.",
+      "touchstone plan lat00,lat20 --plan faces -o plan.csv\n"
+      "touchstone rig run plan.csv -o session.db --server 127.0.0.1:50052\n"
+      "touchstone rig run plan.csv -o monday.csv --session monday --server "
+      "127.0.0.1:50052     also monday.db",
+      [cli, options] { return Run(*cli, *options).Go(); });
   cli->AddInput(
       command,
       command->add_option("PLAN", options->plan, "A CSV file of touches (touchstone plan writes one)")
