@@ -15,7 +15,8 @@ struct Parameters {
 
 constexpr ParameterRow<Parameters> kRows[] = {
     {&Parameters::acceleration_m_s2, "acceleration_mm_s2", Unit::kMillimetrePerSecondSquared, 1, kNoRampMmS2,
-     kNoRampMmS2, 100, "Acceleration from rest up to the speed; 1000000 stands for no ramp at all."},
+     kNoRampMmS2, 100, "Acceleration from rest up to the speed; 1000000 stands for no ramp at all.",
+     /*sum_zero=*/false, /*reciprocal=*/true},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {

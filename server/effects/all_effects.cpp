@@ -77,4 +77,10 @@ const EffectCatalogue& Catalogue() {
   return catalogue;
 }
 
+std::shared_ptr<const Effect> FindByRole(EffectRole role) {
+  for (const auto& effect : Catalogue().All())
+    if (effect->role == role) return effect;
+  return nullptr;
+}
+
 }  // namespace touchstone

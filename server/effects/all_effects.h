@@ -10,4 +10,7 @@ namespace touchstone {
 // never changed; any thread may use it.
 const EffectCatalogue& Catalogue();
 
+// The one effect of the catalogue with this role; not for kSystematic, of which there are many.
+std::shared_ptr<const Effect> FindByRole(EffectRole role);
+
 }  // namespace touchstone

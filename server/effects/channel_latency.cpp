@@ -35,6 +35,15 @@ Effect ChannelLatency() {
       .check_on_rig =
           "Touch a flat plate at two speeds; or trigger all inputs from one signal and compare the times.",
       .remedy = "Match filters and debouncing of the channels, or keep the measured latencies.",
+      .confounded_with =
+          {
+              {"finger_length",
+               "Touch again at half and at twice the speed: a latency keeps its time, a length keeps its"
+               " travel."},
+              {"tool_tilt",
+               "Touch again at half and at twice the speed: a latency keeps its time, a tilt keeps its "
+               "travel."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -31,6 +31,12 @@ Effect ClockSkew() {
                    "larger values point at the speed.",
       .check_on_rig = "Let the controller report its clock for ten minutes against the computer's.",
       .remedy = "Use a crystal, or synchronise the clock over the serial line.",
+      .confounded_with =
+          {
+              {"contact_slowdown",
+               "Compare with an absolute clock; or read the arm's speed before and after the first "
+               "contact."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

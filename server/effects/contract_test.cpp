@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "server/effects/all_effects.h"
@@ -157,6 +158,80 @@ TEST_P(EffectContract, StaysFiniteOverItsBoundsAndKeepsMisses) {
       EXPECT_THAT(after.missed_probability, testing::AllOf(testing::Ge(0), testing::Lt(1)));
     }
   }
+}
+
+// The fields that say how readings scatter, and none that say where they are expected.
+std::set<std::string> ScatterFields() {
+  return {"noise_sigma_s",      "noise_growth",    "any_noise",
+          "degrees_of_freedom", "poll_interval_s", "missed_probability"};
+}
+
+TEST_P(EffectContract, ChangesTheExpectationOrTheScatterAsItsRoleSays) {
+  if (is_formula()) GTEST_SKIP() << "the catalogue's entry does nothing";
+  const TouchBatch before = TestBatch(20, 3, 7);
+  TouchBatch after = before;
+  ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &after);
+  for (const std::string& field : ChangedFields(before, after)) {
+    if (effect().role == EffectRole::kSmoothError) continue;  // drawn anew for every object, see below
+    EXPECT_EQ(ScatterFields().count(field) == 1, effect().random()) << field;
+  }
+}
+
+TEST_P(EffectContract, DependsOnTheSeedOnlyIfItIsRandom) {
+  TouchBatch one = TestBatch(20, 3, 7);
+  TouchBatch other = one;
+  other.seed = one.seed + 1;
+  ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &one);
+  ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &other);
+  one.seed = other.seed;
+  if (effect().role == EffectRole::kSmoothError) {
+    EXPECT_THAT(ChangedFields(one, other), testing::Not(testing::IsEmpty()));
+  } else {
+    EXPECT_THAT(ChangedFields(one, other), testing::IsEmpty());
+  }
+}
+
+TEST_P(EffectContract, DependsOnSessionTimeAndOnTheLastTouchOnlyIfItSaysSo) {
+  TouchBatch one = TestBatch(20, 3, 7), later = one, pressed = one;
+  for (double& time_s : later.session_time_s) time_s += 3600;
+  for (double& press_m : pressed.previous_press_m) press_m += 0.004;
+  const auto reported = [&](TouchBatch* touches) {
+    ApplyEffect(effect(), TypicalValues(effect(), 3, 1), touches);
+    return touches->reported_time_s;
+  };
+  const std::vector<double> now_s = reported(&one);
+  EXPECT_EQ(reported(&later) != now_s, effect().needs.session_time);
+  EXPECT_EQ(reported(&pressed) != now_s, effect().needs.previous_press);
+}
+
+TEST_P(EffectContract, ReciprocalParametersStandAtTheirUpperBoundWhereTheyChangeNothing) {
+  for (const ParameterInfo& p : effect().parameters) {
+    if (!p.reciprocal) continue;
+    EXPECT_EQ(p.neutral, p.upper) << p.name;
+    EXPECT_GT(p.lower, 0) << p.name;
+    EXPECT_EQ(p.arity, Arity::kScalar) << p.name;
+  }
+}
+
+TEST_P(EffectContract, NamesWhatItIsConfoundedWithAndWhatTellsThemApart) {
+  for (const ConfoundedEffect& confounded : effect().confounded_with) {
+    EXPECT_TRUE(absl::EndsWith(confounded.discriminating_measurement, ".")) << confounded.effect;
+    EXPECT_GE(confounded.discriminating_measurement.size(), 30u) << confounded.effect;
+    if (confounded.effect.empty()) continue;
+    const auto other = Catalogue().Find(confounded.effect);
+    ASSERT_NE(other, nullptr) << confounded.effect;
+    EXPECT_NE(other->name, effect().name);
+    for (const ConfoundedEffect& back : other->confounded_with)
+      EXPECT_NE(back.effect, effect().name) << "declared on both sides, which may contradict each other";
+  }
+}
+
+TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
+  std::map<EffectRole, int> effects;
+  for (const auto& effect : Catalogue().All()) ++effects[effect->role];
+  for (const EffectRole role : {EffectRole::kNoiseLevel, EffectRole::kNoiseGrowth, EffectRole::kNoiseTails,
+                                EffectRole::kQuantisation, EffectRole::kDropout, EffectRole::kSmoothError})
+    EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, EffectContract, testing::ValuesIn(Catalogue().All()),

@@ -33,19 +33,23 @@ struct ParameterRow {
   double neutral;  // changes nothing; the default
   double typical;  // the size that rigs show
   const char* meaning;
-  bool sum_zero = false;  // per finger: only differences can be seen, so the values sum to 0
+  bool sum_zero = false;    // per finger: only differences can be seen, so the values sum to 0
+  bool reciprocal = false;  // the response is smooth in 1 / value, and infinity stands for "none"
 };
 
 template <typename P>
 struct EffectDefinition {
   const char* name;
   Stage stage;
+  EffectRole role = EffectRole::kSystematic;
   bool always_per_object = false;
+  bool often_per_object = false;
   bool before_cast = false;
   const char* meaning;
   const char* signature;
   const char* check_on_rig;
   const char* remedy;
+  std::vector<ConfoundedEffect> confounded_with = {};
   absl::Span<const ParameterRow<P>> rows;
   EffectNeeds needs = {};
   void (*apply)(const P& parameters, TouchBatch& touches);
@@ -80,12 +84,15 @@ Effect DefineEffect(const EffectDefinition<P>& definition) {
   Effect effect;
   effect.name = definition.name;
   effect.stage = definition.stage;
+  effect.role = definition.role;
   effect.always_per_object = definition.always_per_object;
+  effect.often_per_object = definition.often_per_object;
   effect.before_cast = definition.before_cast;
   effect.meaning = definition.meaning;
   effect.signature = definition.signature;
   effect.check_on_rig = definition.check_on_rig;
   effect.remedy = definition.remedy;
+  effect.confounded_with = definition.confounded_with;
   effect.needs = definition.needs;
   for (const ParameterRow<P>& row : definition.rows) {
     ParameterInfo info;
@@ -99,6 +106,7 @@ Effect DefineEffect(const EffectDefinition<P>& definition) {
     info.neutral = row.neutral;
     info.typical = row.typical;
     info.sum_zero = row.sum_zero;
+    info.reciprocal = row.reciprocal;
     info.meaning = row.meaning;
     effect.parameters.push_back(std::move(info));
   }

@@ -32,6 +32,10 @@ Effect FingerSpacing() {
       .check_on_rig =
           "Measure the distance of the outer tips with calipers and divide by the number of gaps.",
       .remedy = "Write the measured spacing into end_effector.spacing_mm of the model.",
+      .confounded_with =
+          {
+              {"object_scale", "Measure the distance of the outer fingers with a caliper."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

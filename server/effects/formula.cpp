@@ -197,6 +197,7 @@ absl::Status Resolve(const FormulaSpec& spec, CompiledFormula* formula, EffectNe
     }
     needs->curvature |= name.name == "curvature_per_m";
     needs->previous_press |= name.name == "previous_press_mm";
+    needs->session_time |= name.name == "session_time_s";
     formula->inputs.push_back(std::move(input));
   }
   for (size_t p = 0; p < used.size(); ++p)

@@ -32,6 +32,7 @@ Effect GaussianNoise() {
   return DefineEffect<Parameters>({
       .name = "gaussian_noise",
       .stage = Stage::kSensor,
+      .role = EffectRole::kNoiseLevel,
       .meaning = "Each finger's time scatters independently, with a normal distribution.",
       .signature = "Repeats of the same touch differ, everywhere alike, and their mean settles with the "
                    "number of repeats. "

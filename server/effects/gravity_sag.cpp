@@ -34,6 +34,11 @@ Effect GravitySag() {
           "grows with the reach.",
       .remedy = "Set the payload and centre of gravity in the arm's installation, stiffen the "
                 "fingers, or keep the effect.",
+      .confounded_with =
+          {
+              {"object_pose",
+               "Turn the object upside down: sag stays below, a misplaced object turns along."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

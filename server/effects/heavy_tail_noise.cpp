@@ -30,6 +30,7 @@ Effect HeavyTailNoise() {
   return DefineEffect<Parameters>({
       .name = "heavy_tail_noise",
       .stage = Stage::kSensor,
+      .role = EffectRole::kNoiseTails,
       .meaning = "The noise has outliers: Student's t instead of a normal distribution.",
       .signature = "Most repeats agree well and a few are far off; the standard deviation jumps from batch "
                    "to batch and "

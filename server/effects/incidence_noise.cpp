@@ -30,6 +30,7 @@ Effect IncidenceNoise() {
   return DefineEffect<Parameters>({
       .name = "incidence_noise",
       .stage = Stage::kSensor,
+      .role = EffectRole::kNoiseGrowth,
       .meaning = "The scatter of a finger's time grows with the obliqueness of its contact.",
       .signature =
           "Repeats scatter more on slopes than head-on, while their means stay right; a model with constant "

@@ -24,6 +24,7 @@ Effect MissedContact() {
   return DefineEffect<Parameters>({
       .name = "missed_contact",
       .stage = Stage::kSensor,
+      .role = EffectRole::kDropout,
       .meaning = "Now and then a finger that touches reports nothing.",
       .signature =
           "Empty times at places where repeats of the same touch have one. Fingers that miss the object are "

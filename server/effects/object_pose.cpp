@@ -32,6 +32,7 @@ Effect ObjectPose() {
   return DefineEffect<Parameters>({
       .name = "object_pose",
       .stage = Stage::kPose,
+      .often_per_object = true,
       .meaning = "The object lies moved or turned against the frame that the touches are commanded in.",
       .signature =
           "A turn tilts every flat face: outer fingers err with opposite signs, and the sign follows the "

@@ -32,6 +32,12 @@ Effect ObjectPush() {
                    "with the gap.",
       .check_on_rig = "Clamp the object and repeat ten touches: the step disappears.",
       .remedy = "Stiffen the fixture, or keep the effect in the model.",
+      .confounded_with =
+          {
+              {"contact_slowdown",
+               "Clamp the object: a push disappears. Or touch surfaces of larger steps: a slowdown grows"
+               " with the gap."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -24,6 +24,7 @@ Effect ObjectScale() {
   return DefineEffect<Parameters>({
       .name = "object_scale",
       .stage = Stage::kPose,
+      .often_per_object = true,
       .meaning = "The object is larger or smaller than its mesh by the same share in every "
                  "direction (a print that shrank).",
       .signature =
@@ -31,6 +32,12 @@ Effect ObjectScale() {
           "faces met head-on show nothing, because all fingers meet them alike.",
       .check_on_rig = "Measure the object's length, width and height with calipers and divide by the mesh's.",
       .remedy = "Import the mesh with the measured scale, or print again with the shrinkage compensated.",
+      .confounded_with =
+          {
+              {"speed_error",
+               "Measure the object with a caliper, or touch it from the side with a shorter standoff: a "
+               "wrong scale moves the surface, a wrong speed stretches all differences alike."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

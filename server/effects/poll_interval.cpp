@@ -24,6 +24,7 @@ Effect PollInterval() {
   return DefineEffect<Parameters>({
       .name = "poll_interval",
       .stage = Stage::kSensor,
+      .role = EffectRole::kQuantisation,
       .meaning = "Contacts are noticed only at the ticks of a polling loop.",
       .signature = "Time differences are multiples of the interval: a histogram of them is a comb; close "
                    "contacts come out as exactly equal.",

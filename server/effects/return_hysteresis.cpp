@@ -38,8 +38,14 @@ Effect ReturnHysteresis() {
       .check_on_rig = "Press one finger by hand, then touch a flat plate at once and again after a minute.",
       .remedy = "Stronger return springs, grease, a pause between touches; or keep the "
                 "effect and the order of touches.",
+      .confounded_with =
+          {
+              {"",
+               "Repeat one touch after a deep and after a shallow one: only hysteresis remembers which "
+               "came before."},
+          },
       .rows = kRows,
-      .needs = {/*previous_press=*/true, /*curvature=*/false, /*covariates=*/{}},
+      .needs = {.previous_press = true},
       .apply = Apply,
   });
 }

@@ -31,6 +31,15 @@ Effect SpeedError() {
           "(and contact_slowdown, which only stretches).",
       .check_on_rig = "Time 200 mm of travel with the arm's encoders, or film it against a ruler.",
       .remedy = "Correct the commanded speed, check the speed slider of the pendant, or keep the effect.",
+      .confounded_with =
+          {
+              {"clock_skew",
+               "Compare with an absolute clock, or with the arm's encoders: only a wrong speed shows "
+               "there."},
+              {"contact_slowdown",
+               "Read the arm's speed from its encoders before and after the first contact, or clamp the "
+               "object and touch with one finger: a slowdown begins at the first contact."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -117,6 +117,7 @@ Effect SurfaceError() {
   return DefineEffect<Parameters>({
       .name = "surface_error",
       .stage = Stage::kContact,
+      .role = EffectRole::kSmoothError,
       .always_per_object = true,
       .meaning = "The real surface departs from its mesh by smooth bumps along the normal: "
                  "a bad print, a dent, paint.",
@@ -127,6 +128,10 @@ Effect SurfaceError() {
           "Touch the same place with two different fingers and from two directions: the error stays with the "
           "place. Or scan the object.",
       .remedy = "Print anew, sand, or scan the object and use the scan as its mesh.",
+      .confounded_with =
+          {
+              {"", "Turn the object by 180 deg and touch the same places: bumps turn with it."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -36,7 +36,15 @@ Effect ThermalDrift() {
           "session; without session times it looks like too much noise.",
       .check_on_rig = "Repeat one touch every ten minutes for two hours after switching on.",
       .remedy = "Let the rig warm up first, or touch a reference plate every half hour and subtract it.",
+      .confounded_with =
+          {
+              {"finger_length",
+               "Pause for an hour with the rig warm and repeat ten touches: only a drift has gone on."},
+              {"channel_latency",
+               "Pause for an hour with the rig warm and repeat ten touches: only a drift has gone on."},
+          },
       .rows = kRows,
+      .needs = {.session_time = true},
       .apply = Apply,
   });
 }

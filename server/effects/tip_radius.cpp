@@ -33,6 +33,12 @@ Effect TipRadius() {
           "above 30 deg, and early beside edges. oblique_slip comes late instead and follows tan(incidence).",
       .check_on_rig = "Measure the tips, or touch one flat face at 0 and 25 deg: only the second shifts.",
       .remedy = "Keep the measured radius in the model; pointed tips make it small.",
+      .confounded_with =
+          {
+              {"oblique_slip",
+               "Measure the tips, or touch one flat face at 0 and at 25 deg: balls come early there, "
+               "slip comes late."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -42,6 +42,11 @@ Effect ToolTilt() {
           "Touch a flat plate that is square to the approach; then turn the wrist by 180 deg and touch it "
           "again. A tilt of the tool turns with it, a tilt of the plate does not.",
       .remedy = "Shim the tool flange, or correct the tool frame of the arm by this angle.",
+      .confounded_with =
+          {
+              {"finger_length", "Swap the outer fingers: lengths go with them, a tilt stays."},
+              {"object_pose", "Turn the object by 90 deg about the approach: a tilt stays with the tool."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -44,6 +44,10 @@ Effect ToolYaw() {
           "lie on both sides of the edge.",
       .remedy = "Loosen the flange, turn the tool against a straight edge, tighten; or set "
                 "the tool frame of the arm.",
+      .confounded_with =
+          {
+              {"object_pose", "Turn the object by 90 deg about the approach: a yaw stays with the tool."},
+          },
       .rows = kRows,
       .apply = Apply,
   });

@@ -37,6 +37,7 @@ struct ParameterInfo {
   double neutral = 0;     // the default: the value that changes nothing
   double typical = 0;     // the size that rigs show; the scale of the prior: neutral +- typical
   bool sum_zero = false;  // per finger: only differences between fingers can be seen, so the values sum to 0
+  bool reciprocal = false;  // the response is smooth in 1 / value: a fit moves that, and "none" is infinity
   std::string meaning;
 
   int Count(int fingers) const {
@@ -44,11 +45,30 @@ struct ParameterInfo {
   }
 };
 
+// What an effect does to the data: to their expectation, or to one property of their scatter. A diagnosis fits
+// systematic effects and judges each of the others by the likelihood of what the best explanation leaves.
+enum class EffectRole {
+  kSystematic,    // changes the expected times
+  kNoiseLevel,    // standard deviation of one reading
+  kNoiseGrowth,   // growth of the noise with the incidence
+  kNoiseTails,    // degrees of freedom of heavy tails
+  kQuantisation,  // readings fall on ticks
+  kDropout,       // readings are missing
+  kSmoothError,   // a smooth error of the surface, drawn anew for every object
+};
+
+// Another effect that may explain the same data, and what tells the two apart.
+struct ConfoundedEffect {
+  std::string effect;                      // its name; empty: whatever else it may be
+  std::string discriminating_measurement;  // a sentence for people
+};
+
 // What a simulation must provide beyond the ordinary for an effect to work.
 struct EffectNeeds {
-  bool previous_press = false;          // the press of the session's previous touch
-  bool curvature = false;               // the surface's mean curvature at each contact
-  std::vector<std::string> covariates;  // cov_* columns
+  bool previous_press = false;               // the press of the session's previous touch
+  bool curvature = false;                    // the surface's mean curvature at each contact
+  bool session_time = false;                 // session_time_s: repeats of a touch differ
+  std::vector<std::string> covariates = {};  // cov_* columns
 };
 
 // What a formula effect is made of, as the model file has it.
@@ -64,7 +84,9 @@ struct FormulaSpec {
 struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
+  EffectRole role = EffectRole::kSystematic;
   bool always_per_object = false;  // scope is always object (surface_error)
+  bool often_per_object = false;   // a diagnosis also tries values that differ from object to object
   bool before_cast =
       false;              // contact stage only: sets up the cast instead of changing its result (tip_radius)
   std::string meaning;    // what it is
@@ -72,12 +94,15 @@ struct Effect {
   std::string check_on_rig;  // how to check it
   std::string remedy;        // how to remove it
   std::vector<ParameterInfo> parameters;
+  std::vector<ConfoundedEffect> confounded_with;  // each pair is declared by one of the two
   EffectNeeds needs;
   std::shared_ptr<const FormulaSpec> formula;  // set for formulas only
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, TouchBatch& batch)> apply;
 
+  // Its draws differ from touch to touch or from object to object: it changes no expectation.
+  bool random() const { return role != EffectRole::kSystematic; }
   int ValueCount(int fingers) const;                     // of the flat array
   std::vector<double> NeutralValues(int fingers) const;  // SI
 };

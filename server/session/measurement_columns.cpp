@@ -137,10 +137,6 @@ absl::Status CheckComplete(const Columns& columns, const std::string& place) {
 
 }  // namespace
 
-std::string FingerName(int finger, int fingers) {
-  return fingers == 3 ? std::string(1, "lmr"[finger]) : std::to_string(finger);
-}
-
 std::string Shown(absl::string_view field) {
   const bool cut = field.size() > kMaxShown;
   return absl::StrCat(absl::CHexEscape(field.substr(0, kMaxShown)), cut ? "..." : "");

@@ -11,6 +11,8 @@
 #include <absl/strings/string_view.h>
 #include <Eigen/Core>
 
+#include "server/model/finger_name.h"
+
 namespace touchstone {
 
 struct MeasurementSet {
@@ -36,9 +38,6 @@ struct MeasurementSet {
   int size() const { return static_cast<int>(object.size()); }
   double TimeS(int row, int finger) const { return time_s[static_cast<size_t>(row) * fingers + finger]; }
 };
-
-// "l", "m", "r" for three fingers, else "0", "1", ...
-std::string FingerName(int finger, int fingers);
 
 // Reads the bytes of a measurement file or of a plan. Errors name `origin`, line, column, what is wrong and
 // what was expected: a missing or unknown column, a number that is none (NaN and infinities too), a vector
