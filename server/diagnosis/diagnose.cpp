@@ -5,14 +5,11 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <optional>
 
 #include "server/base/status.h"
-#include "server/base/units.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
-#include "server/diagnosis/report/design_messages.h"
-#include "server/diagnosis/report/distributions_messages.h"
-#include "server/diagnosis/report/residuals_messages.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/selection/ladder.h"
@@ -21,30 +18,30 @@ namespace touchstone {
 namespace {
 
 constexpr int kMaxCompetingModels = 4;
-constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is ambiguous
+constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is confounded
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
 // Passes progress on from whatever thread works, one at a time, and remembers a cancellation.
-class Gate {
+class ProgressGate {
  public:
-  explicit Gate(const DiagnosisContext& context) : context_(context) {}
+  explicit ProgressGate(const DiagnosisContext& context) : context_(context) {}
 
-  // Returns false once cancelled.
-  bool Tell(const std::string& stage, double done) {
+  // A stage and the share that is done by now. Returns false once cancelled.
+  bool Enter(const std::string& stage, double done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     stage_ = stage;
     done_ = std::max(done_, done);
-    return Pass();
+    return Report();
   }
-  // The same stage goes on. Busy threads do not wait for each other.
-  bool Again() {
+  // The same stage continues. Busy threads do not wait for each other.
+  bool Continue() {
     const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (lock.owns_lock()) Pass();
+    if (lock.owns_lock()) Report();
     return !cancelled_;
   }
 
  private:
-  bool Pass() {
+  bool Report() {
     if (context_.progress && !cancelled_ && !context_.progress(stage_, done_)) cancelled_ = true;
     return !cancelled_;
   }
@@ -59,150 +56,172 @@ double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void SetReducibleShare(v1::Report* report) {
-  const double floor = report->noise_floor_us(), rmse = report->initial().rmse_us();
-  report->set_reducible_share(rmse > 0 ? std::clamp(1 - floor * floor / (rmse * rmse), 0.0, 1.0) : 0);
+double ReducibleShare(const NoiseFloor& floor, const Quality& initial) {
+  const double noise_s2 = floor.sigma_s * floor.sigma_s, error_s2 = initial.rmse_s * initial.rmse_s;
+  return error_s2 > 0 ? std::clamp(1 - noise_s2 / error_s2, 0.0, 1.0) : 0;
 }
 
-// The parts that Compare and Diagnose share, once the noise floor is known.
-void Describe(const Study& study, const std::vector<double>& before, const Prediction& improved,
-              const std::vector<double>& after, v1::Report* report) {
-  const Observations& o = *study.observations;
-  const double sigma_s = report->noise_floor_us() * 1e-6;
-  WriteResiduals(DescribeResiduals(o, study.nominal, improved, before, after,
-                                   {sigma_s, study.input.model->spacing_m, study.input.seed}),
-                 o.fingers, report);
+// The residuals of the initial and of the improved model, described.
+ResidualSummary DescribeBoth(const Workspace& workspace, const std::vector<double>& before,
+                             const Prediction& improved, const std::vector<double>& after, double sigma_s) {
+  return DescribeResiduals(*workspace.observations, workspace.nominal, improved, before, after,
+                           {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
 }
 
-// Touches that would tell what fits alike apart. Always asked for by Propose; Diagnose asks only where
-// something is ambiguous.
-absl::Status AddNextTouches(const Study& study, const Explained& explained, const Ladder& ladder, int touches,
-                            bool always, v1::Report* report) {
+Diagnosis Begin(const Workspace& workspace) {
+  Diagnosis diagnosis;
+  diagnosis.model_name = workspace.input.model->name;
+  diagnosis.model_hash = workspace.input.model->Hash();
+  diagnosis.data = SummarizeData(*workspace.observations);
+  diagnosis.warnings = workspace.warnings;
+  return diagnosis;
+}
+
+void AddSentences(Diagnosis* diagnosis) {
+  for (std::string& warning : DataWarnings(diagnosis->data))
+    diagnosis->warnings.push_back(std::move(warning));
+  diagnosis->summary = Summarize(*diagnosis);
+}
+
+// The step with the closest competing effect decides what further touches are to tell. Null: no step has one.
+// `always`: even if the data can tell the two apart already.
+const SelectedStep* MostConfounded(const SelectionResult& selection, bool always) {
+  const SelectedStep* closest = nullptr;
+  for (const SelectedStep& step : selection.steps) {
+    if (step.competing.empty() || !(always || step.competing[0].equivalent)) continue;
+    if (closest == nullptr ||
+        step.competing[0].relative_log_evidence > closest->competing[0].relative_log_evidence)
+      closest = &step;
+  }
+  return closest;
+}
+
+// The improved model, named after the step, and the models that compete with it.
+std::vector<CompetingModel> ModelsToTellApart(const SelectionResult& selection, const SelectedStep& step,
+                                              const Model& improved) {
+  std::vector<CompetingModel> models = {{NameOf(*selection.fit.model.base().effects[step.effect].effect),
+                                         std::make_shared<const Model>(improved)}};
+  for (const CompetingEffect& other : step.competing) {
+    if (!other.equivalent && models.size() > 1) break;
+    if (static_cast<int>(models.size()) == kMaxCompetingModels) break;
+    models.push_back({other.name, std::make_shared<const Model>(other.model)});
+  }
+  return models;
+}
+
+// Touches that would tell what fits equally well apart. Always asked for by Propose; Diagnose asks only where
+// something is confounded.
+absl::Status AddNextTouches(const Workspace& workspace, const SelectionResult& selection,
+                            const Ladder& ladder, int max_touches, bool always, Diagnosis* diagnosis) {
+  const SelectedStep* closest = MostConfounded(selection, always);
+  if (closest == nullptr && !always) return absl::OkStatus();
   std::vector<CompetingModel> models = {
       {"the model as it is", std::make_shared<const Model>(ladder.improved)}};
-  // The step with the closest competing effect decides what is asked.
-  const ExplainedStep* closest = nullptr;
-  for (const ExplainedStep& step : explained.steps) {
-    if (step.rivals.empty() || !(always || step.rivals[0].equivalent)) continue;
-    if (closest == nullptr || step.rivals[0].evidence > closest->rivals[0].evidence) closest = &step;
-  }
-  if (closest != nullptr) {
-    models[0].name = NameOf(*explained.fit.model.base().effects[closest->effect].effect);
-    for (const Rival& rival : closest->rivals) {
-      if (!rival.equivalent && models.size() > 1) break;
-      if (static_cast<int>(models.size()) == kMaxCompetingModels) break;
-      models.push_back({rival.name, std::make_shared<const Model>(rival.model)});
-    }
-  } else if (!always) {
-    return absl::OkStatus();
-  }
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const std::vector<ProposedTouch> proposed,
-      ProposeTouches(*study.searched, models, report->noise_floor_us() * kSecondsPerMicrosecond, touches,
-                     study.input.seed, study.context.pool));
-  for (const ProposedTouch& touch : proposed) WriteProposedTouch(touch, report);
-  if (always && proposed.empty())
-    report->add_warnings(closest == nullptr
-                             ? "No touch would tell more than those at hand."
-                             : "No touch of this rig tells " + models[0].name + " from " + models[1].name +
-                                   ": " + DecidedBy({models[0].name, models[1].name}));
+  if (closest != nullptr) models = ModelsToTellApart(selection, *closest, ladder.improved);
+  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis->next_touches,
+                              ProposeTouches(*workspace.searched, models, ladder.noise_floor.sigma_s,
+                                             max_touches, workspace.input.seed, workspace.context.pool));
+  if (!always || !diagnosis->next_touches.empty()) return absl::OkStatus();
+  diagnosis->warnings.push_back(
+      closest == nullptr ? "No touch would tell more than those at hand."
+                         : "No touch of this rig tells " + models[0].name + " from " + models[1].name + ": " +
+                               DiscriminatingMeasurement({models[0].name, models[1].name}));
   return absl::OkStatus();
 }
 
-v1::Report Begin(const DiagnosisInput& input) {
-  v1::Report report;
-  report.set_model_name(input.model->name);
-  report.set_model_hash(input.model->Hash());
-  return report;
+absl::StatusOr<Diagnosis> DiagnosePoseFree(const DiagnosisInput& input, const DiagnosisContext& context,
+                                           bool with_verdict) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(PoseFreeComparison comparison, ComparePoseFree(input, context, with_verdict));
+  Diagnosis diagnosis;
+  diagnosis.pose_free = PoseFreeDiagnosis{input, std::move(comparison)};
+  return diagnosis;
 }
 
-absl::StatusOr<v1::Report> ReportWithoutPoses(const DiagnosisInput& input, const DiagnosisContext& context,
-                                              bool diagnose) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const PoseFreeComparison comparison, ComparePoseFree(input, context, diagnose));
-  return PoseFreeReport(input, comparison);
+// What a selection says, without the residuals.
+void AddLadder(const Ladder& ladder, Diagnosis* diagnosis) {
+  diagnosis->verdict = ladder.verdict;
+  diagnosis->noise_floor = ladder.noise_floor;
+  diagnosis->final = ladder.final;
+  diagnosis->reducible_share = ReducibleShare(ladder.noise_floor, *diagnosis->initial);
+  diagnosis->refitted = ladder.refitted;
+  diagnosis->steps = ladder.steps;
+  diagnosis->confounded = ladder.confounded;
+  diagnosis->candidates = ladder.candidates;
+  diagnosis->unexplained = ladder.unexplained;
+  if (!ladder.changed) return;
+  diagnosis->improved_model_yaml = FormatModel(ladder.improved);
+  diagnosis->improved_model_hash = ladder.improved.Hash();
 }
 
-}  // namespace
-
-absl::StatusOr<v1::Report> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
-  if (!input.set->has_poses) return ReportWithoutPoses(input, context, false);
+// `always`: Propose, which names touches even where nothing is confounded.
+absl::StatusOr<Diagnosis> DiagnoseTouches(const DiagnosisInput& input, int max_touches, bool always,
+                                          const DiagnosisContext& context) {
+  if (!input.set->has_poses) return DiagnosePoseFree(input, context, true);
   const double began = Now();
-  Gate gate(context);
+  ProgressGate gate(context);
   DiagnosisContext gated = context;
-  gated.progress = [&gate](const std::string& stage, double done) { return gate.Tell(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Study> study, MakeStudy(input, gated));
-  if (!gate.Tell("comparing", 0.3)) return absl::CancelledError(kCancelled);
-  const Observations& o = *study->observations;
-  v1::Report report = Begin(input);
-  DescribeData(o, &report);
-  const std::vector<double> residuals = Residuals(o, study->nominal);
-  *report.mutable_noise_floor() = NoiseFloorOf(o, residuals, 0);
-  report.set_noise_floor_us(report.noise_floor().sigma_us());
-  const double rmse_us = Rmse(o, residuals) * 1e6;
-  report.mutable_initial()->set_rmse_us(rmse_us);
-  report.mutable_initial()->set_heldout_rmse_us(rmse_us);
-  report.mutable_initial()->set_lack_of_fit_p(LackOfFitP(o, residuals, 0));
-  *report.mutable_final() = report.initial();
-  SetReducibleShare(&report);
-  if (report.touches() > 0) Describe(*study, residuals, study->nominal, residuals, &report);
-  for (const std::string& warning : study->warnings) report.add_warnings(warning);
-  AddWarnings(o, &report);
-  report.set_summary(Summary(report));
-  report.set_duration_s(Now() - began);
-  return report;
-}
-
-namespace {
-
-// `always`: Propose, which names touches even where nothing is ambiguous.
-absl::StatusOr<v1::Report> DiagnoseStudy(const DiagnosisInput& input, int touches, bool always,
-                                         const DiagnosisContext& context) {
-  if (!input.set->has_poses) return ReportWithoutPoses(input, context, true);
-  const double began = Now();
-  Gate gate(context);
-  DiagnosisContext gated = context;
-  gated.progress = [&gate](const std::string& stage, double done) { return gate.Tell(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Study> study, MakeStudy(input, gated));
-  study->experiment.cancelled = [&gate] { return !gate.Again(); };
-  if (!gate.Tell("fitting", 0.1)) return absl::CancelledError(kCancelled);
-  Observations& o = *study->observations;
-  v1::Report report = Begin(input);
+  gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, gated));
+  workspace->experiment.cancelled = [&gate] { return !gate.Continue(); };
+  if (!gate.Enter("fitting", 0.1)) return absl::CancelledError(kCancelled);
+  const Observations& o = *workspace->observations;
   if (std::none_of(o.used.begin(), o.used.end(), [](char used) { return used; })) {
-    DescribeData(o, &report);
-    AddWarnings(o, &report);
-    report.set_verdict(v1::Report::ADEQUATE);
-    report.set_summary(Summary(report));
-    return report;
+    Diagnosis diagnosis = Begin(*workspace);
+    diagnosis.warnings.clear();  // nothing was compared
+    diagnosis.verdict = Verdict::kAdequate;
+    AddSentences(&diagnosis);
+    return diagnosis;
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Explained explained, Explain(study.get()));
-  if (!gate.Tell("describing", 0.7)) return absl::CancelledError(kCancelled);
-
-  DescribeData(o, &report);
-  const std::vector<double> before = Residuals(o, study->nominal);
-  *report.mutable_initial() = QualityOf(*study, *explained.search, explained.given, before, false);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Ladder ladder, BuildLadder(study.get(), explained, &report));
-  SetReducibleShare(&report);
-  if (!gate.Tell("describing", 0.85)) return absl::CancelledError(kCancelled);
-  Describe(*study, before, ladder.prediction, ladder.residuals, &report);
-  for (const std::string& warning : study->warnings) report.add_warnings(warning);
-  AddWarnings(o, &report);
-  report.set_summary(Summary(report));
-  TOUCHSTONE_RETURN_IF_ERROR(
-      AddNextTouches(*study, explained, ladder, always ? touches : kDefaultTouches, always, &report));
-  report.set_duration_s(Now() - began);
-  gate.Tell("done", 1);
-  return report;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const SelectionResult selection, SelectExplanation(workspace.get()));
+  if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
+  Diagnosis diagnosis = Begin(*workspace);
+  const std::vector<double> before = Residuals(o, workspace->nominal);
+  diagnosis.initial = QualityOf(*workspace, selection.initial_model, before);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Ladder ladder, BuildLadder(*workspace, selection));
+  AddLadder(ladder, &diagnosis);
+  if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
+  diagnosis.residuals =
+      DescribeBoth(*workspace, before, ladder.prediction, ladder.residuals, ladder.noise_floor.sigma_s);
+  AddSentences(&diagnosis);
+  TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
+  diagnosis.duration_s = Now() - began;
+  gate.Enter("done", 1);
+  return diagnosis;
 }
 
 }  // namespace
 
-absl::StatusOr<v1::Report> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
-  return DiagnoseStudy(input, kDefaultTouches, false, context);
+absl::StatusOr<Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
+  if (!input.set->has_poses) return DiagnosePoseFree(input, context, false);
+  const double began = Now();
+  ProgressGate gate(context);
+  DiagnosisContext gated = context;
+  gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, gated));
+  if (!gate.Enter("comparing", 0.3)) return absl::CancelledError(kCancelled);
+  const Observations& o = *workspace->observations;
+  Diagnosis diagnosis = Begin(*workspace);
+  const std::vector<double> residuals = Residuals(o, workspace->nominal);
+  const double rmse_s = Rmse(o, residuals);
+  diagnosis.noise_floor = NoiseFloorOf(o, residuals, 0);
+  diagnosis.initial = {rmse_s, rmse_s, LackOfFitP(o, residuals, 0)};
+  diagnosis.final = diagnosis.initial;
+  diagnosis.reducible_share = ReducibleShare(*diagnosis.noise_floor, *diagnosis.initial);
+  if (diagnosis.data.touches > 0)
+    diagnosis.residuals =
+        DescribeBoth(*workspace, residuals, workspace->nominal, residuals, diagnosis.noise_floor->sigma_s);
+  AddSentences(&diagnosis);
+  diagnosis.duration_s = Now() - began;
+  return diagnosis;
 }
 
-absl::StatusOr<v1::Report> Propose(const DiagnosisInput& input, int touches,
-                                   const DiagnosisContext& context) {
-  return DiagnoseStudy(input, touches, true, context);
+absl::StatusOr<Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
+  return DiagnoseTouches(input, kDefaultTouches, false, context);
+}
+
+absl::StatusOr<Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
+                                  const DiagnosisContext& context) {
+  return DiagnoseTouches(input, max_touches, true, context);
 }
 
 }  // namespace touchstone

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone {
@@ -13,75 +14,75 @@ using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-v1::Report DiagnoseRig(const HiddenRig& rig) {
-  const absl::StatusOr<v1::Report> report = Diagnose(MakeTestInput(rig), {});
-  EXPECT_TRUE(report.ok()) << report.status();
-  return report.ok() ? *report : v1::Report();
+Diagnosis DiagnoseRig(const HiddenRig& rig) {
+  const absl::StatusOr<Diagnosis> diagnosis = Diagnose(MakeTestInput(rig), {});
+  EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
+  return diagnosis.ok() ? *diagnosis : Diagnosis();
 }
 
-std::vector<std::string> StepNames(const v1::Report& report) {
+std::vector<std::string> StepNames(const Diagnosis& report) {
   std::vector<std::string> names;
-  for (const v1::Step& step : report.steps()) names.push_back(step.effect());
+  for (const LadderStep& step : report.steps) names.push_back(step.effect);
   return names;
 }
 
 TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
-  const v1::Report report = DiagnoseRig({});
-  EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE) << report.summary();
-  EXPECT_EQ(report.steps_size(), 0);
-  EXPECT_NEAR(report.noise_floor_us(), 2000, 150);
-  EXPECT_GT(report.initial().lack_of_fit_p(), 0.001);
-  EXPECT_TRUE(report.improved_model_yaml().empty());
+  const Diagnosis report = DiagnoseRig({});
+  EXPECT_EQ(report.verdict, Verdict::kAdequate) << report.summary;
+  EXPECT_EQ(report.steps.size(), 0u);
+  EXPECT_NEAR(report.noise_floor->sigma_s, 2000e-6, 150e-6);
+  EXPECT_GT(report.initial->lack_of_fit_p, 0.001);
+  EXPECT_TRUE(report.improved_model_yaml.empty());
 }
 
 TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
   HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
+  const Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"tip_radius"});
-  const v1::ParameterValue& radius = report.steps(0).parameters(0);
-  EXPECT_NEAR(radius.value(), 1.5, 4 * radius.std_error());
-  EXPECT_LT(radius.std_error(), 0.05);
-  EXPECT_LT(report.final().rmse_us(), 1.06 * report.noise_floor_us());
-  EXPECT_GT(report.initial().rmse_us(), 3 * report.noise_floor_us());
+  const ParameterEstimate& radius = report.steps[0].parameters[0];
+  EXPECT_NEAR(radius.value, 1.5, 4 * radius.std_error);
+  EXPECT_LT(radius.std_error, 0.05);
+  EXPECT_LT(report.final->rmse_s, 1.06 * report.noise_floor->sigma_s);
+  EXPECT_GT(report.initial->rmse_s, 3 * report.noise_floor->sigma_s);
   // The improved model is a file that holds the effect.
-  const absl::StatusOr<Model> better = ParseModel(report.improved_model_yaml(), "better", Catalogue());
+  const absl::StatusOr<Model> better = ParseModel(report.improved_model_yaml, "better", Catalogue());
   ASSERT_TRUE(better.ok()) << better.status();
-  EXPECT_EQ(better->Hash(), report.improved_model_hash());
+  EXPECT_EQ(better->Hash(), report.improved_model_hash);
   EXPECT_EQ(better->effects.back().effect->name, "tip_radius");
 }
 
 TEST(Diagnose, FindsTwoEffectsAtOnce) {
   HiddenRig rig;
   rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}, {"object_push", {"shift_mm=0.4"}}};
-  const v1::Report report = DiagnoseRig(rig);
+  const Diagnosis report = DiagnoseRig(rig);
   EXPECT_THAT(StepNames(report), ::testing::UnorderedElementsAre("oblique_slip", "object_push"));
 }
 
 TEST(Diagnose, SaysWhatTheDataCannotTellApartAndWhatWould) {
   HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_GE(report.steps_size(), 1);
-  std::vector<std::string> alike(report.steps(0).equivalent().begin(), report.steps(0).equivalent().end());
-  alike.push_back(report.steps(0).effect());
-  EXPECT_THAT(alike, Contains("channel_latency"));
-  EXPECT_THAT(alike, Contains("finger_length"));
-  EXPECT_THAT(report.steps(0).decided_by(), HasSubstr("speed"));
-  EXPECT_EQ(report.ambiguities_size(), 1);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_GE(report.steps.size(), 1u);
+  std::vector<std::string> equivalent = report.steps[0].equivalent;
+  equivalent.push_back(report.steps[0].effect);
+  EXPECT_THAT(equivalent, Contains("channel_latency"));
+  EXPECT_THAT(equivalent, Contains("finger_length"));
+  EXPECT_THAT(report.steps[0].discriminating_measurement, HasSubstr("speed"));
+  EXPECT_EQ(report.confounded.size(), 1u);
 }
 
 TEST(Diagnose, SaysThatAValueOfTheModelIsWrong) {
   HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=2"}}};
   rig.known = {{"tip_radius", {"radius_mm=1"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict(), v1::Report::WRONG_VALUES) << report.summary();
-  ASSERT_EQ(report.refitted_size(), 1);
-  EXPECT_EQ(report.refitted(0).effect(), "tip_radius");
-  EXPECT_NEAR(report.refitted(0).parameters(0).value(), 2, 0.1);
-  EXPECT_EQ(report.refitted(0).parameters(0).before(), 1);
+  const Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, Verdict::kWrongValues) << report.summary;
+  ASSERT_EQ(report.refitted.size(), 1u);
+  EXPECT_EQ(report.refitted[0].effect, "tip_radius");
+  EXPECT_NEAR(report.refitted[0].parameters[0].value, 2, 0.1);
+  EXPECT_EQ(report.refitted[0].parameters[0].before, 1);
 }
 
 TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
@@ -90,16 +91,16 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
   rig.hidden = {{"formula",
                  {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
                   "k_min=-1", "k_max=1"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED) << report.summary();
-  ASSERT_GE(report.unexplained().covariates_size(), 1);
-  EXPECT_EQ(report.unexplained().covariates(0).name(), "approach_z");
-  EXPECT_THAT(report.unexplained().formula(), HasSubstr("approach_z"));
-  EXPECT_GT(report.unexplained().heldout_gain(), 0.5);
+  const Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, Verdict::kUnexplained) << report.summary;
+  ASSERT_GE(report.unexplained->covariates.size(), 1u);
+  EXPECT_EQ(report.unexplained->covariates[0].name, "approach_z");
+  EXPECT_THAT(report.unexplained->formula, HasSubstr("approach_z"));
+  EXPECT_GT(report.unexplained->heldout_gain, 0.5);
   // The formula can be added as it stands.
   const std::string yaml =
       "touchstone: model/1\nname: m\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n" +
-      report.unexplained().formula_yaml();
+      report.unexplained->formula_yaml;
   EXPECT_TRUE(ParseModel(yaml, "formula", Catalogue()).ok()) << yaml;
 }
 
@@ -114,20 +115,20 @@ TEST(Diagnose, LetsAFormulaOfTheUserCompete) {
                                     {"name=mine", "adds=travel_mm", "expression=c*(finger==0)*approach_z",
                                      "c=0", "c_unit=mm", "c_min=-1", "c_max=1"}}});
   input.also = {mine.effects[0].effect};
-  const absl::StatusOr<v1::Report> report = Diagnose(input, {});
+  const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict(), v1::Report::MISSING_EFFECTS);
+  EXPECT_EQ(report->verdict, Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(*report), std::vector<std::string>{"formula mine"});
-  EXPECT_NEAR(report->steps(0).parameters(0).value(), 0.4, 0.05);
+  EXPECT_NEAR(report->steps[0].parameters[0].value, 0.4, 0.05);
 }
 
 TEST(Diagnose, FindsTheTicksOfAPollingLoop) {
   HiddenRig rig;
   rig.sigma_us = 300;
   rig.hidden = {{"poll_interval", {"interval_us=8000"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_THAT(StepNames(report), Contains("poll_interval")) << report.summary();
-  EXPECT_NEAR(report.steps(0).parameters(0).value(), 8000, 1);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_THAT(StepNames(report), Contains("poll_interval")) << report.summary;
+  EXPECT_NEAR(report.steps[0].parameters[0].value, 8000, 1);
 }
 
 TEST(Diagnose, FindsHeavyTails) {
@@ -135,9 +136,9 @@ TEST(Diagnose, FindsHeavyTails) {
   rig.samples_per_face = 8;
   rig.rounds = 4;
   rig.hidden = {{"heavy_tail_noise", {"degrees_of_freedom=3"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_EQ(StepNames(report), std::vector<std::string>{"heavy_tail_noise"}) << report.summary();
-  EXPECT_NEAR(report.steps(0).parameters(0).value(), 3, 1);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"heavy_tail_noise"}) << report.summary;
+  EXPECT_NEAR(report.steps[0].parameters[0].value, 3, 1);
 }
 
 TEST(Diagnose, FindsNoiseThatGrowsOnSlopes) {
@@ -145,25 +146,25 @@ TEST(Diagnose, FindsNoiseThatGrowsOnSlopes) {
   rig.samples_per_face = 8;
   rig.rounds = 4;
   rig.hidden = {{"incidence_noise", {"slope=2"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_EQ(StepNames(report), std::vector<std::string>{"incidence_noise"}) << report.summary();
-  EXPECT_NEAR(report.steps(0).parameters(0).value(), 2, 0.7);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"incidence_noise"}) << report.summary;
+  EXPECT_NEAR(report.steps[0].parameters[0].value, 2, 0.7);
 }
 
 TEST(Diagnose, FindsMissedContacts) {
   HiddenRig rig;
   rig.hidden = {{"missed_contact", {"probability=0.1"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_EQ(StepNames(report), std::vector<std::string>{"missed_contact"}) << report.summary();
-  EXPECT_NEAR(report.steps(0).parameters(0).value(), 0.1, 0.04);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"missed_contact"}) << report.summary;
+  EXPECT_NEAR(report.steps[0].parameters[0].value, 0.1, 0.04);
 }
 
 TEST(Diagnose, FindsHysteresisFromTheCourseOfTheSession) {
   HiddenRig rig;
   rig.hidden = {{"return_hysteresis", {"fraction=0.05"}}};
-  const v1::Report report = DiagnoseRig(rig);
-  ASSERT_EQ(StepNames(report), std::vector<std::string>{"return_hysteresis"}) << report.summary();
-  EXPECT_NEAR(report.steps(0).parameters(0).value(), 0.05, 0.01);
+  const Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"return_hysteresis"}) << report.summary;
+  EXPECT_NEAR(report.steps[0].parameters[0].value, 0.05, 0.01);
 }
 
 TEST(Diagnose, GivesTheSameReportTwiceAndWithThreads) {
@@ -173,10 +174,11 @@ TEST(Diagnose, GivesTheSameReportTwiceAndWithThreads) {
   ThreadPool pool(2);
   DiagnosisContext threads;
   threads.pool = &pool;
-  absl::StatusOr<v1::Report> a = Diagnose(input, {}), b = Diagnose(input, threads);
+  absl::StatusOr<Diagnosis> a = Diagnose(input, {}), b = Diagnose(input, threads);
   ASSERT_TRUE(a.ok() && b.ok());
-  a->set_duration_s(0), b->set_duration_s(0);
-  EXPECT_EQ(a->SerializeAsString(), b->SerializeAsString());
+  a->duration_s = b->duration_s = 0;
+  // Every value, whatever it is: the message holds them all.
+  EXPECT_EQ(ToReport(*a).SerializeAsString(), ToReport(*b).SerializeAsString());
 }
 
 TEST(Diagnose, EndsWhenItIsCancelled) {
@@ -226,10 +228,10 @@ TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
     set->time_s.resize(touches * 3);
     DiagnosisInput input = all;
     input.set = set;
-    const absl::StatusOr<v1::Report> report = Diagnose(input, {});
+    const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict(), v1::Report::ADEQUATE) << touches << ": " << report->summary();
-    EXPECT_GE(report->warnings_size(), 1);
+    EXPECT_EQ(report->verdict, Verdict::kAdequate) << touches << ": " << report->summary;
+    EXPECT_GE(report->warnings.size(), 1u);
   }
 }
 
@@ -239,23 +241,23 @@ TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
   for (double& time_s : set->time_s) time_s = NAN;
   DiagnosisInput input = all;
   input.set = set;
-  const absl::StatusOr<v1::Report> report = Diagnose(input, {});
+  const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->touches(), 0u);
-  ASSERT_EQ(report->data().unused_size(), 1);
-  EXPECT_EQ(report->data().unused(0).rows(), static_cast<uint32_t>(set->size()));
+  EXPECT_EQ(report->data.touches, 0);
+  ASSERT_EQ(report->data.unused.size(), 1u);
+  EXPECT_EQ(report->data.unused.begin()->second.count, set->size());
 }
 
 TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
   HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
-  const absl::StatusOr<v1::Report> report = Propose(MakeTestInput(rig), 12, {});
+  const absl::StatusOr<Diagnosis> report = Propose(MakeTestInput(rig), 12, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  ASSERT_EQ(report->next_touches_size(), 12);
-  for (const v1::ProposedTouch& touch : report->next_touches()) {
-    EXPECT_GT(std::abs(touch.touch().speed_m_s() - 0.02), 0.005);
-    EXPECT_GT(touch.separation(), 0);
-    EXPECT_FALSE(touch.purpose().empty());
+  ASSERT_EQ(report->next_touches.size(), 12u);
+  for (const ProposedTouch& touch : report->next_touches) {
+    EXPECT_GT(std::abs(touch.touch.speed_m_s - 0.02), 0.005);
+    EXPECT_GT(touch.separation_sigmas, 0);
+    EXPECT_FALSE(touch.purpose.empty());
   }
 }
 
@@ -263,23 +265,23 @@ TEST(Propose, NamesTouchesEvenWhereNothingIsAmbiguous) {
   HiddenRig rig;
   rig.known = {{"tip_radius", {"radius_mm=1"}}};
   rig.hidden = rig.known;
-  const absl::StatusOr<v1::Report> report = Propose(MakeTestInput(rig), 5, {});
+  const absl::StatusOr<Diagnosis> report = Propose(MakeTestInput(rig), 5, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_TRUE(report->next_touches_size() == 5 || report->warnings_size() > 0);
+  EXPECT_TRUE(report->next_touches.size() == 5 || report->warnings.size() > 0);
 }
 
 TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
   HiddenRig rig;
   rig.samples_per_face = 8;
   rig.hidden = {{"finger_length", {"offset_mm=0.4,-0.2,-0.2"}}};
-  const absl::StatusOr<v1::Report> report = Compare(MakeTestInput(rig), {});
+  const absl::StatusOr<Diagnosis> report = Compare(MakeTestInput(rig), {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict(), v1::Report::VERDICT_UNSPECIFIED);
-  EXPECT_NEAR(report->noise_floor_us(), 2000, 200);
-  EXPECT_GT(report->reducible_share(), 0.9);
-  ASSERT_GE(report->where_size(), 1);
-  EXPECT_EQ(report->where(0).slice(), "finger = l");
-  EXPECT_EQ(report->fingers_size(), 3);
+  EXPECT_EQ(report->verdict, Verdict::kNone);
+  EXPECT_NEAR(report->noise_floor->sigma_s, 2000e-6, 200e-6);
+  EXPECT_GT(report->reducible_share, 0.9);
+  ASSERT_GE(report->residuals.slices.size(), 1u);
+  EXPECT_EQ(report->residuals.slices[0].conditions, "finger = l");
+  EXPECT_EQ(report->data.fingers, 3);
 }
 
 }  // namespace

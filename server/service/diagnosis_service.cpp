@@ -11,6 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
@@ -18,7 +19,7 @@
 namespace touchstone {
 namespace {
 
-using Work = std::function<absl::StatusOr<v1::Report>(const DiagnosisInput&, const DiagnosisContext&)>;
+using Work = std::function<absl::StatusOr<Diagnosis>(const DiagnosisInput&, const DiagnosisContext&)>;
 constexpr std::chrono::milliseconds kProgressInterval{250};
 constexpr int kDefaultProposedTouches = 24;
 
@@ -84,7 +85,8 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
       [&](const DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
         TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, ReadEvidence(evidence, *resources));
-        return work(input, how);
+        TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, work(input, how));
+        return ToReport(diagnosis);
       },
       resources->pool.get());
   v1::Progress progress;

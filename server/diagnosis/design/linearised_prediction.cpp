@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/inference/free_model.h"
+#include "server/diagnosis/inference/parameterization.h"
 #include "server/diagnosis/touches/prediction.h"
 
 namespace touchstone {
@@ -24,14 +24,15 @@ Vector Centred(const std::vector<double>& time_s, int k, int fingers, double sig
 }
 
 // Derivatives of every touch by all free parameters, [touch] fingers x parameters; those that are not finite are 0.
-absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observations, const FreeModel& free,
+absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observations,
+                                                  const Parameterization& free,
                                                   const std::vector<double>& at_start_s, double sigma_s,
                                                   ThreadPool* pool) {
   const int fingers = observations.fingers;
   std::vector<Matrix> columns(observations.size(), Matrix::Zero(fingers, free.size()));
   const Vector start = free.Start();
   for (int c = 0; c < free.size(); ++c) {
-    const Coordinate& coordinate = free.coordinates()[c];
+    const FreeParameter& coordinate = free.parameters()[c];
     double step = kStep * coordinate.scale;
     if (start[c] + step > coordinate.upper) step = -step;
     Vector point = start;
@@ -53,7 +54,7 @@ absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observatio
 absl::StatusOr<LinearisedPrediction> Linearise(const Model& model, const Observations& present, double weight,
                                                const Observations& candidates, double sigma_s,
                                                ThreadPool* pool) {
-  FreeModel free(model, present.objects);
+  Parameterization free(model, present.objects);
   for (size_t e = 0; e < model.effects.size(); ++e) free.Free(static_cast<int>(e), true);
   LinearisedPrediction result;
   TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction now, Predict(present, model, false, false, pool));

@@ -53,12 +53,8 @@ ProposedTouch TouchOf(const Observations& candidates, int k) {
 }
 
 bool Drifts(const Model& model) {
-  for (const EffectInstance& instance : model.effects) {
-    const Effect& effect = *instance.effect;
-    if (effect.name == "thermal_drift") return true;
-    if (effect.formula && effect.formula->expression.find("session_time_s") != std::string::npos) return true;
-  }
-  return false;
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [](const EffectInstance& instance) { return instance.effect->needs.session_time; });
 }
 
 // Chooses touches one after the other, spread over the objects.

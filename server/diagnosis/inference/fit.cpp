@@ -3,95 +3,149 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "server/base/status.h"
 
 namespace touchstone {
 namespace {
 
-constexpr double kStep = 0.02;     // of a coordinate's scale, for derivatives
-constexpr double kJumpM = 0.3e-3;  // a finger that moves so far within a step has met another face
-constexpr double kJumpOverMedian = 200;
+constexpr double kStep = 0.02;  // of a parameter's scale, for derivatives
 constexpr int kMaxHalvings = 5;
 constexpr double kConverged = 0.02;  // nats
 constexpr double kSmallStep = 0.05;  // standard errors
 
+// One simulation with all parameters of one shape moved; writes their columns.
+absl::Status DifferentiateShape(const Experiment& experiment, const Parameterization& model,
+                                const Eigen::VectorXd& point, const std::vector<double>& predicted,
+                                const std::vector<int>& members, int first, Eigen::MatrixXd* columns) {
+  const ObservationModel& observations = *experiment.observations;
+  Eigen::VectorXd moved = point;
+  std::vector<double> steps;
+  for (const int i : members) {
+    const FreeParameter& c = model.parameters()[i];
+    double step = kStep * c.scale;
+    if (point[i] + step > c.upper) step = -step;
+    moved[i] += step;
+    steps.push_back(step);
+  }
+  const absl::StatusOr<std::vector<double>> prediction = observations.Predict(model.At(moved));
+  if (!prediction.ok()) return prediction.status();
+  const Eigen::VectorXd column = observations.Change(predicted, *prediction);
+  for (size_t j = 0; j < members.size(); ++j) {
+    const int i = members[j];
+    const std::string& object = model.parameters()[i].object;
+    if (object.empty()) {
+      columns->col(i - first) = column / steps[j];
+      continue;
+    }
+    const std::vector<std::string>& groups = observations.groups();
+    const int group = static_cast<int>(std::find(groups.begin(), groups.end(), object) - groups.begin());
+    const int begin_row = observations.FirstRowOfGroup(group);
+    const int rows = observations.FirstRowOfGroup(group + 1) - begin_row;
+    columns->col(i - first).segment(begin_row, rows) = column.segment(begin_row, rows) / steps[j];
+  }
+  return absl::OkStatus();
+}
+
+// One fit under way: where it stands, and what the columns there say.
+class GaussNewton {
+ public:
+  GaussNewton(const Experiment& experiment, const Parameterization& model, Fit* fit)
+      : experiment_(experiment), model_(model), fit_(fit), members_(model.size() + 1) {
+    std::iota(members_.begin(), members_.end(), 0);
+  }
+
+  absl::Status Begin() {
+    fit_->point = model_.Clip(model_.Start());
+    TOUCHSTONE_ASSIGN_OR_RETURN(fit_->predicted, experiment_.observations->Predict(model_.At(fit_->point)));
+    return absl::OkStatus();
+  }
+
+  absl::Status Linearise() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd derivatives,
+                                Derivatives(experiment_, model_, fit_->point, fit_->predicted, 0));
+    Eigen::MatrixXd values(experiment_.likelihood->rows(), model_.size() + 1);
+    values << experiment_.observations->Residual(fit_->predicted), derivatives;
+    fit_->columns = experiment_.likelihood->Prepare(values);
+    return absl::OkStatus();
+  }
+
+  LaplaceEvidence Evidence() const {
+    return ComputeLaplaceEvidence(*experiment_.likelihood, Grams(*experiment_.likelihood, fit_->columns),
+                                  members_, model_.parameters(), fit_->point);
+  }
+
+  struct Step {
+    bool moved = false;
+    double fraction = 1;  // of the proposed step
+    double gain = 0;      // of log likelihood and prior, nats
+  };
+
+  // Along the step, as far as the likelihood of the best hypothesis really grows.
+  absl::StatusOr<Step> MoveAlong(const LaplaceEvidence& evidence) {
+    const int s = evidence.hypothesis;
+    const double here = LogPosterior(Likelihood::Pick(fit_->columns, {0}), s, fit_->point);
+    Step step;
+    for (int halving = 0; halving <= kMaxHalvings; ++halving, step.fraction /= 2) {
+      const Eigen::VectorXd point = model_.Clip(fit_->point + step.fraction * evidence.step);
+      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> predicted,
+                                  experiment_.observations->Predict(model_.At(point)));
+      const Likelihood::Columns r =
+          experiment_.likelihood->Prepare(experiment_.observations->Residual(predicted));
+      step.gain = LogPosterior(r, s, point) - here;
+      if (step.gain <= 0) continue;
+      step.moved = true;
+      fit_->point = point;
+      fit_->predicted = std::move(predicted);
+      // The old derivatives are good enough if the simulator did what they predicted.
+      fit_->columns = Likelihood::Join(
+          r, Likelihood::Pick(fit_->columns, std::vector<int>(members_.begin() + 1, members_.end())));
+      return step;
+    }
+    return step;
+  }
+
+  // The longest way that is left to go, in standard errors.
+  double DistanceLeft(const LaplaceEvidence& evidence) const {
+    double farthest = 0;
+    for (int i = 0; i < model_.size(); ++i)
+      farthest = std::max(farthest, std::abs(evidence.step[i]) /
+                                        std::sqrt(std::max(evidence.covariance(i, i), 1e-300)) *
+                                        (evidence.covariance(i, i) > 0));
+    return farthest;
+  }
+
+ private:
+  double LogPosterior(const Likelihood::Columns& residual, int s, const Eigen::VectorXd& point) const {
+    const Likelihood& likelihood = *experiment_.likelihood;
+    return likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s) +
+           LogPriorOfValues(model_.parameters(), point);
+  }
+
+  const Experiment& experiment_;
+  const Parameterization& model_;
+  Fit* fit_;
+  std::vector<int> members_;
+};
+
 }  // namespace
 
-Eigen::VectorXd ResidualContrasts(const Experiment& experiment, const std::vector<double>& predicted_s) {
-  const std::vector<double>& measured = experiment.observations->time_s;
-  std::vector<double> residual(measured.size());
-  for (size_t e = 0; e < measured.size(); ++e)
-    residual[e] = measured[e] - (std::isnan(predicted_s[e]) ? experiment.nominal_s[e] : predicted_s[e]);
-  return experiment.contrasts->Apply(residual);
-}
-
-absl::StatusOr<std::vector<double>> PredictTimes(const Experiment& experiment, const Model& model) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(Prediction prediction, experiment.predictor->Run(model, false, false));
-  return std::move(prediction.time_s);
-}
-
-absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const FreeModel& model,
-                                            const Eigen::VectorXd& point, const std::vector<double>& at_s,
-                                            int first) {
-  // One simulation a shape: coordinates that differ by object only are moved together.
+absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const Parameterization& model,
+                                            const Eigen::VectorXd& point,
+                                            const std::vector<double>& predicted, int first) {
+  // One simulation per shape: parameters that differ by object only are moved together.
   std::map<int, std::vector<int>> shapes;
-  for (int i = first; i < model.size(); ++i) shapes[model.coordinates()[i].shape].push_back(i);
+  for (int i = first; i < model.size(); ++i) shapes[model.parameters()[i].shape].push_back(i);
   std::vector<std::vector<int>> tasks;
   for (auto& [shape, members] : shapes) tasks.push_back(std::move(members));
 
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(experiment.contrasts->rows(), model.size() - first);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(experiment.observations->rows(), model.size() - first);
   std::vector<absl::Status> statuses(tasks.size());
-  const Observations& o = *experiment.observations;
   const auto run = [&](int begin, int end) {
     for (int task = begin; task < end; ++task) {
       if (experiment.cancelled && experiment.cancelled()) continue;
-      Eigen::VectorXd moved = point;
-      std::vector<double> steps;
-      for (const int i : tasks[task]) {
-        const Coordinate& c = model.coordinates()[i];
-        double step = kStep * c.scale;
-        if (point[i] + step > c.upper) step = -step;
-        moved[i] += step;
-        steps.push_back(step);
-      }
-      const absl::StatusOr<std::vector<double>> times = PredictTimes(experiment, model.At(moved));
-      if (!times.ok()) {
-        statuses[task] = times.status();
-        continue;
-      }
-      // Where a contact jumps there is no derivative.
-      std::vector<double> change(at_s.size(), 0.0), sizes;
-      for (size_t e = 0; e < at_s.size(); ++e) {
-        const double difference = (*times)[e] - at_s[e];
-        if (std::isnan(difference)) continue;
-        change[e] = difference;
-        if (difference != 0) sizes.push_back(std::abs(difference));
-      }
-      if (sizes.empty()) continue;
-      std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-      const double median = sizes[sizes.size() / 2];
-      for (int k = 0; k < o.size(); ++k) {
-        const double jump_s = std::max(kJumpM / o.set->speed_m_s[o.row[k]], kJumpOverMedian * median);
-        for (int i = 0; i < o.fingers; ++i) {
-          double& value = change[static_cast<size_t>(k) * o.fingers + i];
-          if (std::abs(value) > jump_s) value = 0;
-        }
-      }
-      const Eigen::VectorXd column = experiment.contrasts->Apply(change);
-      for (size_t j = 0; j < tasks[task].size(); ++j) {
-        const int i = tasks[task][j];
-        const std::string& object = model.coordinates()[i].object;
-        if (object.empty()) {
-          columns.col(i - first) = column / steps[j];
-          continue;
-        }
-        const int index =
-            static_cast<int>(std::find(o.objects.begin(), o.objects.end(), object) - o.objects.begin());
-        const int begin_row = experiment.contrasts->FirstRowOfObject(index);
-        const int rows = experiment.contrasts->FirstRowOfObject(index + 1) - begin_row;
-        columns.col(i - first).segment(begin_row, rows) = column.segment(begin_row, rows) / steps[j];
-      }
+      statuses[task] = DifferentiateShape(experiment, model, point, predicted, tasks[task], first, &columns);
     }
   };
   ParallelFor(experiment.pool, static_cast<int>(tasks.size()), 1, run);
@@ -101,72 +155,33 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
   return columns;
 }
 
-absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start, int max_iterations) {
-  const Likelihood& likelihood = *experiment.likelihood;
+absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start, int max_iterations) {
   Fit fit;
-  fit.point = start.Clip(start.Start());
-  TOUCHSTONE_ASSIGN_OR_RETURN(fit.time_s, PredictTimes(experiment, start.At(fit.point)));
-  std::vector<int> members(start.size() + 1);
-  for (int i = 0; i <= start.size(); ++i) members[i] = i;
-
-  Eigen::MatrixXd derivatives;
-  Judgement judgement;
+  GaussNewton search(experiment, start, &fit);
+  TOUCHSTONE_RETURN_IF_ERROR(search.Begin());
+  LaplaceEvidence evidence;
   for (int iteration = 0;; ++iteration) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(derivatives, Derivatives(experiment, start, fit.point, fit.time_s, 0));
-    Eigen::MatrixXd values(likelihood.rows(), start.size() + 1);
-    values << ResidualContrasts(experiment, fit.time_s), derivatives;
-    fit.columns = likelihood.Prepare(values);
-    judgement = Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
+    TOUCHSTONE_RETURN_IF_ERROR(search.Linearise());
+    evidence = search.Evidence();
     if (start.size() == 0 || iteration == max_iterations) break;
-
-    // Along the step, as far as the likelihood of the best hypothesis really grows.
-    const int s = judgement.surface;
-    const double here =
-        likelihood.LogLikelihood(likelihood.Gram(Likelihood::Pick(fit.columns, {0}), s)(0, 0), s) +
-        LogPriorOfValues(start.coordinates(), fit.point);
-    double fraction = 1, gain = 0;
-    bool moved = false;
-    for (int halving = 0; halving <= kMaxHalvings; ++halving, fraction /= 2) {
-      const Eigen::VectorXd point = start.Clip(fit.point + fraction * judgement.step);
-      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> times, PredictTimes(experiment, start.At(point)));
-      const Likelihood::Columns r = likelihood.Prepare(ResidualContrasts(experiment, times));
-      gain = likelihood.LogLikelihood(likelihood.Gram(r, s)(0, 0), s) +
-             LogPriorOfValues(start.coordinates(), point) - here;
-      if (gain <= 0) continue;
-      moved = true;
-      fit.point = point;
-      fit.time_s = std::move(times);
-      // The columns are good enough if the simulator did what they foretold.
-      fit.columns = Likelihood::Join(
-          r, Likelihood::Pick(fit.columns, std::vector<int>(members.begin() + 1, members.end())));
-      break;
-    }
-    if (!moved) break;
-    if (gain < kConverged) {
-      judgement = Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
-      break;
-    }
-    // A full step that came out as foretold needs no further derivatives.
-    const Judgement after =
-        Judge(likelihood, Grams(likelihood, fit.columns), members, start.coordinates(), fit.point);
-    double farthest = 0;  // of what is left to go, in standard errors
-    for (int i = 0; i < start.size(); ++i)
-      farthest =
-          std::max(farthest, std::abs(after.step[i]) / std::sqrt(std::max(after.covariance(i, i), 1e-300)) *
-                                 (after.covariance(i, i) > 0));
-    if (fraction == 1 && farthest < kSmallStep &&
-        std::abs(after.evidence - judgement.evidence) < kConverged) {
-      judgement = after;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const GaussNewton::Step step, search.MoveAlong(evidence));
+    if (!step.moved) break;
+    const LaplaceEvidence after = search.Evidence();
+    // A full step that ended where the linearised prediction said needs no further derivatives.
+    const bool as_predicted = step.fraction == 1 && search.DistanceLeft(after) < kSmallStep &&
+                              std::abs(after.log_evidence - evidence.log_evidence) < kConverged;
+    if (step.gain < kConverged || as_predicted) {
+      evidence = after;
       break;
     }
   }
   start.MoveTo(fit.point);
   fit.model = std::move(start);
-  fit.evidence = judgement.evidence;
-  fit.log_likelihood = judgement.log_likelihood;
-  fit.surface = judgement.surface;
-  fit.sigma_s = judgement.sigma_s;
-  fit.covariance = judgement.covariance;
+  fit.log_evidence = evidence.log_evidence;
+  fit.log_likelihood = evidence.log_likelihood;
+  fit.hypothesis = evidence.hypothesis;
+  fit.sigma = evidence.sigma;
+  fit.covariance = evidence.covariance;
   return fit;
 }
 

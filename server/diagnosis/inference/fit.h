@@ -1,5 +1,5 @@
-// Fitting values of a model to the observations: Gauss-Newton with the simulator in the loop, under the
-// likelihood with a surface error, and the evidence for the fitted model.
+// Fitting free parameters to the rows: Gauss-Newton with the simulator in the loop, under the likelihood with a smooth
+// error, and the evidence for the fitted model.
 #pragma once
 
 #include <functional>
@@ -8,51 +8,43 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/inference/free_model.h"
-#include "server/diagnosis/inference/judgement.h"
+#include "server/base/thread_pool.h"
+#include "server/diagnosis/inference/laplace_evidence.h"
 #include "server/diagnosis/inference/likelihood.h"
-#include "server/diagnosis/touches/contrasts.h"
-#include "server/diagnosis/touches/predictor.h"
+#include "server/diagnosis/inference/observation_model.h"
+#include "server/diagnosis/inference/parameterization.h"
 
 namespace touchstone {
 
 // What is fitted to: shared by all fits of a diagnosis.
 struct Experiment {
-  const Observations* observations = nullptr;
-  const Predictor* predictor = nullptr;
-  const Contrasts* contrasts = nullptr;
+  const ObservationModel* observations = nullptr;
   const Likelihood* likelihood = nullptr;
-  std::vector<double> nominal_s;  // the given model's times: stand in where another model misses
-  ThreadPool* pool = nullptr;     // for columns; null: this thread
+  ThreadPool* pool = nullptr;  // for columns; null: this thread
   std::function<bool()> cancelled;
 };
 
 struct Fit {
-  FreeModel model;              // its base stands at the optimum
-  Eigen::VectorXd point;        // the optimum
-  Likelihood::Columns columns;  // [residual | one derivative a coordinate], contrasts
-  std::vector<double> time_s;   // predicted
-  double evidence = 0;          // nats; comparable between models of one experiment
-  double log_likelihood = 0;    // maximum over values, averaged over hypotheses of the surface
-  int surface = 0;              // most probable hypothesis
-  double sigma_s = 0;
-  Eigen::MatrixXd covariance;  // of the coordinates
+  Parameterization model;         // its base stands at the optimum
+  Eigen::VectorXd point;          // the optimum
+  Likelihood::Columns columns;    // rows: [residual | one derivative per free parameter]
+  std::vector<double> predicted;  // of ObservationModel::Predict at the optimum
+  double log_evidence = 0;        // nats; comparable between models of one experiment
+  double log_likelihood = 0;      // maximum over values, averaged over hypotheses of the smooth error
+  int hypothesis = 0;             // the most probable one
+  double sigma = 0;               // noise, in the unit of the rows
+  Eigen::MatrixXd covariance;     // of the free parameters
 };
 
-// Contrasts of measured minus predicted.
-Eigen::VectorXd ResidualContrasts(const Experiment& experiment, const std::vector<double>& predicted_s);
+// Derivatives of the predicted rows by free parameters first .. size of `model` at `point`; `predicted` is the
+// prediction there. Error: CANCELLED, or what the simulator says.
+absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const Parameterization& model,
+                                            const Eigen::VectorXd& point,
+                                            const std::vector<double>& predicted, int first);
 
-absl::StatusOr<std::vector<double>> PredictTimes(const Experiment& experiment, const Model& model);
-
-// Derivatives of the predicted contrasts by coordinates first .. size of `model` at `point`; `at_s` are the
-// times predicted there. Entries where a finger's contact jumps to another face within the step are zero.
-absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const FreeModel& model,
-                                            const Eigen::VectorXd& point, const std::vector<double>& at_s,
-                                            int first);
-
-// `max_iterations` 0 only judges the start.
+// `max_iterations` 0 only evaluates the start.
 inline constexpr int kMaxIterations = 10;
-absl::StatusOr<Fit> FitModel(const Experiment& experiment, FreeModel start,
+absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start,
                              int max_iterations = kMaxIterations);
 
 }  // namespace touchstone

@@ -4,16 +4,14 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace touchstone {
 namespace {
 
-// Correlation lengths over the longest side of the object, and bump sizes over sigma (as contact time).
+// Correlation lengths over the longest side of the object, and bump sizes (as rows) over sigma.
 constexpr double kLengths[] = {0.04, 0.07, 0.12, 0.2, 0.35};
 constexpr double kRatios[] = {0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9, 1.35, 2, 3, 5, 8, 15, 30};
-constexpr double kMinCosine = 0.1;
 constexpr int kMaxPoints = 160;
 constexpr int kMaxWithInner = 128;  // columns
 
@@ -39,106 +37,81 @@ std::vector<Eigen::Vector3d> Inducing(const std::vector<Eigen::Vector3d>& points
   return chosen;
 }
 
+// Features of the field at a group's rows, turned so that they are orthogonal; `energies`: their squared norms.
+Eigen::MatrixXd OrthogonalFeatures(const std::vector<SmoothErrorSite>& sites,
+                                   const std::vector<Eigen::Vector3d>& inducing, double length_m,
+                                   int first_row, int rows, Eigen::VectorXd* energies) {
+  const int m = static_cast<int>(inducing.size());
+  Eigen::MatrixXd kernel(m, m);
+  for (int a = 0; a < m; ++a)
+    for (int b = 0; b <= a; ++b)
+      kernel(a, b) = kernel(b, a) = Matern52((inducing[a] - inducing[b]).norm(), length_m);
+  kernel.diagonal().array() += 1e-6;
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(kernel);
+  Eigen::MatrixXd raw = Eigen::MatrixXd::Zero(rows, m);
+  Eigen::VectorXd feature(m);
+  for (const SmoothErrorSite& site : sites) {
+    for (int a = 0; a < m; ++a) feature[a] = Matern52((site.position_m - inducing[a]).norm(), length_m);
+    for (size_t j = 0; j < site.row_per_m.size(); ++j)
+      raw.row(site.first_row - first_row + static_cast<int>(j)) += site.row_per_m[j] * feature.transpose();
+  }
+  // raw L^-T: features of unit variance.
+  const Eigen::MatrixXd z = cholesky.matrixL().solve(raw.transpose()).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z);
+  const double min_energy = 1e-7 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
+  int kept = 0;
+  for (int a = 0; a < m; ++a) kept += eigen.eigenvalues()[a] > min_energy;
+  *energies = eigen.eigenvalues().tail(kept);
+  return z * eigen.eigenvectors().rightCols(kept);
+}
+
 }  // namespace
 
-Likelihood::Likelihood(const Observations& o, const Contrasts& contrasts, const Prediction& details,
-                       bool field, double floor_s, ThreadPool* pool)
-    : rows_(contrasts.rows()), floor_s_(floor_s) {
-  const int objects = static_cast<int>(o.objects.size());
-  for (int object = 0; object <= objects; ++object) object_row_.push_back(contrasts.FirstRowOfObject(object));
-  surfaces_.push_back({});
-  if (!field || rows_ == 0) return;
-
-  // Contacts of each object, once a pose and finger.
-  double mean_slope = 0;
-  int counted = 0;
-  std::vector<std::vector<Eigen::Vector3d>> points(objects);
-  std::vector<char> seen(o.poses, 0);
-  for (size_t t = 0; t < contrasts.touches().size(); ++t) {
-    const int k = contrasts.touches()[t];
-    for (int i = 0; i < o.fingers; ++i) {
-      if (!contrasts.TakesPart(static_cast<int>(t), i)) continue;
-      mean_slope += details.slope_s_m[static_cast<size_t>(k) * o.fingers + i];
-      ++counted;
-      if (!seen[o.pose[k]])
-        points[o.object[k]].push_back(details.contact_m[static_cast<size_t>(k) * o.fingers + i]);
+Likelihood::Likelihood(std::vector<int> group_rows, const SmoothErrorGeometry* geometry, double floor,
+                       ThreadPool* pool)
+    : group_rows_(std::move(group_rows)), floor_(floor) {
+  hypotheses_.push_back({});
+  if (geometry == nullptr || rows() == 0) return;
+  std::vector<double> length_m;
+  for (const double length : kLengths) length_m.push_back(length * geometry->size_m);
+  MakeBases(*geometry, length_m, pool);
+  for (size_t l = 0; l < length_m.size(); ++l) {
+    const Eigen::VectorXd& energies = bases_[l].energies;
+    for (const double ratio : kRatios) {
+      SurfaceErrorHypothesis hypothesis;
+      hypothesis.length_m = length_m[l];
+      hypothesis.length_index = static_cast<int>(l);
+      hypothesis.amplitude_over_sigma = ratio / geometry->mean_row_per_m;
+      const double square = hypothesis.amplitude_over_sigma * hypothesis.amplitude_over_sigma;
+      hypothesis.log_determinant = (1 + square * energies.array()).log().sum();
+      hypothesis.effective_dof = (square * energies.array() / (1 + square * energies.array())).sum();
+      hypotheses_.push_back(hypothesis);
     }
-    seen[o.pose[k]] = 1;
   }
-  mean_slope /= counted;
+}
 
-  // For every length and object: features of the field at the contacts, as contrasts, turned so that they are
-  // orthogonal.
-  const int lengths = static_cast<int>(std::size(kLengths));
-  std::vector<double> length_m(lengths);
-  double side_m = 0;
-  for (const auto& surface : o.surfaces)
-    side_m += (surface->bounds().max_m - surface->bounds().min_m).maxCoeff() / objects;
-  for (int l = 0; l < lengths; ++l) length_m[l] = kLengths[l] * side_m;
+void Likelihood::MakeBases(const SmoothErrorGeometry& geometry, const std::vector<double>& length_m,
+                           ThreadPool* pool) {
+  const int groups = static_cast<int>(group_rows_.size()) - 1, lengths = static_cast<int>(length_m.size());
   bases_.resize(lengths);
-  for (Basis& basis : bases_) basis.directions.resize(objects);
-  std::vector<std::vector<Eigen::VectorXd>> energies(lengths, std::vector<Eigen::VectorXd>(objects));
+  for (Basis& basis : bases_) basis.directions.resize(groups);
+  std::vector<std::vector<Eigen::VectorXd>> energies(lengths, std::vector<Eigen::VectorXd>(groups));
   const auto make = [&](int begin, int end) {
     for (int task = begin; task < end; ++task) {
-      const int l = task / objects, object = task % objects;
-      const int first = object_row_[object], rows = object_row_[object + 1] - first;
-      if (rows == 0) {
-        energies[l][object].resize(0);
-        bases_[l].directions[object].resize(0, 0);
-        continue;
-      }
-      const std::vector<Eigen::Vector3d> inducing = Inducing(points[object]);
-      const int m = static_cast<int>(inducing.size());
-      Eigen::MatrixXd kernel(m, m);
-      for (int a = 0; a < m; ++a)
-        for (int b = 0; b <= a; ++b)
-          kernel(a, b) = kernel(b, a) = Matern52((inducing[a] - inducing[b]).norm(), length_m[l]);
-      kernel.diagonal().array() += 1e-6;
-      const Eigen::LLT<Eigen::MatrixXd> cholesky(kernel);
-      Eigen::MatrixXd raw = Eigen::MatrixXd::Zero(rows, m);
-      Eigen::VectorXd feature(m);
-      for (int row = first; row < first + rows;) {
-        const int t = contrasts.touch_of_row()[row];
-        const int k = contrasts.touches()[t];
-        const Eigen::MatrixXd& h = contrasts.MatrixOf(t);
-        for (int i = 0; i < o.fingers; ++i) {
-          if (!contrasts.TakesPart(t, i)) continue;
-          const size_t entry = static_cast<size_t>(k) * o.fingers + i;
-          const double gain = -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kMinCosine);
-          for (int a = 0; a < m; ++a)
-            feature[a] = Matern52((details.contact_m[entry] - inducing[a]).norm(), length_m[l]);
-          for (int j = 0; j < h.rows(); ++j)
-            raw.row(row - first + j) += (contrasts.root_weights()[t] * gain * h(j, i)) * feature.transpose();
-        }
-        row += static_cast<int>(h.rows());
-      }
-      // raw L^-T: features of unit variance.
-      const Eigen::MatrixXd z = cholesky.matrixL().solve(raw.transpose()).transpose();
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z);
-      const double least = 1e-7 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
-      int kept = 0;
-      for (int a = 0; a < m; ++a) kept += eigen.eigenvalues()[a] > least;
-      bases_[l].directions[object] = z * eigen.eigenvectors().rightCols(kept);
-      energies[l][object] = eigen.eigenvalues().tail(kept);
+      const int l = task / groups, group = task % groups;
+      const int first = group_rows_[group], rows = group_rows_[group + 1] - first;
+      if (rows == 0) continue;
+      bases_[l].directions[group] =
+          OrthogonalFeatures(geometry.sites[group], Inducing(geometry.distinct_m[group]), length_m[l], first,
+                             rows, &energies[l][group]);
     }
   };
-  ParallelFor(pool, lengths * objects, 1, make);
-
+  ParallelFor(pool, lengths * groups, 1, make);
   for (int l = 0; l < lengths; ++l) {
     Eigen::VectorXd& all = bases_[l].energies;
     for (const Eigen::VectorXd& part : energies[l]) {
       all.conservativeResize(all.size() + part.size());
       all.tail(part.size()) = part;
-    }
-    for (const double ratio : kRatios) {
-      Surface surface;
-      surface.length_m = length_m[l];
-      surface.length_index = l;
-      surface.ratio_m_s = ratio / mean_slope;
-      const double square = surface.ratio_m_s * surface.ratio_m_s;
-      surface.log_determinant = (1 + square * all.array()).log().sum();
-      surface.degrees = (square * all.array() / (1 + square * all.array())).sum();
-      surfaces_.push_back(surface);
     }
   }
 }
@@ -149,11 +122,11 @@ Likelihood::Columns Likelihood::Prepare(const Eigen::MatrixXd& values) const {
   for (const Basis& basis : bases_) {
     Eigen::MatrixXd projected(basis.energies.size(), values.cols());
     int next = 0;
-    for (size_t object = 0; object < basis.directions.size(); ++object) {
-      const Eigen::MatrixXd& directions = basis.directions[object];
+    for (size_t group = 0; group < basis.directions.size(); ++group) {
+      const Eigen::MatrixXd& directions = basis.directions[group];
       if (directions.cols() == 0) continue;
       projected.middleRows(next, directions.cols()).noalias() =
-          directions.transpose() * values.middleRows(object_row_[object], directions.rows());
+          directions.transpose() * values.middleRows(group_rows_[group], directions.rows());
       next += static_cast<int>(directions.cols());
     }
     columns.projected.push_back(std::move(projected));
@@ -191,14 +164,14 @@ Likelihood::Columns Likelihood::Pick(const Columns& all, const std::vector<int>&
 }
 
 Eigen::VectorXd Likelihood::Shrinkage(int s) const {
-  const double square = surfaces_[s].ratio_m_s * surfaces_[s].ratio_m_s;
-  const Eigen::VectorXd& energies = bases_[surfaces_[s].length_index].energies;
+  const double square = hypotheses_[s].amplitude_over_sigma * hypotheses_[s].amplitude_over_sigma;
+  const Eigen::VectorXd& energies = bases_[hypotheses_[s].length_index].energies;
   return (square / (1 + square * energies.array())).matrix();
 }
 
 Eigen::MatrixXd Likelihood::Cross(const Columns& a, const Columns& b, int s) const {
   Eigen::MatrixXd cross = a.values.transpose() * b.values;
-  const int l = surfaces_[s].length_index;
+  const int l = hypotheses_[s].length_index;
   if (l >= 0) cross.noalias() -= a.projected[l].transpose() * (Shrinkage(s).asDiagonal() * b.projected[l]);
   return cross;
 }
@@ -206,7 +179,7 @@ Eigen::MatrixXd Likelihood::Cross(const Columns& a, const Columns& b, int s) con
 Eigen::MatrixXd Likelihood::Gram(const Columns& columns, int s) const {
   if (columns.inner.size() == 0) return Cross(columns, columns, s);
   Eigen::MatrixXd gram = columns.inner;
-  const int l = surfaces_[s].length_index;
+  const int l = hypotheses_[s].length_index;
   if (l >= 0)
     gram.noalias() -= columns.projected[l].transpose() * (Shrinkage(s).asDiagonal() * columns.projected[l]);
   return gram;
@@ -214,7 +187,7 @@ Eigen::MatrixXd Likelihood::Gram(const Columns& columns, int s) const {
 
 Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
   Eigen::VectorXd norms = columns.values.colwise().squaredNorm().transpose();
-  const int l = surfaces_[s].length_index;
+  const int l = hypotheses_[s].length_index;
   if (l >= 0)
     norms -= (columns.projected[l].array().square().colwise() * Shrinkage(s).array())
                  .colwise()
@@ -225,30 +198,30 @@ Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
 }
 
 double Likelihood::LogLikelihood(double q, int s) const {
-  const double n = rows_;
-  return -0.5 * n * std::log(std::max(q, 0.0) / n + floor_s_ * floor_s_) - 0.5 * surfaces_[s].log_determinant;
+  const double n = rows();
+  return -0.5 * n * std::log(std::max(q, 0.0) / n + floor_ * floor_) - 0.5 * hypotheses_[s].log_determinant;
 }
 
 double Likelihood::Sigma(double q, int parameters) const {
-  return std::sqrt(std::max(q, 0.0) / std::max(rows_ - parameters, 1) + floor_s_ * floor_s_);
+  return std::sqrt(std::max(q, 0.0) / std::max(rows() - parameters, 1) + floor_ * floor_);
 }
 
 double Likelihood::LogPrior(int s) const {
-  const int others = static_cast<int>(surfaces_.size()) - 1;
+  const int others = static_cast<int>(hypotheses_.size()) - 1;
   if (others == 0) return 0;
   return s == 0 ? std::log(0.5) : std::log(0.5 / others);
 }
 
 Eigen::VectorXd Likelihood::FieldMean(const Columns& r, int s) const {
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(rows_);
-  const int l = surfaces_[s].length_index;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(rows());
+  const int l = hypotheses_[s].length_index;
   if (l < 0) return mean;
   const Eigen::VectorXd weights = Shrinkage(s).cwiseProduct(r.projected[l].col(0));
   int next = 0;
-  for (size_t object = 0; object < bases_[l].directions.size(); ++object) {
-    const Eigen::MatrixXd& directions = bases_[l].directions[object];
+  for (size_t group = 0; group < bases_[l].directions.size(); ++group) {
+    const Eigen::MatrixXd& directions = bases_[l].directions[group];
     if (directions.cols() == 0) continue;
-    mean.segment(object_row_[object], directions.rows()) =
+    mean.segment(group_rows_[group], directions.rows()) =
         directions * weights.segment(next, directions.cols());
     next += static_cast<int>(directions.cols());
   }

@@ -1,13 +1,13 @@
 // The one likelihood that every explanation is judged by: residuals are what the effects leave, plus a smooth
-// error of each object's surface, plus noise.
+// error of each group's surface, plus noise.
 //
-//   r = J theta + B h + e,   e ~ N(0, sigma^2 I),   h ~ GP(0, a^2 Matern-5/2(distance / length)) an object
+//   r = J theta + B h + e,   e ~ N(0, sigma^2 I),   h ~ GP(0, a^2 Matern-5/2(distance / length)) per group
 //
-// B turns a bump h along the normal into contact time: -slope / cos(incidence). The field always takes part,
-// so that the bumps of a bad print are not sold as physics (DIAGNOSIS: BIC alone claims an effect in up to 80
-// % of such sets). Its amplitude and length are not estimated but averaged over a grid; sigma is profiled.
-// With the field integrated out, everything is a function of inner products, so a candidate costs no pass
-// over the data.
+// B turns a bump h along the normal into rows (SmoothErrorGeometry). The field always takes part, so that the
+// bumps of a bad print are not sold as physics: without it, BIC claimed an effect in up to 80 % of sets that had
+// bumps and nothing else. Its amplitude and length are not estimated but averaged over a grid of hypotheses;
+// sigma is profiled. With the field integrated out, everything is a function of inner products, so a candidate
+// costs no pass over the data.
 #pragma once
 
 #include <vector>
@@ -15,30 +15,32 @@
 #include <Eigen/Core>
 
 #include "server/base/thread_pool.h"
-#include "server/diagnosis/touches/contrasts.h"
-#include "server/diagnosis/touches/prediction.h"
+#include "server/diagnosis/inference/smooth_error.h"
 
 namespace touchstone {
 
+// One hypothesis about the smooth error.
+struct SurfaceErrorHypothesis {
+  double length_m = 0;              // correlation length
+  double amplitude_over_sigma = 0;  // bumps in m over noise in the unit of the rows
+  double log_determinant = 0;       // of the rows' covariance over sigma^2
+  double effective_dof = 0;         // degrees of freedom that the field takes up
+  int length_index = -1;            // -1: no smooth error
+};
+
 class Likelihood {
  public:
-  // `details` of the nominal model: where the contacts are. `field` false: no surface error (large sets).
-  // `floor_s`: what the simulation itself may be wrong by; keeps data without noise from proving anything.
-  Likelihood(const Observations& observations, const Contrasts& contrasts, const Prediction& details,
-             bool field, double floor_s, ThreadPool* pool);
+  // `group_rows`: first row of each group, then the number of rows. `geometry` null: no smooth error (large
+  // sets). `floor`: what the simulation itself may be wrong by, in the unit of the rows; keeps data without
+  // noise from proving anything.
+  Likelihood(std::vector<int> group_rows, const SmoothErrorGeometry* geometry, double floor,
+             ThreadPool* pool);
 
-  // One hypothesis about the surface error; the first is that there is none.
-  struct Surface {
-    double length_m = 0;
-    double ratio_m_s = 0;  // amplitude over sigma
-    double log_determinant = 0;
-    double degrees = 0;  // of freedom that the field takes up
-    int length_index = -1;
-  };
-  const std::vector<Surface>& surfaces() const { return surfaces_; }
-  int rows() const { return rows_; }
+  // The first is that there is no smooth error.
+  const std::vector<SurfaceErrorHypothesis>& hypotheses() const { return hypotheses_; }
+  int rows() const { return group_rows_.back(); }
 
-  // Columns of contrasts (the residual, derivatives), prepared for any hypothesis.
+  // Columns of rows (the residual, derivatives), prepared for any hypothesis.
   struct Columns {
     Eigen::MatrixXd values;                  // rows x columns
     std::vector<Eigen::MatrixXd> projected;  // by length: onto the field's directions
@@ -56,7 +58,7 @@ class Likelihood {
 
   // -(N/2) log(Q/N + floor^2) - (1/2) log det, for a quadratic form Q.
   double LogLikelihood(double q, int s) const;
-  double Sigma(double q, int parameters) const;  // seconds
+  double Sigma(double q, int parameters) const;  // in the unit of the rows
   // The prior weight of hypothesis s, in nats: half for "none", the rest even.
   double LogPrior(int s) const;
 
@@ -65,16 +67,16 @@ class Likelihood {
 
  private:
   struct Basis {                              // of one length
-    std::vector<Eigen::MatrixXd> directions;  // an object: its rows x m, orthogonal columns
-    Eigen::VectorXd energies;                 // all objects' columns, squared norms
+    std::vector<Eigen::MatrixXd> directions;  // per group: its rows x m, orthogonal columns
+    Eigen::VectorXd energies;                 // all groups' columns, squared norms
   };
-  Eigen::VectorXd Shrinkage(int s) const;  // ratio^2 / (1 + ratio^2 energy), one a direction
+  void MakeBases(const SmoothErrorGeometry& geometry, const std::vector<double>& length_m, ThreadPool* pool);
+  Eigen::VectorXd Shrinkage(int s) const;  // ratio^2 / (1 + ratio^2 energy), one per direction
 
-  int rows_;
-  double floor_s_;
-  std::vector<int> object_row_;
+  std::vector<int> group_rows_;
+  double floor_;
   std::vector<Basis> bases_;
-  std::vector<Surface> surfaces_;
+  std::vector<SurfaceErrorHypothesis> hypotheses_;
 };
 
 }  // namespace touchstone

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
 
 #include "server/diagnosis/inference/noise_likelihood.h"
 
 namespace touchstone {
 namespace {
 
-constexpr int kMaxTouches = 1500;           // that a shape is judged on
+constexpr int kMaxGroups = 1500;            // that a shape is judged on
 constexpr double kEnterNats = 10;           // gain in log likelihood that a further noise parameter needs
 constexpr double kKurtosisSigmas = 4;       // of the sample's excess kurtosis before tails are looked at
 constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
@@ -18,7 +17,7 @@ constexpr double kMinTick = 20e-6;          // s
 constexpr double kMaxSlope = 10;
 
 // The maximum of f on [low, high] by golden section.
-double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* most) {
+double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* max) {
   const double golden = 0.5 * (std::sqrt(5.0) - 1);
   double a = high - golden * (high - low), b = low + golden * (high - low);
   double fa = f(a), fb = f(b);
@@ -28,7 +27,7 @@ double Maximise(const std::function<double(double)>& f, double low, double high,
     else
       low = a, a = b, fa = fb, b = low + golden * (high - low), fb = f(b);
   }
-  *most = std::max(fa, fb);
+  *max = std::max(fa, fb);
   return fa > fb ? a : b;
 }
 
@@ -38,38 +37,20 @@ double CurvatureError(const std::function<double(double)>& f, double at, double 
   return bend < 0 ? step / std::sqrt(-bend) : 0;
 }
 
-std::vector<NoisyTouch> Collect(const Observations& o, const std::vector<double>& residuals,
-                                const std::vector<double>& tangents) {
-  std::vector<NoisyTouch> all;
-  for (int k = 0; k < o.size(); ++k) {
-    if (!o.used[k]) continue;
-    NoisyTouch touch;
-    touch.k = k;
-    for (int i = 0; i < o.fingers; ++i) {
-      const size_t e = static_cast<size_t>(k) * o.fingers + i;
-      if (std::isnan(residuals[e]) || std::isnan(tangents[e])) continue;
-      touch.residual_s.push_back(residuals[e]);
-      touch.tangent.push_back(std::min(tangents[e], 10.0));
-    }
-    if (touch.residual_s.size() >= 2) all.push_back(std::move(touch));
-  }
-  return all;
-}
-
-std::vector<NoisyTouch> Thinned(const std::vector<NoisyTouch>& all) {
-  if (static_cast<int>(all.size()) <= kMaxTouches) return all;
-  std::vector<NoisyTouch> part;
-  for (int j = 0; j < kMaxTouches; ++j) part.push_back(all[all.size() * j / kMaxTouches]);
+std::vector<ReadingGroup> Thinned(const std::vector<ReadingGroup>& all) {
+  if (static_cast<int>(all.size()) <= kMaxGroups) return all;
+  std::vector<ReadingGroup> part;
+  for (int j = 0; j < kMaxGroups; ++j) part.push_back(all[all.size() * j / kMaxGroups]);
   return part;
 }
 
 // Excess kurtosis of residuals in units of their own scale.
-bool TailsLookHeavy(const std::vector<NoisyTouch>& touches, const NoiseModel& model) {
+bool TailsLookHeavy(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
   double second = 0, fourth = 0, count = 0;
-  for (const NoisyTouch& touch : touches) {
-    const double n = static_cast<double>(touch.residual_s.size());
-    for (size_t i = 0; i < touch.residual_s.size(); ++i) {
-      const double x = touch.residual_s[i] / std::sqrt(1 - 1 / n) / (1 + model.slope * touch.tangent[i]);
+  for (const ReadingGroup& group : groups) {
+    const double n = static_cast<double>(group.residual_s.size());
+    for (size_t i = 0; i < group.residual_s.size(); ++i) {
+      const double x = group.residual_s[i] / std::sqrt(1 - 1 / n) / (1 + model.slope * group.growth[i]);
       second += x * x, fourth += x * x * x * x, count += 1;
     }
   }
@@ -77,23 +58,28 @@ bool TailsLookHeavy(const std::vector<NoisyTouch>& touches, const NoiseModel& mo
   return fourth * count / (second * second) - 3 > kKurtosisSigmas * std::sqrt(24 / count);
 }
 
-// Times of a polling loop differ by whole multiples of its interval.
-NoiseEstimate FindPolling(const Observations& o) {
-  std::vector<double> differences;
-  for (int k = 0; k < o.size() && differences.size() < 6000; ++k) {
-    if (!o.used[k]) continue;
-    double least = INFINITY;
-    for (int i = 0; i < o.fingers; ++i) {
-      const double time = o.time_s[static_cast<size_t>(k) * o.fingers + i];
-      if (time < least) least = time;
+// Times of a polling loop differ by whole multiples of its interval: the interval that `differences` (sorted) fit,
+// near `interval`; 0 if they do not.
+double RefinedTick(const std::vector<double>& differences, double interval) {
+  // Refined over ever larger differences, so that the count of ticks stays certain.
+  for (size_t known = 1; known < differences.size(); known *= 2) {
+    double sum_nd = 0, sum_nn = 0;
+    for (size_t j = 0; j < std::min(2 * known, differences.size()); ++j) {
+      const double ticks = std::round(differences[j] / interval);
+      sum_nd += ticks * differences[j], sum_nn += ticks * ticks;
     }
-    for (int i = 0; i < o.fingers; ++i) {
-      const double time = o.time_s[static_cast<size_t>(k) * o.fingers + i];
-      if (time > least) differences.push_back(time - least);
-    }
+    if (!(sum_nn > 0)) return 0;
+    interval = sum_nd / sum_nn;
   }
-  NoiseEstimate none;
-  if (differences.size() < 20) return none;
+  size_t on_tick = 0;
+  for (const double difference : differences)
+    on_tick += std::abs(difference - std::round(difference / interval) * interval) <= kTickTolerance;
+  return on_tick < 0.99 * differences.size() ? 0 : interval;
+}
+
+NoiseEstimate FindPolling(std::vector<double> differences) {
+  NoiseEstimate found;
+  if (differences.size() < 20) return found;
   std::sort(differences.begin(), differences.end());
   // The smallest step between different values is the interval, or a small multiple of it.
   double min_gap = differences[0];
@@ -102,26 +88,9 @@ NoiseEstimate FindPolling(const Observations& o) {
     if (gap > 2 * kTickTolerance) min_gap = std::min(min_gap, gap);
   }
   for (int divisor = 1; divisor <= 3; ++divisor) {
-    double interval = min_gap / divisor;
-    if (interval < kMinTick) break;
-    // Refined over ever larger differences, so that the count of ticks stays certain.
-    bool fits = true;
-    for (size_t known = 1; known < differences.size() && fits; known *= 2) {
-      double sum_nd = 0, sum_nn = 0;
-      for (size_t j = 0; j < std::min(2 * known, differences.size()); ++j) {
-        const double ticks = std::round(differences[j] / interval);
-        sum_nd += ticks * differences[j], sum_nn += ticks * ticks;
-      }
-      if (!(sum_nn > 0))
-        fits = false;
-      else
-        interval = sum_nd / sum_nn;
-    }
-    size_t on_tick = 0;
-    for (const double difference : differences)
-      on_tick += std::abs(difference - std::round(difference / interval) * interval) <= kTickTolerance;
-    if (!fits || on_tick < 0.99 * differences.size()) continue;
-    NoiseEstimate found;
+    if (min_gap / divisor < kMinTick) break;
+    const double interval = RefinedTick(differences, min_gap / divisor);
+    if (interval == 0) continue;
     found.value = interval;
     found.std_error =
         0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
@@ -130,39 +99,24 @@ NoiseEstimate FindPolling(const Observations& o) {
     found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
     return found;
   }
-  return none;
+  return found;
 }
 
-// Contacts of one finger at one pose: how many were expected, how many silent.
-struct Repeats {
-  double all = 0, silent = 0;
-  bool AlwaysSilent() const { return all > 1 && silent == all; }
-};
-
-// A finger that is silent in every repeat of a pose is out of reach there (the stroke ended, a sensor cannot
-// see it); that is no chance, unless chance alone would bring about as many such fingers.
-NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expected) {
-  std::map<std::pair<int, int>, Repeats> groups;  // by pose and finger
-  for (int k = 0; k < o.size(); ++k)
-    for (int i = 0; i < o.fingers; ++i) {
-      const size_t e = static_cast<size_t>(k) * o.fingers + i;
-      if (!expected[e]) continue;
-      Repeats& group = groups[{o.pose[k], i}];
-      group.all += 1;
-      group.silent += std::isnan(o.time_s[e]);
-    }
+// A sensor that is silent in every repeat is out of reach there (the stroke ended, a finger cannot meet the object);
+// that is no chance, unless chance alone would bring about as many such groups.
+NoiseEstimate FindMissed(const std::vector<RepeatedReading>& repeated) {
   double silent = 0, all = 0, always = 0;
-  for (const auto& [key, group] : groups) {
-    always += group.AlwaysSilent();
-    if (!group.AlwaysSilent()) silent += group.silent, all += group.all;
+  for (const RepeatedReading& reading : repeated) {
+    always += reading.AlwaysSilent();
+    if (!reading.AlwaysSilent()) silent += reading.silent, all += reading.expected;
   }
   const double sometimes = all > 0 ? silent / all : 0;
   double by_chance = 0;
-  for (const auto& [key, group] : groups)
-    if (group.all > 1) by_chance += std::pow(sometimes, group.all);
+  for (const RepeatedReading& reading : repeated)
+    if (reading.expected > 1) by_chance += std::pow(sometimes, reading.expected);
   if (always <= by_chance + 3 * std::sqrt(by_chance) + 0.5)
-    for (const auto& [key, group] : groups)
-      if (group.AlwaysSilent()) silent += group.silent, all += group.all;
+    for (const RepeatedReading& reading : repeated)
+      if (reading.AlwaysSilent()) silent += reading.silent, all += reading.expected;
 
   NoiseEstimate found;
   if (silent < 3 || silent < 0.002 * all) return found;
@@ -172,104 +126,158 @@ NoiseEstimate FindMissed(const Observations& o, const std::vector<char>& expecte
   return found;
 }
 
-}  // namespace
+// The kind of noise that residuals have, from the simplest on: each further parameter must earn its likelihood.
+class NoiseSearch {
+ public:
+  NoiseSearch(const std::vector<ReadingGroup>& all, NoiseFindings* found)
+      : all_(all), groups_(Thinned(all)), found_(found) {
+    best_log_ = ProfileSigma(groups_, &best_);
+  }
 
-NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residuals,
-                        const std::vector<double>& tan_incidence, const std::vector<char>& expected,
-                        double taken) {
-  NoiseFindings found;
-  found.poll_interval_s = FindPolling(o);
-  found.missed_probability = FindMissed(o, expected);
-  const std::vector<NoisyTouch> all = Collect(o, residuals, tan_incidence);
-  if (all.empty()) return found;
-  const std::vector<NoisyTouch> touches = Thinned(all);
+  const NoiseModel& best() const { return best_; }
 
-  NoiseModel best;
-  double best_log = ProfileSigma(touches, &best);
-  double degrees = 0;
-  for (const NoisyTouch& touch : all) degrees += static_cast<double>(touch.residual_s.size()) - 1;
-
-  // Does it grow on slopes?
-  const auto with_slope = [&](NoiseModel from, double* log_likelihood) {
-    NoiseModel sloped = from;
+  // Does it grow with the covariate?
+  void TryGrowth() {
+    double log_likelihood = -INFINITY;
+    NoiseModel sloped = best_;
+    const NoiseModel from = best_;
     const auto at = [&](double log_slope) {
       sloped.slope = std::exp(log_slope);
       sloped.sigma_s = from.sigma_s;
-      return ProfileSigma(touches, &sloped);
+      return ProfileSigma(groups_, &sloped);
     };
-    const int steps = from.shape == NoiseShape::kGaussian ? 20 : 8;
-    const double log_slope = Maximise(at, std::log(0.02), std::log(kMaxSlope), steps, log_likelihood);
-    at(log_slope);
-    return sloped;
-  };
-  double sloped_log = -INFINITY;
-  const NoiseModel sloped = with_slope(best, &sloped_log);
-  double slope_gain = sloped_log - best_log;
-  if (slope_gain >= kEnterNats) best = sloped, best_log = sloped_log;
+    at(Maximise(at, std::log(0.02), std::log(kMaxSlope), 20, &log_likelihood));
+    slope_gain_ = log_likelihood - best_log_;
+    if (slope_gain_ >= kEnterNats) best_ = sloped, best_log_ = log_likelihood;
+  }
 
   // Heavy tails, or a few outliers among Gaussian noise?
-  if (TailsLookHeavy(touches, best)) {
-    NoiseModel student = best;
-    student.shape = NoiseShape::kStudent;
-    const auto student_at = [&](double log_degrees) {
-      student.degrees = std::exp(log_degrees);
-      student.sigma_s = best.sigma_s;
-      return ProfileSigma(touches, &student);
-    };
-    double student_log = -INFINITY;
-    const double log_degrees = Maximise(student_at, std::log(1.2), std::log(60.0), 9, &student_log);
+  void TryTails() {
+    if (!TailsLookHeavy(groups_, best_)) return;
+    const double before = best_log_;
+    const StudentFit student = FitStudent(best_);
     NoiseModel mixture;
-    double mixture_log = -INFINITY;
-    for (const double width : {6.0, 15.0, 40.0, 100.0})
-      for (const double share : {0.002, 0.007, 0.02, 0.05}) {
-        NoiseModel at = best;
-        at.shape = NoiseShape::kMixture;
-        at.width = width, at.share = share;
-        const double value = ProfileSigma(touches, &at);
-        if (value > mixture_log) mixture_log = value, mixture = at;
-      }
-    const double before = best_log;
-    if (student_log - before >= kEnterNats && student_log >= mixture_log - 3) {
-      const double bend = CurvatureError(student_at, log_degrees, 0.1);
-      student_at(log_degrees);
-      found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - before};
-      best = student, best_log = student_log;
+    const double mixture_log = FitMixture(&mixture);
+    if (student.log_likelihood - before >= kEnterNats && student.log_likelihood >= mixture_log - 3) {
+      found_->degrees_of_freedom = {student.model.degrees_of_freedom, student.std_error,
+                                    student.log_likelihood - before};
+      best_ = student.model, best_log_ = student.log_likelihood;
     } else if (mixture_log - before >= kEnterNats) {
-      for (const NoisyTouch& touch : all)
-        if (OutlierProbability(touch, mixture) > 0.5) found.outliers.push_back(touch.k);
-      best = mixture, best_log = mixture_log;
+      for (const ReadingGroup& group : all_)
+        if (OutlierProbability(group, mixture) > 0.5) found_->outliers.push_back(group.index);
+      best_ = mixture, best_log_ = mixture_log;
     }
-    // Tails may have looked like a slope.
-    if (slope_gain >= kEnterNats && best.shape != NoiseShape::kGaussian) {
-      NoiseModel level = best;
-      level.slope = 0;
-      slope_gain = best_log - ProfileSigma(touches, &level);
-      if (slope_gain < kEnterNats) {
-        best = level;
-        if (best.shape == NoiseShape::kStudent) {
-          student = level;
-          double level_log = -INFINITY;
-          const double log_level = Maximise(student_at, std::log(1.2), std::log(60.0), 9, &level_log);
-          const double bend = CurvatureError(student_at, log_level, 0.1);
-          student_at(log_level);
-          found.degrees_of_freedom = {student.degrees, student.degrees * bend, student_log - before};
-          best = student;
-        }
-      }
-    }
+    if (slope_gain_ >= kEnterNats && best_.shape != NoiseShape::kGaussian) DropSlopeThatTailsExplain();
   }
-  if (slope_gain >= kEnterNats) {
-    NoiseModel at = best;
+
+  void DescribeGrowth() {
+    if (slope_gain_ < kEnterNats) return;
+    NoiseModel at = best_;
     const auto by_slope = [&](double slope) {
       at.slope = slope;
-      at.sigma_s = best.sigma_s;
-      return ProfileSigma(touches, &at);
+      at.sigma_s = best_.sigma_s;
+      return ProfileSigma(groups_, &at);
     };
-    found.slope = {best.slope, CurvatureError(by_slope, best.slope, 0.05 * best.slope), slope_gain};
+    found_->slope = {best_.slope, CurvatureError(by_slope, best_.slope, 0.05 * best_.slope), slope_gain_};
   }
+
+ private:
+  struct StudentFit {
+    NoiseModel model;
+    double log_likelihood = -INFINITY;
+    double std_error = 0;  // of the degrees of freedom
+  };
+  StudentFit FitStudent(const NoiseModel& from) const {
+    StudentFit fit;
+    fit.model = from;
+    fit.model.shape = NoiseShape::kStudent;
+    const auto at = [&](double log_dof) {
+      fit.model.degrees_of_freedom = std::exp(log_dof);
+      fit.model.sigma_s = from.sigma_s;
+      return ProfileSigma(groups_, &fit.model);
+    };
+    const double log_dof = Maximise(at, std::log(1.2), std::log(60.0), 9, &fit.log_likelihood);
+    const double relative_error = CurvatureError(at, log_dof, 0.1);
+    at(log_dof);
+    fit.std_error = fit.model.degrees_of_freedom * relative_error;
+    return fit;
+  }
+
+  // The best mixture of noise and outliers on a grid; returns its log likelihood.
+  double FitMixture(NoiseModel* mixture) const {
+    double best = -INFINITY;
+    for (const double width : {6.0, 15.0, 40.0, 100.0})
+      for (const double share : {0.002, 0.007, 0.02, 0.05}) {
+        NoiseModel at = best_;
+        at.shape = NoiseShape::kMixture;
+        at.width = width, at.share = share;
+        const double value = ProfileSigma(groups_, &at);
+        if (value > best) best = value, *mixture = at;
+      }
+    return best;
+  }
+
+  // Tails may have looked like a slope.
+  void DropSlopeThatTailsExplain() {
+    NoiseModel level = best_;
+    level.slope = 0;
+    slope_gain_ = best_log_ - ProfileSigma(groups_, &level);
+    if (slope_gain_ >= kEnterNats) return;
+    best_ = level;
+    if (best_.shape != NoiseShape::kStudent) return;
+    const StudentFit student = FitStudent(level);
+    found_->degrees_of_freedom.value = student.model.degrees_of_freedom;
+    found_->degrees_of_freedom.std_error = student.std_error;
+    best_ = student.model;
+  }
+
+  const std::vector<ReadingGroup>& all_;
+  std::vector<ReadingGroup> groups_;
+  NoiseFindings* found_;
+  NoiseModel best_;
+  double best_log_ = 0;
+  double slope_gain_ = 0;
+};
+
+// What a group should count for where the noise is not the same everywhere.
+std::vector<double> WeightsOf(const std::vector<ReadingGroup>& all, const NoiseModel& model,
+                              double degrees_of_freedom, int size) {
+  std::vector<double> weights(size, 1.0);
+  for (const ReadingGroup& group : all) {
+    double squares = 0, variance = 0;
+    const double n = static_cast<double>(group.residual_s.size());
+    for (size_t i = 0; i < group.residual_s.size(); ++i) {
+      const double s = model.sigma_s * (1 + model.slope * group.growth[i]);
+      squares += group.residual_s[i] * group.residual_s[i] / (s * s);
+      variance += s * s / n;
+    }
+    double weight = model.sigma_s * model.sigma_s / variance;
+    if (std::isfinite(degrees_of_freedom))
+      weight *= (degrees_of_freedom + n - 1) / (degrees_of_freedom + squares);
+    weights[group.index] = weight;
+  }
+  return weights;
+}
+
+}  // namespace
+
+NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof) {
+  NoiseFindings found;
+  found.poll_interval_s = FindPolling(sample.delays_s);
+  found.missed_probability = FindMissed(sample.repeated);
+  if (sample.groups.empty()) return found;
+  NoiseSearch search(sample.groups, &found);
+  search.TryGrowth();
+  search.TryTails();
+  search.DescribeGrowth();
+
   // What the fit has followed of the noise is given back.
-  const double left = std::max(degrees - taken, 1.0);
-  best.sigma_s *= std::sqrt(degrees / left);
+  NoiseModel best = search.best();
+  double degrees_of_freedom = 0;
+  for (const ReadingGroup& group : sample.groups)
+    degrees_of_freedom += static_cast<double>(group.residual_s.size()) - 1;
+  const double left = std::max(degrees_of_freedom - effective_dof, 1.0);
+  best.sigma_s *= std::sqrt(degrees_of_freedom / left);
   found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * left), 0};
   // Slope and tails share what is known of the scale.
   if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;
@@ -282,24 +290,10 @@ NoiseFindings FindNoise(const Observations& o, const std::vector<double>& residu
     found.sigma_s.value = variance > 0 ? std::sqrt(variance) : 0;
     if (found.sigma_s.value < 0.1 * tick) found.sigma_s.value = 0;
   }
-
-  // What a touch should count for where the noise is not the same everywhere.
-  if (found.degrees_of_freedom.gain_nats > 0 || found.slope.gain_nats > 0) {
-    found.weights.assign(o.size(), 1.0);
-    const double nu = found.degrees_of_freedom.gain_nats > 0 ? best.degrees : INFINITY;
-    for (const NoisyTouch& touch : all) {
-      double squares = 0, variance = 0;
-      const double n = static_cast<double>(touch.residual_s.size());
-      for (size_t i = 0; i < touch.residual_s.size(); ++i) {
-        const double s = best.sigma_s * (1 + best.slope * touch.tangent[i]);
-        squares += touch.residual_s[i] * touch.residual_s[i] / (s * s);
-        variance += s * s / n;
-      }
-      double weight = best.sigma_s * best.sigma_s / variance;
-      if (std::isfinite(nu)) weight *= (nu + n - 1) / (nu + squares);
-      found.weights[touch.k] = weight;
-    }
-  }
+  const bool heavy_tails = found.degrees_of_freedom.gain_nats > 0;
+  if (heavy_tails || found.slope.gain_nats > 0)
+    found.weights =
+        WeightsOf(sample.groups, best, heavy_tails ? best.degrees_of_freedom : INFINITY, sample.size);
   return found;
 }
 

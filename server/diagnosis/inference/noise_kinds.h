@@ -1,14 +1,27 @@
-// What kind of noise the residuals have: how large, whether it grows on slopes, whether its tails are heavy,
-// whether times sit on the ticks of a polling loop, whether contacts are missed. Judged by the likelihood of
-// what the best explanation leaves, not by means.
+// What kind of noise the residuals have: how large, whether it grows with a covariate, whether its tails are heavy,
+// whether times sit on the ticks of a polling loop, whether readings are missing. Judged by the likelihood of what
+// the best explanation leaves, not by means.
 #pragma once
 
-#include <string>
 #include <vector>
 
-#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/inference/noise_likelihood.h"
 
 namespace touchstone {
+
+// Readings of one sensor that should have been alike.
+struct RepeatedReading {
+  double expected = 0, silent = 0;  // counts
+  bool AlwaysSilent() const { return expected > 1 && silent == expected; }
+};
+
+// What the noise is found in.
+struct NoiseSample {
+  std::vector<ReadingGroup> groups;       // residuals, less any smooth error
+  std::vector<double> delays_s;           // readings after the first of their group, s, as they were recorded
+  std::vector<RepeatedReading> repeated;  // which of the expected readings are missing
+  int size = 0;                           // one more than the largest index that a group may have
+};
 
 struct NoiseEstimate {
   double value = 0;
@@ -17,21 +30,16 @@ struct NoiseEstimate {
 };
 
 struct NoiseFindings {
-  NoiseEstimate sigma_s;             // of the noise on one finger's time (scale, where tails are heavy)
-  NoiseEstimate slope;               // incidence_noise
-  NoiseEstimate degrees_of_freedom;  // heavy_tail_noise
-  NoiseEstimate poll_interval_s;     // poll_interval
-  NoiseEstimate missed_probability;  // missed_contact
-  std::vector<int> outliers;         // touches with a finger that no noise of the others explains
-  std::vector<double> weights;       // a touch: what it should count for in a fit; empty: all the same
+  NoiseEstimate sigma_s;             // of the noise of one reading (scale, where tails are heavy)
+  NoiseEstimate slope;               // growth: EffectRole::kNoiseGrowth
+  NoiseEstimate degrees_of_freedom;  // EffectRole::kNoiseTails
+  NoiseEstimate poll_interval_s;     // EffectRole::kQuantisation
+  NoiseEstimate missed_probability;  // EffectRole::kDropout
+  std::vector<int> outliers;         // indices of groups with a reading that no noise of the others explains
+  std::vector<double> weights;       // by index: what a group should count for in a fit; empty: all the same
 };
 
-// residuals: what is left, less any surface error; tan_incidence: of every finger; both [k * fingers + i],
-// NaN where a finger takes no part. expected: whether the model expects the finger to report. taken: degrees
-// of freedom that the fit and the surface error have used up. Only touches that are used count; large sets
-// are thinned.
-NoiseFindings FindNoise(const Observations& observations, const std::vector<double>& residuals,
-                        const std::vector<double>& tan_incidence, const std::vector<char>& expected,
-                        double taken);
+// `effective_dof`: degrees of freedom that the fit and the smooth error have used up. Large sets are thinned.
+NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof);
 
 }  // namespace touchstone

@@ -13,14 +13,14 @@ constexpr int kNodes = 20;     // a finger, of the integral over the common shif
 constexpr int kSearches = 18;  // golden section steps
 const double kLogTwoPi = std::log(2 * kPi);
 
-double GaussianTouch(const NoisyTouch& touch, const NoiseModel& model) {
+double LogGaussian(const ReadingGroup& group, const NoiseModel& model) {
   double weights = 0, first = 0, second = 0, logs = 0;
-  for (size_t i = 0; i < touch.residual_s.size(); ++i) {
-    const double s = model.sigma_s * (1 + model.slope * touch.tangent[i]);
+  for (size_t i = 0; i < group.residual_s.size(); ++i) {
+    const double s = model.sigma_s * (1 + model.slope * group.growth[i]);
     const double w = 1 / (s * s);
     weights += w;
-    first += w * touch.residual_s[i];
-    second += w * touch.residual_s[i] * touch.residual_s[i];
+    first += w * group.residual_s[i];
+    second += w * group.residual_s[i] * group.residual_s[i];
     logs -= 0.5 * kLogTwoPi + std::log(s);
   }
   return logs + 0.5 * (kLogTwoPi - std::log(weights)) - 0.5 * (second - first * first / weights);
@@ -30,13 +30,14 @@ double GaussianTouch(const NoisyTouch& touch, const NoiseModel& model) {
 class Density {
  public:
   explicit Density(const NoiseModel& model) : model_(model) {
-    const double nu = model.degrees;
+    const double nu = model.degrees_of_freedom;
     if (model.shape == NoiseShape::kStudent)
       log_constant_ = std::lgamma((nu + 1) / 2) - std::lgamma(nu / 2) - 0.5 * std::log(nu * kPi);
   }
   double operator()(double x) const {
     if (model_.shape == NoiseShape::kStudent)
-      return std::exp(log_constant_ - 0.5 * (model_.degrees + 1) * std::log1p(x * x / model_.degrees));
+      return std::exp(log_constant_ -
+                      0.5 * (model_.degrees_of_freedom + 1) * std::log1p(x * x / model_.degrees_of_freedom));
     const double narrow = std::exp(-0.5 * x * x);
     if (model_.shape == NoiseShape::kGaussian) return narrow / std::sqrt(2 * kPi);
     const double y = x / model_.width;
@@ -51,21 +52,21 @@ class Density {
 
 // Importance quadrature: shifts are placed by Cauchy distributions round every finger, so that no mode of the
 // integrand is missed, however far an outlier lies.
-double IntegratedTouch(const NoisyTouch& touch, const NoiseModel& model, const Density& density,
-                       const std::array<double, kNodes>& tangents) {
-  const int n = static_cast<int>(touch.residual_s.size());
+double LogIntegrated(const ReadingGroup& group, const NoiseModel& model, const Density& density,
+                     const std::array<double, kNodes>& tangents) {
+  const int n = static_cast<int>(group.residual_s.size());
   double scale[16], logs = 0;
   for (int i = 0; i < n; ++i) {
-    scale[i] = model.sigma_s * (1 + model.slope * touch.tangent[i]);
+    scale[i] = model.sigma_s * (1 + model.slope * group.growth[i]);
     logs -= std::log(scale[i]);
   }
   double sum = 0;
   for (int j = 0; j < n; ++j) {
     for (const double tangent : tangents) {
-      const double shift = touch.residual_s[j] + scale[j] * tangent;
+      const double shift = group.residual_s[j] + scale[j] * tangent;
       double product = 1, proposal = 0;
       for (int i = 0; i < n; ++i) {
-        const double x = (touch.residual_s[i] - shift) / scale[i];
+        const double x = (group.residual_s[i] - shift) / scale[i];
         product *= density(x);
         proposal += 1 / (kPi * scale[i] * (1 + x * x));
       }
@@ -77,43 +78,43 @@ double IntegratedTouch(const NoisyTouch& touch, const NoiseModel& model, const D
 
 }  // namespace
 
-double NoiseLogLikelihood(const std::vector<NoisyTouch>& touches, const NoiseModel& model) {
+double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
   double sum = 0;
   if (model.shape == NoiseShape::kGaussian) {
-    for (const NoisyTouch& touch : touches) sum += GaussianTouch(touch, model);
+    for (const ReadingGroup& group : groups) sum += LogGaussian(group, model);
     return sum;
   }
   const Density density(model);
   std::array<double, kNodes> tangents;
   for (int m = 0; m < kNodes; ++m) tangents[m] = std::tan(kPi * ((m + 0.5) / kNodes - 0.5));
-  for (const NoisyTouch& touch : touches) sum += IntegratedTouch(touch, model, density, tangents);
+  for (const ReadingGroup& group : groups) sum += LogIntegrated(group, model, density, tangents);
   return sum;
 }
 
-double ProfileSigma(const std::vector<NoisyTouch>& touches, NoiseModel* model) {
+double ProfileSigma(const std::vector<ReadingGroup>& groups, NoiseModel* model) {
   if (model->shape == NoiseShape::kGaussian) {
     // Closed form: the quadratic form over its degrees of freedom.
     double squares = 0, degrees = 0;
-    for (const NoisyTouch& touch : touches) {
+    for (const ReadingGroup& group : groups) {
       double weights = 0, first = 0, second = 0;
-      for (size_t i = 0; i < touch.residual_s.size(); ++i) {
-        const double s = 1 + model->slope * touch.tangent[i];
+      for (size_t i = 0; i < group.residual_s.size(); ++i) {
+        const double s = 1 + model->slope * group.growth[i];
         weights += 1 / (s * s);
-        first += touch.residual_s[i] / (s * s);
-        second += touch.residual_s[i] * touch.residual_s[i] / (s * s);
+        first += group.residual_s[i] / (s * s);
+        second += group.residual_s[i] * group.residual_s[i] / (s * s);
       }
       squares += second - first * first / weights;
-      degrees += static_cast<double>(touch.residual_s.size()) - 1;
+      degrees += static_cast<double>(group.residual_s.size()) - 1;
     }
     model->sigma_s = std::sqrt(std::max(squares / std::max(degrees, 1.0), 1e-24));
-    return NoiseLogLikelihood(touches, *model);
+    return NoiseLogLikelihood(groups, *model);
   }
   double low = std::log(model->sigma_s) - 1.5, high = std::log(model->sigma_s) + 0.5;
   const double golden = 0.5 * (std::sqrt(5.0) - 1);
   const auto value = [&](double log_sigma) {
     NoiseModel at = *model;
     at.sigma_s = std::exp(log_sigma);
-    return NoiseLogLikelihood(touches, at);
+    return NoiseLogLikelihood(groups, at);
   };
   double a = high - golden * (high - low), b = low + golden * (high - low);
   double fa = value(a), fb = value(b);
@@ -128,12 +129,12 @@ double ProfileSigma(const std::vector<NoisyTouch>& touches, NoiseModel* model) {
   return std::max(fa, fb);
 }
 
-double OutlierProbability(const NoisyTouch& touch, const NoiseModel& model) {
+double OutlierProbability(const ReadingGroup& group, const NoiseModel& model) {
   NoiseModel narrow = model;
   narrow.shape = NoiseShape::kGaussian;
-  const double n = static_cast<double>(touch.residual_s.size());
-  const double clean = NoiseLogLikelihood({touch}, narrow) + n * std::log(1 - model.share);
-  return 1 - std::min(1.0, std::exp(clean - NoiseLogLikelihood({touch}, model)));
+  const double n = static_cast<double>(group.residual_s.size());
+  const double clean = NoiseLogLikelihood({group}, narrow) + n * std::log(1 - model.share);
+  return 1 - std::min(1.0, std::exp(clean - NoiseLogLikelihood({group}, model)));
 }
 
 }  // namespace touchstone

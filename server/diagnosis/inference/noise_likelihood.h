@@ -1,5 +1,5 @@
-// Likelihood of residuals under kinds of noise that are independent from finger to finger. A touch's times
-// are known up to a common shift only, so the density is integrated over that shift:
+// Likelihood of residuals under kinds of noise that are independent from reading to reading. The readings of a group
+// (a touch) are known up to a common shift only, so the density is integrated over that shift:
 //   p(residuals) = integral over m of prod_i f((r_i - m) / s_i) / s_i
 #pragma once
 
@@ -7,11 +7,11 @@
 
 namespace touchstone {
 
-// What one touch contributes.
-struct NoisyTouch {
-  int k = 0;
+// Readings that share an unknown shift: the fingers of one touch that report.
+struct ReadingGroup {
+  int index = 0;  // of the touch
   std::vector<double> residual_s;
-  std::vector<double> tangent;  // of the incidence
+  std::vector<double> growth;  // what the noise may grow with: tan of the incidence
 };
 
 enum class NoiseShape { kGaussian, kStudent, kMixture };
@@ -19,18 +19,18 @@ enum class NoiseShape { kGaussian, kStudent, kMixture };
 struct NoiseModel {
   NoiseShape shape = NoiseShape::kGaussian;
   double sigma_s = 0;
-  double slope = 0;    // s_i = sigma (1 + slope tan(inc_i))
-  double degrees = 0;  // of freedom of Student's t
-  double share = 0;    // of outliers in the mixture,
-  double width = 0;    // and their sigma over the others'
+  double slope = 0;               // s_i = sigma (1 + slope growth_i)
+  double degrees_of_freedom = 0;  // of Student's t
+  double share = 0;               // of outliers in the mixture,
+  double width = 0;               // and their sigma over the others'
 };
 
-double NoiseLogLikelihood(const std::vector<NoisyTouch>& touches, const NoiseModel& model);
+double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model);
 
 // The same with the best sigma near model.sigma_s, which is set.
-double ProfileSigma(const std::vector<NoisyTouch>& touches, NoiseModel* model);
+double ProfileSigma(const std::vector<ReadingGroup>& groups, NoiseModel* model);
 
-// Probability that a finger of the touch is an outlier, under a mixture.
-double OutlierProbability(const NoisyTouch& touch, const NoiseModel& model);
+// Probability that a reading of the group is an outlier, under a mixture.
+double OutlierProbability(const ReadingGroup& group, const NoiseModel& model);
 
 }  // namespace touchstone

@@ -1,19 +1,17 @@
-// What a report says in sentences.
+// What a diagnosis says in sentences.
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/report/diagnosis.h"
 
 namespace touchstone {
 
-// Rows, objects, poses, repeats, speeds, what was left out and why.
-void DescribeData(const Observations& observations, v1::Report* report);
+// What limits the diagnosis: few objects, no repeats, few touches.
+std::vector<std::string> DataWarnings(const DataSummary& data);
 
-// What limits the report: few objects, no repeats, few touches.
-void AddWarnings(const Observations& observations, v1::Report* report);
-
-// One paragraph: how wrong, why, what to do. The numbers must stand in the report already.
-std::string Summary(const v1::Report& report);
+// One paragraph: how wrong, why, what to do.
+std::string Summarize(const Diagnosis& diagnosis);
 
 }  // namespace touchstone

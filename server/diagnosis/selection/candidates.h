@@ -1,4 +1,4 @@
-// What may be missing: the effects that a search tries, and what would tell those apart that fit alike.
+// What may be missing: the effects that a search tries, and what tells apart those that fit equally well.
 #pragma once
 
 #include <memory>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/diagnosis/input.h"
+#include "server/diagnosis/touches/observations.h"
 
 namespace touchstone {
 
@@ -13,13 +14,16 @@ struct Candidate {
   std::shared_ptr<const Effect> effect;
   bool per_object = false;
   bool of_user = false;  // from `also`
+  // Values of the effect's last free parameter from where a fit starts as well: where the response is not linear.
+  std::vector<double> further_starts = {};
 };
 
-// Every effect of the catalogue that changes expectations and that the model does not have yet, an object's
-// pose and scale also object by object, and the user's own.
-std::vector<Candidate> MakeCandidates(const DiagnosisInput& input);
+// Every effect of the catalogue that changes expectations and that the model does not have yet, some also object by
+// object, and the user's own. `searched`: the touches of the search.
+std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const Observations& searched);
 
-// The measurement or intervention that tells two or more effects apart, for people.
-std::string DecidedBy(const std::vector<std::string>& effects);
+// The measurement or intervention that tells two or more effects apart, for people. Effects declare it
+// (Effect::confounded_with); of several pairs the one of the effects that are named first counts.
+std::string DiscriminatingMeasurement(const std::vector<std::string>& effects);
 
 }  // namespace touchstone

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/diagnosis/selection/term_factors.h"
 #include "server/effects/formula.h"
 
@@ -20,12 +22,12 @@ constexpr double kTypicalTravelM = 0.2e-3;
 constexpr int kPeriods = 40;
 constexpr double kMinPeriodMm = 1.5, kMaxPeriodMm = 40;
 
-ParameterInfo Bounded(const std::string& name, Unit unit, double most) {
+ParameterInfo Bounded(const std::string& name, Unit unit, double bound) {
   ParameterInfo parameter;
   parameter.name = name;
   parameter.unit = unit;
-  parameter.lower = -most;
-  parameter.upper = most;
+  parameter.lower = -bound;
+  parameter.upper = bound;
   parameter.meaning = "fitted";
   return parameter;
 }
@@ -35,198 +37,258 @@ double BoundFor(double value) {
   return std::pow(10.0, std::ceil(std::log10(std::max(std::abs(value) * 3, 1e-9))));
 }
 
-class Scorer {
+// Gains of blocks of columns, one per block.
+struct TermScores {
+  std::vector<double> log_evidence, log_ratio;  // over the fit
+  Eigen::MatrixXd step;                         // width x blocks: best values
+};
+
+// Scores further columns against a fit, under every hypothesis of the surface: a term may take the surface's place.
+class TermScorer {
  public:
-  Scorer(const Experiment& experiment, const Fit& fit) : experiment_(experiment), fit_(fit) {
-    // Only hypotheses of the surface that the data do not rule out already, with or without a term: all of
-    // them; a term may take the surface's place.
-    const Likelihood& likelihood = *experiment.likelihood;
-    const int own = 1 + fit.model.size();
-    std::vector<int> members(own);
-    for (int i = 0; i < own; ++i) members[i] = i;
-    base_ = Judge(likelihood, Grams(likelihood, fit.columns), members, fit.model.coordinates(), fit.point);
+  TermScorer(const Experiment& experiment, const Fit& fit) : likelihood_(*experiment.likelihood), fit_(fit) {
+    std::vector<int> members(1 + fit.model.size());
+    std::iota(members.begin(), members.end(), 0);
+    base_log_ = ComputeLaplaceEvidence(likelihood_, Grams(likelihood_, fit.columns), members,
+                                       fit.model.parameters(), fit.point)
+                    .log_likelihood;
   }
 
-  // Blocks of `width` columns: log likelihood and evidence gains of each.
-  void Score(const Eigen::MatrixXd& columns, int width, const std::vector<double>& scales,
-             std::vector<double>* evidence, std::vector<double>* log_ratio, Eigen::MatrixXd* step) const {
-    const Likelihood& likelihood = *experiment_.likelihood;
-    const Likelihood::Columns prepared = likelihood.Prepare(columns);
-    const int blocks = static_cast<int>(columns.cols()) / width, p = fit_.model.size();
-    const int surfaces = static_cast<int>(likelihood.surfaces().size());
-    std::vector<double> best(blocks, -INFINITY), sum_e(blocks, 0), sum_l(blocks, 0);
-    step->setZero(width, blocks);
-    double most = 0;  // scale of the sums: the base
-    most = base_.log_likelihood;
-    for (int s = 0; s < surfaces; ++s) {
-      const Eigen::MatrixXd own = likelihood.Gram(fit_.columns, s);
-      const Eigen::MatrixXd cross = likelihood.Cross(fit_.columns, prepared, s);
-      const Eigen::VectorXd norms = likelihood.Norms(prepared, s);
-      // Without the fit's own directions.
-      Eigen::MatrixXd jj = own.bottomRightCorner(p, p);
-      for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
-      const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
-      const Eigen::VectorXd own_step =
-          p > 0 ? Eigen::VectorXd(solver.solve(own.col(0).tail(p))) : Eigen::VectorXd();
-      const double q = own(0, 0) - (p > 0 ? own.col(0).tail(p).dot(own_step) : 0);
-      const Eigen::MatrixXd own_cross =
-          p > 0 ? Eigen::MatrixXd(solver.solve(cross.bottomRows(p))) : Eigen::MatrixXd();
-      Eigen::MatrixXd inner;
-      if (width == 2) {
-        inner.resize(1, blocks);
-        const int l = likelihood.surfaces()[s].length_index;
-        (void)l;
-        for (int b = 0; b < blocks; ++b)
-          inner(0, b) = likelihood.Cross(Likelihood::Pick(prepared, {2 * b}),
-                                         Likelihood::Pick(prepared, {2 * b + 1}), s)(0, 0);
-      }
+  // Blocks of `width` (1 or 2) columns. `scales`: of each column's value, the width of its prior.
+  TermScores Score(const Eigen::MatrixXd& columns, int width, const std::vector<double>& scales) const {
+    const Likelihood::Columns prepared = likelihood_.Prepare(columns);
+    const int blocks = static_cast<int>(columns.cols()) / width;
+    TermScores scores;
+    scores.step.setZero(width, blocks);
+    std::vector<double> best(blocks, -INFINITY), sum_evidence(blocks, 0), sum_likelihood(blocks, 0);
+    for (int s = 0; s < static_cast<int>(likelihood_.hypotheses().size()); ++s) {
+      const Projection projection = Project(prepared, width, s);
       for (int b = 0; b < blocks; ++b) {
-        Eigen::MatrixXd a(width, width);
-        Eigen::VectorXd g(width);
-        for (int i = 0; i < width; ++i) {
-          const int ci = b * width + i;
-          g[i] = cross(0, ci) - (p > 0 ? cross.col(ci).tail(p).dot(own_step) : 0);
-          for (int j = 0; j < width; ++j) {
-            const int cj = b * width + j;
-            a(i, j) = i == j ? norms[ci] : inner(0, b);
-            if (p > 0) a(i, j) -= cross.col(ci).tail(p).dot(own_cross.col(cj));
-          }
-          if (!(a(i, i) > 1e-6 * norms[ci])) a(i, i) = INFINITY;  // the fit has it already
-        }
-        if (!a.allFinite()) continue;
-        for (int i = 0; i < width; ++i) a(i, i) *= 1 + 1e-9;
-        const Eigen::VectorXd x = a.ldlt().solve(g);
-        const double left = std::max(q - g.dot(x), 0.0);
-        const double sigma = likelihood.Sigma(left, p + width);
-        double occam = 0;
-        for (int i = 0; i < width; ++i) {
-          const double scale = scales[b * width + i];
-          occam += 0.5 * std::log1p(a(i, i) * scale * scale / (sigma * sigma)) +
-                   std::log1p(std::pow(x[i] / scale, 2));
-        }
-        const double log_likelihood = likelihood.LogPrior(s) + likelihood.LogLikelihood(left, s);
-        sum_l[b] += std::exp(std::min(log_likelihood - most, 600.0));
-        sum_e[b] += std::exp(std::min(log_likelihood - occam - most, 600.0));
-        if (log_likelihood - occam > best[b]) best[b] = log_likelihood - occam, step->col(b) = x;
+        const BlockFit block = FitBlock(projection, b, width, scales, s);
+        if (!block.determined) continue;
+        sum_likelihood[b] += std::exp(std::min(block.log_likelihood - base_log_, 600.0));
+        sum_evidence[b] += std::exp(std::min(block.log_evidence - base_log_, 600.0));
+        if (block.log_evidence > best[b]) best[b] = block.log_evidence, scores.step.col(b) = block.step;
       }
     }
-    evidence->resize(blocks);
-    log_ratio->resize(blocks);
+    scores.log_evidence.resize(blocks);
+    scores.log_ratio.resize(blocks);
     for (int b = 0; b < blocks; ++b) {
-      (*log_ratio)[b] = sum_l[b] > 0 ? std::log(sum_l[b]) : -INFINITY;
-      (*evidence)[b] = sum_e[b] > 0 ? std::log(sum_e[b]) : -INFINITY;
-      // Gains so large that the sums overflow are told by their best hypothesis alone.
-      if (best[b] - most > 500) (*evidence)[b] = (*log_ratio)[b] = best[b] - most;
+      scores.log_ratio[b] = sum_likelihood[b] > 0 ? std::log(sum_likelihood[b]) : -INFINITY;
+      scores.log_evidence[b] = sum_evidence[b] > 0 ? std::log(sum_evidence[b]) : -INFINITY;
+      // Where the sums overflow the best hypothesis alone counts.
+      if (best[b] - base_log_ > 500) scores.log_evidence[b] = scores.log_ratio[b] = best[b] - base_log_;
     }
+    return scores;
   }
 
  private:
-  const Experiment& experiment_;
+  // Inner products under one hypothesis, and what the fit's own columns explain of each.
+  struct Projection {
+    Eigen::MatrixXd cross;      // [residual, own columns] x columns
+    Eigen::VectorXd norms;      // of the columns
+    Eigen::VectorXd inner;      // of the two columns of each block, if there are two
+    Eigen::VectorXd own_step;   // of the fit's parameters, without any term
+    Eigen::MatrixXd own_cross;  // of the fit's parameters, per column
+    double q = 0;               // squared residual beyond the fit's own columns
+  };
+  struct BlockFit {
+    bool determined = false;  // false: the fit has such a column already
+    double log_likelihood = 0, log_evidence = 0;
+    Eigen::VectorXd step;
+  };
+
+  Projection Project(const Likelihood::Columns& prepared, int width, int s) const {
+    const int p = fit_.model.size();
+    const Eigen::MatrixXd own = likelihood_.Gram(fit_.columns, s);
+    Projection projection;
+    projection.cross = likelihood_.Cross(fit_.columns, prepared, s);
+    projection.norms = likelihood_.Norms(prepared, s);
+    projection.q = own(0, 0);
+    if (p > 0) {
+      Eigen::MatrixXd jj = own.bottomRightCorner(p, p);
+      for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
+      const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
+      projection.own_step = solver.solve(own.col(0).tail(p));
+      projection.own_cross = solver.solve(projection.cross.bottomRows(p));
+      projection.q -= own.col(0).tail(p).dot(projection.own_step);
+    }
+    if (width == 2) {
+      projection.inner.resize(projection.norms.size() / 2);
+      for (int b = 0; b < projection.inner.size(); ++b)
+        projection.inner[b] = likelihood_.Cross(Likelihood::Pick(prepared, {2 * b}),
+                                                Likelihood::Pick(prepared, {2 * b + 1}), s)(0, 0);
+    }
+    return projection;
+  }
+
+  BlockFit FitBlock(const Projection& projection, int b, int width, const std::vector<double>& scales,
+                    int s) const {
+    const int p = fit_.model.size();
+    Eigen::MatrixXd a(width, width);
+    Eigen::VectorXd g(width);
+    for (int i = 0; i < width; ++i) {
+      const int ci = b * width + i;
+      const auto own = [&](int column) { return projection.cross.col(column).tail(p); };
+      g[i] = projection.cross(0, ci) - (p > 0 ? own(ci).dot(projection.own_step) : 0);
+      for (int j = 0; j < width; ++j) {
+        a(i, j) = i == j ? projection.norms[ci] : projection.inner[b];
+        if (p > 0) a(i, j) -= own(ci).dot(projection.own_cross.col(b * width + j));
+      }
+      if (!(a(i, i) > 1e-6 * projection.norms[ci])) a(i, i) = INFINITY;  // the fit has it already
+    }
+    BlockFit block;
+    block.determined = a.allFinite();
+    if (!block.determined) return block;
+    for (int i = 0; i < width; ++i) a(i, i) *= 1 + 1e-9;
+    block.step = a.ldlt().solve(g);
+    const double left = std::max(projection.q - g.dot(block.step), 0.0);
+    const double sigma = likelihood_.Sigma(left, p + width);
+    double occam = 0;
+    for (int i = 0; i < width; ++i) {
+      const double scale = scales[b * width + i];
+      occam += 0.5 * std::log1p(a(i, i) * scale * scale / (sigma * sigma)) +
+               std::log1p(std::pow(block.step[i] / scale, 2));
+    }
+    block.log_likelihood = likelihood_.LogPrior(s) + likelihood_.LogLikelihood(left, s);
+    block.log_evidence = block.log_likelihood - occam;
+    return block;
+  }
+
+  const Likelihood& likelihood_;
   const Fit& fit_;
-  Judgement base_;
+  double base_log_ = 0;  // log likelihood of the fit without a term: scale of the sums
 };
 
-}  // namespace
+// Terms with their columns: of time in s for a value of 1 in the units of files.
+class TermTable {
+ public:
+  TermTable(const TouchObservationModel& touches, const Prediction& details)
+      : touches_(touches), o_(touches.observations()), d_(details), values_(o_.time_s.size()) {}
 
-std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit, const Prediction& d) {
-  const Observations& o = *experiment.observations;
+  // The rows of a value that is multiplied by k = 1 mm (of travel) or 1 us.
+  Eigen::VectorXd Column(bool adds_time, const TermValue& value) {
+    for (int k = 0; k < o_.size(); ++k)
+      for (int i = 0; i < o_.fingers; ++i) {
+        const size_t e = static_cast<size_t>(k) * o_.fingers + i;
+        const double size =
+            value(k, i) * (adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre * d_.slope_s_m[e]);
+        values_[e] = std::isfinite(size) ? size : 0;
+      }
+    return touches_.contrasts().Apply(values_);
+  }
+
+  void Add(const Eigen::VectorXd& column) {
+    columns_.push_back(column);
+    const double rms = std::sqrt(column.squaredNorm() / touches_.rows());
+    const double speed_m_s = o_.set->speed_m_s[o_.row[0]];
+    scales_.push_back(rms > 0 ? kTypicalTravelM / speed_m_s / rms : 1.0);
+  }
+
+  TermScores Score(const TermScorer& scorer, int width) const {
+    Eigen::MatrixXd columns(touches_.rows(), columns_.size());
+    for (size_t c = 0; c < columns_.size(); ++c) columns.col(c) = columns_[c];
+    return scorer.Score(columns, width, scales_);
+  }
+
+ private:
+  const TouchObservationModel& touches_;
+  const Observations& o_;
+  const Prediction& d_;
+  std::vector<double> values_;
+  std::vector<Eigen::VectorXd> columns_;
+  std::vector<double> scales_;
+};
+
+// Of k, in a term of one factor: a length or a time where the factor is a ratio; other products get no unit.
+Unit UnitOfFactor(const FormulaTerm& term) {
+  const auto about = [&](const char* prefix) { return term.covariate.rfind(prefix, 0) == 0; };
+  const bool ratio = about("approach") || about("lateral") || about("normal") ||
+                     term.expression.find("pi/180") != std::string::npos;
+  return !ratio ? Unit::kNone : term.adds_time ? Unit::kMicrosecond : Unit::kMillimetre;
+}
+
+// A factor of the fingers times a covariate or a function of one.
+std::vector<FormulaTerm> ScoreProducts(const TermScorer& scorer, const TouchObservationModel& touches,
+                                       const Prediction& d) {
+  const Observations& o = touches.observations();
   const std::vector<TermFactor> factors = ListTermFactors(o, d);
-  const std::vector<FingerFactor> fingers = ListFingerFactors(o, d);
-  const double speed_m_s = o.set->speed_m_s[o.row[0]];
   const bool several_speeds = std::any_of(factors.begin(), factors.end(),
                                           [](const TermFactor& f) { return f.covariate == "speed_mm_s"; });
-  const int rows = experiment.contrasts->rows();
-
-  // Columns of time in s for k = 1 mm (of travel) or 1 us.
-  std::vector<double> values(o.time_s.size());
-  const auto column = [&](bool adds_time, const TermValue& value) {
-    for (int k = 0; k < o.size(); ++k)
-      for (int i = 0; i < o.fingers; ++i) {
-        const size_t e = static_cast<size_t>(k) * o.fingers + i;
-        const double size = value(k, i) * (adds_time ? 1e-6 : 1e-3 * d.slope_s_m[e]);
-        values[e] = std::isfinite(size) ? size : 0;
-      }
-    return experiment.contrasts->Apply(values);
-  };
-  const auto scale_of = [&](const Eigen::VectorXd& c) {
-    const double rms = std::sqrt(c.squaredNorm() / rows);
-    return rms > 0 ? kTypicalTravelM / speed_m_s / rms : 1.0;
-  };
-
+  TermTable table(touches, d);
   std::vector<FormulaTerm> terms;
-  std::vector<double> prices, scales;
-  Eigen::MatrixXd columns(rows, 0);
-  std::vector<Eigen::VectorXd> list;
+  std::vector<double> penalties;
   for (const TermFactor& factor : factors)
-    for (const FingerFactor& finger : fingers) {
+    for (const FingerFactor& finger : ListFingerFactors(o, d)) {
       const bool plain = finger.expression.empty();
       if (plain && !factor.differs) continue;  // the same on every finger cannot be seen
       for (const bool adds_time : {false, true}) {
         if (adds_time && !several_speeds) continue;
-        const Eigen::VectorXd c =
-            column(adds_time, [&](int k, int i) { return factor.value(k, i) * finger.value(k, i); });
-        if (!(c.norm() > 0)) continue;
+        const Eigen::VectorXd column =
+            table.Column(adds_time, [&](int k, int i) { return factor.value(k, i) * finger.value(k, i); });
+        if (!(column.norm() > 0)) continue;
         FormulaTerm term;
         term.covariate = factor.covariate;
         term.adds_time = adds_time;
         term.expression = absl::StrCat("k * ", finger.expression, plain ? "" : " * ", factor.expression);
         terms.push_back(std::move(term));
-        list.push_back(c);
-        scales.push_back(scale_of(c));
-        prices.push_back(factor.price + (plain || !factor.differs ? 0 : kProductNats));
+        table.Add(column);
+        penalties.push_back(factor.penalty_nats + (plain || !factor.differs ? 0 : kProductNats));
       }
     }
-  columns.resize(rows, list.size());
-  for (size_t c = 0; c < list.size(); ++c) columns.col(c) = list[c];
-  const Scorer scorer(experiment, fit);
-  std::vector<double> evidence, log_ratio;
-  Eigen::MatrixXd step;
-  scorer.Score(columns, 1, scales, &evidence, &log_ratio, &step);
+  const TermScores scores = table.Score(scorer, 1);
   for (size_t c = 0; c < terms.size(); ++c) {
-    terms[c].gain_nats = evidence[c] - prices[c];
-    terms[c].log_ratio = log_ratio[c];
-    const bool number =
-        terms[c].covariate.rfind("approach", 0) == 0 || terms[c].covariate.rfind("lateral", 0) == 0 ||
-        terms[c].covariate.rfind("normal", 0) == 0 || terms[c].expression.find("pi/180") != std::string::npos;
-    const Unit unit = !number ? Unit::kNone : terms[c].adds_time ? Unit::kMicrosecond : Unit::kMillimetre;
-    terms[c].parameters.push_back(Bounded("k", unit, BoundFor(step(0, c))));
-    terms[c].values.push_back(step(0, c));
+    terms[c].gain_nats = scores.log_evidence[c] - penalties[c];
+    terms[c].log_ratio = scores.log_ratio[c];
+    terms[c].parameters.push_back(Bounded("k", UnitOfFactor(terms[c]), BoundFor(scores.step(0, c))));
+    terms[c].values.push_back(scores.step(0, c));
   }
+  return terms;
+}
 
-  // Periodic in the travel: a lead screw, a gear.
-  std::vector<FormulaTerm> periodic;
-  list.clear(), scales.clear();
+// Periodic in the travel: a lead screw, a gear.
+std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const TouchObservationModel& touches,
+                                      const Prediction& d) {
+  const int fingers = touches.observations().fingers;
+  TermTable table(touches, d);
+  std::vector<FormulaTerm> terms;
   for (int n = 0; n < kPeriods; ++n) {
     const double period_mm = kMinPeriodMm * std::pow(kMaxPeriodMm / kMinPeriodMm, n / (kPeriods - 1.0));
-    for (const double shift : {0.0, 0.25}) {
-      list.push_back(column(false, [&](int k, int i) {
-        return std::sin(2 * kPi *
-                        (d.travel_m[static_cast<size_t>(k) * o.fingers + i] * 1e3 / period_mm + shift));
+    for (const double shift : {0.0, 0.25})
+      table.Add(table.Column(false, [&](int k, int i) {
+        const double travel_mm = d.travel_m[static_cast<size_t>(k) * fingers + i] * kMillimetresPerMetre;
+        return std::sin(2 * kPi * (travel_mm / period_mm + shift));
       }));
-      scales.push_back(scale_of(list.back()));
-    }
     FormulaTerm term;
     term.covariate = "travel_mm";
     term.expression = "k * sin(2*pi*travel_mm/lead + phase)";
     term.values = {0, period_mm, 0};
-    term.degrees = 3;
-    periodic.push_back(std::move(term));
+    term.degrees_of_freedom = 3;
+    terms.push_back(std::move(term));
   }
-  columns.resize(rows, list.size());
-  for (size_t c = 0; c < list.size(); ++c) columns.col(c) = list[c];
-  scorer.Score(columns, 2, scales, &evidence, &log_ratio, &step);
+  const TermScores scores = table.Score(scorer, 2);
   for (int n = 0; n < kPeriods; ++n) {
-    FormulaTerm& term = periodic[n];
-    term.gain_nats = evidence[n] - kCurvedNats - std::log(static_cast<double>(kPeriods));
-    term.log_ratio = log_ratio[n];
-    const double k = std::hypot(step(0, n), step(1, n));
+    FormulaTerm& term = terms[n];
+    term.gain_nats = scores.log_evidence[n] - kCurvedNats - std::log(static_cast<double>(kPeriods));
+    term.log_ratio = scores.log_ratio[n];
+    const double k = std::hypot(scores.step(0, n), scores.step(1, n));
     term.values[0] = k;
-    term.values[2] = std::atan2(step(1, n), step(0, n));
+    term.values[2] = std::atan2(scores.step(1, n), scores.step(0, n));
     term.parameters = {Bounded("k", Unit::kMillimetre, BoundFor(k)), Bounded("lead", Unit::kMillimetre, 0),
                        Bounded("phase", Unit::kNone, 7)};
     term.parameters[1].lower = 0.8 * term.values[1];
     term.parameters[1].upper = 1.25 * term.values[1];
   }
+  return terms;
+}
+
+}  // namespace
+
+std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const TouchObservationModel& touches,
+                                    const Fit& fit, const Prediction& details) {
+  const TermScorer scorer(experiment, fit);
+  std::vector<FormulaTerm> terms = ScoreProducts(scorer, touches, details);
+  const std::vector<FormulaTerm> periodic = ScorePeriods(scorer, touches, details);
   terms.insert(terms.end(), periodic.begin(), periodic.end());
   std::stable_sort(terms.begin(), terms.end(),
                    [](const FormulaTerm& a, const FormulaTerm& b) { return a.gain_nats > b.gain_nats; });
@@ -262,7 +324,7 @@ FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b) {
   }
   while (!second.empty() && second.back() == ' ') second.pop_back();
   sum.expression = absl::StrCat(a.expression, " +", second);
-  sum.degrees += b.degrees;
+  sum.degrees_of_freedom += b.degrees_of_freedom;
   return sum;
 }
 

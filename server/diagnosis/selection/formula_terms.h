@@ -1,5 +1,5 @@
-// A dictionary of simple terms that a rest may follow when no effect of the catalogue does: a factor that
-// tells the fingers apart, times a covariate or a function of one, as people would write it in a model file.
+// A dictionary of simple terms that a rest may follow when no effect of the catalogue does: a factor that differs
+// from finger to finger, times a covariate or a function of one, as people would write it in a model file.
 #pragma once
 
 #include <string>
@@ -8,6 +8,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone {
 
@@ -17,13 +18,14 @@ struct FormulaTerm {
   bool adds_time = false;
   std::vector<ParameterInfo> parameters;  // in the units of files
   std::vector<double> values;             // where a fit starts
-  double gain_nats = 0;  // evidence over the fit without it, price of the choice not yet paid
-  double log_ratio = 0;  // of the likelihoods
-  int degrees = 1;
+  double gain_nats = 0;                   // log evidence over the fit without it, less its complexity penalty
+  double log_ratio = 0;                   // of the likelihoods
+  int degrees_of_freedom = 1;
 };
 
 // Every term's gain over `fit`, best first. `details` are of the fit's model, with curvature.
-std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const Fit& fit, const Prediction& details);
+std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const TouchObservationModel& touches,
+                                    const Fit& fit, const Prediction& details);
 
 // The term as an effect of this name.
 absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/selection/study.h"
+#include "server/diagnosis/selection/workspace.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone {
@@ -18,17 +18,17 @@ FormulaTerm BestTerm(const std::string& expression, const std::string& k) {
   rig.hidden = {{"formula",
                  {"name=odd", "adds=travel_mm", "expression=" + expression, "k=" + k, "k_unit=1", "k_min=-9",
                   "k_max=9"}}};
-  const auto study = MakeStudy(MakeTestInput(rig), {});
-  EXPECT_TRUE(study.ok()) << study.status();
-  EXPECT_TRUE(PrepareSearch(study->get(), {}).ok());
-  const auto fit =
-      FitModel((*study)->experiment, FreeModel(*(*study)->input.model, (*study)->searched->objects));
+  const auto workspace = MakeWorkspace(MakeTestInput(rig), {});
+  EXPECT_TRUE(workspace.ok()) << workspace.status();
+  EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
+  const auto fit = FitModel((*workspace)->experiment,
+                            Parameterization(*(*workspace)->input.model, (*workspace)->searched->objects));
   EXPECT_TRUE(fit.ok());
-  const auto details = (*study)->searched_predictor->Run(fit->model.base(), true, true);
-  return ScoreTerms((*study)->experiment, *fit, *details)[0];
+  const auto details = (*workspace)->searched_predictor->Run(fit->model.base(), true, true);
+  return ScoreTerms((*workspace)->experiment, *(*workspace)->rows, *fit, *details)[0];
 }
 
-TEST(FormulaTerms, FindADirectionThatOneFingerHangsOn) {
+TEST(FormulaTerms, FindADirectionThatOneFingerDependsOn) {
   const FormulaTerm term = BestTerm("k*(finger==0)*approach_z", "0.4");
   EXPECT_EQ(term.covariate, "approach_z");
   EXPECT_THAT(term.expression, HasSubstr("(finger == 0)"));

@@ -1,31 +1,55 @@
-// From an explanation to the report's steps, refits, unexplained rest and improved model.
+// From a selected explanation to the ladder: the error after each step, refits, what remains, the improved model.
 #pragma once
 
-#include "server/diagnosis/selection/explain.h"
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/selection/selection.h"
 
 namespace touchstone {
 
 struct Ladder {
-  Model improved;                 // steps and refits, no formula
-  bool changed = false;           // improved differs from the given model
-  bool values_wrong = false;      // an effect of the given model, other than noise, has other values
-  bool surface = false;           // a surface error is a step
-  std::vector<double> residuals;  // of the improved model, all touches
+  Verdict verdict = Verdict::kNone;
+  NoiseFloor noise_floor;
+  std::vector<RefittedEffect> refitted;
+  std::vector<LadderStep> steps;  // in the order in which they explain most
+  Quality final;                  // after all steps and refits
+  std::vector<ConfoundedEffects> confounded;
+  std::vector<RankedCandidate> candidates;  // best first
+  std::optional<UnexplainedRest> unexplained;
+
+  Model improved;                 // the initial model with steps and refits, without a formula
+  bool changed = false;           // improved differs from the initial model
+  bool values_wrong = false;      // an effect of the initial model, other than noise, has other values
+  std::vector<double> residuals;  // of the improved model, all touches, s
   Prediction prediction;          // of the improved model, with details
 };
 
-// Fills verdict, noise floor, refitted, steps, final, unexplained, candidates, ambiguities and the improved
-// model of the report; `initial` must stand there already.
-absl::StatusOr<Ladder> BuildLadder(Study* study, const Explained& explained, v1::Report* report);
+absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionResult& selection);
 
 // Its parts.
-void AddNoise(const NoiseFindings& noise, Ladder* ladder, v1::Report* report);  // noise_steps.cpp
-absl::Status DescribeCandidates(const Study& study, const Explained& explained, v1::Report* report);
-absl::Status DescribeUnexplained(const Study& study, const Explained& explained, double floor_us,
-                                 v1::Report* report);
 
-// Values that a person can read: three more digits than the standard error leaves uncertain.
+// The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
+// noise floor and final errors, which noise does not change.
+void AddNoiseSteps(const NoiseFindings& noise, Ladder* ladder);
+
+// Every effect of the catalogue as the only step.
+absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,
+                                                            const SelectionResult& selection);
+
+// What depends on which covariate where no named effect explains it, and a formula, if one was found. `final`:
+// errors after all steps, `floor_s`: of the noise.
+absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
+                                                    const SelectionResult& selection, const Quality& final,
+                                                    double floor_s);
+
+// A value that a person can read: three more digits than the standard error leaves uncertain.
 double RoundedTo(double value, double std_error);
+
+// Sets the fitted values of a model, rounded so.
+void RoundValues(const Fit& fit, Model* model);
 
 }  // namespace touchstone

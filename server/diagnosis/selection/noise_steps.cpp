@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/normal.h"
+#include "server/base/units.h"
 #include "server/diagnosis/selection/ladder.h"
 #include "server/effects/all_effects.h"
 
@@ -11,85 +13,94 @@ namespace {
 constexpr double kSignificant = 3.3;   // standard errors, for a refit
 constexpr double kRelevant = 0.02;     // relative change, for a refit
 constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
+constexpr double kMinFloorUs = 2;      // of noise as a step: less is the rounding of the file
+constexpr double kCertainNats = 1e3;   // noise is there or not: any scatter beyond rounding proves it
+constexpr double kMaxExponent = 700;   // of a probability's odds
 
-class NoiseWriter {
+class NoiseStepWriter {
  public:
-  NoiseWriter(Ladder* ladder, v1::Report* report) : ladder_(ladder), report_(report) {}
+  explicit NoiseStepWriter(Ladder* ladder) : ladder_(*ladder) {}
 
-  // One effect with one parameter; nothing is written unless it is claimed.
-  void Write(const char* name, const NoiseEstimate& found, bool claimed) {
-    if (!claimed) return;
+  // The effect of this role, which has one parameter.
+  void Write(EffectRole role, const NoiseEstimate& found) {
     EffectInstance* present = nullptr;
-    for (EffectInstance& instance : ladder_->improved.effects)
-      if (instance.effect->name == name) present = &instance;
-    const auto effect = Catalogue().Find(name);
-    const ParameterInfo& parameter = effect->parameters[0];
-    const double value = FromSi(parameter.unit, std::clamp(found.value, ToSi(parameter.unit, parameter.lower),
-                                                           ToSi(parameter.unit, parameter.upper)));
-    const double error = FromSi(parameter.unit, found.std_error);
-    v1::ParameterValue described;
-    described.set_name(parameter.name);
-    described.set_unit(std::string(UnitSymbol(parameter.unit)));
-    described.set_value(value);
-    described.set_std_error(error);
-    described.set_lower(std::max(parameter.lower, value - 1.96 * error));
-    described.set_upper(std::min(parameter.upper, value + 1.96 * error));
-    const double rounded = RoundedTo(value, error);
-    if (present != nullptr) {
-      const double before = FromSi(parameter.unit, present->values[0]);
-      if (std::abs(value - before) < kSignificant * error || std::abs(value - before) < kRelevant * value)
-        return;
-      described.set_before(before);
-      v1::Refit* refit = report_->add_refitted();
-      refit->set_effect(name);
-      *refit->add_parameters() = std::move(described);
-      present->values[0] = ToSi(parameter.unit, rounded);
-      present->object_values.clear();
-      ladder_->changed = true;
-      return;
-    }
-    v1::Step* step = report_->add_steps();
-    step->set_effect(name);
-    step->set_scope("rig");
-    step->set_meaning(effect->meaning);
-    step->set_check_on_rig(effect->check_on_rig);
-    step->set_remedy(effect->remedy);
-    step->set_gain_nats(found.gain_nats);
-    step->set_probability(1 / (1 + std::exp(-std::min(found.gain_nats, 700.0))));
-    *step->add_parameters() = std::move(described);
-    // Noise changes no expectation: the errors stay.
-    step->set_rmse_us(report_->final().rmse_us());
-    step->set_heldout_rmse_us(report_->final().heldout_rmse_us());
-    step->set_lack_of_fit_p(report_->final().lack_of_fit_p());
-    EffectInstance instance;
-    instance.effect = effect;
-    instance.values = effect->NeutralValues(ladder_->improved.fingers);
-    instance.values[0] = ToSi(parameter.unit, rounded);
-    ladder_->improved.effects.push_back(std::move(instance));
-    ladder_->changed = true;
+    for (EffectInstance& instance : ladder_.improved.effects)
+      if (instance.effect->role == role) present = &instance;
+    const auto effect = FindByRole(role);
+    const ParameterEstimate estimate = Estimate(effect->parameters[0], found);
+    if (present != nullptr)
+      Refit(estimate, present);
+    else
+      Add(effect, estimate, found.gain_nats);
   }
 
  private:
-  Ladder* ladder_;
-  v1::Report* report_;
+  static ParameterEstimate Estimate(const ParameterInfo& parameter, const NoiseEstimate& found) {
+    ParameterEstimate estimate;
+    estimate.name = parameter.name;
+    estimate.unit = std::string(UnitSymbol(parameter.unit));
+    estimate.value = FromSi(parameter.unit, std::clamp(found.value, ToSi(parameter.unit, parameter.lower),
+                                                       ToSi(parameter.unit, parameter.upper)));
+    estimate.std_error = FromSi(parameter.unit, found.std_error);
+    estimate.lower = std::max(parameter.lower, estimate.value - kNormalQuantile975 * estimate.std_error);
+    estimate.upper = std::min(parameter.upper, estimate.value + kNormalQuantile975 * estimate.std_error);
+    return estimate;
+  }
+
+  void Refit(ParameterEstimate estimate, EffectInstance* present) {
+    const Unit unit = present->effect->parameters[0].unit;
+    const double before = FromSi(unit, present->values[0]), change = std::abs(estimate.value - before);
+    if (change < kSignificant * estimate.std_error || change < kRelevant * estimate.value) return;
+    estimate.before = before;
+    present->values[0] = ToSi(unit, RoundedTo(estimate.value, estimate.std_error));
+    present->object_values.clear();
+    ladder_.refitted.push_back({present->effect->name, {std::move(estimate)}});
+    ladder_.changed = true;
+  }
+
+  void Add(const std::shared_ptr<const Effect>& effect, const ParameterEstimate& estimate, double gain_nats) {
+    LadderStep step;
+    step.effect = effect->name;
+    step.meaning = effect->meaning;
+    step.check_on_rig = effect->check_on_rig;
+    step.remedy = effect->remedy;
+    step.gain_nats = gain_nats;
+    step.probability = 1 / (1 + std::exp(-std::min(gain_nats, kMaxExponent)));
+    step.parameters = {estimate};
+    step.quality = ladder_.final;  // noise changes no expectation: the errors stay
+    ladder_.steps.push_back(std::move(step));
+    EffectInstance instance;
+    instance.effect = effect;
+    instance.values = effect->NeutralValues(ladder_.improved.fingers);
+    instance.values[0] = ToSi(effect->parameters[0].unit, RoundedTo(estimate.value, estimate.std_error));
+    ladder_.improved.effects.push_back(std::move(instance));
+    ladder_.changed = true;
+  }
+
+  Ladder& ladder_;
 };
 
 }  // namespace
 
-void AddNoise(const NoiseFindings& noise, Ladder* ladder, v1::Report* report) {
-  NoiseWriter writer(ladder, report);
+void AddNoiseSteps(const NoiseFindings& noise, Ladder* ladder) {
+  NoiseStepWriter writer(ladder);
   const bool has_sigma =
       std::any_of(ladder->improved.effects.begin(), ladder->improved.effects.end(),
-                  [](const EffectInstance& e) { return e.effect->name == "gaussian_noise"; });
+                  [](const EffectInstance& e) { return e.effect->role == EffectRole::kNoiseLevel; });
   NoiseEstimate sigma = noise.sigma_s;
-  sigma.gain_nats = 1e3;  // noise is there or not: any scatter beyond rounding proves it
+  sigma.gain_nats = kCertainNats;
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
-  writer.Write("gaussian_noise", sigma, has_sigma ? scatter : scatter && report->noise_floor_us() > 2);
-  writer.Write("incidence_noise", noise.slope, noise.slope.gain_nats > 0);
-  writer.Write("heavy_tail_noise", noise.degrees_of_freedom, noise.degrees_of_freedom.gain_nats > 0);
-  writer.Write("poll_interval", noise.poll_interval_s, noise.poll_interval_s.gain_nats > 0);
-  writer.Write("missed_contact", noise.missed_probability, noise.missed_probability.gain_nats > 0);
+  if (scatter && (has_sigma || ladder->noise_floor.sigma_s * kMicrosecondsPerSecond > kMinFloorUs))
+    writer.Write(EffectRole::kNoiseLevel, sigma);
+  const std::pair<EffectRole, const NoiseEstimate*> kinds[] = {
+      {EffectRole::kNoiseGrowth, &noise.slope},
+      {EffectRole::kNoiseTails, &noise.degrees_of_freedom},
+      {EffectRole::kQuantisation, &noise.poll_interval_s},
+      {EffectRole::kDropout, &noise.missed_probability},
+  };
+  for (const auto& [role, found] : kinds)
+    if (found->gain_nats > 0) writer.Write(role, *found);
 }
 
 }  // namespace touchstone

@@ -6,71 +6,82 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/inference/held_out.h"
+
 namespace touchstone {
 namespace {
 
-constexpr double kMinDegrees = 8;
+constexpr double kMinDegreesOfFreedom = 8;
+
+// Held-out error over error, on the touches of the search.
+double HeldOutRatio(const Workspace& workspace, const Fit& fit) {
+  const double rmse = std::sqrt(fit.columns.values.col(0).squaredNorm() /
+                                std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
+  return rmse > 0 ? HeldOutRmse(workspace.experiment, fit) / rmse : 1;
+}
+
+// Without repeats: how much better a smooth remainder explains the residuals than none.
+double SmoothRemainderP(const Workspace& workspace, const Fit& fit) {
+  const double gain = std::max(SurfaceErrorNats(workspace, fit), 0.0);
+  return 0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) +
+         (gain > 0 ? 0 : 0.5);
+}
 
 }  // namespace
 
 bool HasRepeats(const SumOfSquares& error) {
-  return error.degrees >= kMinDegrees;
+  return error.degrees_of_freedom >= kMinDegreesOfFreedom;
 }
 
 double LackOfFitP(const Observations& o, const std::vector<double>& residuals, double parameters) {
   const SumOfSquares pure = PureErrorOf(o, residuals), total = TotalSquares(o, residuals);
-  const double degrees = total.degrees - pure.degrees - parameters;
-  if (!HasRepeats(pure) || degrees < 1 || !(pure.sum_of_squares > 0)) return 1;
-  const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / degrees /
-                   (pure.sum_of_squares / pure.degrees);
-  return boost::math::cdf(boost::math::complement(boost::math::fisher_f(degrees, pure.degrees), f));
+  const double dof = total.degrees_of_freedom - pure.degrees_of_freedom - parameters;
+  if (!HasRepeats(pure) || dof < 1 || !(pure.sum_of_squares > 0)) return 1;
+  const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / dof /
+                   (pure.sum_of_squares / pure.degrees_of_freedom);
+  return boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof, pure.degrees_of_freedom), f));
 }
 
-v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
-                      const std::vector<double>& residuals, bool surface) {
-  v1::Quality quality;
-  const Observations& o = *study.observations;
-  double rmse = Rmse(o, residuals);
-  const double own = std::sqrt(fit.columns.values.col(0).squaredNorm() /
-                               std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  const double share = own > 0 ? search.HeldoutRmse(fit) / own : 1;
-  const SumOfSquares pure = PureErrorOf(o, residuals);
-  if (surface) {
-    const std::vector<double> left = ResidualsWithoutSurface(study, fit);
-    const double taken = study.likelihood->surfaces()[fit.surface].degrees + fit.model.size();
-    const SumOfSquares total = TotalSquares(*study.searched, left);
-    rmse = std::sqrt(total.sum_of_squares / std::max(total.degrees - taken, 1.0));
-    quality.set_lack_of_fit_p(LackOfFitP(*study.searched, left, taken));
-  } else if (HasRepeats(pure)) {
-    quality.set_lack_of_fit_p(LackOfFitP(o, residuals, fit.model.size()));
-  } else {
-    // Without repeats: how much better a smooth remainder explains the residuals than none.
-    const double gain = std::max(SurfaceEvidence(study, fit), 0.0);
-    quality.set_lack_of_fit_p(
-        0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) +
-        (gain > 0 ? 0 : 0.5));
-  }
-  quality.set_rmse_us(rmse * 1e6);
-  quality.set_heldout_rmse_us(rmse * share * 1e6);
+Quality QualityOf(const Workspace& workspace, const Fit& fit, const std::vector<double>& residuals) {
+  Quality quality;
+  const Observations& o = *workspace.observations;
+  quality.rmse_s = Rmse(o, residuals);
+  quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
+  quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
+                                                                : SmoothRemainderP(workspace, fit);
   return quality;
 }
 
-v1::NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best,
-                            double fitted_parameters) {
-  v1::NoiseFloor floor;
+Quality QualityWithoutSurface(const Workspace& workspace, const Fit& fit) {
+  Quality quality;
+  const std::vector<double> left = ResidualsWithoutSurface(workspace, fit);
+  const double effective_dof =
+      workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof + fit.model.size();
+  const SumOfSquares total = TotalSquares(*workspace.searched, left);
+  quality.rmse_s = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
+  quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
+  quality.lack_of_fit_p = LackOfFitP(*workspace.searched, left, effective_dof);
+  return quality;
+}
+
+NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best, double fitted_parameters) {
+  NoiseFloor floor;
   SumOfSquares error = PureErrorOf(o, best);
-  floor.set_from_repeats(HasRepeats(error));
-  if (!floor.from_repeats()) {
+  floor.from_repeats = HasRepeats(error);
+  if (!floor.from_repeats) {
     error = TotalSquares(o, best);
-    error.degrees = std::max(error.degrees - fitted_parameters, 1.0);
+    error.degrees_of_freedom = std::max(error.degrees_of_freedom - fitted_parameters, 1.0);
   }
-  const double sigma = error.degrees > 0 ? std::sqrt(error.sum_of_squares / error.degrees) : 0;
-  floor.set_sigma_us(sigma * 1e6);
-  floor.set_degrees_of_freedom(static_cast<uint32_t>(error.degrees));
-  if (error.degrees >= 1) {
-    const boost::math::chi_squared distribution(error.degrees);
-    floor.set_lower_us(sigma * 1e6 * std::sqrt(error.degrees / boost::math::quantile(distribution, 0.975)));
-    floor.set_upper_us(sigma * 1e6 * std::sqrt(error.degrees / boost::math::quantile(distribution, 0.025)));
+  floor.degrees_of_freedom = error.degrees_of_freedom;
+  if (error.degrees_of_freedom > 0)
+    floor.sigma_s = std::sqrt(error.sum_of_squares / error.degrees_of_freedom);
+  if (error.degrees_of_freedom >= 1) {
+    const boost::math::chi_squared distribution(error.degrees_of_freedom);
+    const auto bound_s = [&](double p) {
+      return floor.sigma_s * std::sqrt(error.degrees_of_freedom / boost::math::quantile(distribution, p));
+    };
+    floor.lower_s = bound_s(0.975);
+    floor.upper_s = bound_s(0.025);
   }
   return floor;
 }

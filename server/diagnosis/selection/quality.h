@@ -1,24 +1,27 @@
-// How good a model is: error, error on touches left out, lack of fit (DESIGN 8).
+// How good a model is: error, error on touches left out, lack of fit.
 #pragma once
 
-#include "server/diagnosis/selection/explain.h"
+#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/selection/selection.h"
 
 namespace touchstone {
 
-// F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without
-// repeats or without degrees of freedom.
+// F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without repeats or
+// without degrees of freedom.
 double LackOfFitP(const Observations& observations, const std::vector<double>& residuals, double parameters);
 
 // Repeats enough for an F test.
 bool HasRepeats(const SumOfSquares& error);
 
-// Of the model of a fit (or of part of its effects), on all touches. `heldout_share`: error on touches left
-// out over that on all, from the search. `surface`: judge what a surface error leaves (searched touches).
-v1::Quality QualityOf(const Study& study, const Search& search, const Fit& fit,
-                      const std::vector<double>& residuals, bool surface);
+// Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
+// comes from the touches of the search.
+Quality QualityOf(const Workspace& workspace, const Fit& fit, const std::vector<double>& residuals);
+
+// The same for what the fit's surface error leaves, on the touches of the search.
+Quality QualityWithoutSurface(const Workspace& workspace, const Fit& fit);
 
 // The floor below which no model can go, from the repeats, else from `best`, residuals of the best model.
-v1::NoiseFloor NoiseFloorOf(const Observations& observations, const std::vector<double>& best,
-                            double fitted_parameters);
+NoiseFloor NoiseFloorOf(const Observations& observations, const std::vector<double>& best,
+                        double fitted_parameters);
 
 }  // namespace touchstone

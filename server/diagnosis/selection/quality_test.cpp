@@ -20,8 +20,8 @@ TEST(PureError, IsTheScatterOfRepeatsWhateverTheMisfit) {
     set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
   set.Finish();
   const SumOfSquares error = PureErrorOf(set.observations, set.residuals);
-  EXPECT_EQ(error.degrees, 5 * 48 * (4 - 1) * 2);
-  EXPECT_NEAR(std::sqrt(error.sum_of_squares / error.degrees), 0.005, 0.0003);
+  EXPECT_EQ(error.degrees_of_freedom, 5 * 48 * (4 - 1) * 2);
+  EXPECT_NEAR(std::sqrt(error.sum_of_squares / error.degrees_of_freedom), 0.005, 0.0003);
   EXPECT_GT(Rmse(set.observations, set.residuals), 0.015);
 }
 
@@ -45,11 +45,11 @@ TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
 
 TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
   const MadeUpSet set(5, 48, 1, 0.005, 4);
-  const v1::NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
-  EXPECT_FALSE(floor.from_repeats());
-  EXPECT_NEAR(floor.sigma_us(), 5000, 400);
-  EXPECT_LT(floor.lower_us(), floor.sigma_us());
-  EXPECT_GT(floor.upper_us(), floor.sigma_us());
+  const NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
+  EXPECT_FALSE(floor.from_repeats);
+  EXPECT_NEAR(floor.sigma_s, 5000e-6, 400e-6);
+  EXPECT_LT(floor.lower_s, floor.sigma_s);
+  EXPECT_GT(floor.upper_s, floor.sigma_s);
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ std::vector<TermFactor> ListTermFactors(const Observations& o, const Prediction&
   const MeasurementSet& set = *o.set;
   const auto at = [&o](int k, int i) { return static_cast<size_t>(k) * o.fingers + i; };
   const auto add = [&](const std::string& covariate, const std::string& expression, bool differs,
-                       double price, TermValue value) {
-    factors.push_back({covariate, expression, differs, price, std::move(value)});
+                       double penalty_nats, TermValue value) {
+    factors.push_back({covariate, expression, differs, penalty_nats, std::move(value)});
   };
   const auto with_square = [&](const std::string& name, bool differs, const TermValue& value) {
     add(name, name, differs, kSimpleNats, value);

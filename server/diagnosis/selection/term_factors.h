@@ -1,5 +1,5 @@
-// What terms of the formula dictionary are made of: covariates and functions of them, and factors that tell
-// the fingers of a touch apart.
+// What terms of the formula dictionary are made of: covariates and functions of them, and factors that
+// differ from finger to finger.
 #pragma once
 
 #include <functional>
@@ -15,10 +15,10 @@ using TermValue = std::function<double(int k, int finger)>;
 
 // A covariate or a function of one, in the units of files.
 struct TermFactor {
-  std::string covariate;   // "incidence_deg"
-  std::string expression;  // "tan(incidence_deg*pi/180)"
-  bool differs = false;    // between the fingers of a touch
-  double price = 0;        // nats: what people would try first comes cheaper
+  std::string covariate;    // "incidence_deg"
+  std::string expression;   // "tan(incidence_deg*pi/180)"
+  bool differs = false;     // between the fingers of a touch
+  double penalty_nats = 0;  // what people would try first costs less
   TermValue value;
 };
 
@@ -27,7 +27,7 @@ struct FingerFactor {
   TermValue value;
 };
 
-// What a curved function, and a product of two things that differ, cost.
+// Complexity penalties of a curved function, and of a product of two things that differ.
 inline constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
 
 // Both must outlive the lists.

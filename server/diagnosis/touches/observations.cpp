@@ -113,11 +113,10 @@ absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
 void LeaveOut(Observations* observations, int k, const std::string& reason) {
   if (!observations->used[k]) return;
   observations->used[k] = 0;
-  v1::UnusedRows& unused = observations->unused[reason];
-  unused.set_rows(unused.rows() + 1);
-  unused.set_reason(reason);
-  if (static_cast<size_t>(unused.examples_size()) < kMaxExamples)
-    unused.add_examples(observations->set->touch[observations->row[k]]);
+  UnusedTouches& unused = observations->unused[reason];
+  ++unused.count;
+  if (unused.examples.size() < kMaxExamples)
+    unused.examples.push_back(observations->set->touch[observations->row[k]]);
 }
 
 }  // namespace touchstone

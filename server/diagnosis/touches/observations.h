@@ -9,9 +9,14 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/input.h"
-#include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone {
+
+// Touches that were left out for one reason.
+struct UnusedTouches {
+  int count = 0;
+  std::vector<uint64_t> examples;  // the first few, by touch number
+};
 
 // Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's
 // order).
@@ -27,13 +32,17 @@ struct Observations {
   std::vector<double> time_s;  // [k * fingers + finger], NaN: not reported
   std::vector<char> used;      // 0: left out of every fit and error (edge contacts, outliers, ...)
   std::vector<int> previous;   // the session's previous touch; -1: none
-  std::map<std::string, v1::UnusedRows> unused;  // by reason
+  std::map<std::string, UnusedTouches> unused;  // by reason
 
   int size() const { return static_cast<int>(row.size()); }
 };
 
 // Checks that set, model and surfaces belong together. Errors name what is missing.
 absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input);
+
+// The reason of touches with a finger whose time no noise explains.
+inline constexpr char kOutlierReason[] =
+    "an outlier: one finger's time is far from what all other touches allow";
 
 // Takes touch k out, with the reason in words for people ("a finger within 0.3 mm of an edge").
 void LeaveOut(Observations* observations, int k, const std::string& reason);

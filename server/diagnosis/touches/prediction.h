@@ -30,15 +30,14 @@ struct Prediction {
 absl::StatusOr<Prediction> Predict(const Observations& observations, const Model& model, bool details,
                                    bool curvature, ThreadPool* pool);
 
-// The residual of DESIGN 8: measured minus predicted less its mean over the touch's fingers that report and
-// that the model expects to; NaN elsewhere, and in touches with fewer than two such fingers. [k * fingers +
-// i]
+// Measured minus predicted less its mean over the touch's fingers that report and that the model expects to: only
+// differences between fingers are measured, so nothing may depend on which finger came first. NaN elsewhere, and in
+// touches with fewer than two such fingers. [k * fingers + i]
 std::vector<double> Residuals(const Observations& observations, const Prediction& prediction);
 
-// Squares of residuals and what they are free to be.
 struct SumOfSquares {
   double sum_of_squares = 0;
-  double degrees = 0;
+  double degrees_of_freedom = 0;
 };
 
 // sum ||residual||^2 and sum (fingers - 1) over the touches used.

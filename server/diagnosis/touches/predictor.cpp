@@ -1,7 +1,5 @@
 #include "server/diagnosis/touches/predictor.h"
 
-#include <absl/strings/match.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -15,31 +13,20 @@ namespace {
 constexpr int kBlock = 1024;
 
 // Whether touches of one pose may differ under this model.
-bool HangsOnSession(const Model& model) {
-  for (const EffectInstance& instance : model.effects) {
-    const Effect& effect = *instance.effect;
-    if (effect.needs.previous_press || !effect.needs.covariates.empty() || effect.name == "thermal_drift")
-      return true;
-    if (effect.formula && absl::StrContains(effect.formula->expression, "session_time")) return true;
-  }
-  return false;
+bool DependsOnSession(const Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const EffectInstance& instance) {
+    const EffectNeeds& needs = instance.effect->needs;
+    return needs.previous_press || needs.session_time || !needs.covariates.empty();
+  });
 }
 
 }  // namespace
 
-bool IsRandomEffect(const Effect& effect) {
-  for (const char* name : {"gaussian_noise", "incidence_noise", "heavy_tail_noise", "poll_interval",
-                           "missed_contact", "surface_error"})
-    if (effect.name == name) return true;
-  return false;
-}
-
 Model DeterministicPart(const Model& model) {
   Model part = model;
-  part.effects.erase(
-      std::remove_if(part.effects.begin(), part.effects.end(),
-                     [](const EffectInstance& instance) { return IsRandomEffect(*instance.effect); }),
-      part.effects.end());
+  part.effects.erase(std::remove_if(part.effects.begin(), part.effects.end(),
+                                    [](const EffectInstance& instance) { return instance.effect->random(); }),
+                     part.effects.end());
   return part;
 }
 
@@ -97,121 +84,156 @@ void Predictor::ForBlocks(const std::vector<Block>& blocks,
   ParallelFor(count > 1 ? pool_ : nullptr, count, 1, run);
 }
 
-absl::StatusOr<Prediction> Predictor::Run(const Model& model, bool details, bool curvature) const {
-  const Observations& o = observations_;
-  const size_t entries = static_cast<size_t>(o.size()) * o.fingers;
-  Prediction p;
-  p.fingers = o.fingers;
-  p.time_s.assign(entries, NAN);
-  if (details) {
-    for (auto* column : {&p.travel_m, &p.slope_s_m, &p.cos_incidence}) column->assign(entries, NAN);
-    for (auto* column : {&p.previous_press_m, &p.press_m}) column->assign(entries, 0);
-    p.contact_m.assign(entries, Eigen::Vector3d::Constant(NAN));
-    p.normal.assign(entries, Eigen::Vector3d::Zero());
-    p.first_finger.assign(o.size(), -1);
-    if (curvature) p.curvature_per_m.assign(entries, NAN);
+// One prediction under way: simulation block by block, then copies for the repeats of a pose.
+class Predictor::Task {
+ public:
+  Task(const Predictor& predictor, const Model& model, bool details, bool curvature)
+      : predictor_(predictor),
+        o_(predictor.observations_),
+        details_(details),
+        curvature_(curvature && details),
+        model_(DeterministicPart(model)),
+        every_touch_(DependsOnSession(model_)),
+        simulator_(std::make_shared<const Model>(WithCurvature())),
+        blocks_(every_touch_ ? predictor.touch_blocks_ : predictor.pose_blocks_) {}
+
+  absl::StatusOr<Prediction> Run() {
+    Allocate();
+    if (simulator_.needs_previous_press() || details_) {
+      FindPresses();
+      TOUCHSTONE_RETURN_IF_ERROR(status_);
+    }
+    predictor_.ForBlocks(blocks_, [this](const Block& block) { Simulate(block); });
+    TOUCHSTONE_RETURN_IF_ERROR(status_);
+    if (!every_touch_) CopyToRepeats();
+    if (details_) FillPresses();
+    return std::move(p_);
   }
 
-  Model part = DeterministicPart(model);
-  TouchSimulator simulator(std::make_shared<const Model>(part));
-  if (curvature && details) {
-    // The stage fills curvature only for effects that need it.
+ private:
+  // The contact stage fills curvature only for effects that need it.
+  Model WithCurvature() const {
+    Model model = model_;
+    if (!curvature_) return model;
     auto asks = std::make_shared<Effect>();
     asks->name = "curvature_of_contacts";
     asks->stage = Stage::kSensor;
     asks->needs.curvature = true;
     asks->apply = [](absl::Span<const double>, TouchBatch&) {};
-    part.effects.push_back({asks, false, {}, {}});
-    simulator = TouchSimulator(std::make_shared<const Model>(part));
+    model.effects.push_back({asks, false, {}, {}});
+    return model;
   }
-  const bool every_touch = HangsOnSession(part);
-  const std::vector<Block>& blocks = every_touch ? touch_blocks_ : pose_blocks_;
 
-  std::mutex mutex;
-  absl::Status status;
-  std::vector<double> presses;  // only where the next touch feels them
-  const auto simulate = [&](const Block& block, TouchBatch* batch, TouchWorkspace* workspace) {
-    Fill(block, simulator, batch);
-    absl::Status ran = simulator.RunToMotion(batch, workspace);
-    if (ran.ok()) return true;
-    const std::lock_guard<std::mutex> lock(mutex);
-    status = ran;
-    return false;
-  };
-  if (simulator.needs_previous_press() || details) {
-    presses.assign(entries, 0);
-    ForBlocks(blocks, [&](const Block& block) {
+  void Allocate() {
+    const size_t entries = static_cast<size_t>(o_.size()) * o_.fingers;
+    p_.fingers = o_.fingers;
+    p_.time_s.assign(entries, NAN);
+    if (!details_) return;
+    for (auto* column : {&p_.travel_m, &p_.slope_s_m, &p_.cos_incidence}) column->assign(entries, NAN);
+    for (auto* column : {&p_.previous_press_m, &p_.press_m}) column->assign(entries, 0);
+    p_.contact_m.assign(entries, Eigen::Vector3d::Constant(NAN));
+    p_.normal.assign(entries, Eigen::Vector3d::Zero());
+    p_.first_finger.assign(o_.size(), -1);
+    if (curvature_) p_.curvature_per_m.assign(entries, NAN);
+  }
+
+  size_t Entry(int k, int finger) const { return static_cast<size_t>(k) * o_.fingers + finger; }
+
+  void Fail(absl::Status status) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = std::move(status);
+  }
+
+  bool SimulateToMotion(const Block& block, TouchBatch* batch, TouchWorkspace* workspace) {
+    predictor_.Fill(block, simulator_, batch);
+    absl::Status ran = simulator_.RunToMotion(batch, workspace);
+    if (!ran.ok()) Fail(ran);
+    return ran.ok();
+  }
+
+  // How far each touch presses each finger, which the next touch may feel.
+  void FindPresses() {
+    presses_m_.assign(static_cast<size_t>(o_.size()) * o_.fingers, 0);
+    predictor_.ForBlocks(blocks_, [this](const Block& block) {
       thread_local TouchBatch batch;
       thread_local TouchWorkspace workspace;
-      if (!simulate(block, &batch, &workspace)) return;
+      if (!SimulateToMotion(block, &batch, &workspace)) return;
       for (size_t t = 0; t < block.touches.size(); ++t)
-        for (int i = 0; i < o.fingers; ++i)
-          presses[static_cast<size_t>(block.touches[t]) * o.fingers + i] =
-              batch.press_m[batch.At(i, static_cast<int>(t))];
+        for (int i = 0; i < o_.fingers; ++i)
+          presses_m_[Entry(block.touches[t], i)] = batch.press_m[batch.At(i, static_cast<int>(t))];
     });
-    TOUCHSTONE_RETURN_IF_ERROR(status);
-    if (!every_touch)
-      for (int k = 0; k < o.size(); ++k)
-        for (int i = 0; i < o.fingers; ++i)
-          presses[static_cast<size_t>(k) * o.fingers + i] =
-              presses[static_cast<size_t>(first_of_pose_[o.pose[k]]) * o.fingers + i];
+    if (every_touch_) return;
+    for (int k = 0; k < o_.size(); ++k)
+      for (int i = 0; i < o_.fingers; ++i)
+        presses_m_[Entry(k, i)] = presses_m_[Entry(predictor_.first_of_pose_[o_.pose[k]], i)];
   }
 
-  ForBlocks(blocks, [&](const Block& block) {
+  void Simulate(const Block& block) {
     thread_local TouchBatch batch;
     thread_local TouchWorkspace workspace;
-    if (!simulate(block, &batch, &workspace)) return;
-    for (size_t t = 0; t < block.touches.size() && simulator.needs_previous_press(); ++t) {
-      const int previous = o.previous[block.touches[t]];
-      for (int i = 0; i < o.fingers && previous >= 0; ++i)
-        batch.previous_press_m[batch.At(i, static_cast<int>(t))] =
-            presses[static_cast<size_t>(previous) * o.fingers + i];
+    if (!SimulateToMotion(block, &batch, &workspace)) return;
+    for (size_t t = 0; t < block.touches.size() && simulator_.needs_previous_press(); ++t) {
+      const int previous = o_.previous[block.touches[t]];
+      for (int i = 0; i < o_.fingers && previous >= 0; ++i)
+        batch.previous_press_m[batch.At(i, static_cast<int>(t))] = presses_m_[Entry(previous, i)];
     }
-    if (absl::Status ran = simulator.RunSensor(&batch, &workspace); !ran.ok()) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      status = ran;
-      return;
-    }
-    for (size_t t = 0; t < block.touches.size(); ++t) {
-      const int k = block.touches[t];
-      if (details) p.first_finger[k] = batch.first_finger[t];
-      for (int i = 0; i < o.fingers; ++i) {
-        const size_t to = static_cast<size_t>(k) * o.fingers + i;
-        const int from = batch.At(i, static_cast<int>(t));
-        p.time_s[to] = batch.reported_time_s[from];
-        if (!details) continue;
-        p.travel_m[to] = batch.travel_m[from];
-        p.slope_s_m[to] = batch.time_per_travel_s_m[from];
-        p.cos_incidence[to] = batch.cos_incidence[from];
-        p.contact_m[to] = batch.contact_m[from];
-        p.normal[to] = batch.normal[from];
-        if (curvature) p.curvature_per_m[to] = batch.curvature_per_m[from];
-      }
-    }
-  });
-  TOUCHSTONE_RETURN_IF_ERROR(status);
+    if (absl::Status ran = simulator_.RunSensor(&batch, &workspace); !ran.ok()) return Fail(std::move(ran));
+    for (size_t t = 0; t < block.touches.size(); ++t) Keep(batch, static_cast<int>(t), block.touches[t]);
+  }
 
-  if (!every_touch) {
-    for (int k = 0; k < o.size(); ++k) {
-      const int first = first_of_pose_[o.pose[k]];
-      if (first == k) continue;
-      const size_t to = static_cast<size_t>(k) * o.fingers, from = static_cast<size_t>(first) * o.fingers;
-      const auto copy = [&](auto& column) { std::copy_n(&column[from], o.fingers, &column[to]); };
-      copy(p.time_s);
-      if (!details) continue;
-      copy(p.travel_m), copy(p.slope_s_m), copy(p.cos_incidence), copy(p.contact_m), copy(p.normal);
-      if (curvature) copy(p.curvature_per_m);
-      p.first_finger[k] = p.first_finger[first];
+  // Touch t of a batch is touch k.
+  void Keep(const TouchBatch& batch, int t, int k) {
+    if (details_) p_.first_finger[k] = batch.first_finger[t];
+    for (int i = 0; i < o_.fingers; ++i) {
+      const size_t to = Entry(k, i);
+      const int from = batch.At(i, t);
+      p_.time_s[to] = batch.reported_time_s[from];
+      if (!details_) continue;
+      p_.travel_m[to] = batch.travel_m[from];
+      p_.slope_s_m[to] = batch.time_per_travel_s_m[from];
+      p_.cos_incidence[to] = batch.cos_incidence[from];
+      p_.contact_m[to] = batch.contact_m[from];
+      p_.normal[to] = batch.normal[from];
+      if (curvature_) p_.curvature_per_m[to] = batch.curvature_per_m[from];
     }
   }
-  if (details) {
-    p.press_m = presses;
-    for (int k = 0; k < o.size(); ++k)
-      for (int i = 0; i < o.fingers && o.previous[k] >= 0; ++i)
-        p.previous_press_m[static_cast<size_t>(k) * o.fingers + i] =
-            presses[static_cast<size_t>(o.previous[k]) * o.fingers + i];
+
+  void CopyToRepeats() {
+    for (int k = 0; k < o_.size(); ++k) {
+      const int first = predictor_.first_of_pose_[o_.pose[k]];
+      if (first == k) continue;
+      const size_t to = Entry(k, 0), from = Entry(first, 0);
+      const auto copy = [&](auto& column) { std::copy_n(&column[from], o_.fingers, &column[to]); };
+      copy(p_.time_s);
+      if (!details_) continue;
+      copy(p_.travel_m), copy(p_.slope_s_m), copy(p_.cos_incidence), copy(p_.contact_m), copy(p_.normal);
+      if (curvature_) copy(p_.curvature_per_m);
+      p_.first_finger[k] = p_.first_finger[first];
+    }
   }
-  return p;
+
+  void FillPresses() {
+    p_.press_m = presses_m_;
+    for (int k = 0; k < o_.size(); ++k)
+      for (int i = 0; i < o_.fingers && o_.previous[k] >= 0; ++i)
+        p_.previous_press_m[Entry(k, i)] = presses_m_[Entry(o_.previous[k], i)];
+  }
+
+  const Predictor& predictor_;
+  const Observations& o_;
+  const bool details_, curvature_;
+  const Model model_;
+  const bool every_touch_;  // else one touch per pose
+  const TouchSimulator simulator_;
+  const std::vector<Block>& blocks_;
+  Prediction p_;
+  std::vector<double> presses_m_;  // empty unless they are needed
+  std::mutex mutex_;
+  absl::Status status_;
+};
+
+absl::StatusOr<Prediction> Predictor::Run(const Model& model, bool details, bool curvature) const {
+  return Task(*this, model, details, curvature).Run();
 }
 
 absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const Model& model, double along_lateral_m,
@@ -274,14 +296,14 @@ SumOfSquares TotalSquares(const Observations& observations, const std::vector<do
       const double residual = residuals[static_cast<size_t>(k) * observations.fingers + i];
       if (!std::isnan(residual)) total.sum_of_squares += residual * residual, ++count;
     }
-    total.degrees += std::max(count - 1, 0);
+    total.degrees_of_freedom += std::max(count - 1, 0);
   }
   return total;
 }
 
 double Rmse(const Observations& observations, const std::vector<double>& residuals) {
   const SumOfSquares total = TotalSquares(observations, residuals);
-  return total.degrees > 0 ? std::sqrt(total.sum_of_squares / total.degrees) : 0;
+  return total.degrees_of_freedom > 0 ? std::sqrt(total.sum_of_squares / total.degrees_of_freedom) : 0;
 }
 
 }  // namespace touchstone

@@ -9,12 +9,7 @@
 
 namespace touchstone {
 
-// True for effects that change no expectation but the scatter, or that are drawn anew for every object:
-// gaussian_noise, incidence_noise, heavy_tail_noise, poll_interval, missed_contact, surface_error. They are
-// judged by likelihood, not by prediction.
-bool IsRandomEffect(const Effect& effect);
-
-// The model without random effects.
+// The model without random effects (Effect::random).
 Model DeterministicPart(const Model& model);
 
 class Predictor {
@@ -22,7 +17,7 @@ class Predictor {
   // `observations` must outlive it.
   Predictor(const Observations& observations, ThreadPool* pool);
 
-  // See Predict. Touches of one pose are simulated once, unless the model hangs on the session's course.
+  // See Predict. Touches of one pose are simulated once, unless the model depends on the session's course.
   absl::StatusOr<Prediction> Run(const Model& model, bool details, bool curvature) const;
 
   // Contact travel of every touch with the whole end effector moved by `along_lateral_m` along the lateral
@@ -38,6 +33,7 @@ class Predictor {
     int object = 0;
     std::vector<int> touches;  // k of each line of the batch
   };
+  class Task;
   static std::vector<Block> MakeBlocks(const Observations& observations, const std::vector<int>& touches);
   void Fill(const Block& block, const TouchSimulator& simulator, TouchBatch* batch) const;
   void ForBlocks(const std::vector<Block>& blocks, const std::function<void(const Block&)>& body) const;

@@ -21,28 +21,27 @@ constexpr double kSure = 0.9975;
 constexpr const char* kEffects[] = {"tip_radius", "oblique_slip", "finger_spacing", "object_scale",
                                     "tool_yaw"};
 
-bool RightAndSure(const v1::Report& report, const std::string& effect) {
-  return report.steps_size() == 1 && report.steps(0).effect() == effect &&
-         report.steps(0).equivalent_size() == 0 && report.steps(0).probability() >= kSure;
+bool RightAndSure(const Diagnosis& diagnosis, const std::string& effect) {
+  return diagnosis.steps.size() == 1 && diagnosis.steps[0].effect == effect &&
+         diagnosis.steps[0].equivalent.empty() && diagnosis.steps[0].probability >= kSure;
 }
 
 absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const Scenario& scenario) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Propose(input, kAddedAtOnce, {}));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, Propose(input, kAddedAtOnce, {}));
   std::vector<Command> commands;
-  for (const v1::ProposedTouch& proposed : report.next_touches()) {
-    const v1::CommandedTouch& touch = proposed.touch();
+  for (const ProposedTouch& proposed : diagnosis.next_touches) {
+    const CommandedTouch& touch = proposed.touch;
     Command command;
     while (command.object < static_cast<int>(scenario.objects.size()) &&
-           scenario.objects[command.object]->name() != proposed.object())
+           scenario.objects[command.object]->name() != proposed.object)
       ++command.object;
     if (command.object == static_cast<int>(scenario.objects.size()))
-      return absl::InternalError("a touch of an unknown object was proposed: " + proposed.object());
-    command.target_mm =
-        1000 * Eigen::Vector3d(touch.target_m().x(), touch.target_m().y(), touch.target_m().z());
-    command.approach = Eigen::Vector3d(touch.approach().x(), touch.approach().y(), touch.approach().z());
-    command.lateral = Eigen::Vector3d(touch.lateral().x(), touch.lateral().y(), touch.lateral().z());
-    command.standoff_mm = 1000 * touch.standoff_m();
-    command.speed_mm_s = 1000 * touch.speed_m_s();
+      return absl::InternalError("a touch of an unknown object was proposed: " + proposed.object);
+    command.target_mm = 1000 * touch.target_m;
+    command.approach = touch.approach;
+    command.lateral = touch.lateral;
+    command.standoff_mm = 1000 * touch.standoff_m;
+    command.speed_mm_s = 1000 * touch.speed_m_s;
     commands.push_back(command);
   }
   return commands;
@@ -56,9 +55,9 @@ absl::StatusOr<int> Added(const TestObjects& objects, const Scenario& scenario, 
   for (;;) {
     const Set set = GenerateFor(scenario, commands, seed);
     TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set, objects));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, Diagnose(input, {}));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, Diagnose(input, {}));
     const int added = static_cast<int>(commands.size()) - kBegin;
-    *arrived = RightAndSure(report, scenario.hidden.front().effect);
+    *arrived = RightAndSure(diagnosis, scenario.hidden.front().effect);
     if (*arrived || added >= kMaxAdded) return added;
     std::vector<Command> next(random.begin() + commands.size(),
                               random.begin() + commands.size() + kAddedAtOnce);

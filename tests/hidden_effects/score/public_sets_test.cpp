@@ -33,9 +33,9 @@ class PublicSets : public testing::Test {
     input.model = std::make_shared<const Model>(*std::move(model));
     for (const std::string& object : input.set->objects)
       input.surfaces[object] = objects_->surfaces.at(object);
-    auto report = Diagnose(input, {});
-    EXPECT_TRUE(report.ok()) << report.status();
-    return report.ok() ? *report : v1::Report();
+    const auto diagnosis = Diagnose(input, {});
+    EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
+    return diagnosis.ok() ? ToReport(*diagnosis) : v1::Report();
   }
 
   static double Value(const v1::Step& step, const std::string& finger = "") {

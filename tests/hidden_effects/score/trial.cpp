@@ -82,12 +82,12 @@ Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool b
   const auto input = InputFor(out.set, objects);
   if (!input.ok()) return out.error = input.status().ToString(), out;
   const double start_s = ThreadSeconds();
-  auto report = Diagnose(*input, {});
+  const auto diagnosis = Diagnose(*input, {});
   out.seconds = ThreadSeconds() - start_s;
-  if (report.ok())
-    out.report = *std::move(report);
+  if (diagnosis.ok())
+    out.report = ToReport(*diagnosis);
   else
-    out.error = report.status().ToString();
+    out.error = diagnosis.status().ToString();
   // Without a report every question is answered wrongly.
   double cuts_to = NAN;
   if (arm.kind == Kind::kUnlisted) cuts_to = FormulaCutsTo(out.set.truth, seed, out.report, objects);

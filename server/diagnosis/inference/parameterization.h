@@ -1,4 +1,4 @@
-// A model with some of its values set free, as a point in R^n that a fit can move.
+// A model with some of its values free, as a point in R^n that a fit can move.
 #pragma once
 
 #include <memory>
@@ -7,59 +7,59 @@
 
 #include <Eigen/Core>
 
+#include "server/diagnosis/inference/parameter_estimate.h"
 #include "server/model/model.h"
-#include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone {
 
 // One direction in which values may move.
-struct Coordinate {
+struct FreeParameter {
   int effect = 0;               // index into the model's effects
   int parameter = 0;            // of that effect
   std::string object;           // whose value; empty: every object's
-  std::vector<double> weights;  // change of the effect's flat values (SI) per unit of the coordinate
-  double lower = 0, upper = 0;  // of the coordinate
+  std::vector<double> weights;  // change of the effect's flat values (SI) per unit of this one
+  double lower = 0, upper = 0;  // of this one
   double scale = 1;             // size that rigs show: unit of steps and width of the prior
   double neutral = 0;           // the value that changes nothing, or that the model had
-  bool inverse = false;         // the value is 1 / coordinate (acceleration_ramp: neutral at infinity)
-  int shape = 0;                // coordinates of one shape differ by object only
+  bool reciprocal = false;      // the value is 1 / this one (ParameterInfo::reciprocal)
+  int shape = 0;                // parameters of one shape differ by object only
 };
 
-class FreeModel {
+class Parameterization {
  public:
-  FreeModel() = default;
+  Parameterization() = default;
   // Nothing is free yet; values of per-object effects are spelled out for `objects`.
-  FreeModel(Model base, std::vector<std::string> objects);
+  Parameterization(Model base, std::vector<std::string> objects);
 
   // Sets every value of effect `index` free. Values that start where a sum of zero binds them stay bound.
   // `refit`: the model had the effect; the prior is around its values.
   void Free(int index, bool refit);
   // Appends an effect at values that change nothing (or, for formulas, at those given) and sets it free.
   void Add(std::shared_ptr<const Effect> effect, bool per_object);
-  // Takes effect `index` out, with its coordinates.
-  FreeModel Without(int index) const;
+  // Takes effect `index` out, with its free parameters.
+  Parameterization Without(int index) const;
 
   const Model& base() const { return base_; }
-  const std::vector<Coordinate>& coordinates() const { return coordinates_; }
-  int size() const { return static_cast<int>(coordinates_.size()); }
+  const std::vector<FreeParameter>& parameters() const { return parameters_; }
+  int size() const { return static_cast<int>(parameters_.size()); }
   bool IsFree(int effect) const;
 
   // The point where the base stands.
   Eigen::VectorXd Start() const;
   // The model at a point; values are clipped to their bounds.
   Model At(const Eigen::VectorXd& point) const;
-  // The same as a new base: fits go on from there. `frozen`: nothing is free in it.
+  // The same as a new base: fits continue from there.
   void MoveTo(const Eigen::VectorXd& point);
   Eigen::VectorXd Clip(Eigen::VectorXd point) const;
 
-  // Values and errors of effect `index` at a point, in the units of files. covariance is of the coordinates.
-  std::vector<v1::ParameterValue> Describe(int index, const Eigen::VectorXd& point,
-                                           const Eigen::MatrixXd& covariance) const;
+  // Values and errors of effect `index` at a point, in the units of files. `covariance` of the free parameters.
+  std::vector<ParameterEstimate> Describe(int index, const Eigen::VectorXd& point,
+                                          const Eigen::MatrixXd& covariance) const;
 
  private:
   Model base_;
   std::vector<std::string> objects_;
-  std::vector<Coordinate> coordinates_;
+  std::vector<FreeParameter> parameters_;
   int shapes_ = 0;
 };
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/selection/study.h"
+#include "server/diagnosis/selection/workspace.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -62,14 +62,14 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
 absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
   std::vector<double> measured, predicted;
   for (int k = 0; k < o.size(); ++k) {
-    double least = INFINITY, most = -INFINITY, min_p = INFINITY, max_p = -INFINITY;
+    double min_s = INFINITY, max_s = -INFINITY, min_p = INFINITY, max_p = -INFINITY;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e) {
       if (std::isnan(o.time_s[e]) || std::isnan(nominal.time_s[e])) continue;
-      least = std::min(least, o.time_s[e]), most = std::max(most, o.time_s[e]);
+      min_s = std::min(min_s, o.time_s[e]), max_s = std::max(max_s, o.time_s[e]);
       min_p = std::min(min_p, nominal.time_s[e]), max_p = std::max(max_p, nominal.time_s[e]);
     }
-    if (most < least) continue;
-    measured.push_back(most - least);
+    if (max_s < min_s) continue;
+    measured.push_back(max_s - min_s);
     predicted.push_back(max_p - min_p);
   }
   if (measured.empty()) return absl::OkStatus();
@@ -166,95 +166,113 @@ SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& resid
     double mean_squares = 0;
     for (const double sum : group.sum) mean_squares += sum * sum / group.touches;
     error.sum_of_squares += group.squares - mean_squares;
-    error.degrees += static_cast<double>(group.members - 1) * (group.touches - 1);
+    error.degrees_of_freedom += static_cast<double>(group.members - 1) * (group.touches - 1);
   }
   return error;
 }
 
-absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_row) {
-  const Observations& o = *study->observations;
-  std::vector<int> kept;
-  study->thinned = o.size() > kMaxSearched;
-  if (!study->thinned) {
-    for (int k = 0; k < o.size(); ++k) kept.push_back(k);
-  } else {
-    // Up to four touches a pose, of poses spread evenly; with the touch before each, which hysteresis feels.
-    std::vector<int> usable(o.poses, 0);
-    for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
-    int total = 0;
-    for (int& count : usable) count = std::min(count, kRepeatsSearched), total += count;
-    const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
-    std::vector<int> quota(o.poses, 0);
-    double credit = 0;
-    for (int pose = 0; pose < o.poses; ++pose) {
-      credit += usable[pose];
-      if (usable[pose] == 0 || credit < stride * usable[pose]) continue;
-      credit -= stride * usable[pose];
-      quota[pose] = usable[pose];
-    }
-    std::vector<char> taken(o.size(), 0), needed(o.size(), 0);
-    for (int k = 0; k < o.size(); ++k) {
-      if (!o.used[k] || quota[o.pose[k]] == 0) continue;
-      --quota[o.pose[k]];
-      taken[k] = 1;
-      if (o.previous[k] >= 0) needed[o.previous[k]] = 1;
-    }
-    for (int k = 0; k < o.size(); ++k)
-      if (taken[k] || needed[k]) kept.push_back(k);
-    study->searched = std::make_unique<Observations>(Thin(o, kept));
-    for (size_t j = 0; j < kept.size(); ++j)
-      if (!taken[kept[j]]) study->searched->used[j] = 0;
+namespace {
+
+// Up to four touches per pose, of poses spread evenly over the set. [k]
+std::vector<char> ChooseTouches(const Observations& o) {
+  std::vector<int> usable(o.poses, 0);
+  for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
+  int total = 0;
+  for (int& count : usable) count = std::min(count, kRepeatsSearched), total += count;
+  const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
+  std::vector<int> quota(o.poses, 0);
+  double credit = 0;
+  for (int pose = 0; pose < o.poses; ++pose) {
+    credit += usable[pose];
+    if (usable[pose] == 0 || credit < stride * usable[pose]) continue;
+    credit -= stride * usable[pose];
+    quota[pose] = usable[pose];
   }
-  if (!study->thinned) study->searched = std::make_unique<Observations>(Thin(o, kept));
-  study->searched_predictor = std::make_unique<Predictor>(*study->searched, nullptr);
-  TOUCHSTONE_ASSIGN_OR_RETURN(study->searched_nominal,
-                              study->searched_predictor->Run(*study->input.model, true, false));
-  const Observations& searched = *study->searched;
-  study->contrasts = std::make_unique<Contrasts>(searched, study->searched_nominal.time_s);
+  std::vector<char> chosen(o.size(), 0);
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k] || quota[o.pose[k]] == 0) continue;
+    --quota[o.pose[k]];
+    chosen[k] = 1;
+  }
+  return chosen;
+}
+
+// The touches that the search sees; of large sets a part, with the touch before each, which hysteresis feels.
+Observations SearchedOf(const Observations& o, bool thinned) {
+  std::vector<int> kept;
+  if (!thinned) {
+    for (int k = 0; k < o.size(); ++k) kept.push_back(k);
+    return Thin(o, kept);
+  }
+  const std::vector<char> chosen = ChooseTouches(o);
+  std::vector<char> needed(o.size(), 0);
+  for (int k = 0; k < o.size(); ++k)
+    if (chosen[k] && o.previous[k] >= 0) needed[o.previous[k]] = 1;
+  for (int k = 0; k < o.size(); ++k)
+    if (chosen[k] || needed[k]) kept.push_back(k);
+  Observations searched = Thin(o, kept);
+  for (size_t j = 0; j < kept.size(); ++j)
+    if (!chosen[kept[j]]) searched.used[j] = 0;
+  return searched;
+}
+
+}  // namespace
+
+absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row) {
+  const Observations& o = *workspace->observations;
+  workspace->thinned = o.size() > kMaxSearched;
+  workspace->searched = std::make_unique<Observations>(SearchedOf(o, workspace->thinned));
+  workspace->searched_predictor = std::make_unique<Predictor>(*workspace->searched, nullptr);
+  TOUCHSTONE_ASSIGN_OR_RETURN(workspace->searched_nominal,
+                              workspace->searched_predictor->Run(*workspace->input.model, true, false));
+  const Observations& searched = *workspace->searched;
+  workspace->contrasts = std::make_unique<Contrasts>(searched, workspace->searched_nominal.time_s);
   if (!weights_by_row.empty()) {
     std::vector<double> weights;
-    for (const int k : study->contrasts->touches()) weights.push_back(weights_by_row[searched.row[k]]);
-    study->contrasts->SetWeights(weights);
+    for (const int k : workspace->contrasts->touches()) weights.push_back(weights_by_row[searched.row[k]]);
+    workspace->contrasts->SetWeights(weights);
   }
-  double slope = 0;
-  for (const int k : study->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
-  slope /= std::max<size_t>(study->contrasts->touches().size(), 1);
-  study->likelihood = std::make_unique<Likelihood>(searched, *study->contrasts, study->searched_nominal, true,
-                                                   kFloorM * slope, study->context.pool);
-  Experiment& experiment = study->experiment;
-  experiment.observations = study->searched.get();
-  experiment.predictor = study->searched_predictor.get();
-  experiment.contrasts = study->contrasts.get();
-  experiment.likelihood = study->likelihood.get();
-  experiment.nominal_s = study->searched_nominal.time_s;
-  experiment.pool = study->context.pool;
+  double slope = 0;  // s/m
+  for (const int k : workspace->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
+  slope /= std::max<size_t>(workspace->contrasts->touches().size(), 1);
+  const SmoothErrorGeometry geometry =
+      SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
+  workspace->likelihood = std::make_unique<Likelihood>(
+      FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())), &geometry,
+      kFloorM * slope, workspace->context.pool);
+  workspace->rows = std::make_unique<TouchObservationModel>(
+      searched, *workspace->searched_predictor, *workspace->contrasts, workspace->searched_nominal.time_s);
+  Experiment& experiment = workspace->experiment;
+  experiment.observations = workspace->rows.get();
+  experiment.likelihood = workspace->likelihood.get();
+  experiment.pool = workspace->context.pool;
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input,
-                                                 const DiagnosisContext& context) {
-  auto study = std::make_unique<Study>();
-  study->input = input;
-  study->context = context;
+absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& input,
+                                                         const DiagnosisContext& context) {
+  auto workspace = std::make_unique<Workspace>();
+  workspace->input = input;
+  workspace->context = context;
   if (context.progress && !context.progress("reading", 0))
     return absl::CancelledError("the diagnosis was cancelled");
   TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
-  study->observations = std::make_unique<Observations>(std::move(observations));
-  Observations& o = *study->observations;
-  study->predictor = std::make_unique<Predictor>(o, context.pool);
+  workspace->observations = std::make_unique<Observations>(std::move(observations));
+  Observations& o = *workspace->observations;
+  workspace->predictor = std::make_unique<Predictor>(o, context.pool);
   if (context.progress && !context.progress("predicting", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
-  TOUCHSTONE_ASSIGN_OR_RETURN(study->nominal, study->predictor->Run(*input.model, true, true));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(o, study->nominal, &study->warnings));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckUnits(o, study->nominal));
+  TOUCHSTONE_ASSIGN_OR_RETURN(workspace->nominal, workspace->predictor->Run(*input.model, true, true));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(o, workspace->nominal, &workspace->warnings));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckUnits(o, workspace->nominal));
   for (int k = 0; k < o.size(); ++k) {
     int members = 0;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
-      members += !std::isnan(o.time_s[e]) && !std::isnan(study->nominal.time_s[e]);
+      members += !std::isnan(o.time_s[e]) && !std::isnan(workspace->nominal.time_s[e]);
     if (members < 2) LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
   }
-  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*study->predictor, *input.model, &o).status());
-  return study;
+  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*workspace->predictor, *input.model, &o).status());
+  return workspace;
 }
 
 }  // namespace touchstone

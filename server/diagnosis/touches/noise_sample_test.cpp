@@ -1,4 +1,4 @@
-#include "server/diagnosis/inference/noise_kinds.h"
+#include "server/diagnosis/touches/noise_sample.h"
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,8 @@ NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
     set.observations.time_s[e] += draw(tangents[e]);
   }
   set.Finish();
-  return FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
+  return FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
 }
 
 TEST(FindNoise, MeasuresPlainNoiseAndClaimsNothingElse) {
@@ -68,8 +69,8 @@ TEST(FindNoise, FindsTheTicksOfAPollingLoop) {
   for (double& time_s : set.observations.time_s) time_s = std::ceil(time_s / 0.0125) * 0.0125;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const NoiseFindings found =
-      FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
+  const NoiseFindings found = FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_NEAR(found.poll_interval_s.value, 0.0125, 1e-8);
 }
 
@@ -78,8 +79,8 @@ TEST(FindNoise, CountsContactsThatAreMissed) {
   for (size_t e = 0; e < set.observations.time_s.size(); e += 11) set.observations.time_s[e] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const NoiseFindings found =
-      FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
+  const NoiseFindings found = FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_NEAR(found.missed_probability.value, 1.0 / 11, 0.01);
 }
 
@@ -90,8 +91,8 @@ TEST(FindNoise, AFingerThatIsSilentInEveryRepeatIsOutOfReachAndNoChance) {
     if (o.pose[k] % 10 == 0) set.observations.time_s[static_cast<size_t>(k) * o.fingers + 2] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const NoiseFindings found =
-      FindNoise(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1), 0);
+  const NoiseFindings found = FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_EQ(found.missed_probability.gain_nats, 0) << found.missed_probability.value;
 }
 

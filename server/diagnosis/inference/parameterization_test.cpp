@@ -1,4 +1,4 @@
-#include "server/diagnosis/inference/free_model.h"
+#include "server/diagnosis/inference/parameterization.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@ Model With(const std::string& effect, const std::vector<std::string>& values) {
   return *AddEffect(NominalModel(), effect, values, Catalogue());
 }
 
-TEST(FreeModel, StandsWhereItsBaseStands) {
-  FreeModel model(With("finger_length", {"offset_mm=0.3,-0.1,-0.2"}), {"lat00"});
+TEST(Parameterization, StandsWhereItsBaseStands) {
+  Parameterization model(With("finger_length", {"offset_mm=0.3,-0.1,-0.2"}), {"lat00"});
   model.Free(0, true);
   EXPECT_EQ(model.size(), 2);  // three values that sum to zero
   const Model again = model.At(model.Start());
@@ -20,15 +20,15 @@ TEST(FreeModel, StandsWhereItsBaseStands) {
     EXPECT_NEAR(again.effects[0].values[i], model.base().effects[0].values[i], 1e-12);
 }
 
-TEST(FreeModel, KeepsTheSumOfZeroWhereverItMoves) {
-  FreeModel model(NominalModel(), {});
+TEST(Parameterization, KeepsTheSumOfZeroWhereverItMoves) {
+  Parameterization model(NominalModel(), {});
   model.Add(Catalogue().Find("channel_latency"), false);
   const Model moved = model.At(Eigen::Vector2d(0.001, -0.004));
   EXPECT_NEAR(moved.effects[0].values[0] + moved.effects[0].values[1] + moved.effects[0].values[2], 0, 1e-15);
 }
 
-TEST(FreeModel, GivesEveryObjectItsOwnValues) {
-  FreeModel model(NominalModel(), {"a", "b"});
+TEST(Parameterization, GivesEveryObjectItsOwnValues) {
+  Parameterization model(NominalModel(), {"a", "b"});
   model.Add(Catalogue().Find("object_scale"), true);
   ASSERT_EQ(model.size(), 2);
   const Model moved = model.At(Eigen::Vector2d(0.01, -0.02));
@@ -36,16 +36,16 @@ TEST(FreeModel, GivesEveryObjectItsOwnValues) {
   EXPECT_NEAR(moved.effects[0].ValuesFor("b")[0], -0.02, 1e-15);
 }
 
-TEST(FreeModel, HoldsValuesWithinTheirBounds) {
-  FreeModel model(NominalModel(), {});
+TEST(Parameterization, HoldsValuesWithinTheirBounds) {
+  Parameterization model(NominalModel(), {});
   model.Add(Catalogue().Find("tip_radius"), false);
   Eigen::VectorXd below(1);
   below << -1;
   EXPECT_EQ(model.At(below).effects[0].values[0], 0);
 }
 
-TEST(FreeModel, TurnsTheRampsInfinityIntoZero) {
-  FreeModel model(NominalModel(), {});
+TEST(Parameterization, TurnsTheRampsInfinityIntoZero) {
+  Parameterization model(NominalModel(), {});
   model.Add(Catalogue().Find("acceleration_ramp"), false);
   EXPECT_NEAR(model.Start()[0], 0, 1e-2);
   Eigen::VectorXd point(1);
@@ -53,26 +53,26 @@ TEST(FreeModel, TurnsTheRampsInfinityIntoZero) {
   EXPECT_NEAR(model.At(point).effects[0].values[0], 0.02, 1e-12);
 }
 
-TEST(FreeModel, TellsValuesWithErrorsInTheUnitsOfFiles) {
-  FreeModel model(NominalModel(), {});
+TEST(Parameterization, TellsValuesWithErrorsInTheUnitsOfFiles) {
+  Parameterization model(NominalModel(), {});
   model.Add(Catalogue().Find("tip_radius"), false);
   Eigen::VectorXd point(1);
   point << 1.5e-3;
   const auto values = model.Describe(0, point, Eigen::MatrixXd::Constant(1, 1, 1e-10));
   ASSERT_EQ(values.size(), 1u);
-  EXPECT_EQ(values[0].name(), "radius_mm");
-  EXPECT_NEAR(values[0].value(), 1.5, 1e-9);
-  EXPECT_NEAR(values[0].std_error(), 0.01, 1e-9);
-  EXPECT_NEAR(values[0].upper() - values[0].lower(), 2 * 1.96 * 0.01, 1e-4);
+  EXPECT_EQ(values[0].name, "radius_mm");
+  EXPECT_NEAR(values[0].value, 1.5, 1e-9);
+  EXPECT_NEAR(values[0].std_error, 0.01, 1e-9);
+  EXPECT_NEAR(values[0].upper - values[0].lower, 2 * 1.96 * 0.01, 1e-4);
 }
 
-TEST(FreeModel, WithoutAnEffectKeepsTheOthersCoordinates) {
-  FreeModel model(NominalModel(), {});
+TEST(Parameterization, WithoutAnEffectKeepsTheOthersParameters) {
+  Parameterization model(NominalModel(), {});
   model.Add(Catalogue().Find("tool_tilt"), false);
   model.Add(Catalogue().Find("tip_radius"), false);
-  const FreeModel rest = model.Without(0);
+  const Parameterization rest = model.Without(0);
   ASSERT_EQ(rest.size(), 1);
-  EXPECT_EQ(rest.base().effects[rest.coordinates()[0].effect].effect->name, "tip_radius");
+  EXPECT_EQ(rest.base().effects[rest.parameters()[0].effect].effect->name, "tip_radius");
 }
 
 }  // namespace

@@ -1,16 +1,15 @@
-#include "server/diagnosis/inference/free_model.h"
+#include "server/diagnosis/inference/parameterization.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/check.h"
+#include "server/base/normal.h"
+#include "server/model/finger_name.h"
 #include "server/model/parameter_values.h"
-#include "server/session/measurement_set.h"
 
 namespace touchstone {
 namespace {
-
-constexpr double kNormalQuantile = 1.959964;  // of 97.5 %
 
 // Directions in which the entries of one parameter may move: the unit vectors, or, where the entries sum to
 // zero, an orthonormal basis of that plane (Helmert's).
@@ -44,19 +43,19 @@ std::string EntryName(const ParameterInfo& parameter, int entry, int fingers) {
   return "";
 }
 
-FreeModel::FreeModel(Model base, std::vector<std::string> objects)
+Parameterization::Parameterization(Model base, std::vector<std::string> objects)
     : base_(std::move(base)), objects_(std::move(objects)) {
   for (EffectInstance& instance : base_.effects)
     if (instance.per_object)
       for (const std::string& object : objects_) instance.object_values.emplace(object, instance.values);
 }
 
-bool FreeModel::IsFree(int effect) const {
-  return std::any_of(coordinates_.begin(), coordinates_.end(),
-                     [&](const Coordinate& c) { return c.effect == effect; });
+bool Parameterization::IsFree(int effect) const {
+  return std::any_of(parameters_.begin(), parameters_.end(),
+                     [&](const FreeParameter& c) { return c.effect == effect; });
 }
 
-void FreeModel::Free(int index, bool refit) {
+void Parameterization::Free(int index, bool refit) {
   if (IsFree(index)) return;
   const EffectInstance& instance = base_.effects[index];
   const Effect& effect = *instance.effect;
@@ -66,7 +65,7 @@ void FreeModel::Free(int index, bool refit) {
     const double si = SiFactor(parameter.unit);
     const int count = parameter.Count(fingers), offset = ValueOffset(effect, p, fingers);
     for (const std::vector<double>& direction : Directions(parameter, count)) {
-      Coordinate c;
+      FreeParameter c;
       c.effect = index;
       c.parameter = p;
       c.shape = shapes_++;
@@ -77,8 +76,8 @@ void FreeModel::Free(int index, bool refit) {
       c.upper = parameter.upper * si;
       c.neutral = parameter.sum_zero ? 0 : parameter.neutral * si;
       if (parameter.sum_zero) c.lower = std::min(c.lower, -c.upper);
-      if (effect.name == "acceleration_ramp") {
-        c.inverse = true;
+      if (parameter.reciprocal) {
+        c.reciprocal = true;
         c.neutral = 0;
         c.scale = 1 / (parameter.typical * si);
         c.lower = 1 / (parameter.upper * si);
@@ -87,23 +86,23 @@ void FreeModel::Free(int index, bool refit) {
       const auto start = [&](const std::vector<double>& values) {
         double sum = 0;
         for (size_t j = 0; j < values.size(); ++j) sum += c.weights[j] * values[j];
-        return c.inverse ? 1 / sum : sum;
+        return c.reciprocal ? 1 / sum : sum;
       };
       if (!instance.per_object) {
         if (refit) c.neutral = start(instance.values);
-        coordinates_.push_back(c);
+        parameters_.push_back(c);
         continue;
       }
       for (const std::string& object : objects_) {
         c.object = object;
         if (refit) c.neutral = start(instance.object_values.at(object));
-        coordinates_.push_back(c);
+        parameters_.push_back(c);
       }
     }
   }
 }
 
-void FreeModel::Add(std::shared_ptr<const Effect> effect, bool per_object) {
+void Parameterization::Add(std::shared_ptr<const Effect> effect, bool per_object) {
   EffectInstance instance;
   instance.values = effect->NeutralValues(base_.fingers);
   instance.per_object = per_object || effect->always_per_object;
@@ -114,55 +113,55 @@ void FreeModel::Add(std::shared_ptr<const Effect> effect, bool per_object) {
   Free(static_cast<int>(base_.effects.size()) - 1, false);
 }
 
-FreeModel FreeModel::Without(int index) const {
-  FreeModel other = *this;
+Parameterization Parameterization::Without(int index) const {
+  Parameterization other = *this;
   other.base_.effects.erase(other.base_.effects.begin() + index);
-  other.coordinates_.clear();
-  for (Coordinate c : coordinates_) {
+  other.parameters_.clear();
+  for (FreeParameter c : parameters_) {
     if (c.effect == index) continue;
     if (c.effect > index) --c.effect;
-    other.coordinates_.push_back(std::move(c));
+    other.parameters_.push_back(std::move(c));
   }
   return other;
 }
 
-Eigen::VectorXd FreeModel::Start() const {
+Eigen::VectorXd Parameterization::Start() const {
   Eigen::VectorXd point(size());
   for (int i = 0; i < size(); ++i) {
-    const Coordinate& c = coordinates_[i];
+    const FreeParameter& c = parameters_[i];
     const EffectInstance& instance = base_.effects[c.effect];
     const std::vector<double>& values =
         c.object.empty() ? instance.values : instance.object_values.at(c.object);
     double sum = 0;  // the weights of one parameter's coordinates are orthonormal
     for (size_t j = 0; j < values.size(); ++j) sum += c.weights[j] * values[j];
-    point[i] = c.inverse ? 1 / sum : sum;
+    point[i] = c.reciprocal ? 1 / sum : sum;
   }
   return point;
 }
 
-Eigen::VectorXd FreeModel::Clip(Eigen::VectorXd point) const {
+Eigen::VectorXd Parameterization::Clip(Eigen::VectorXd point) const {
   for (int i = 0; i < size(); ++i)
-    point[i] = std::clamp(point[i], coordinates_[i].lower, coordinates_[i].upper);
+    point[i] = std::clamp(point[i], parameters_[i].lower, parameters_[i].upper);
   return point;
 }
 
-Model FreeModel::At(const Eigen::VectorXd& point) const {
+Model Parameterization::At(const Eigen::VectorXd& point) const {
   Model model = base_;
   // Free values are the sum of their coordinates.
-  const auto values_of = [&](const Coordinate& c) -> std::vector<double>& {
+  const auto values_of = [&](const FreeParameter& c) -> std::vector<double>& {
     EffectInstance& instance = model.effects[c.effect];
     return c.object.empty() ? instance.values : instance.object_values.at(c.object);
   };
-  for (const Coordinate& c : coordinates_)
+  for (const FreeParameter& c : parameters_)
     for (size_t j = 0; j < c.weights.size(); ++j)
       if (c.weights[j] != 0) values_of(c)[j] = 0;
   for (int i = 0; i < size(); ++i) {
-    const Coordinate& c = coordinates_[i];
-    const double value = c.inverse ? 1 / std::max(point[i], 1e-12) : point[i];
+    const FreeParameter& c = parameters_[i];
+    const double value = c.reciprocal ? 1 / std::max(point[i], 1e-12) : point[i];
     std::vector<double>& values = values_of(c);
     for (size_t j = 0; j < c.weights.size(); ++j) values[j] += c.weights[j] * value;
   }
-  for (const Coordinate& c : coordinates_) {
+  for (const FreeParameter& c : parameters_) {
     const Effect& effect = *model.effects[c.effect].effect;
     const ParameterInfo& parameter = effect.parameters[c.parameter];
     const int offset = ValueOffset(effect, c.parameter, model.fingers);
@@ -175,13 +174,13 @@ Model FreeModel::At(const Eigen::VectorXd& point) const {
   return model;
 }
 
-void FreeModel::MoveTo(const Eigen::VectorXd& point) {
+void Parameterization::MoveTo(const Eigen::VectorXd& point) {
   base_ = At(point);
 }
 
-std::vector<v1::ParameterValue> FreeModel::Describe(int index, const Eigen::VectorXd& point,
-                                                    const Eigen::MatrixXd& covariance) const {
-  std::vector<v1::ParameterValue> described;
+std::vector<ParameterEstimate> Parameterization::Describe(int index, const Eigen::VectorXd& point,
+                                                          const Eigen::MatrixXd& covariance) const {
+  std::vector<ParameterEstimate> described;
   const Model model = At(point);
   const EffectInstance& instance = model.effects[index];
   const Effect& effect = *instance.effect;
@@ -196,22 +195,22 @@ std::vector<v1::ParameterValue> FreeModel::Describe(int index, const Eigen::Vect
         // The entry's variance through the coordinates that move it.
         Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size());
         for (int i = 0; i < size(); ++i) {
-          const Coordinate& c = coordinates_[i];
+          const FreeParameter& c = parameters_[i];
           if (c.effect != index || c.object != object) continue;
           gradient[i] = c.weights[offset + j];
-          if (c.inverse) gradient[i] *= 1 / (point[i] * point[i]);
+          if (c.reciprocal) gradient[i] *= 1 / (point[i] * point[i]);
         }
-        v1::ParameterValue value;
-        value.set_name(parameter.name);
-        value.set_unit(std::string(UnitSymbol(parameter.unit)));
-        value.set_finger(EntryName(parameter, j, model.fingers));
-        value.set_object(object);
+        ParameterEstimate value;
+        value.name = parameter.name;
+        value.unit = std::string(UnitSymbol(parameter.unit));
+        value.entry = EntryName(parameter, j, model.fingers);
+        value.object = object;
         const double si = SiFactor(parameter.unit);
-        value.set_value(values[offset + j] / si);
+        value.value = values[offset + j] / si;
         const double variance = covariance.size() > 0 ? gradient.dot(covariance * gradient) : 0;
-        value.set_std_error(std::sqrt(std::max(variance, 0.0)) / si);
-        value.set_lower(std::max(value.value() - kNormalQuantile * value.std_error(), parameter.lower));
-        value.set_upper(std::min(value.value() + kNormalQuantile * value.std_error(), parameter.upper));
+        value.std_error = std::sqrt(std::max(variance, 0.0)) / si;
+        value.lower = std::max(value.value - kNormalQuantile975 * value.std_error, parameter.lower);
+        value.upper = std::min(value.value + kNormalQuantile975 * value.std_error, parameter.upper);
         described.push_back(std::move(value));
       }
     }

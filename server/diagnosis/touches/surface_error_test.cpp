@@ -8,6 +8,7 @@
 #include "server/base/random.h"
 #include "server/diagnosis/touches/predictor.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone {
 namespace {
@@ -19,13 +20,16 @@ HiddenRig SmallRig() {
   return rig;
 }
 
-class LikelihoodTest : public ::testing::Test {
+class SurfaceErrorTest : public ::testing::Test {
  protected:
-  LikelihoodTest() : input(MakeTestInput(SmallRig())) {
+  SurfaceErrorTest() : input(MakeTestInput(SmallRig())) {
     observations = std::make_unique<Observations>(*MakeObservations(input));
     details = *Predict(*observations, *input.model, true, false, nullptr);
     contrasts = std::make_unique<Contrasts>(*observations, details.time_s);
-    likelihood = std::make_unique<Likelihood>(*observations, *contrasts, details, true, 0, nullptr);
+    const SmoothErrorGeometry geometry = SurfaceErrorGeometry(*observations, *contrasts, details);
+    likelihood = std::make_unique<Likelihood>(
+        FirstRowsOfObjects(*contrasts, static_cast<int>(observations->objects.size())), &geometry, 0,
+        nullptr);
   }
   Eigen::VectorXd Noise(uint64_t seed) const {
     RandomStream random(seed, RandomDomain::kTest);
@@ -41,8 +45,8 @@ class LikelihoodTest : public ::testing::Test {
 };
 
 // The covariance of contrasts under a hypothesis, element by element from its definition.
-Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, const Contrasts& c,
-                                const Prediction& d, const Likelihood::Surface& surface) {
+Eigen::MatrixXd DenseCovariance(const SurfaceErrorTest&, const Observations& o, const Contrasts& c,
+                                const Prediction& d, const SurfaceErrorHypothesis& surface) {
   const int entries = static_cast<int>(o.time_s.size());
   Eigen::MatrixXd field = Eigen::MatrixXd::Zero(entries, entries);
   for (int a = 0; a < entries; ++a)
@@ -52,8 +56,8 @@ Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, co
       const double x = std::sqrt(5.0) * (d.contact_m[a] - d.contact_m[b]).norm() / surface.length_m;
       const double gain_a = d.slope_s_m[a] / std::max(d.cos_incidence[a], 0.1);
       const double gain_b = d.slope_s_m[b] / std::max(d.cos_incidence[b], 0.1);
-      field(a, b) =
-          surface.ratio_m_s * surface.ratio_m_s * gain_a * gain_b * (1 + x + x * x / 3) * std::exp(-x);
+      field(a, b) = surface.amplitude_over_sigma * surface.amplitude_over_sigma * gain_a * gain_b *
+                    (1 + x + x * x / 3) * std::exp(-x);
     }
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(c.rows(), entries);
   for (size_t t = 0; t < c.touches().size(); ++t)
@@ -62,9 +66,9 @@ Eigen::MatrixXd DenseCovariance(const LikelihoodTest&, const Observations& o, co
   return Eigen::MatrixXd::Identity(c.rows(), c.rows()) + h * field * h.transpose();
 }
 
-TEST_F(LikelihoodTest, IsTheGaussianWithTheFieldsCovariance) {
+TEST_F(SurfaceErrorTest, IsTheGaussianWithTheFieldsCovariance) {
   for (const int s : {0, 5, 20, 40, 65}) {
-    const Likelihood::Surface& surface = likelihood->surfaces()[s];
+    const SurfaceErrorHypothesis& surface = likelihood->hypotheses()[s];
     Eigen::MatrixXd v = Eigen::MatrixXd::Identity(likelihood->rows(), likelihood->rows());
     if (s > 0) v = DenseCovariance(*this, *observations, *contrasts, details, surface);
     const Eigen::VectorXd r = Noise(s);
@@ -75,7 +79,7 @@ TEST_F(LikelihoodTest, IsTheGaussianWithTheFieldsCovariance) {
   }
 }
 
-TEST_F(LikelihoodTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
+TEST_F(SurfaceErrorTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
   Eigen::MatrixXd values(likelihood->rows(), 4);
   for (int c = 0; c < 4; ++c) values.col(c) = Noise(10 + c);
   const Likelihood::Columns all = likelihood->Prepare(values);
@@ -88,7 +92,7 @@ TEST_F(LikelihoodTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
   EXPECT_NEAR(likelihood->Norms(all, 30)[2], whole(2, 2), 1e-9);
 }
 
-TEST_F(LikelihoodTest, TheFieldFollowsBumpsAndNotNoise) {
+TEST_F(SurfaceErrorTest, TheFieldFollowsBumpsAndNotNoise) {
   // A bump along the normal of one object, 0.3 mm high.
   std::vector<double> bump(observations->time_s.size());
   for (size_t e = 0; e < bump.size(); ++e)
@@ -98,7 +102,7 @@ TEST_F(LikelihoodTest, TheFieldFollowsBumpsAndNotNoise) {
   const Eigen::VectorXd r = contrasts->Apply(bump);
   const Likelihood::Columns columns = likelihood->Prepare(r);
   double best = 0;
-  for (int s = 1; s < static_cast<int>(likelihood->surfaces().size()); ++s)
+  for (int s = 1; s < static_cast<int>(likelihood->hypotheses().size()); ++s)
     best = std::max(best, 1 - (r - likelihood->FieldMean(columns, s)).squaredNorm() / r.squaredNorm());
   EXPECT_GT(best, 0.97);
   EXPECT_EQ(likelihood->FieldMean(columns, 0).norm(), 0);

@@ -1,5 +1,4 @@
-// Everything that a diagnosis prepares once: which touches take part, what the given model predicts, the
-// likelihood. Large sets are thinned for the search; values and errors are measured on all touches.
+// Everything that a diagnosis prepares once: which touches take part, what the initial model predicts, the likelihood. Large sets are thinned for the search; values and errors are measured on all touches.
 #pragma once
 
 #include <memory>
@@ -9,18 +8,20 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/input.h"
+#include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone {
 
 // The search works on at most so many touches: its likelihood costs the square of an object's touches.
 inline constexpr int kMaxSearched = 2400;
 
-struct Study {
+struct Workspace {
   DiagnosisInput input;
   DiagnosisContext context;
   std::unique_ptr<Observations> observations;  // every touch
   std::unique_ptr<Predictor> predictor;
-  Prediction nominal;  // of the given model, with details
+  Prediction nominal;  // of the initial model, with details
   std::vector<std::string> warnings;
 
   // What the search sees.
@@ -28,24 +29,24 @@ struct Study {
   std::unique_ptr<Predictor> searched_predictor;
   Prediction searched_nominal;
   std::unique_ptr<Contrasts> contrasts;
+  std::unique_ptr<TouchObservationModel> rows;
   std::unique_ptr<Likelihood> likelihood;
   Experiment experiment;
   bool thinned = false;
 };
 
 // Errors: input that contradicts itself, a mesh that most touches miss, times in the wrong unit.
-absl::StatusOr<std::unique_ptr<Study>> MakeStudy(const DiagnosisInput& input,
-                                                 const DiagnosisContext& context);
+absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& input,
+                                                         const DiagnosisContext& context);
 
-// Chooses the touches of the search anew, after some were left out. `weights` of the touches of
-// study->searched->row (empty: all 1).
-absl::Status PrepareSearch(Study* study, const std::vector<double>& weights_by_row);
+// Chooses the touches of the search anew, after some were left out. `weights_by_row`: of the set's rows (empty: all 1).
+absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row);
 
 // Where a small move of the tool makes a finger meet another part of the object, the time says more about the
 // edge than about the rig, and a fit would chase it. Leaves such touches out; returns how many are new.
 absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* observations);
 
-// Pure error of residuals (contrasts) among repeats: touches of one pose with the same fingers.
+// Pure error of residuals [k * fingers + i] among repeats: touches of one pose with the same fingers.
 SumOfSquares PureErrorOf(const Observations& observations, const std::vector<double>& residuals);
 
 }  // namespace touchstone

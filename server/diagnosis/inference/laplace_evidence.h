@@ -1,0 +1,39 @@
+// The evidence for a model with free parameters by Laplace's approximation, from inner products alone: no pass over
+// the data.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "server/diagnosis/inference/likelihood.h"
+#include "server/diagnosis/inference/parameterization.h"
+
+namespace touchstone {
+
+// What the data say of one model with free parameters. Logs in nats, comparable between models of one set of rows.
+struct LaplaceEvidence {
+  double log_evidence = 0;
+  double log_likelihood = 0;   // maximum over the parameters, averaged over hypotheses of the smooth error
+  int hypothesis = 0;          // the most probable one
+  double sigma = 0;            // noise under it, in the unit of the rows
+  Eigen::VectorXd step;        // from the point to its optimum
+  Eigen::MatrixXd covariance;  // of the parameters; zero where one is held at a bound
+};
+
+// `grams`: inner products of the residual and of derivative columns, by hypothesis; `members`: which of them are
+// the residual (first) and the derivatives by `parameters`. Values are held within bounds. `point`: where the
+// columns were taken.
+LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
+                                       const std::vector<Eigen::MatrixXd>& grams,
+                                       const std::vector<int>& members,
+                                       const std::vector<FreeParameter>& parameters,
+                                       const Eigen::VectorXd& point);
+
+// The Gram matrices of columns under every hypothesis.
+std::vector<Eigen::MatrixXd> Grams(const Likelihood& likelihood, const Likelihood::Columns& columns);
+
+// What the prior says of values: Cauchy round what changes nothing, ten times as wide as rigs usually show.
+double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point);
+
+}  // namespace touchstone

@@ -1,0 +1,53 @@
+// All that a diagnosis says, as plain values in SI (parameters in the units of files). write_report.h turns it into
+// the wire message, summary.h into sentences.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/design/propose.h"
+#include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/touches/data_summary.h"
+
+namespace touchstone {
+
+// What was compared as distributions, and how it came out.
+struct PoseFreeDiagnosis {
+  DiagnosisInput input;
+  PoseFreeComparison comparison;
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kNone;
+  std::string model_name, model_hash;  // of the initial model
+  DataSummary data;
+
+  // How wrong; none of them if no touch could be used.
+  std::optional<NoiseFloor> noise_floor;
+  std::optional<Quality> initial;  // the model as it was given
+  std::optional<Quality> final;    // after all steps and refits
+  double reducible_share = 0;      // of the mean square error that is not noise, 0 to 1
+
+  // Where.
+  ResidualSummary residuals;
+
+  // Why, and what to do.
+  std::vector<RefittedEffect> refitted;
+  std::vector<LadderStep> steps;
+  std::vector<ConfoundedEffects> confounded;
+  std::vector<RankedCandidate> candidates;
+  std::optional<UnexplainedRest> unexplained;
+  std::string improved_model_yaml, improved_model_hash;  // empty if nothing changed
+  std::vector<ProposedTouch> next_touches;
+
+  std::string summary;                // one paragraph
+  std::vector<std::string> warnings;  // what limits all this
+  double duration_s = 0;
+
+  std::optional<PoseFreeDiagnosis> pose_free;  // of a set without poses, instead of all the rest
+};
+
+}  // namespace touchstone

@@ -1,0 +1,189 @@
+#include "server/diagnosis/report/write_report.h"
+
+#include "server/base/units.h"
+#include "server/diagnosis/report/design_messages.h"
+#include "server/diagnosis/report/distributions_messages.h"
+#include "server/diagnosis/report/residuals_messages.h"
+#include "server/model/finger_name.h"
+
+namespace touchstone {
+namespace {
+
+double Us(double time_s) {
+  return time_s * kMicrosecondsPerSecond;
+}
+
+v1::Report::Verdict ToMessage(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kNone:
+      return v1::Report::VERDICT_UNSPECIFIED;
+    case Verdict::kAdequate:
+      return v1::Report::ADEQUATE;
+    case Verdict::kWrongValues:
+      return v1::Report::WRONG_VALUES;
+    case Verdict::kMissingEffects:
+      return v1::Report::MISSING_EFFECTS;
+    case Verdict::kUnexplained:
+      return v1::Report::UNEXPLAINED;
+  }
+  return v1::Report::VERDICT_UNSPECIFIED;
+}
+
+const char* ToMessage(EffectScope scope) {
+  return scope == EffectScope::kObject ? "object" : "rig";
+}
+
+const char* ToMessage(CandidateNote note) {
+  switch (note) {
+    case CandidateNote::kNone:
+      return "";
+    case CandidateNote::kInvisible:
+      return "this experiment cannot see it";
+    case CandidateNote::kNeutral:
+      return "fits best where it changes nothing";
+    case CandidateNote::kLinearised:
+      return "not among the eight most probable; its gain is a linearised prediction";
+  }
+  return "";
+}
+
+template <typename Message>
+void WriteParameters(const std::vector<ParameterEstimate>& parameters, Message* message) {
+  for (const ParameterEstimate& estimate : parameters) {
+    v1::ParameterValue* value = message->add_parameters();
+    value->set_name(estimate.name);
+    value->set_value(estimate.value);
+    value->set_std_error(estimate.std_error);
+    value->set_unit(estimate.unit);
+    value->set_finger(estimate.entry);
+    value->set_object(estimate.object);
+    value->set_lower(estimate.lower);
+    value->set_upper(estimate.upper);
+    if (estimate.before) value->set_before(*estimate.before);
+  }
+}
+
+void WriteQuality(const Quality& quality, v1::Quality* message) {
+  message->set_rmse_us(Us(quality.rmse_s));
+  message->set_heldout_rmse_us(Us(quality.heldout_rmse_s));
+  message->set_lack_of_fit_p(quality.lack_of_fit_p);
+}
+
+void WriteNoiseFloor(const NoiseFloor& floor, v1::NoiseFloor* message) {
+  message->set_sigma_us(Us(floor.sigma_s));
+  message->set_lower_us(Us(floor.lower_s));
+  message->set_upper_us(Us(floor.upper_s));
+  message->set_degrees_of_freedom(static_cast<uint32_t>(floor.degrees_of_freedom));
+  message->set_from_repeats(floor.from_repeats);
+}
+
+void WriteStep(const LadderStep& step, v1::Step* message) {
+  message->set_effect(step.effect);
+  for (const std::string& name : step.equivalent) message->add_equivalent(name);
+  message->set_probability(step.probability);
+  WriteParameters(step.parameters, message);
+  message->set_rmse_us(Us(step.quality.rmse_s));
+  message->set_heldout_rmse_us(Us(step.quality.heldout_rmse_s));
+  message->set_lack_of_fit_p(step.quality.lack_of_fit_p);
+  message->set_gain_nats(step.gain_nats);
+  message->set_meaning(step.meaning);
+  message->set_check_on_rig(step.check_on_rig);
+  message->set_remedy(step.remedy);
+  message->set_decided_by(step.discriminating_measurement);
+  message->set_scope(ToMessage(step.scope));
+}
+
+void WriteCandidate(const RankedCandidate& candidate, v1::Candidate* message) {
+  message->set_effect(candidate.effect);
+  WriteParameters(candidate.parameters, message);
+  message->set_probability(candidate.probability);
+  message->set_rmse_us(Us(candidate.rmse_s));
+  message->set_heldout_rmse_us(Us(candidate.heldout_rmse_s));
+  message->set_gain_nats(candidate.gain_nats);
+  message->set_note(ToMessage(candidate.note));
+  message->set_scope(ToMessage(candidate.scope));
+}
+
+void WriteUnexplained(const UnexplainedRest& rest, v1::Unexplained* message) {
+  for (const CovariateTest& test : rest.covariates) {
+    v1::CovariateTest* covariate = message->add_covariates();
+    covariate->set_name(test.name);
+    covariate->set_p(test.p);
+    covariate->set_gain_nats(test.gain_nats);
+  }
+  message->set_formula(rest.formula);
+  message->set_formula_yaml(rest.formula_yaml);
+  WriteParameters(rest.parameters, message);
+  message->set_rmse_us(Us(rest.rmse_s));
+  message->set_heldout_rmse_us(Us(rest.heldout_rmse_s));
+  message->set_heldout_gain(rest.heldout_gain);
+  message->set_nearest_effect(rest.nearest_effect);
+  message->set_nearest_cosine(rest.nearest_cosine);
+}
+
+void WriteData(const DataSummary& data, v1::Report* report) {
+  report->set_touches(static_cast<uint32_t>(data.touches));
+  for (int finger = 0; finger < data.fingers; ++finger) report->add_fingers(FingerName(finger, data.fingers));
+  v1::DataSummary* message = report->mutable_data();
+  message->set_origin(data.origin);
+  message->set_rows(static_cast<uint32_t>(data.rows));
+  for (const auto& [reason, unused] : data.unused) {
+    v1::UnusedRows* rows = message->add_unused();
+    rows->set_reason(reason);
+    rows->set_rows(static_cast<uint32_t>(unused.count));
+    for (const uint64_t touch : unused.examples) rows->add_examples(touch);
+  }
+  message->set_outliers(static_cast<uint32_t>(data.outliers));
+  for (const std::string& object : data.objects) message->add_objects(object);
+  message->set_poses(static_cast<uint32_t>(data.poses));
+  message->set_repeats(static_cast<uint32_t>(data.repeats));
+  message->set_rounds(static_cast<uint32_t>(data.rounds));
+  for (const double speed_mm_s : data.speeds_mm_s) message->add_speeds_mm_s(speed_mm_s);
+  message->set_missed_contacts(static_cast<uint32_t>(data.missed_contacts));
+}
+
+void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
+  for (const RefittedEffect& refit : diagnosis.refitted) {
+    v1::Refit* message = report->add_refitted();
+    message->set_effect(refit.effect);
+    WriteParameters(refit.parameters, message);
+  }
+  for (const LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
+  for (const ConfoundedEffects& confounded : diagnosis.confounded) {
+    v1::Ambiguity* message = report->add_ambiguities();
+    for (const std::string& effect : confounded.effects) message->add_effects(effect);
+    message->set_decided_by(confounded.discriminating_measurement);
+  }
+  for (const RankedCandidate& candidate : diagnosis.candidates)
+    WriteCandidate(candidate, report->add_candidates());
+  if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
+  report->set_improved_model_yaml(diagnosis.improved_model_yaml);
+  report->set_improved_model_hash(diagnosis.improved_model_hash);
+}
+
+}  // namespace
+
+v1::Report ToReport(const Diagnosis& diagnosis) {
+  if (diagnosis.pose_free) return PoseFreeReport(diagnosis.pose_free->input, diagnosis.pose_free->comparison);
+  v1::Report report;
+  report.set_verdict(ToMessage(diagnosis.verdict));
+  report.set_model_name(diagnosis.model_name);
+  report.set_model_hash(diagnosis.model_hash);
+  WriteData(diagnosis.data, &report);
+  if (diagnosis.noise_floor) {
+    WriteNoiseFloor(*diagnosis.noise_floor, report.mutable_noise_floor());
+    report.set_noise_floor_us(report.noise_floor().sigma_us());
+  }
+  if (diagnosis.initial) WriteQuality(*diagnosis.initial, report.mutable_initial());
+  if (diagnosis.final) WriteQuality(*diagnosis.final, report.mutable_final());
+  report.set_reducible_share(diagnosis.reducible_share);
+  WriteResiduals(diagnosis.residuals, diagnosis.data.fingers, &report);
+  WriteCauses(diagnosis, &report);
+  for (const ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);
+  report.set_summary(diagnosis.summary);
+  for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
+  report.set_duration_s(diagnosis.duration_s);
+  return report;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,101 @@
+// What a diagnosis finds, as plain values: seconds, metres; parameters in the units of files. report/ turns them
+// into messages.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/inference/parameter_estimate.h"
+
+namespace touchstone {
+
+enum class Verdict {
+  kNone,            // a comparison gives none
+  kAdequate,        // as good as the data can tell
+  kWrongValues,     // no effect is missing, values must change
+  kMissingEffects,  // the steps bring the rest down to noise
+  kUnexplained,     // a structure remains that no built-in effect explains
+};
+
+enum class EffectScope { kRig, kObject };
+
+struct Quality {
+  double rmse_s = 0;          // sqrt(sum ||residual||^2 / sum (reporting fingers - 1))
+  double heldout_rmse_s = 0;  // the same on touches that the fit did not see
+  double lack_of_fit_p =
+      0;  // 0 to 1; of at least this misfit beyond the repeats' scatter if nothing were missing
+};
+
+// The standard deviation that repeats of one touch have among themselves: no model can go below it.
+struct NoiseFloor {
+  double sigma_s = 0;
+  double lower_s = 0, upper_s = 0;  // 95 % interval; 0 if unknown
+  double degrees_of_freedom = 0;
+  bool from_repeats = false;  // false: an upper bound from the best model's residuals
+};
+
+// New values of an effect that the model has.
+struct RefittedEffect {
+  std::string effect;  // "formula NAME" for a formula
+  std::vector<ParameterEstimate> parameters;
+};
+
+// An effect to add, after all earlier ones.
+struct LadderStep {
+  std::string effect;
+  EffectScope scope = EffectScope::kRig;
+  std::vector<std::string> equivalent;     // effects that these data cannot tell from this one
+  std::string discriminating_measurement;  // that would tell; empty if nothing is confounded
+  double probability = 0;                  // with its equivalents, among all that could take its place
+  double gain_nats = 0;                    // of log evidence, over the fit without it
+  std::vector<ParameterEstimate> parameters;
+  Quality quality;  // with this step, all earlier ones and refits, everything fitted anew
+  std::string meaning, check_on_rig, remedy;  // for people, from the catalogue
+};
+
+enum class CandidateNote {
+  kNone,
+  kInvisible,   // this experiment cannot see it
+  kNeutral,     // fits best where it changes nothing
+  kLinearised,  // not among the most probable: its gain is a linearised prediction
+};
+
+// One effect of the catalogue as the only step.
+struct RankedCandidate {
+  std::string effect;
+  EffectScope scope = EffectScope::kRig;
+  CandidateNote note = CandidateNote::kNone;
+  double probability = 0;  // of being the one effect that is missing
+  double gain_nats = 0;
+  std::vector<ParameterEstimate> parameters;  // empty unless it was fitted
+  double rmse_s = 0, heldout_rmse_s = 0;      // 0 unless it was fitted
+
+  bool explains() const { return note != CandidateNote::kInvisible && note != CandidateNote::kNeutral; }
+};
+
+// Effects that these data cannot tell apart.
+struct ConfoundedEffects {
+  std::vector<std::string> effects;
+  std::string discriminating_measurement;
+};
+
+struct CovariateTest {
+  std::string name;
+  double p = 1;  // corrected for the number of terms that were tried
+  double gain_nats = 0;
+};
+
+// What no effect of the catalogue explains.
+struct UnexplainedRest {
+  std::vector<CovariateTest> covariates;  // that it depends on, largest gain first
+  std::string formula;                    // a suggestion; empty: none
+  std::string formula_yaml;               // the whole effect for a model file
+  std::vector<ParameterEstimate> parameters;
+  double rmse_s = 0, heldout_rmse_s = 0;  // with the formula
+  double heldout_gain = 0;                // share of the held-out excess error that it removes, 0 to 1
+  std::string nearest_effect;             // of the catalogue, and the cosine between the two
+  double nearest_cosine = 0;
+};
+
+}  // namespace touchstone

@@ -1,0 +1,264 @@
+#include "server/diagnosis/selection/selection.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/inference/held_out.h"
+#include "server/diagnosis/touches/noise_sample.h"
+
+namespace touchstone {
+namespace {
+
+constexpr int kTermsFitted = 3;
+constexpr int kMaxFormulaTerms = 2;
+constexpr int kPasses = 3;
+constexpr double kSameLikelihoodNats = 1;  // less is no difference
+
+std::string FormulaName(const FormulaTerm& term) {
+  std::string name = "rest_" + term.covariate;
+  return name.substr(0, 60);
+}
+
+// The best fit with one more term of the dictionary, if it is worth its complexity.
+struct WithTerm {
+  bool found = false;
+  FormulaTerm term;
+  Explanation explanation;
+};
+
+// The index of the formula of this name among the effects that were added; -1: there is none.
+int FindFormula(const Fit& fit, int initial_effects, const std::string& name) {
+  for (int index = initial_effects; index < static_cast<int>(fit.model.base().effects.size()); ++index) {
+    const Effect& effect = *fit.model.base().effects[index].effect;
+    if (effect.formula != nullptr && effect.formula->name == name) return index;
+  }
+  return -1;
+}
+
+absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const StepwiseSearch& search,
+                                  const Explanation& without, const FormulaTerm* first) {
+  const Experiment& experiment = workspace.experiment;
+  WithTerm best;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+                              workspace.searched_predictor->Run(without.fit.model.base(), true, true));
+  const std::vector<FormulaTerm> terms = ScoreTerms(experiment, *workspace.rows, without.fit, details);
+  const double penalty_nats = search.rules().complexity_penalty_nats;
+  double best_evidence = without.fit.log_evidence + search.rules().enter_nats + penalty_nats;
+  int fitted = 0;
+  for (const FormulaTerm& candidate : terms) {
+    if (fitted++ == kTermsFitted || candidate.gain_nats < 0.5 * penalty_nats) break;
+    FormulaTerm term = candidate;
+    Parameterization base = without.fit.model;
+    if (first != nullptr) {
+      // The second term joins the first in one expression.
+      term = Sum(*first, candidate);
+      const int at = FindFormula(without.fit, without.initial_effects, FormulaName(*first));
+      if (at >= 0) base = base.Without(at);
+      term.covariate = first->covariate;
+    }
+    const auto effect = MakeTermEffect(FormulaName(term), term);
+    if (!effect.ok()) return effect.status();
+    Parameterization start = base;
+    start.Add(*effect, false);
+    absl::StatusOr<Fit> fit = FitModel(experiment, std::move(start));
+    if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit.status();
+    if (!fit.ok() || fit->log_evidence <= best_evidence) continue;
+    const double gain = 1 - HeldOutRmse(experiment, *fit) / HeldOutRmse(experiment, without.fit);
+    if (gain < search.rules().min_relative_cv_gain) continue;
+    best_evidence = fit->log_evidence;
+    best.found = true;
+    best.term = term;
+    best.explanation.fit = *std::move(fit);
+    best.explanation.initial_effects = without.initial_effects;
+  }
+  return best;
+}
+
+// Effects of the catalogue first; what they leave may follow a formula; with the formula in place some of the
+// effects may turn out to have stood in for it.
+absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
+  const StepwiseSearch& search = *result->search;
+  const int initial_effects = static_cast<int>(workspace.input.model->effects.size());
+  result->initial_effects = initial_effects;
+  Parameterization base(*workspace.input.model, workspace.searched->objects);
+  TOUCHSTONE_ASSIGN_OR_RETURN(result->initial_model, FitModel(workspace.experiment, base));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Explanation best, search.Run(base, initial_effects));
+  result->formula = -1;
+  FormulaTerm* first = nullptr;
+  for (int terms = 0; terms < kMaxFormulaTerms; ++terms) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(workspace, search, best, first));
+    if (!with.found) break;
+    // From scratch, with the formula's term as one effect among the others.
+    const auto effect = MakeTermEffect(FormulaName(with.term), with.term);
+    if (!effect.ok()) return effect.status();
+    Parameterization start = base;
+    start.Add(*effect, false);
+    TOUCHSTONE_ASSIGN_OR_RETURN(Explanation again, search.Run(start, initial_effects));
+    const int at = FindFormula(again.fit, initial_effects, FormulaName(with.term));
+    if (at >= 0 && again.fit.log_evidence > with.explanation.fit.log_evidence - 0.5) {
+      best = std::move(again);
+    } else {
+      best = std::move(with.explanation);
+    }
+    result->term = with.term;
+    result->formula = FindFormula(best.fit, initial_effects, FormulaName(with.term));
+    first = &result->term;
+  }
+  result->fit = best.fit;
+  result->without_formula = best.fit;
+  if (result->formula >= 0) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(result->without_formula,
+                                FitModel(workspace.experiment, best.fit.model.Without(result->formula)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FindCompetingEffects(SelectionResult* result) {
+  Explanation whole{result->fit, result->initial_effects};
+  const StepwiseSearch& search = *result->search;
+  for (int index = result->initial_effects; index < static_cast<int>(result->fit.model.base().effects.size());
+       ++index) {
+    if (index == result->formula) continue;
+    SelectedStep step;
+    step.effect = index;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, search.WithoutEffect(whole, index));
+    step.gain_nats = result->fit.log_evidence - without.log_evidence;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<CompetingFit> competing,
+                                search.CompetingFits(whole, index));
+    const std::string own = NameOf(*result->fit.model.base().effects[index].effect);
+    double all = std::exp(-std::min(step.gain_nats, 700.0)), equivalent_sum = 0;
+    for (const CompetingFit& competitor : competing) {
+      const double evidence = competitor.fit.log_evidence - result->fit.log_evidence;
+      const bool same = competitor.name == own;
+      // Equivalent: as probable, or as likely with no more parameters, whatever rigs usually show.
+      const bool equivalent =
+          evidence > -search.rules().equivalent_nats ||
+          (competitor.fit.log_likelihood > result->fit.log_likelihood - kSameLikelihoodNats &&
+           competitor.fit.model.size() <= result->fit.model.size());
+      all += std::exp(evidence);
+      if (same || equivalent) equivalent_sum += std::exp(evidence);
+      if (same) continue;
+      step.competing.push_back(
+          {competitor.name, competitor.per_object, evidence, equivalent, competitor.fit.model.base()});
+    }
+    step.probability = std::min(1.0, equivalent_sum / all);
+    result->steps.push_back(std::move(step));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const Fit& fit) {
+  const Contrasts& contrasts = *workspace.contrasts;
+  const Observations& o = *workspace.searched;
+  const Eigen::VectorXd left =
+      fit.columns.values.col(0) -
+      workspace.likelihood->FieldMean(Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
+  std::vector<double> residuals(o.time_s.size(), NAN);
+  for (size_t t = 0; t < contrasts.touches().size(); ++t) {
+    const Eigen::MatrixXd& h = contrasts.MatrixOf(static_cast<int>(t));
+    const int first = contrasts.FirstRow(static_cast<int>(t));
+    for (int i = 0; i < o.fingers; ++i) {
+      if (!contrasts.TakesPart(static_cast<int>(t), i)) continue;
+      double sum = 0;
+      for (int row = 0; row < h.rows(); ++row) sum += h(row, i) * left[first + row];
+      residuals[static_cast<size_t>(contrasts.touches()[t]) * o.fingers + i] =
+          sum / contrasts.root_weights()[t];
+    }
+  }
+  return residuals;
+}
+
+double SurfaceErrorNats(const Workspace& workspace, const Fit& fit) {
+  std::vector<int> members(fit.model.size() + 1);
+  for (int i = 0; i <= fit.model.size(); ++i) members[i] = i;
+  const std::vector<Eigen::MatrixXd> grams = {workspace.likelihood->Gram(fit.columns, 0)};
+  const double none =
+      ComputeLaplaceEvidence(*workspace.likelihood, grams, members, fit.model.parameters(), fit.point)
+          .log_evidence;
+  const double excess = fit.log_evidence - none;  // log of (none + some) / none
+  return excess > 30 ? excess : std::log(std::max(std::expm1(excess), 1e-12));
+}
+
+namespace {
+
+// The noise of what the fit leaves, on all touches.
+absl::StatusOr<NoiseFindings> NoiseOf(const Workspace& workspace, const Fit& fit) {
+  const Observations& o = *workspace.observations;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+                              workspace.predictor->Run(fit.model.base(), true, false));
+  const std::vector<double> residuals =
+      workspace.thinned ? Residuals(o, details) : ResidualsWithoutSurface(workspace, fit);
+  std::vector<double> tangents(residuals.size());
+  std::vector<char> expected(residuals.size());
+  // A finger that would have had farther to go than any that reported is beyond the rig's stroke.
+  double farthest_m = 0;
+  for (size_t e = 0; e < residuals.size(); ++e)
+    if (!std::isnan(o.time_s[e]) && details.travel_m[e] > farthest_m) farthest_m = details.travel_m[e];
+  for (size_t e = 0; e < residuals.size(); ++e) {
+    const double cosine = std::clamp(details.cos_incidence[e], 0.05, 1.0);
+    tangents[e] = std::sqrt(1 / (cosine * cosine) - 1);
+    expected[e] = !std::isnan(details.time_s[e]) && details.travel_m[e] <= farthest_m;
+  }
+  const double surface_dof =
+      workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
+  return FindNoise(MakeNoiseSample(o, residuals, tangents, expected), fit.model.size() + surface_dof);
+}
+
+// Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
+// count less. Returns whether anything changed; `weights`: by row of the set.
+absl::StatusOr<bool> ReviseTouches(const Fit& fit, const NoiseFindings& noise, Workspace* workspace,
+                                   std::vector<double>* weights) {
+  Observations& o = *workspace->observations;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int edges, LeaveOutEdges(*workspace->predictor, fit.model.base(), &o));
+  const bool reweigh = weights->empty() && !noise.weights.empty();
+  if (edges == 0 && noise.outliers.empty() && !reweigh) return false;
+  for (const int k : noise.outliers) LeaveOut(&o, k, kOutlierReason);
+  weights->clear();
+  if (noise.weights.empty()) return true;
+  weights->assign(o.set->size(), 1.0);
+  for (int k = 0; k < o.size(); ++k) (*weights)[o.row[k]] = noise.weights[k];
+  return true;
+}
+
+}  // namespace
+
+absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
+  SelectionResult result;
+  std::vector<double> weights;
+  // The share that is done stays where the caller has put it.
+  const auto progress = [workspace](const std::string& what) {
+    if (workspace->context.progress) workspace->context.progress(what, 0);
+  };
+  for (int pass = 0; pass < kPasses; ++pass) {
+    TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
+    result = SelectionResult();
+    result.search = std::make_unique<StepwiseSearch>(workspace->experiment,
+                                                     MakeCandidates(workspace->input, *workspace->searched),
+                                                     SearchRules(), progress);
+    TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, &result));
+    TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
+    if (pass + 1 == kPasses) break;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised,
+                                ReviseTouches(result.fit, result.noise, workspace, &weights));
+    if (!revised) break;
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  if (result.formula >= 0) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const Prediction details,
+        workspace->searched_predictor->Run(result.without_formula.model.base(), true, true));
+    result.terms = ScoreTerms(workspace->experiment, *workspace->rows, result.without_formula, details);
+  }
+  const SurfaceErrorHypothesis& hypothesis = workspace->likelihood->hypotheses()[result.fit.hypothesis];
+  result.surface_error = {SurfaceErrorNats(*workspace, result.fit),
+                          hypothesis.amplitude_over_sigma * result.fit.sigma, hypothesis.length_m,
+                          hypothesis.effective_dof};
+  return result;
+}
+
+}  // namespace touchstone

@@ -1,0 +1,64 @@
+// Why: the best explanation of the residuals. Effects, values set free, a formula for what the catalogue does not
+// have, the kind of noise, a surface error; and what else fits as well.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/diagnosis/inference/noise_kinds.h"
+#include "server/diagnosis/selection/formula_terms.h"
+#include "server/diagnosis/selection/stepwise_search.h"
+#include "server/diagnosis/selection/workspace.h"
+
+namespace touchstone {
+
+// Another way to explain what one step explains.
+struct CompetingEffect {
+  std::string name;
+  bool per_object = false;
+  double relative_log_evidence = 0;  // nats, over the step's own
+  bool equivalent = false;           // these data cannot tell it from the step
+  Model model;                       // the whole model with it
+};
+
+struct SelectedStep {
+  int effect = 0;                          // index in the fit's model
+  double gain_nats = 0;                    // over the fit without it
+  double probability = 0;                  // with its equivalents, among all that could take its place
+  std::vector<CompetingEffect> competing;  // best first
+};
+
+// A smooth error of the surfaces, in the final fit.
+struct SurfaceErrorFinding {
+  double gain_nats = 0;  // evidence of any over none
+  double rms_m = 0, length_m = 0;
+  double effective_dof = 0;
+};
+
+struct SelectionResult {
+  std::unique_ptr<StepwiseSearch> search;  // the experiment that it works on belongs to the workspace
+  Fit initial_model;                       // as it was given
+  Fit fit;                                 // everything: effects, refits, formula
+  Fit without_formula;                     // the same if there is no formula
+  int initial_effects = 0;                 // effects below this index are the initial model's
+  int formula = -1;                        // index of the formula's effect in fit.model
+  FormulaTerm term;
+  std::vector<FormulaTerm> terms;  // scored on what the named effects leave; empty if there is no formula
+  std::vector<SelectedStep> steps;
+  NoiseFindings noise;
+  SurfaceErrorFinding surface_error;
+};
+
+// Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.
+absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace);
+
+// Residuals [k * fingers + i], s, of a fit on the searched touches, without what its surface hypothesis explains.
+std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const Fit& fit);
+
+// Log evidence of any surface error over none, nats.
+double SurfaceErrorNats(const Workspace& workspace, const Fit& fit);
+
+}  // namespace touchstone

@@ -1,0 +1,139 @@
+// What is left when no cause of the catalogue explains it.
+#include <Eigen/QR>
+
+#include <boost/math/special_functions/gamma.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/status.h"
+#include "server/base/units.h"
+#include "server/diagnosis/selection/ladder.h"
+
+namespace touchstone {
+namespace {
+
+constexpr size_t kMaxCovariates = 6;
+constexpr double kCovariateP = 0.01;
+constexpr int kMaxSpan = 8;  // columns: effects with more of them look like anything
+
+// Cosine between a column and the nearest point of the span of others, all without `own`.
+double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const Eigen::MatrixXd& span) {
+  const auto without = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
+    if (own.cols() == 0) return values;
+    return values - own * own.colPivHouseholderQr().solve(values);
+  };
+  const Eigen::VectorXd c = without(column);
+  const Eigen::MatrixXd s = without(span);
+  if (!(c.norm() > 0) || !(s.norm() > 0)) return 0;
+  return (s * s.colPivHouseholderQr().solve(c)).norm() / c.norm();
+}
+
+// "formula: ..." as it stands in a model file.
+std::string FormulaYaml(const Fit& fit, int index) {
+  Model only = fit.model.base();
+  only.effects = {only.effects[index]};
+  EffectInstance& instance = only.effects[0];
+  size_t at_value = 0;  // a formula's parameters are numbers
+  for (const ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
+    const ParameterInfo& parameter = instance.effect->parameters[at_value];
+    instance.values[at_value++] = ToSi(parameter.unit, RoundedTo(estimate.value, estimate.std_error));
+  }
+  const std::string text = FormatModel(only);
+  const size_t at = text.find("effects:");
+  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
+  return line == std::string::npos ? text : text.substr(line + 1);
+}
+
+// Each covariate by its best term, the number of terms paid for; those that chance hardly brings about, largest
+// gain first. `first`: a covariate that stands before all others; empty: none.
+std::vector<CovariateTest> TestCovariates(const std::vector<FormulaTerm>& terms, const std::string& first) {
+  std::map<std::string, CovariateTest> tests;
+  for (const FormulaTerm& term : terms) {
+    const double tail = boost::math::gamma_q(0.5 * term.degrees_of_freedom, std::max(term.log_ratio, 0.0));
+    const double p = std::min(1.0, tail * static_cast<double>(terms.size()));
+    CovariateTest& test = tests[term.covariate];
+    if (!test.name.empty() && test.gain_nats >= term.gain_nats) continue;
+    test = {term.covariate, p, term.gain_nats};
+  }
+  std::vector<CovariateTest> sorted;
+  for (auto& [name, test] : tests) sorted.push_back(std::move(test));
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const CovariateTest& a, const CovariateTest& b) { return a.gain_nats > b.gain_nats; });
+  std::stable_partition(sorted.begin(), sorted.end(),
+                        [&](const CovariateTest& test) { return test.name == first; });
+  std::vector<CovariateTest> kept;
+  for (const CovariateTest& test : sorted)
+    if (kept.size() < kMaxCovariates && test.p < kCovariateP) kept.push_back(test);
+  return kept;
+}
+
+// The formula, its values, and what it would do.
+absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& selection,
+                             const Quality& final, double floor_s, UnexplainedRest* rest) {
+  const Fit& fit = selection.fit;
+  const EffectInstance& instance = fit.model.base().effects[selection.formula];
+  rest->formula = instance.effect->formula->expression;
+  rest->formula_yaml = FormulaYaml(fit, selection.formula);
+  rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction with,
+                              workspace.predictor->Run(fit.model.base(), false, false));
+  const Quality quality = QualityOf(workspace, fit, Residuals(*workspace.observations, with));
+  rest->rmse_s = quality.rmse_s;
+  rest->heldout_rmse_s = quality.heldout_rmse_s;
+  const double before = std::pow(final.heldout_rmse_s, 2) - floor_s * floor_s;
+  const double after = std::pow(quality.heldout_rmse_s, 2) - floor_s * floor_s;
+  rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+  return absl::OkStatus();
+}
+
+// What of the catalogue looks most like the formula.
+absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult& selection,
+                               UnexplainedRest* rest) {
+  const Fit& fit = selection.fit;
+  const Fit& without = selection.without_formula;
+  const int own = without.model.size();
+  const Eigen::MatrixXd others = without.columns.values.rightCols(own);
+  Eigen::VectorXd column;
+  for (int i = 0; i < fit.model.size(); ++i)
+    if (fit.model.parameters()[i].effect == selection.formula && column.size() == 0)
+      column = fit.columns.values.col(1 + i);
+  if (column.size() == 0) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
+                              selection.search->Score(without, selection.initial_effects));
+  for (const Extension& extension : extensions) {
+    if (extension.candidate < 0 || !extension.visible) continue;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const Eigen::MatrixXd span,
+        Derivatives(workspace.experiment, extension.start, extension.start.Start(), without.predicted, own));
+    if (span.cols() > kMaxSpan) continue;
+    const double cosine = Cosine(others, column, span);
+    if (cosine <= rest->nearest_cosine) continue;
+    rest->nearest_cosine = cosine;
+    rest->nearest_effect = extension.name;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
+                                                    const SelectionResult& selection, const Quality& final,
+                                                    double floor_s) {
+  std::vector<FormulaTerm> terms = selection.terms;
+  if (terms.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+                                workspace.searched_predictor->Run(selection.fit.model.base(), true, true));
+    terms = ScoreTerms(workspace.experiment, *workspace.rows, selection.fit, details);
+  }
+  const bool has_formula = selection.formula >= 0;
+  UnexplainedRest rest;
+  rest.covariates = TestCovariates(terms, has_formula ? selection.term.covariate : "");
+  if (!has_formula) return rest;
+  TOUCHSTONE_RETURN_IF_ERROR(DescribeFormula(workspace, selection, final, floor_s, &rest));
+  TOUCHSTONE_RETURN_IF_ERROR(FindNearestEffect(workspace, selection, &rest));
+  return rest;
+}
+
+}  // namespace touchstone
