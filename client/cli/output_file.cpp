@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxLinks = 40;
 constexpr size_t kBlockBytes = 1 << 20;
+constexpr size_t kMaxNameBytes = 200;  // of a name in one that is made from it; file systems allow 255
 
 absl::Status FileFailure(const std::string& path, absl::string_view what, int error_number) {
   const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error_number));
@@ -78,8 +79,8 @@ std::string FolderOf(const std::string& path) {
 std::string FreePath(const std::string& folder, const std::string& name) {
   std::random_device random;
   while (true) {
-    const std::string path =
-        absl::StrCat(folder, "/.", name, ".", absl::Hex(random(), absl::kZeroPad8), ".part");
+    const std::string path = absl::StrCat(folder, "/.", name.substr(0, kMaxNameBytes), ".",
+                                          absl::Hex(random(), absl::kZeroPad8), ".part");
     struct stat info;
     if (::lstat(path.c_str(), &info) != 0) return path;
   }
@@ -170,9 +171,9 @@ absl::Status WriteAll(int descriptor, const std::string& path, absl::string_view
   return absl::OkStatus();
 }
 
-// A new file with the permission bits that the umask leaves.
-absl::Status MakeFile(const std::string& path, absl::string_view data) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+// A new file with what the umask leaves of these permission bits.
+absl::Status MakeFile(const std::string& path, absl::string_view data, mode_t mode) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (file.number() < 0) return FileFailure(path, "cannot be made", errno);
   TOUCHSTONE_RETURN_IF_ERROR(WriteAll(file.number(), path, data));
   if (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)
@@ -301,8 +302,10 @@ absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bo
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const Destination destination, Resolve(path));
   if (destination.regular())
-    return WriteBeside(path, destination, force,
-                       [&](const std::string& part) { return MakeFile(part, data); });
+    return WriteBeside(path, destination, force, [&](const std::string& part) {
+      // What takes the place of another file gets its bits at the end, and shows nobody anything before.
+      return MakeFile(part, data, destination.exists ? 0600 : 0666);
+    });
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto file, OpenSpecial(path));
   return WriteAll(file->number(), path, data);
 }

@@ -77,6 +77,13 @@ TEST_F(OutputFileTest, AnExistingFileIsReplacedWithForceOnly) {
   EXPECT_THAT(Names(), testing::ElementsAre("old.csv"));
 }
 
+TEST_F(OutputFileTest, ALongNameIsWrittenToo) {
+  const std::string name = std::string(250, 'n') + ".csv";
+  EXPECT_TRUE(CheckAndWrite(name, "data").ok());
+  EXPECT_EQ(Get(name), "data");
+  EXPECT_FALSE(Check(name + "too_long").ok());
+}
+
 TEST_F(OutputFileTest, ForceKeepsThePermissionBits) {
   for (const mode_t mode : {0600u, 0640u, 0755u}) {
     Put("old.csv", "precious");
