@@ -13,16 +13,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/exit_code.h"
 #include "client/cli/output_file.h"
 #include "client/source/connection.h"
 
 namespace touchstone::cli {
 
 using Json = nlohmann::ordered_json;
-
-// 0 done, 2 usage or bad input, 3 source unreachable, 4 refused or failed by the source, 130 interrupted.
-enum ExitCode { kDone = 0, kBadInput = 2, kUnreachable = 3, kRefused = 4, kInterrupted = 130 };
-ExitCode ExitCodeOf(const absl::Status& status);
 
 // Options of every command.
 struct OutputOptions {

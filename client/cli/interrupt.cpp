@@ -8,7 +8,7 @@
 #include <mutex>
 #include <thread>
 
-#include "client/cli/common.h"
+#include "client/cli/exit_code.h"
 
 namespace touchstone::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "client/cli/common.h"
+#include "client/cli/output_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/session_files.h"

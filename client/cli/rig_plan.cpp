@@ -5,6 +5,9 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <tuple>
+
+#include <absl/strings/str_cat.h>
 
 #include "client/source/touch_ids.h"
 #include "server/session/command_bytes.h"

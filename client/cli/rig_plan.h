@@ -8,7 +8,6 @@
 
 #include <absl/status/statusor.h>
 
-#include "client/cli/common.h"
 #include "client/source/measurement_csv.h"
 
 namespace touchstone::cli {
