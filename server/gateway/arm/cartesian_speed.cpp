@@ -23,16 +23,16 @@ double LimitedCartesianSpeed(const UrKinematics& kinematics, const Eigen::Isomet
                              const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
                              Joints* joints) {
   const double line_speed_m_s = LineSpeed(from, to, speed_m_s);
-  const Eigen::Vector3d way_m = to.translation() - from.translation();
+  const Eigen::Vector3d line_m = to.translation() - from.translation();
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
   const int steps =
-      std::max(1, static_cast<int>(std::ceil(std::max(way_m.norm() / kStepM, turn.angle() / kStepRad))));
-  const double step_s = std::max(way_m.norm() / line_speed_m_s, turn.angle() / kMaxTurnRadS) / steps;
+      std::max(1, static_cast<int>(std::ceil(std::max(line_m.norm() / kStepM, turn.angle() / kStepRad))));
+  const double step_s = std::max(line_m.norm() / line_speed_m_s, turn.angle() / kMaxTurnRadS) / steps;
   double slower = 1;
   for (int step = 1; step <= steps; ++step) {
     const double part = static_cast<double>(step) / steps;
     Eigen::Isometry3d pose = from;
-    pose.translation() += part * way_m;
+    pose.translation() += part * line_m;
     pose.linear() = from.linear() * Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix();
     const std::vector<Joints> found = kinematics.Inverse(pose * tip_from_flange, *joints);
     if (found.empty()) break;

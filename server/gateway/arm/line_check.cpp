@@ -73,16 +73,16 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   // An end that cannot be reached is reported as such, not as the stretched elbow on the path to it.
   TOUCHSTONE_RETURN_IF_ERROR(CheckTips(to, what));
   if (Joints unused; !JointsAt(to, *joints, &unused)) return OutOfReach(to, what);
-  const Eigen::Vector3d way_m = to.translation() - from.translation();
+  const Eigen::Vector3d line_m = to.translation() - from.translation();
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
   const int steps =
-      std::max(1, static_cast<int>(std::ceil(std::max(way_m.norm() / kStepM, turn.angle() / kStepRad))));
+      std::max(1, static_cast<int>(std::ceil(std::max(line_m.norm() / kStepM, turn.angle() / kStepRad))));
   const double step_s =
-      std::max(way_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMaxTurnRadS) / steps;
+      std::max(line_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMaxTurnRadS) / steps;
   for (int step = 0; step <= steps; ++step) {
     const double fraction = static_cast<double>(step) / steps;
     Eigen::Isometry3d pose = from;
-    pose.translation() += fraction * way_m;
+    pose.translation() += fraction * line_m;
     pose.linear() =
         from.linear() * Eigen::AngleAxisd(fraction * turn.angle(), turn.axis()).toRotationMatrix();
     TOUCHSTONE_RETURN_IF_ERROR(CheckTips(pose, what));

@@ -84,7 +84,7 @@ class UrMotionPlanner final : public MotionPlanner {
   // Follows all lines; the joints at the end.
   absl::StatusOr<Joints> FollowAll(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses,
                                    Joints joints, int* wrist_3_beyond) const;
-  // A checked way from where the arm is to a pose, over the clearance plane; *joints become those of its end.
+  // A checked path from where the arm is to a pose, over the clearance plane; *joints become those of its end.
   absl::StatusOr<std::vector<Eigen::Isometry3d>> Transit(const ArmState& from, const Eigen::Isometry3d& start,
                                                          double clearance_height_m, Joints* joints) const;
   double TransitDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
@@ -164,7 +164,7 @@ absl::StatusOr<Joints> UrMotionPlanner::FollowAll(Eigen::Isometry3d from,
                                                   int* wrist_3_beyond) const {
   *wrist_3_beyond = 0;
   for (size_t i = 0; i < poses.size(); ++i) {
-    const std::string what = i + 1 == poses.size() ? "the way to the start" : "the transit";
+    const std::string what = i + 1 == poses.size() ? "the descent to the start" : "the transit";
     TOUCHSTONE_RETURN_IF_ERROR(
         check_.Follow(from, poses[i], limits_.transit_speed_m_s, true, what, &joints, wrist_3_beyond));
     from = poses[i];
@@ -177,16 +177,16 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transit(const Ar
                                                                         double clearance_height_m,
                                                                         Joints* joints) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
-  const TransitPath way{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
-  std::vector<Eigen::Isometry3d> poses = way.Poses(0);
+  const TransitPath path{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
+  std::vector<Eigen::Isometry3d> poses = path.Poses(0);
   int beyond = 0;
   absl::StatusOr<Joints> end = FollowAll(from.base_from_tip, poses, here, &beyond);
-  // Near its limit it would be stuck: the approach and the next way out turn it a little, too.
+  // Near its limit it would be stuck: the approach and the next retract turn it a little, too.
   if (end.ok() && (*end)[5] > limits_.joint_max_rad[5] - kWristReserveRad) beyond = 1;
   if (end.ok() && (*end)[5] < limits_.joint_min_rad[5] + kWristReserveRad) beyond = -1;
   if (beyond != 0) {
-    // Wrist 3 would wind the cable up: the tool turns the other way round.
-    const std::vector<Eigen::Isometry3d> unwinding = way.Poses(-beyond);
+    // Wrist 3 would wind the cable up: the tool turns in the other direction.
+    const std::vector<Eigen::Isometry3d> unwinding = path.Poses(-beyond);
     if (absl::StatusOr<Joints> other = FollowAll(from.base_from_tip, unwinding, here, &beyond); other.ok())
       poses = unwinding, end = other;
   }

@@ -1,4 +1,4 @@
-// Every check that a motion passes before it is sent, and the way it takes. A dry run uses this very code.
+// Every check that a motion passes before it is sent, and the path that it takes. A dry run uses the same code.
 #pragma once
 
 #include <array>

@@ -121,15 +121,15 @@ TEST(MotionPlanner, TransitsCrossAboveTheObject) {
     touch.standoff_m = 0.02;
     const auto plan = rig.Plan(touch);
     ASSERT_TRUE(plan.ok()) << plan.status();
-    std::vector<Eigen::Isometry3d> way = {rig.at.base_from_tip};
-    way.insert(way.end(), plan->motion.transit.begin(), plan->motion.transit.end());
-    for (size_t line = 0; line + 1 < way.size(); ++line) {
-      const Eigen::Vector3d along = way[line + 1].translation() - way[line].translation();
-      const bool by_its_axis = along.normalized().cross(way[line + 1].linear().col(2)).norm() < 1e-6 &&
-                               way[line].linear().isApprox(way[line + 1].linear(), 1e-6);
+    std::vector<Eigen::Isometry3d> path = {rig.at.base_from_tip};
+    path.insert(path.end(), plan->motion.transit.begin(), plan->motion.transit.end());
+    for (size_t line = 0; line + 1 < path.size(); ++line) {
+      const Eigen::Vector3d along = path[line + 1].translation() - path[line].translation();
+      const bool by_its_axis = along.normalized().cross(path[line + 1].linear().col(2)).norm() < 1e-6 &&
+                               path[line].linear().isApprox(path[line + 1].linear(), 1e-6);
       if (by_its_axis) continue;
       for (const double part : {0.0, 0.25, 0.5, 0.75, 1.0})
-        EXPECT_GT((way[line].translation() + part * along).z(), 0.175 + 0.05 - 1e-6) << "touch " << i;
+        EXPECT_GT((path[line].translation() + part * along).z(), 0.175 + 0.05 - 1e-6) << "touch " << i;
     }
     rig.Make(*plan);
   }

@@ -40,7 +40,7 @@ std::vector<Eigen::Isometry3d> TransitPath::Poses(int turn) const {
   const Eigen::Isometry3d out = Lifted(from, height_m), in = Lifted(to, height_m);
   std::vector<Eigen::Isometry3d> poses = {out};
 
-  // The long way round, in thirds: the tilt changes evenly while the tool turns about its own axis.
+  // The longer turn, in thirds: the tilt changes evenly while the tool turns about its own axis.
   const Eigen::Quaterniond change(out.linear().transpose() * in.linear());
   const double short_rad = std::remainder(2 * std::atan2(change.z(), change.w()), 2 * kPi);
   if (turn * short_rad < 0) {

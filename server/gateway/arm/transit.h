@@ -1,4 +1,4 @@
-// The way between two poses of the tip that keeps clear of the object: out along the tool's own axis up to a
+// The path between two poses of the tip that keeps clear of the object: out along the tool's own axis up to a
 // plane, across, and in along the axis of the pose to come.
 #pragma once
 
@@ -13,8 +13,8 @@ struct TransitPath {
   double plane_m = 0;             // height, base frame, that every fingertip crosses at, at least
   double outermost_finger_m = 0;  // from the middle one
 
-  // Poses to go through in straight lines; the last is `to`. turn = 0: the tool turns the shorter way about
-  // its axis; +1 or -1: counter-clockwise or clockwise about its z, the long way if need be.
+  // Poses to go through in straight lines; the last is `to`. turn = 0: the tool turns in the shorter direction about
+  // its axis; +1 or -1: counter-clockwise or clockwise about its z, even if that is the longer turn.
   std::vector<Eigen::Isometry3d> Poses(int turn) const;
 };
 

@@ -84,7 +84,7 @@ absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
   std::vector<Eigen::Isometry3d> path = touch.transit;
-  path.push_back(touch.end);  // the retract is as fast as the way down could be
+  path.push_back(touch.end);  // the speed of the retract
   return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path), options_.script));
 }
 

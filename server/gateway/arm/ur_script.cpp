@@ -68,17 +68,18 @@ int32_t CommandWord(uint32_t program_id, int command) {
 }
 
 double LineSpeed(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s) {
-  const double way_m = (to.translation() - from.translation()).norm(), turn_rad = TurnRad(from, to);
-  if (way_m < 1e-4 || turn_rad <= 0) return speed_m_s;  // the tool turns on the spot
-  return std::min(speed_m_s, way_m * kMaxTurnRadS / turn_rad);
+  const double distance_m = (to.translation() - from.translation()).norm(), turn_rad = TurnRad(from, to);
+  if (distance_m < 1e-4 || turn_rad <= 0) return speed_m_s;  // the tool turns on the spot
+  return std::min(speed_m_s, distance_m * kMaxTurnRadS / turn_rad);
 }
 
 double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
                     double acceleration_m_s2) {
-  const double way_m = (to.translation() - from.translation()).norm(), v = LineSpeed(from, to, speed_m_s);
+  const double distance_m = (to.translation() - from.translation()).norm(),
+               v = LineSpeed(from, to, speed_m_s);
   const double ramp_m = v * v / acceleration_m_s2;  // of both ends
-  const double straight_s =
-      way_m < ramp_m ? 2 * std::sqrt(way_m / acceleration_m_s2) : way_m / v + v / acceleration_m_s2;
+  const double straight_s = distance_m < ramp_m ? 2 * std::sqrt(distance_m / acceleration_m_s2)
+                                                : distance_m / v + v / acceleration_m_s2;
   return std::max(straight_s, TurnRad(from, to) / kMaxTurnRadS);
 }
 

@@ -26,7 +26,7 @@ struct ScriptOptions {
 // "p[0.3,0,0.1,3.14159,0,0]": position in m, rotation vector in rad.
 std::string PoseText(const Eigen::Isometry3d& pose);
 
-// `speeds_m_s` has one speed for every line of the transit, and one for the retreat.
+// `speeds_m_s` has one speed for every line of the transit, and one for the retract.
 std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options);
 // One speed for every pose.

@@ -139,9 +139,10 @@ absl::Status SerialEffector::StartCaptureOnDevice(uint32_t touch) {
     std::vector<int> fingers;
     for (int i = 0; i < firmware::kMaxFingers; ++i)
       if ((refused_.detail >> i & 1) != 0) fingers.push_back(i + 1);
-    why = absl::StrCat(fingers.size() == 1 ? "finger " : "fingers ", absl::StrJoin(fingers, ", "),
-                       fingers.size() == 1 ? " is" : " are",
-                       " pressed before the touch begins; retreat, or look whether something sticks");
+    why = absl::StrCat(
+        fingers.size() == 1 ? "finger " : "fingers ", absl::StrJoin(fingers, ", "),
+        fingers.size() == 1 ? " is" : " are",
+        " pressed before the touch begins; move the tool away, or look whether something sticks");
   }
   std::lock_guard<std::mutex> lock(mutex_);
   record_.MarkLost(absl::StrCat("touch ", touch, " was not armed: ", why));

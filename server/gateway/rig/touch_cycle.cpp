@@ -100,10 +100,10 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
         if (state.phase == MotionPhase::kDone) return true;
         TOUCHSTONE_ASSIGN_OR_RETURN(const EffectorTouch contacts, parts_.effector->Touch());
         const int count = contacts.Contacts();
-        const double way_m = approach.dot(state.base_from_tip.translation());
-        if (count > 0 && !pressed_from_m.has_value()) pressed_from_m = way_m;
+        const double distance_m = approach.dot(state.base_from_tip.translation());
+        if (count > 0 && !pressed_from_m.has_value()) pressed_from_m = distance_m;
         const bool pressed =
-            pressed_from_m.has_value() && way_m - *pressed_from_m > options_.max_overtravel_m;
+            pressed_from_m.has_value() && distance_m - *pressed_from_m > options_.max_overtravel_m;
         if (!ended && (count == options_.fingers || pressed)) {
           TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->EndApproach(program_id));
           ended = true;
