@@ -1,0 +1,109 @@
+#include "server/diagnosis/selection/stepwise_search.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/diagnosis/inference/linear_test_model.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone {
+namespace {
+
+constexpr double kSigma = 0.005;
+constexpr double kColumn = 50;  // per m
+constexpr double kPushM = 0.8e-3;
+
+class StepwiseSearchTest : public ::testing::Test {
+ protected:
+  StepwiseSearchTest() : rows(4, 25, 2) {
+    for (const char* effect : {"object_push", "oblique_slip", "gravity_sag"}) {
+      rows.columns[effect] = rows.Random(rows.columns.size() + 1, kColumn);
+      candidates.push_back({Catalogue().Find(effect), false, false, {}});
+    }
+    rows.measured = rows.Random(9, kSigma);
+    likelihood = std::make_unique<Likelihood>(rows.GroupRows(), nullptr, 0, nullptr);
+    experiment.observations = &rows;
+    experiment.likelihood = likelihood.get();
+  }
+  StepwiseSearch Search() const {
+    return {experiment, candidates, SearchRules(), [](const std::string&) {}};
+  }
+  Parameterization Nominal() const { return {NominalModel(), rows.groups()}; }
+  static std::vector<std::string> Names(const Fit& fit) {
+    std::vector<std::string> names;
+    for (const EffectInstance& instance : fit.model.base().effects) names.push_back(instance.effect->name);
+    return names;
+  }
+  LinearTestModel rows;
+  std::vector<Candidate> candidates;
+  std::unique_ptr<Likelihood> likelihood;
+  Experiment experiment;
+};
+
+TEST_F(StepwiseSearchTest, AddsNothingToNoise) {
+  EXPECT_TRUE(Names(Search().Run(Nominal(), 0)->fit).empty());
+}
+
+TEST_F(StepwiseSearchTest, AddsTheEffectThatTheRowsFollow) {
+  rows.measured += kPushM * rows.columns["object_push"];
+  const Explanation explanation = *Search().Run(Nominal(), 0);
+  ASSERT_EQ(Names(explanation.fit), std::vector<std::string>{"object_push"});
+  EXPECT_NEAR(explanation.fit.point[0], kPushM, 4 * std::sqrt(explanation.fit.covariance(0, 0)));
+}
+
+TEST_F(StepwiseSearchTest, RemovesAnEffectThatTwoOthersMakeSuperfluous) {
+  // The third column looks like the sum of the first two, which are the causes.
+  rows.columns["gravity_sag"] =
+      rows.columns["object_push"] + rows.columns["oblique_slip"] + rows.Random(20, 0.3 * kColumn);
+  rows.measured += kPushM * (rows.columns["object_push"] + rows.columns["oblique_slip"]);
+  std::vector<std::string> names = Names(Search().Run(Nominal(), 0)->fit);
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names, (std::vector<std::string>{"object_push", "oblique_slip"}));
+}
+
+TEST_F(StepwiseSearchTest, PredictsTheEvidenceOfALinearExtension) {
+  rows.measured += kPushM * rows.columns["oblique_slip"];
+  const StepwiseSearch search = Search();
+  const Fit nominal = *FitModel(experiment, Nominal());
+  const std::vector<Extension> extensions = *search.Score(nominal, 0);
+  ASSERT_EQ(extensions.size(), 3u);
+  for (const Extension& extension : extensions) {
+    EXPECT_TRUE(extension.visible);
+    EXPECT_NEAR(extension.log_evidence, search.FitExtension(extension)->log_evidence, 0.1) << extension.name;
+  }
+  EXPECT_GT(extensions[1].log_evidence, nominal.log_evidence + 50);
+}
+
+TEST_F(StepwiseSearchTest, SaysWhatTheRowsCannotSee) {
+  rows.columns["gravity_sag"].setZero();
+  const std::vector<Extension> extensions = *Search().Score(*FitModel(experiment, Nominal()), 0);
+  EXPECT_FALSE(extensions[2].visible);
+  EXPECT_TRUE(extensions[0].visible);
+}
+
+TEST_F(StepwiseSearchTest, AnEffectWithTheSameColumnCompetesWithEqualEvidence) {
+  rows.columns["gravity_sag"] = rows.columns["oblique_slip"];
+  rows.measured += kPushM * rows.columns["oblique_slip"];
+  const StepwiseSearch search = Search();
+  const Explanation explanation = *search.Run(Nominal(), 0);
+  ASSERT_EQ(explanation.fit.model.base().effects.size(), 1u);
+  const std::vector<CompetingFit> competing = *search.CompetingFits(explanation, 0);
+  ASSERT_GE(competing.size(), 2u);
+  EXPECT_EQ(competing[0].name, Names(explanation.fit)[0]);
+  EXPECT_NE(competing[1].name, competing[0].name);
+  EXPECT_NEAR(competing[1].fit.log_likelihood, competing[0].fit.log_likelihood, 0.1);
+}
+
+TEST_F(StepwiseSearchTest, SetsAValueOfTheInitialModelFreeWhereItIsWrong) {
+  rows.measured += kPushM * rows.columns["object_push"];
+  const Model model = *AddEffect(NominalModel(), "object_push", {"shift_mm=0.4"}, Catalogue());
+  const Explanation explanation = *Search().Run({model, rows.groups()}, 1);
+  EXPECT_EQ(Names(explanation.fit), std::vector<std::string>{"object_push"});
+  ASSERT_TRUE(explanation.fit.model.IsFree(0));
+  EXPECT_NEAR(explanation.fit.point[0], kPushM, 4 * std::sqrt(explanation.fit.covariance(0, 0)));
+}
+
+}  // namespace
+}  // namespace touchstone
