@@ -95,7 +95,7 @@ TEST_F(VirtualSourceTest, RefusesWhatItsLimitsAndObjectsDoNotAllow) {
   unknown.object = "lat0";
   const absl::Status status = source_.Touch(unknown, NoObjection).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("did you mean 'lat00'?"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("did you mean"));
 }
 
 TEST_F(VirtualSourceTest, TheGuardsErrorEndsTheWork) {
