@@ -63,10 +63,40 @@ absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& messa
   return resources.default_model;
 }
 
+namespace {
+
+v1::EffectStage StageToProto(Stage stage) {
+  switch (stage) {
+    case Stage::kPose:
+      return v1::EFFECT_STAGE_POSE;
+    case Stage::kContact:
+      return v1::EFFECT_STAGE_CONTACT;
+    case Stage::kMotion:
+      return v1::EFFECT_STAGE_MOTION;
+    case Stage::kSensor:
+      return v1::EFFECT_STAGE_SENSOR;
+  }
+  return v1::EFFECT_STAGE_UNSPECIFIED;
+}
+
+v1::ParameterArity ArityToProto(Arity arity) {
+  switch (arity) {
+    case Arity::kScalar:
+      return v1::PARAMETER_ARITY_SCALAR;
+    case Arity::kVector3:
+      return v1::PARAMETER_ARITY_VECTOR3;
+    case Arity::kPerFinger:
+      return v1::PARAMETER_ARITY_PER_FINGER;
+  }
+  return v1::PARAMETER_ARITY_UNSPECIFIED;
+}
+
+}  // namespace
+
 v1::Effect ToProto(const Effect& effect) {
   v1::Effect message;
   message.set_name(effect.name);
-  message.set_stage(ToProto(effect.stage));
+  message.set_stage(StageToProto(effect.stage));
   message.set_meaning(effect.meaning);
   message.set_signature(effect.signature);
   message.set_check_on_rig(effect.check_on_rig);
@@ -75,7 +105,7 @@ v1::Effect ToProto(const Effect& effect) {
     v1::Parameter* parameter = message.add_parameters();
     parameter->set_name(info.name);
     parameter->set_unit(std::string(UnitSymbol(info.unit)));
-    parameter->set_arity(ToProto(info.arity));
+    parameter->set_arity(ArityToProto(info.arity));
     parameter->set_min(info.lower);
     parameter->set_max(info.upper);
     parameter->set_default_value(info.neutral);
