@@ -42,9 +42,9 @@ absl::Status RunPropose(const Cli& cli, const Options& options) {
     cli.Log(absl::StrCat(Counted(touches, "touch", "touches"), ": ", purpose));
   // What no touch can decide needs another measurement.
   for (const v1::Ambiguity& ambiguity : report.ambiguities())
-    if (!ambiguity.decided_by().empty())
+    if (!ambiguity.discriminating_measurement().empty())
       cli.Log(absl::StrCat("to tell ", absl::StrJoin(ambiguity.effects(), " from "), ": ",
-                           ambiguity.decided_by()));
+                           ambiguity.discriminating_measurement()));
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (plan.empty()) {
     cli.Log("no touches to propose: no explanations are left that further touches would tell apart");

@@ -54,7 +54,7 @@ std::string StepBody(const v1::Step& step) {
     alike.insert(alike.end(), step.equivalent().begin(), step.equivalent().end());
     absl::StrAppend(&body, "<p>These data cannot tell ", Escape(Join(alike, "and")), " apart.</p>");
   }
-  std::string terms = absl::StrCat(Definition("To decide", step.decided_by()),
+  std::string terms = absl::StrCat(Definition("To decide", step.discriminating_measurement()),
                                    Definition("To check on the rig", step.check_on_rig()),
                                    Definition("To mend it", step.remedy()));
   if (step.scope() == "object") terms += Definition("Scope", "one value an object");

@@ -103,7 +103,7 @@ std::string Ambiguities(const v1::Report& report) {
   for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report)) {
     const std::vector<std::string> effects(ambiguity->effects().begin(), ambiguity->effects().end());
     absl::StrAppend(&items, "<dt class=\"name\">", Escape(Join(effects, "or")), "</dt><dd>",
-                    Typeset(ToDecide(ambiguity->decided_by())), "</dd>");
+                    Typeset(ToDecide(ambiguity->discriminating_measurement())), "</dd>");
   }
   if (items.empty()) return "";
   return absl::StrCat("<h3>What these data cannot tell apart</h3>\n<dl>", items, "</dl>\n");

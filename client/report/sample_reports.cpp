@@ -122,7 +122,8 @@ v1::Report MissingEffectsReport() {
   radius->set_remedy("Keep the radius in the model, or fit pointed tips.");
   radius->set_check_on_rig(
       "Measure the tips, or touch one flat face at 0 and 25 deg: only the second shifts.");
-  radius->set_decided_by("touches on the edge of a box: a ball rolls over it, an offset does not");
+  radius->set_discriminating_measurement(
+      "touches on the edge of a box: a ball rolls over it, an offset does not");
   radius->set_scope("rig");
   v1::Step* latency = report.add_steps();
   latency->set_effect("channel_latency");
@@ -153,7 +154,7 @@ v1::Report MissingEffectsReport() {
   v1::Ambiguity* pair = report.add_ambiguities();
   pair->add_effects("channel_latency");
   pair->add_effects("finger_length");
-  pair->set_decided_by(
+  pair->set_discriminating_measurement(
       "the same touches at a second speed: a latency keeps its time, a length keeps its distance");
   AddModel(
       "touchstone: model/1\nname: nominal-improved\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
@@ -179,7 +180,8 @@ v1::Report WrongValuesReport() {
   SetQuality(815, 818, 0.63, report.mutable_final());
   v1::Ambiguity* pair = report.add_ambiguities();
   for (const char* effect : {"contact_slowdown", "speed_error", "clock_skew"}) pair->add_effects(effect);
-  pair->set_decided_by("the arm's encoders: only a speed error shows before the first contact");
+  pair->set_discriminating_measurement(
+      "the arm's encoders: only a speed error shows before the first contact");
   AddModel(
       "touchstone: model/1\nname: nominal-improved\neffects:\n  - contact_slowdown: {fraction: 0.183}\n"
       "  - gaussian_noise: {sigma_us: 812}\n",

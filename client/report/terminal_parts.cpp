@@ -152,13 +152,13 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   out->Rows(rows);
   for (const v1::Step& step : report.steps()) {
     if (step.equivalent().empty()) continue;
-    out->Paragraph(
-        absl::StrCat(StepName(step), ": these data cannot tell them apart. ", ToDecide(step.decided_by())));
+    out->Paragraph(absl::StrCat(StepName(step), ": these data cannot tell them apart. ",
+                                ToDecide(step.discriminating_measurement())));
   }
   for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report)) {
     const std::vector<std::string> effects(ambiguity->effects().begin(), ambiguity->effects().end());
     out->Paragraph(absl::StrCat(Join(effects, "or"), ": these data cannot tell them apart. ",
-                                ToDecide(ambiguity->decided_by())));
+                                ToDecide(ambiguity->discriminating_measurement())));
   }
 }
 

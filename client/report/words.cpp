@@ -256,9 +256,10 @@ std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report) {
   return others;
 }
 
-std::string ToDecide(const std::string& decided_by) {
-  if (decided_by.empty() || absl::ascii_isupper(decided_by[0])) return decided_by;
-  return absl::StrCat("To decide: ", decided_by);
+std::string ToDecide(const std::string& discriminating_measurement) {
+  if (discriminating_measurement.empty() || absl::ascii_isupper(discriminating_measurement[0]))
+    return discriminating_measurement;
+  return absl::StrCat("To decide: ", discriminating_measurement);
 }
 
 std::string SummaryToShow(const v1::Report& report) {

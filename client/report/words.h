@@ -69,7 +69,7 @@ std::vector<Rung> Ladder(const v1::Report& report);
 // Pairs that no step names as its equivalents.
 std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report);
 // "To decide: a second speed", or the text itself if it is a sentence.
-std::string ToDecide(const std::string& decided_by);
+std::string ToDecide(const std::string& discriminating_measurement);
 // The report's own summary where its parts do not say the same at more length: without a ladder.
 std::string SummaryToShow(const v1::Report& report);
 

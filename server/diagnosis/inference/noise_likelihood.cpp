@@ -9,7 +9,7 @@
 namespace touchstone {
 namespace {
 
-constexpr int kNodes = 20;     // a finger, of the integral over the common shift
+constexpr int kNodes = 20;     // per reading, of the integral over the common shift
 constexpr int kSearches = 18;  // golden section steps
 const double kLogTwoPi = std::log(2 * kPi);
 

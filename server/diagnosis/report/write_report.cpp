@@ -89,7 +89,7 @@ void WriteStep(const LadderStep& step, v1::Step* message) {
   message->set_meaning(step.meaning);
   message->set_check_on_rig(step.check_on_rig);
   message->set_remedy(step.remedy);
-  message->set_decided_by(step.discriminating_measurement);
+  message->set_discriminating_measurement(step.discriminating_measurement);
   message->set_scope(ToMessage(step.scope));
 }
 
@@ -152,7 +152,7 @@ void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
   for (const ConfoundedEffects& confounded : diagnosis.confounded) {
     v1::Ambiguity* message = report->add_ambiguities();
     for (const std::string& effect : confounded.effects) message->add_effects(effect);
-    message->set_decided_by(confounded.discriminating_measurement);
+    message->set_discriminating_measurement(confounded.discriminating_measurement);
   }
   for (const RankedCandidate& candidate : diagnosis.candidates)
     WriteCandidate(candidate, report->add_candidates());

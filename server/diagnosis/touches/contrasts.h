@@ -1,7 +1,6 @@
-// What can be seen of a touch: the differences between its fingers. The n - 1 orthonormal contrasts of the n
-// fingers that report carry all of it, and noise that is independent from finger to finger stays white in
-// them (DIAGNOSIS: treating t - min t as independent numbers raises false alarms to four times the nominal
-// rate).
+// What can be seen of a touch: the differences between its fingers. The n - 1 orthonormal contrasts of the n fingers
+// that report carry all of it, and noise that is independent from finger to finger stays white in them. Treating
+// t - min t as independent numbers instead raised false alarms to 6.5 to 28.5 % at a nominal 5 %.
 #pragma once
 
 #include <vector>
@@ -33,14 +32,14 @@ class Contrasts {
   void SetWeights(const std::vector<double>& weights);
   const std::vector<double>& root_weights() const { return root_weight_; }
 
-  // Contrasts of a value a finger. Entries of fingers that take no part are not read.
+  // Contrasts of one value per finger. Entries of fingers that take no part are not read.
   Eigen::VectorXd Apply(const std::vector<double>& per_finger) const;
 
  private:
   int fingers_;
   int rows_ = 0;
   std::vector<int> touches_;
-  std::vector<uint32_t> mask_;  // of fingers, one a touch
+  std::vector<uint32_t> mask_;  // of fingers, per touch
   std::vector<int> first_row_, object_row_, object_of_row_, touch_of_row_;
   std::vector<double> root_weight_;
   std::vector<Eigen::MatrixXd> matrices_;  // by mask

@@ -125,9 +125,10 @@ void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector
     together.push_back(step.effect());
     said |=
         std::all_of(wanted.begin(), wanted.end(), [&](const auto& name) { return Contains(together, name); });
-    decided |= !step.decided_by().empty();
+    decided |= !step.discriminating_measurement().empty();
   }
-  for (const v1::Ambiguity& ambiguity : report.ambiguities()) decided |= !ambiguity.decided_by().empty();
+  for (const v1::Ambiguity& ambiguity : report.ambiguities())
+    decided |= !ambiguity.discriminating_measurement().empty();
   marks->push_back({"said so", said});
   marks->push_back({"said so, with what decides", said && decided});
   marks->push_back({"one step", report.steps_size() == 1});

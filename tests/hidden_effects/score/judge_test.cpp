@@ -108,7 +108,7 @@ TEST(Judge, WhatDataCannotTellMustBeNamedTogetherWithWhatDecides) {
   v1::Step* step = AddStep(&report, "finger_length", {"channel_latency"});
   EXPECT_EQ(Ask("said so", Judge(arm, truth, report, NAN)), true);
   EXPECT_EQ(Ask("said so, with what decides", Judge(arm, truth, report, NAN)), false);
-  step->set_decided_by("a second speed");
+  step->set_discriminating_measurement("a second speed");
   EXPECT_EQ(Ask("said so, with what decides", Judge(arm, truth, report, NAN)), true);
   step->clear_equivalent();
   EXPECT_EQ(Ask("said so", Judge(arm, truth, report, NAN)), false);
