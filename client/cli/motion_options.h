@@ -18,7 +18,8 @@ struct MotionFlags {
 // --take-lease and, if `session`, --session.
 void AddMotionOptions(CLI::App* command, MotionFlags* flags, bool session);
 
-// The source behind `connection`, with its lease if it needs one. `log` may be null: cli.Log then.
+// The source behind `connection`, with its lease if it needs one. The parts of a rig that is starting are waited for,
+// up to --wait-s. `log` may be null: cli.Log then.
 absl::StatusOr<std::unique_ptr<client::LeasedSource>> OpenLeased(
     const Cli& cli, client::Connection* connection, const MotionFlags& flags,
     std::function<void(const std::string&)> log = nullptr);
