@@ -23,7 +23,7 @@ struct Raw {
   double debounce_ms = 5;
   int threshold = 512, hysteresis = 16;
   double vertical_fov_deg = 45;
-  double max_speed_mm_s = 100, transfer_speed_mm_s = 150, acceleration_mm_s2 = 1200;
+  double max_speed_mm_s = 100, transit_speed_mm_s = 150, acceleration_mm_s2 = 1200;
   double max_standoff_mm = 150, stroke_beyond_target_mm = 30, max_tilt_deg = 60, clearance_mm = 50;
   std::vector<double> box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
 };
@@ -36,7 +36,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"journal", "The SQLite file that keeps every touch", &o.journal},
       {"audit_log", "JSON lines of what was done with the rig, and by whom; empty: none", &o.audit_log},
       {"calibration", "Where tool, objects and camera stand (YAML)", &o.calibration},
-      {"source_note", "Kept with every session; an emulator says here that it is one", &o.source_note},
+      {"provenance_note", "Kept with every session; an emulator says here that it is one", &o.provenance_note,
+       "source_note"},
       {"time_scale", "Rig seconds in one second: 1, but with an emulator on a faster clock", &o.time_scale},
       {"mount_command",
        "Program and arguments that put {object} down with its face {up_face} up; none: a person does",
@@ -66,12 +67,14 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"effector.debounce_ms", "Microswitch", &raw->debounce_ms},
       {"effector.threshold", "Resistor: pressed at or above this reading", &raw->threshold},
       {"effector.hysteresis", "Resistor: released so far below", &raw->hysteresis},
-      {"effector.max_press_mm", "How far the first finger may be pushed while the others are on their way",
-       &o.max_press_mm},
+      {"effector.max_overtravel_mm",
+       "How far the first finger may be indented while the others have no contact", &o.max_overtravel_mm,
+       "effector.max_press_mm"},
       {"effector.reply_timeout_s", "Of one try of a request", &o.effector.reply_timeout_s},
       {"effector.silence_s", "Without a heartbeat for so long the line is lost", &o.effector.silence_s},
       {"effector.clock_query_s", "Between two queries of its clock", &o.effector.clock_query_s},
-      {"camera.source", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.uri},
+      {"camera.uri", "'' none; 0 or /dev/video0; folder:PATH; video:FILE; http://...", &o.camera.uri,
+       "camera.source"},
       {"camera.width", "Asked of the camera; 0: as it comes", &o.camera.width},
       {"camera.height", "", &o.camera.height},
       {"camera.intrinsics", "OpenCV's calibration file; empty: the field of view below",
@@ -79,7 +82,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
       {"camera.timeout_s", "", &o.camera.timeout_s},
       {"limits.max_speed_mm_s", "Limit of an approach's speed", &raw->max_speed_mm_s},
-      {"limits.transfer_speed_mm_s", "Speed between touches", &raw->transfer_speed_mm_s},
+      {"limits.transit_speed_mm_s", "Speed between touches", &raw->transit_speed_mm_s,
+       "limits.transfer_speed_mm_s"},
       {"limits.acceleration_mm_s2", "", &raw->acceleration_mm_s2},
       {"limits.max_standoff_mm", "", &raw->max_standoff_mm},
       {"limits.stroke_beyond_target_mm", "An approach ends so far behind its target",
@@ -127,7 +131,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(raw.fingers, 1, 8, "effector.fingers"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.spacing_mm, 1, 1000, "effector.spacing_mm"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.max_press_mm, 0.1, 1000, "effector.max_press_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.max_overtravel_mm, 0.1, 1000, "effector.max_overtravel_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.time_scale, 1e-3, 1e5, "time_scale"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.silence_s, 0.05, 60, "arm.silence_s"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.watchdog_hz, 0.1, 50, "arm.watchdog_hz"));
@@ -151,7 +155,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
   MotionLimits& limits = o.limits;
   limits.max_speed_m_s = raw.max_speed_mm_s / 1000;
-  limits.transit_speed_m_s = raw.transfer_speed_mm_s / 1000;
+  limits.transit_speed_m_s = raw.transit_speed_mm_s / 1000;
   limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
   limits.max_standoff_m = raw.max_standoff_mm / 1000;
   limits.stroke_beyond_target_m = raw.stroke_beyond_target_mm / 1000;

@@ -28,14 +28,14 @@ struct GatewayOptions {
   std::string journal = "rig.db";
   std::string audit_log = "rig.audit.jsonl";
   std::string calibration = "calibration.yaml";
-  std::string source_note;
+  std::string provenance_note;
   double time_scale = 1;
   std::vector<std::string> mount_command;
   double mount_timeout_s = 120;
   ArmOptions arm;
   EffectorOptions effector;
   double spacing_mm = 30;
-  double max_press_mm = 45;
+  double max_overtravel_mm = 45;
   CameraOptions camera;
   MotionLimits limits;
 

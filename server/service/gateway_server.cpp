@@ -55,10 +55,10 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   rig.fingers = static_cast<int>(options.effector.fingers.size());
   rig.spacing_m = options.spacing_mm / 1000;
   rig.time_scale = options.time_scale;
-  rig.max_overtravel_m = options.max_press_mm / 1000;
+  rig.max_overtravel_m = options.max_overtravel_mm / 1000;
   rig.mount_command = options.mount_command;
   rig.mount_timeout_s = options.mount_timeout_s;
-  rig.provenance_note = options.source_note;
+  rig.provenance_note = options.provenance_note;
   rig.effector_port = options.effector.port;
   return Rig::Create(std::move(rig), std::move(parts));
 }

@@ -65,6 +65,15 @@ absl::Status Assign(const toml::node& node, const std::string& where, const Opti
   return absl::OkStatus();
 }
 
+std::string FlagOfKey(const std::string& key) {
+  return "--" + absl::StrReplaceAll(key, {{"_", "-"}, {".", "-"}});
+}
+
+// With that of its former key, as CLI11 takes several names of one flag.
+std::string FlagNames(const Option& option) {
+  return FlagOfKey(option.key) + (option.former_key.empty() ? "" : "," + FlagOfKey(option.former_key));
+}
+
 absl::Status ReadTable(const toml::table& table, const std::string& prefix, const std::string& origin,
                        const std::vector<Option>& options, const std::set<std::string>& set) {
   std::vector<std::string> known;
@@ -77,11 +86,11 @@ absl::Status ReadTable(const toml::table& table, const std::string& prefix, cons
       TOUCHSTONE_RETURN_IF_ERROR(ReadTable(*node.as_table(), name + ".", origin, options, set));
       continue;
     }
-    const auto option =
-        std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.key == name; });
+    const auto option = std::find_if(options.begin(), options.end(),
+                                     [&](const Option& o) { return o.key == name || o.former_key == name; });
     if (option == options.end())
       return absl::InvalidArgumentError(absl::StrCat(where, ": unknown key", DidYouMean(name, known)));
-    if (set.count(name)) continue;
+    if (set.count(option->key)) continue;
     TOUCHSTONE_RETURN_IF_ERROR(Assign(node, where, option->target));
   }
   return absl::OkStatus();
@@ -90,7 +99,7 @@ absl::Status ReadTable(const toml::table& table, const std::string& prefix, cons
 }  // namespace
 
 std::string FlagOf(const Option& option) {
-  return "--" + absl::StrReplaceAll(option.key, {{"_", "-"}, {".", "-"}});
+  return FlagOfKey(option.key);
 }
 
 absl::Status ReadToml(const std::string& text, const std::string& origin, const std::vector<Option>& options,
@@ -112,13 +121,13 @@ void AddFlags(const std::vector<Option>& options, CLI::App* app) {
         [&](auto* target) {
           using Value = std::remove_pointer_t<decltype(target)>;
           if constexpr (std::is_same_v<Value, bool>) {
-            app->add_flag(FlagOf(option), *target, option.meaning);
+            app->add_flag(FlagNames(option), *target, option.meaning);
           } else if constexpr (std::is_same_v<Value, std::vector<std::string>>) {
-            app->add_option(FlagOf(option), *target, option.meaning)->allow_extra_args(false);
+            app->add_option(FlagNames(option), *target, option.meaning)->allow_extra_args(false);
           } else if constexpr (std::is_same_v<Value, std::vector<double>>) {
-            app->add_option(FlagOf(option), *target, option.meaning)->delimiter(',');
+            app->add_option(FlagNames(option), *target, option.meaning)->delimiter(',');
           } else {
-            app->add_option(FlagOf(option), *target, option.meaning)->capture_default_str();
+            app->add_option(FlagNames(option), *target, option.meaning)->capture_default_str();
           }
         },
         option.target);

@@ -22,6 +22,7 @@ struct Option {
   std::string key;
   std::string meaning;
   Target target;
+  std::string former_key = {};  // an older name, which files and flags may still use; empty: none
 };
 
 // "--arm-address".

@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "server/service/option_table.h"
 #include "server/service/server_flags.h"
 
 namespace touchstone {
@@ -55,6 +56,24 @@ TEST(ServerFlags, EveryMistakeNamesItsPlace) {
   const char* arguments[] = {"touchstone-server", "--treads", "3"};
   EXPECT_THAT(std::string(ParseServerFlags(3, arguments).status().message()),
               HasSubstr("did you mean '--threads'"));
+}
+
+TEST(OptionTable, AFormerKeyIsStillRead) {
+  for (const char* name : {"uri", "source"}) {
+    std::string uri;
+    const std::vector<Option> options = {{"camera.uri", "", &uri, "camera.source"}};
+    const absl::Status read =
+        ReadToml("[camera]\n" + std::string(name) + " = \"folder:pictures\"\n", "a.toml", options, {});
+    ASSERT_TRUE(read.ok()) << read;
+    EXPECT_EQ(uri, "folder:pictures");
+  }
+}
+
+TEST(OptionTable, AFlagWinsOverItsFormerKeyInAFile) {
+  std::string uri = "0";
+  const std::vector<Option> options = {{"camera.uri", "", &uri, "camera.source"}};
+  ASSERT_TRUE(ReadToml("[camera]\nsource = \"1\"\n", "a.toml", options, {"camera.uri"}).ok());
+  EXPECT_EQ(uri, "0");
 }
 
 }  // namespace

@@ -73,7 +73,7 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
   text += "journal = " + Quoted(dir + "/rig.db") + "\n";
   text += "audit_log = " + Quoted(dir + "/audit.jsonl") + "\n";
   text += "calibration = " + Quoted(dir + "/calibration.yaml") + "\n";
-  text += "source_note = \"emulated rig: not a measurement of anything\"\n";
+  text += "provenance_note = \"emulated rig: not a measurement of anything\"\n";
   text += absl::StrFormat("time_scale = %.9g\n", options.speedup);
   if (!addresses.program.empty())
     text += "mount_command = [" + Quoted(addresses.program) + ", \"tell\", " + Quoted(control) +
@@ -93,7 +93,7 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
       "\n[effector]\nport = %s\nbaud = 115200\nfingers = %d\nspacing_mm = %.9g\nsensor = %s\n",
       Quoted(dir + "/effector"), options.fingers, options.spacing_mm, Quoted(options.sensor));
   text += absl::StrFormat(
-      "\n[camera]\nsource = %s\nvertical_fov_deg = %.9g\n",
+      "\n[camera]\nuri = %s\nvertical_fov_deg = %.9g\n",
       Quoted("http://" + options.address + ":" + std::to_string(addresses.camera_port) + "/video.mjpg"),
       kVerticalFovDeg);
   // The plate lies below the arm's base, and an approach may be told to end just above it.

@@ -64,9 +64,9 @@ TEST_F(EmulatorTest, WritesWhatAGatewayNeedsAndSaysThatItIsEmulated) {
     EXPECT_NE(Text(path).find("emulated rig"), std::string::npos) << path;
   const std::string config = Text(emulator_->config_path());
   for (const char* key :
-       {"journal = ", "audit_log = ", "calibration = ", "source_note = ", "time_scale = 4\n",
+       {"journal = ", "audit_log = ", "calibration = ", "provenance_note = ", "time_scale = 4\n",
         "mount_command = [\"/usr/bin/true\", \"tell\", ", "mesh = [\"box=", "[arm]\nmodel = \"ur3e\"",
-        "rtde_port = ", "[effector]\nport = ", "sensor = \"optical\"", "[camera]\nsource = \"http://"})
+        "rtde_port = ", "[effector]\nport = ", "sensor = \"optical\"", "[camera]\nuri = \"http://"})
     EXPECT_NE(config.find(key), std::string::npos) << key << "\n" << config;
   // The box stands on the plate, 75 mm below the base.
   EXPECT_NE(Text(emulator_->calibration_path()).find("box: {translation_mm: [300, 0, -45]"),

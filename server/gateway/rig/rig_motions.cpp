@@ -37,7 +37,7 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
   const MotionGuard guard = UntilStopped(caller);
   if (parts_.camera == nullptr)
     return absl::FailedPreconditionError(
-        "this rig has no camera: set camera.source in the gateway's configuration");
+        "this rig has no camera: set camera.uri in the gateway's configuration");
   if (!parts_.planner->calibration().has_camera)
     return absl::FailedPreconditionError(
         "the calibration file has no flange_from_camera: where the camera sits");

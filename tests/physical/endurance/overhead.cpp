@@ -78,7 +78,7 @@ absl::Status Overhead::Open() {
   RigOptions rig;
   rig.fingers = fingers;
   rig.time_scale = options.time_scale;
-  rig.max_overtravel_m = options.max_press_mm / 1000;
+  rig.max_overtravel_m = options.max_overtravel_mm / 1000;
   rig.mount_command = options.mount_command;
   auto made = Rig::Create(std::move(rig), std::move(parts));
   if (!made.ok()) return made.status();
