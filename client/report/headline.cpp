@@ -63,7 +63,7 @@ std::string Headline(const v1::Report& report) {
                           " touches can tell.");
     case v1::Report::WRONG_VALUES: {
       std::vector<std::string> names;
-      // Noise alone changes no verdict, so it is not the news.
+      // Noise alone changes no verdict, so the headline leaves it out.
       for (const v1::Refit& refit : report.refitted()) {
         if (!absl::StrContains(refit.effect(), "noise")) names.push_back(refit.effect());
       }

@@ -45,7 +45,7 @@ std::string Summary(const v1::Report& report) {
   }
   terms += Term("Objects", absl::StrJoin(objects, ", "));
   terms += Term("Speeds", speeds.empty() ? "" : absl::StrCat(absl::StrJoin(speeds, ", "), " mm/s"));
-  terms += Term("Noise floor, a finger", Floors(report));
+  terms += Term("Noise floor per finger", Floors(report));
   terms += Term("Mean residual of each finger", absl::StrJoin(fingers, ", "));
   if (data.missed_contacts() > 0)
     terms += Term("Fingers that reported nothing", Count(data.missed_contacts()));
@@ -86,9 +86,8 @@ std::string WorstTouches(const v1::Report& report) {
   }
   return absl::StrCat("<h3>Worst touches</h3>\n",
                       Figure(table + "</tbody></table></div>",
-                             "The given model\u2019s residuals, a finger, and their size over the touch: the "
-                             "square root of the sum "
-                             "of squares."));
+                             "The given model\u2019s residuals per finger, and their size over the touch: "
+                             "the square root of the sum of squares."));
 }
 
 }  // namespace
@@ -102,23 +101,19 @@ std::string HtmlMethods(const v1::Report& report) {
   return Section(
       "methods", "How the numbers were computed", "",
       "<dl><dt>Residual</dt><dd>Measured minus simulated contact times of the same commanded touch, less the "
-      "mean over the "
-      "fingers that reported: only differences between fingers are measured.</dd>"
+      "mean over the fingers that reported: only differences between fingers are measured.</dd>"
       "<dt>RMSE</dt><dd>Square root of the sum of squared residuals over the sum of (reporting fingers "
-      "\u2212 1). For a "
-      "perfect model it equals the noise of one finger.</dd>"
+      "\u2212 "
+      "1). For a perfect model it equals the noise of one finger.</dd>"
       "<dt>Noise floor</dt><dd>The same quantity among repeats of the same commanded touch; without repeats "
-      "an upper bound "
-      "from the best model\u2019s residuals.</dd>"
+      "an upper bound from the best model\u2019s residuals.</dd>"
       "<dt>Excess error</dt><dd>The mean square error beyond the noise floor\u2019s.</dd>"
       "<dt>Unseen touches</dt><dd>Touches left out of the fit by whole objects, or by poses where there are "
       "few objects.</dd>"
       "<dt>Lack-of-fit p</dt><dd>Probability of at least this much misfit beyond the scatter of repeats if "
-      "nothing were "
-      "missing.</dd>"
+      "nothing were missing.</dd>"
       "<dt>Probability of an effect</dt><dd>Of being the one that is missing, among all effects that could "
-      "take its "
-      "place.</dd>"
+      "take its place.</dd>"
       "<dt>Mean residual</dt><dd>Positive: the real contact comes later than the model says.</dd></dl>\n");
 }
 

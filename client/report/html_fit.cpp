@@ -127,11 +127,10 @@ std::string Histograms(const v1::Report& report) {
   if (improved) keys.push_back({"better", "improved model"});
   return absl::StrCat(
       "<h3>Histograms</h3>\n", Legend(keys), grids,
-      "<p class=\"note\">Descriptor: a finger\u2019s contact time after the first finger\u2019s. "
-      "Local "
+      "<p class=\"note\">Descriptor: a finger\u2019s contact time after the first finger\u2019s. Local "
       "curvature, for three fingers: speed \u00d7 (t<sub>l</sub> \u2212 2 t<sub>m</sub> + t<sub>r</sub>) / "
-      "spacing\u00b2, positive where the surface is convex. p: that measured and simulated touches come from "
-      "one distribution, by permutation.</p>\n");
+      "spacing\u00b2, positive where the surface is convex. p: that measured and simulated touches come "
+      "from one distribution, by permutation.</p>\n");
 }
 
 }  // namespace

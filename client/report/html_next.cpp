@@ -109,7 +109,7 @@ std::string HtmlNextTouches(const v1::Report& report) {
   return Section(
       "next", "Next touches",
       one_purpose && !first.empty() ? absl::StrCat("What they are for: ", Typeset(first), ".")
-                                    : "Touches that would tell the explanations that are left apart.",
+                                    : "Touches that would discriminate between the remaining explanations.",
       absl::StrCat(
           Pictures(report),
           Figure(absl::StrCat(table, "</tbody></table></div>"),
@@ -143,15 +143,13 @@ std::string HtmlDistributions(const v1::Report& report) {
   if (!comparison.compatible_effects().empty()) {
     const std::vector<std::string> effects(comparison.compatible_effects().begin(),
                                            comparison.compatible_effects().end());
-    absl::StrAppend(&body, "<h3>Compatible effects</h3>\n<p>The difference would be as it is with ",
-                    Escape(Join(effects, "or")), ". Touches with poses would tell which.</p>\n");
+    absl::StrAppend(&body, "<h3>Compatible effects</h3>\n<p>The difference could be explained by ",
+                    Escape(Join(effects, "or")), ". Only touches with poses can tell which.</p>\n");
   }
   body +=
-      "<p class=\"note\">p: how often a set that the model makes alike (same objects, touches and rounds, "
-      "other "
-      "poses) lies as far from a large simulated one; by the energy distance between descriptors, and of "
-      "each "
-      "statistic by the Kolmogorov-Smirnov distance.</p>\n";
+      "<p class=\"note\">p: how often a set that the model makes in the same way (same objects, touches and "
+      "rounds, other poses) lies as far from a large simulated one; by the energy distance between "
+      "descriptors, and of each statistic by the Kolmogorov-Smirnov distance.</p>\n";
   return Section("distributions", "Distributions",
                  "The set has no poses, so touches cannot be compared one by one.", body);
 }

@@ -186,7 +186,7 @@ std::string HtmlObjects(const v1::Report& report) {
                                   "aria-label=\"Finger\" id=\"who\"></span></div>"
                                   "<canvas id=\"turn\" tabindex=\"0\" role=\"img\" aria-label=\"Residuals on "
                                   "the object; turn it by dragging or with "
-                                  "the arrow keys\"></canvas><p class=\"legend\" id=\"told\" "
+                                  "the arrow keys\"></canvas><p class=\"legend\" id=\"readout\" "
                                   "aria-live=\"polite\">Drag, or use the arrow keys, to "
                                   "turn it.</p></div>\n");
   for (size_t i = 0; i < order.size() && i < kMaxObjects; ++i) {

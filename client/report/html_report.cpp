@@ -4,6 +4,7 @@
 #include "client/report/html_page.h"
 #include "client/report/report.h"
 #include "client/report/words.h"
+#include "server/base/units.h"
 
 namespace touchstone::client {
 
@@ -22,8 +23,9 @@ std::string HtmlReport(const v1::Report& report) {
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",
                   Escape(report.version()));
-  if (report.duration_s() > 0) absl::StrAppend(&page, " in ", Typeset(Time(report.duration_s() * 1e6)));
-  absl::StrAppend(&page, ". This file is whole: it fetches nothing.</footer>\n</main>\n<script>",
+  if (report.duration_s() > 0)
+    absl::StrAppend(&page, " in ", Typeset(Time(report.duration_s() * kMicrosecondsPerSecond)));
+  absl::StrAppend(&page, ". This file is self-contained: it loads nothing.</footer>\n</main>\n<script>",
                   HtmlScript(), "</script>\n</body>\n</html>\n");
   return page;
 }

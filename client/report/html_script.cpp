@@ -22,7 +22,7 @@ if (source) turnTable(JSON.parse(source.textContent));
 
 function turnTable(data) {
   const canvas = document.getElementById('turn'), pen = canvas.getContext('2d');
-  const which = document.getElementById('which'), told = document.getElementById('told');
+  const which = document.getElementById('which'), readout = document.getElementById('readout');
   const hidden = new Set();
   let object, after = false, azimuth = -0.96, elevation = 0.49, spots = [];
 
@@ -142,7 +142,7 @@ function turnTable(data) {
       return;
     }
     const near = spots.filter((s) => Math.hypot(s.x - e.offsetX, s.y - e.offsetY) < 8).pop();
-    told.textContent = !near ? 'Drag, or use the arrow keys, to turn it.' : 'finger ' +
+    readout.textContent = !near ? 'Drag, or use the arrow keys, to turn it.' : 'finger ' +
         (data.fingers[near.finger] || near.finger) + ': ' + (near.us > 0 ? '+' : '') +
         (near.us * data.per_us).toPrecision(3) + ' ' + data.unit;
   };

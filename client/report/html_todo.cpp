@@ -50,14 +50,14 @@ std::string StepBody(const v1::Step& step) {
   std::string body;
   if (!step.meaning().empty()) absl::StrAppend(&body, "<p>", Typeset(step.meaning()), "</p>");
   if (!step.equivalent().empty()) {
-    std::vector<std::string> alike = {step.effect()};
-    alike.insert(alike.end(), step.equivalent().begin(), step.equivalent().end());
-    absl::StrAppend(&body, "<p>These data cannot tell ", Escape(Join(alike, "and")), " apart.</p>");
+    std::vector<std::string> equivalent = {step.effect()};
+    equivalent.insert(equivalent.end(), step.equivalent().begin(), step.equivalent().end());
+    absl::StrAppend(&body, "<p>These data cannot tell ", Escape(Join(equivalent, "and")), " apart.</p>");
   }
   std::string terms = absl::StrCat(Definition("To decide", step.discriminating_measurement()),
                                    Definition("To check on the rig", step.check_on_rig()),
-                                   Definition("To mend it", step.remedy()));
-  if (step.scope() == "object") terms += Definition("Scope", "one value an object");
+                                   Definition("To fix it", step.remedy()));
+  if (step.scope() == "object") terms += Definition("Scope", "one value per object");
   if (step.probability() > 0) {
     terms += Definition("Probability", absl::StrCat(EffectProbability(step.probability()),
                                                     " among all effects that could take its place"));

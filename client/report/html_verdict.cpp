@@ -76,7 +76,8 @@ std::string LadderTable(const v1::Report& report) {
   }
   return Figure(
       absl::StrCat(table, "</tbody></table>"),
-      "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), a finger. "
+      "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), per "
+      "finger. "
       "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much misfit "
       "beyond noise is if nothing were missing. Dashed: the noise floor.");
 }

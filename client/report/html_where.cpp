@@ -13,8 +13,8 @@
 namespace touchstone::client {
 namespace {
 
-constexpr double kTellingP = 0.01;
-constexpr size_t kMinCurves = 4;  // shown though they tell nothing
+constexpr double kDependenceP = 0.01;
+constexpr size_t kMinCurves = 4;  // shown even if the residual depends on none of them
 
 std::string Slices(const v1::Report& report) {
   if (report.where().empty()) return "";
@@ -51,7 +51,7 @@ std::string Groups(const v1::Report& report) {
   const double floor = NoiseFloorOf(report).sigma_us;
   std::string grid;
   for (const std::string& kind : order) {
-    if (kinds[kind].size() < 2) continue;  // says no more than the whole
+    if (kinds[kind].size() < 2) continue;  // one group is the whole set
     std::string title = kind;
     for (const auto& [name, shown] : kKinds) title = name == kind ? shown : title;
     std::string table = absl::StrCat("<table>", HeaderRow({title, ">RMSE", "", ">of excess"}), "<tbody>");
@@ -117,11 +117,11 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
   }
   return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>p ",
                       Typeset(Probability(curve.p())),
-                      curve.p() < kTellingP ? ": the residual depends on it" : "",
+                      curve.p() < kDependenceP ? ": the residual depends on it" : "",
                       "</span></p><div class=\"pair\">", pair, "</div></figure>\n");
 }
 
-// Most telling first; those of numbered groups (face 3) are left to the tables of groups.
+// Strongest dependence first; those of numbered groups (face 3) are left to the tables of groups.
 std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::Report& report) {
   std::set<std::string> kinds;
   for (const v1::GroupError& group : report.groups()) kinds.insert(group.kind());
@@ -142,9 +142,9 @@ std::string Curves(const v1::Report& report) {
   std::vector<std::pair<std::string, std::string>> keys;
   size_t shown = 0;
   for (const v1::CovariateCurve* curve : curves) {
-    const bool telling = curve->p() < kTellingP || shown < kMinCurves;
-    (telling ? open : folded) += CurvePair(report, *curve);
-    shown += telling;
+    const bool depends = curve->p() < kDependenceP || shown < kMinCurves;
+    (depends ? open : folded) += CurvePair(report, *curve);
+    shown += depends;
     for (const v1::CurveBin& bin : curve->bins()) {
       const std::string finger = absl::StrCat("finger ", bin.finger());
       const auto same = [&](const auto& key) { return key.second == finger; };

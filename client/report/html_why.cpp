@@ -1,5 +1,5 @@
-// Why: every effect of the catalogue as the one that is missing, and what these data cannot tell apart; and
-// when nothing listed explains the rest, what it hangs on.
+// Why: every effect of the catalogue as the one that is missing, and which of them these data cannot tell
+// apart; where no effect explains the rest, what it depends on.
 #include <cmath>
 #include <map>
 #include <set>
@@ -93,8 +93,7 @@ std::string CandidateTable(const v1::Report& report) {
   }
   return Figure(absl::StrCat(table, "</tbody></table></div>"),
                 "Each effect alone, as the first to be added. It would leave: the RMSE on touches left out "
-                "of the fit, "
-                "dashed the noise floor. Intervals: 95 %, the upright line is zero, no effect.") +
+                "of the fit, dashed the noise floor. Intervals: 95 %, the upright line is zero, no effect.") +
          NotFitted(report);
 }
 

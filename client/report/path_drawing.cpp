@@ -191,11 +191,11 @@ class Panel {
 
 std::string Reasons(const PathDrawing& drawing, double top, size_t impossible) {
   std::string svg;
-  size_t told = 0;
+  size_t listed = 0;
   for (const DrawnTouch& touch : drawing.touches) {
     if (touch.possible) continue;
-    const double y = top + kReasonHeight * static_cast<double>(told + 1);
-    if (told++ == kMaxReasons) {
+    const double y = top + kReasonHeight * static_cast<double>(listed + 1);
+    if (listed++ == kMaxReasons) {
       absl::StrAppendFormat(&svg, "<text class=\"reason\" x=\"%.1f\" y=\"%.1f\">and %d more</text>\n",
                             kMargin, y, impossible - kMaxReasons);
       break;
@@ -250,8 +250,7 @@ std::string DrawPaths(const PathDrawing& drawing) {
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f "
       "%.0f\">\n<style>%s</style>\n"
       "<defs><marker id=\"arrow\" viewBox=\"0 0 8 8\" refX=\"7\" refY=\"4\" markerWidth=\"5\" "
-      "markerHeight=\"5\" "
-      "orient=\"auto\"><path d=\"M0 0L8 4L0 8z\" fill=\"#0f766e\"/></marker></defs>\n"
+      "markerHeight=\"5\" orient=\"auto\"><path d=\"M0 0L8 4L0 8z\" fill=\"#0f766e\"/></marker></defs>\n"
       "<rect width=\"100%%\" height=\"100%%\" fill=\"#f8fafc\"/>\n",
       kWidth, height, kWidth, height, kStyle);
   absl::StrAppendFormat(&svg, "<text class=\"title\" x=\"%.1f\" y=\"42\">%s</text>\n", kMargin,

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/report/sample_evidence.h"
+#include "server/base/normal.h"
 
 namespace touchstone::client {
 namespace {
@@ -21,8 +22,8 @@ v1::ParameterValue* AddParameter(const char* name, const char* unit, double valu
   parameter->set_unit(unit);
   parameter->set_value(value);
   parameter->set_std_error(error);
-  parameter->set_lower(value - 1.96 * error);
-  parameter->set_upper(value + 1.96 * error);
+  parameter->set_lower(value - kNormalQuantile975 * error);
+  parameter->set_upper(value + kNormalQuantile975 * error);
   return parameter;
 }
 
@@ -102,9 +103,8 @@ v1::Report MissingEffectsReport() {
   v1::Report report = Base(41000, 5003);
   report.set_verdict(v1::Report::MISSING_EFFECTS);
   report.set_summary(
-      "The fingers end in balls, the model has points; and the left finger reports late. Both together bring "
-      "the "
-      "error down to what repeats of the same touch have among themselves.");
+      "The fingers end in balls, the model has points; and the left finger reports late. Both together "
+      "bring the error down to what repeats of the same touch have among themselves.");
   AddSlice("incidence > 12 deg", 412, -9100, 0.71, "contact too early by 9.1 ms", &report);
   AddSlice("object = lat20 and face = side", 96, 6200, 0.18, "outer fingers too late by 6.2 ms", &report);
   AddSlice("curvature > 20 1/m and finger = m", 40, -850, 0.04, "contact too early by 850 us", &report);

@@ -17,7 +17,7 @@ namespace {
 
 using Cell = TextLayout::Cell;
 constexpr int kMaxParameters = 6;  // of one effect
-constexpr int kMaxRivals = 3;
+constexpr int kMaxCompetingEffects = 3;
 
 // "2.98 +- 0.02 mm", with the name where it does not go without saying.
 std::string Parameter(const v1::ParameterValue& parameter, bool named) {
@@ -31,7 +31,7 @@ std::string Parameter(const v1::ParameterValue& parameter, bool named) {
   return named ? absl::StrCat(ParameterName(parameter), " ", text) : text;
 }
 
-// The finger alone names a parameter of which there is one a finger.
+// The finger alone names a parameter of which there is one per finger.
 bool OnlyFingersDiffer(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& parameters) {
   return !parameters.empty() && std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) {
     return p.name() == parameters[0].name() && !p.finger().empty() && p.object().empty();
@@ -109,8 +109,9 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
   }
   if (comparison.compatible_effects_size() > 0) {
     out->Label("Why");
-    out->Paragraph(absl::StrCat("It would be so with ", absl::StrJoin(comparison.compatible_effects(), ", "),
-                                "; touches with poses would tell which."));
+    out->Paragraph(absl::StrCat("The difference could be explained by ",
+                                absl::StrJoin(comparison.compatible_effects(), ", "),
+                                "; only touches with poses can tell which."));
   }
 }
 
@@ -137,9 +138,8 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(before, after), "", TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
-    for (int rival = 0, shown = 0; i == 0 && rival < report.candidates_size() && shown < kMaxRivals;
-         ++rival) {
-      const v1::Candidate& candidate = report.candidates(rival);
+    for (int c = 0, shown = 0; i == 0 && c < report.candidates_size() && shown < kMaxCompetingEffects; ++c) {
+      const v1::Candidate& candidate = report.candidates(c);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
                 Change(before, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())), candidate.note(),
@@ -230,7 +230,7 @@ void AddNextTouches(const v1::Report& report, TextLayout* out) {
     const Purpose& purpose = purposes[name];
     out->Paragraph(
         absl::StrCat(purpose.touches, " on ", absl::StrJoin(purpose.objects, ", "), name.empty() ? "" : ": ",
-                     name, "; up to ", Number(purpose.separation, 2), " noise sigmas apart a touch."),
+                     name, "; up to ", Number(purpose.separation, 2), " noise sigmas apart per touch."),
         TextLayout::kPlain, 2);
   }
 }

@@ -128,7 +128,7 @@ TEST(TerminalReport, TellsWhichValuesWereWrong) {
   const std::string text = TerminalReport(WrongValuesReport(), 100, false);
   EXPECT_THAT(text, HasSubstr("the values of contact_slowdown are off"));
   EXPECT_THAT(text, HasSubstr("0.183 +- 0.004, was 0.05"));
-  EXPECT_THAT(LineWith(text, "values fitted anew"), HasSubstr("815 us"));
+  EXPECT_THAT(LineWith(text, "refitted values"), HasSubstr("815 us"));
 }
 
 TEST(TerminalReport, TellsRowsThatWereNotUsedWithTheirReasons) {

@@ -15,6 +15,8 @@
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
+#include "server/base/units.h"
+
 namespace touchstone::client {
 namespace {
 
@@ -79,13 +81,6 @@ std::string Count(uint64_t count) {
   if (text.size() < 5) return text;
   for (int place = static_cast<int>(text.size()) - 3; place > 0; place -= 3) text.insert(place, " ");
   return text;
-}
-
-TimeUnit UnitOfTime(double us) {
-  const double size = std::abs(us);
-  if (size >= 999.5e3) return {1e-6, "s"};
-  if (size >= 999.5) return {1e-3, "ms"};
-  return {1, "us"};
 }
 
 std::string Time(double us) {
@@ -207,9 +202,10 @@ std::string LengthOf(double us, const v1::Report& report) {
   const auto& speeds = report.data().speeds_mm_s();
   if (speeds.empty() || !(us > 0)) return "";
   const auto [slowest, fastest] = std::minmax_element(speeds.begin(), speeds.end());
-  const std::string least = Number(us * 1e-6 * *slowest, 2), most = Number(us * 1e-6 * *fastest, 2);
-  if (*slowest == *fastest) return absl::StrCat(least, " mm at ", Tick(*slowest), " mm/s");
-  return absl::StrCat(least, " to ", most, " mm at ", Tick(*slowest), " to ", Tick(*fastest), " mm/s");
+  const std::string slow = Number(us * kSecondsPerMicrosecond * *slowest, 2),
+                    fast = Number(us * kSecondsPerMicrosecond * *fastest, 2);
+  if (*slowest == *fastest) return absl::StrCat(slow, " mm at ", Tick(*slowest), " mm/s");
+  return absl::StrCat(slow, " to ", fast, " mm at ", Tick(*slowest), " to ", Tick(*fastest), " mm/s");
 }
 
 std::vector<Rung> Ladder(const v1::Report& report) {
@@ -222,7 +218,7 @@ std::vector<Rung> Ladder(const v1::Report& report) {
   add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), initial.rmse_us(),
       initial.heldout_rmse_us(), initial.lack_of_fit_p());
   if (report.steps().empty() && !report.refitted().empty()) {
-    add(Rung::kRefit, "values fitted anew", report.final().rmse_us(), report.final().heldout_rmse_us(),
+    add(Rung::kRefit, "refitted values", report.final().rmse_us(), report.final().heldout_rmse_us(),
         report.final().lack_of_fit_p());
   }
   for (const v1::Step& step : report.steps()) {
@@ -242,16 +238,16 @@ std::vector<Rung> Ladder(const v1::Report& report) {
 }
 
 std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report) {
-  std::set<std::set<std::string>> told;
+  std::set<std::set<std::string>> named;
   for (const v1::Step& step : report.steps()) {
-    std::set<std::string> alike(step.equivalent().begin(), step.equivalent().end());
-    alike.insert(step.effect());
-    told.insert(alike);
+    std::set<std::string> effects(step.equivalent().begin(), step.equivalent().end());
+    effects.insert(step.effect());
+    named.insert(effects);
   }
   std::vector<const v1::Ambiguity*> others;
   for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
-    const std::set<std::string> alike(ambiguity.effects().begin(), ambiguity.effects().end());
-    if (alike.size() > 1 && told.insert(alike).second) others.push_back(&ambiguity);
+    const std::set<std::string> effects(ambiguity.effects().begin(), ambiguity.effects().end());
+    if (effects.size() > 1 && named.insert(effects).second) others.push_back(&ambiguity);
   }
   return others;
 }

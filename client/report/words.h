@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/readable_time.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::client {
@@ -18,13 +19,7 @@ std::string Tick(double value);
 // Whole numbers of at least five digits in groups: "1 000 000".
 std::string Count(uint64_t count);
 
-// The unit in which a person reads a time: us below 1 ms, ms below 1 s, else s.
-struct TimeUnit {
-  double per_us;
-  const char* symbol;
-};
-TimeUnit UnitOfTime(double us);
-
+// Three figures, so that columns of times line up (TimeInWords of base/readable_time.h drops trailing zeros).
 std::string Time(double us);                                              // "41.0 ms", "850 us"
 std::string SignedTime(double us);                                        // "+9.10 ms"
 std::string TimeChange(double from_us, double to_us);                     // "41.0 -> 5.0 ms"

@@ -72,12 +72,10 @@ TEST(Count, GroupsLongNumbers) {
 TEST(Headline, SaysEveryVerdictInOneSentence) {
   EXPECT_EQ(Headline(MissingEffectsReport()),
             "The model lacks tip_radius (or surface_offset) and channel_latency; with them the error falls "
-            "from 41.0 ms "
-            "to 5.01 ms, the noise floor.");
+            "from 41.0 ms to 5.01 ms, the noise floor.");
   EXPECT_EQ(Headline(WrongValuesReport()),
             "No effect is missing, but the values of contact_slowdown are off: put right, the error falls "
-            "from 9.10 ms "
-            "to 815 us.");
+            "from 9.10 ms to 815 us.");
   EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
   EXPECT_EQ(Headline(UnexplainedReport()),
             "The model is wrong in a way that no built-in effect explains. It depends on travel_mm.");

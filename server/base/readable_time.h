@@ -5,8 +5,8 @@
 
 namespace touchstone {
 
-// The unit in which a person reads a time: us below 1 ms, ms below 1 s, else s. A time that three figures would
-// round up to 1 ms or 1 s already has the larger unit.
+// The unit in which a person reads a time: us below 1 ms, ms below 1 s, else s. A time that three figures
+// would round up to 1 ms or 1 s already has the larger unit.
 struct TimeUnit {
   double per_us;       // of this unit in one microsecond: 1, 1e-3 or 1e-6
   const char* symbol;  // "us", "ms" or "s"

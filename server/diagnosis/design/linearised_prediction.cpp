@@ -23,7 +23,8 @@ Vector Centred(const std::vector<double>& time_s, int k, int fingers, double sig
   return (t.array() - t.mean()).matrix() / sigma_s;
 }
 
-// Derivatives of every touch by all free parameters, [touch] fingers x parameters; those that are not finite are 0.
+// Derivatives of every touch by all free parameters, [touch] fingers x parameters; those that are not finite
+// are 0.
 absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observations,
                                                   const Parameterization& free,
                                                   const std::vector<double>& at_start_s, double sigma_s,

@@ -57,8 +57,8 @@ void Number(const std::shared_ptr<const MeasurementSet>& set, Observations* obse
   observations->time_s.assign(static_cast<size_t>(count) * observations->fingers, 0);
 }
 
-// Whether no finger of touch k meets an edge when the touch moves aside by kNearEdgeM: normal and travel change
-// smoothly.
+// Whether no finger of touch k meets an edge when the touch moves aside by kNearEdgeM: normal and travel
+// change smoothly.
 bool AwayFromEdges(const Prediction& here, const Prediction& beside, int k) {
   for (int i = 0; i < here.fingers; ++i) {
     const size_t at = size_t(k) * here.fingers + i;

@@ -15,8 +15,8 @@ struct CandidateChoice {
   uint64_t seed = 0;
 };
 
-// Observations of touches that every finger of `model` completes, none within 1 mm of a sharp edge; their times are
-// unknown (0). Speeds: half, once and twice the median of `observations`.
+// Observations of touches that every finger of `model` completes, none within 1 mm of a sharp edge; their
+// times are unknown (0). Speeds: half, once and twice the median of `observations`.
 absl::StatusOr<Observations> MakeCandidates(const Observations& observations, const Model& model,
                                             const CandidateChoice& choice, ThreadPool* pool);
 

@@ -21,7 +21,8 @@ struct PoseFreeObject {
   bool in_rounds = false;        // repeats stand a constant number of rows apart
 };
 
-// How the poses were probably spread: what a set without poses does not record. By default as the faces plan does.
+// How the poses were probably spread: what a set without poses does not record. By default as the faces plan
+// does.
 struct AssumedPoses {
   double max_tilt_rad = FacesPlan().max_tilt_rad;
   double spread = FacesPlan().spread;  // over the face, 0 to 1
@@ -29,7 +30,8 @@ struct AssumedPoses {
 Plan WithPoses(const Plan& plan, const AssumedPoses& poses);
 
 // How many touches of every pose the times show: 1 unless every touch has that many very close companions.
-// `time_s`: [touch * fingers + finger]. `in_rounds` is set to whether the set visits all poses again and again.
+// `time_s`: [touch * fingers + finger]. `in_rounds` is set to whether the set visits all poses again and
+// again.
 int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds);
 
 // Object `object` of a set, with at most `max_touches` of its touches: whole poses.

@@ -19,8 +19,8 @@ constexpr int kMaxRefinedPerEffect = 2;
 constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMaxTiltRad = 50 * kRadiansPerDegree;
 constexpr double kSpreadStep = 0.1;
 constexpr int kMaxMoves = 3;  // in one direction, per step
-// Step sizes: octaves of the strength, and factors of the steps above. A strength must be right to a few per cent,
-// poses need not: steps below kFineStep leave them alone.
+// Step sizes: octaves of the strength, and factors of the steps above. A strength must be right to a few per
+// cent, poses need not: steps below kFineStep leave them alone.
 constexpr double kSteps[] = {1, 0.5, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
 constexpr size_t kStepsBeforeRenewal = 2;
 constexpr double kFineStep = 0.2;
@@ -62,8 +62,8 @@ absl::Status Screen(const Model& model, const EffectDirection& direction,
   return absl::OkStatus();
 }
 
-// The trial with one quantity moved by `step` (signed): 0: the strength, 1: the poses' tilt, 2: their spread, 3...:
-// the other entries of its parameter.
+// The trial with one quantity moved by `step` (signed): 0: the strength, 1: the poses' tilt, 2: their spread,
+// 3...: the other entries of its parameter.
 Trial Moved(const Trial& trial, size_t what, double step) {
   Trial moved = trial;
   double& amount = moved.amounts[trial.direction.entry];
@@ -79,9 +79,9 @@ Trial Moved(const Trial& trial, size_t what, double step) {
   return moved;
 }
 
-// Coordinate descent over the strength, the poses' tilt and spread (poses that were fitted without the effect imitate
-// a part of it) and the other fingers or axes. Stops where the sets are clearly compatible. `promising`: poses that
-// suit another effect.
+// Coordinate descent over the strength, the poses' tilt and spread (poses that were fitted without the effect
+// imitate a part of it) and the other fingers or axes. Stops where the sets are clearly compatible.
+// `promising`: poses that suit another effect.
 absl::Status Refine(const Model& model, double step, const AssumedPoses& promising,
                     const MisfitOfModel& misfit, Trial* best) {
   if (best->misfit.p_value > kClearlyCompatibleP) return absl::OkStatus();

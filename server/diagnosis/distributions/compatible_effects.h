@@ -20,7 +20,8 @@ struct CompatibleEffect {
   double p_value = 0;  // of the measured set under the model with it
 };
 
-// How far the measured set is from a reference that a model makes, all measures together (no unit), and its p.
+// How far the measured set is from a reference that a model makes, all measures together (no unit), and its
+// p.
 struct PoseFreeMisfit {
   double distance = 0;
   double p_value = 0;
@@ -32,11 +33,11 @@ using MisfitOfModel = std::function<absl::StatusOr<PoseFreeMisfit>(const std::sh
 using RenewMisfit =
     std::function<absl::StatusOr<MisfitOfModel>(const std::shared_ptr<const Model>&, const AssumedPoses&)>;
 
-// Screens every effect of the catalogue and of `also`, one number at a time, with both signs and a few strengths,
-// coarsely and with each of `poses`; then refines the most promising, all entries of a parameter and the poses
-// together, in the end by the misfit that `renew` makes of the best so far. Returns those whose p is above 0.1, most
-// compatible first. `noise_is_known`: no effect that makes noise is tried. `misfit` is called from several threads.
-// Returns CANCELLED if `progress` (0 to 1, one call at a time) returns false.
+// Screens every effect of the catalogue and of `also`, one number at a time, with both signs and a few
+// strengths, coarsely and with each of `poses`; then refines the most promising, all entries of a parameter
+// and the poses together, in the end by the misfit that `renew` makes of the best so far. Returns those whose
+// p is above 0.1, most compatible first. `noise_is_known`: no effect that makes noise is tried. `misfit` is
+// called from several threads. Returns CANCELLED if `progress` (0 to 1, one call at a time) returns false.
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     const Model& model, bool noise_is_known, const std::vector<std::shared_ptr<const Effect>>& also,
     const std::vector<AssumedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,

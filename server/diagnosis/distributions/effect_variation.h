@@ -23,8 +23,9 @@ std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const Effect>& e
 // expression changes nothing, and noise cannot be it where rounds already show the noise.
 bool VisibleWithoutPoses(const Effect& effect, bool noise_is_known);
 
-// The model with `amounts` (SI, one per entry) added to the direction's parameter; where its neutral value stands for
-// infinity, they replace it. The effect is appended if the model lacks it. Null if a value would leave its bounds.
+// The model with `amounts` (SI, one per entry) added to the direction's parameter; where its neutral value
+// stands for infinity, they replace it. The effect is appended if the model lacks it. Null if a value would
+// leave its bounds.
 std::shared_ptr<const Model> Varied(const Model& model, const EffectDirection& direction,
                                     const std::vector<double>& amounts);
 

@@ -1,7 +1,7 @@
 // Sets without poses: only objects and times. Nothing can be compared touch by touch; what is compared are
-// distributions, with those of sets that the model makes by the same plan. That is about two orders of magnitude
-// weaker than a set with poses: the result says whether the model is compatible and with which effects it would be,
-// and never names one culprit.
+// distributions, with those of sets that the model makes by the same plan. That is about two orders of
+// magnitude weaker than a set with poses: the result says whether the model is compatible and with which
+// effects it would be, and never names one culprit.
 #pragma once
 
 #include <memory>
@@ -49,13 +49,13 @@ struct PoseFreeComparison {
 
 // `diagnose`: also the effects of the catalogue with which the model would be compatible.
 //
-// The test: the model makes sets exactly like the measured one (objects, touches, rounds; other poses of the faces
-// plan), and the measured set's distance to a large simulated reference takes its rank among theirs. If the model
-// is right and the plan was that one, every rank is equally probable, whatever the touches of a set have in common;
-// so p is exact. Noise is estimated anew first where the set goes in rounds.
+// The test: the model makes sets exactly like the measured one (objects, touches, rounds; other poses of the
+// faces plan), and the measured set's distance to a large simulated reference takes its rank among theirs. If
+// the model is right and the plan was that one, every rank is equally probable, whatever the touches of a set
+// have in common; so p is exact. Noise is estimated anew first where the set goes in rounds.
 //
-// A pure function of `input`, whatever the number of threads. Errors: no complete touch, an object without a mesh,
-// other numbers of fingers; CANCELLED if the progress callback says so.
+// A pure function of `input`, whatever the number of threads. Errors: no complete touch, an object without a
+// mesh, other numbers of fingers; CANCELLED if the progress callback says so.
 absl::StatusOr<PoseFreeComparison> ComparePoseFree(const DiagnosisInput& input,
                                                    const DiagnosisContext& context, bool diagnose);
 

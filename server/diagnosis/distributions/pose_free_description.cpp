@@ -13,8 +13,8 @@ namespace {
 
 constexpr size_t kMaxExamples = 5;
 
-// Contact times relative to the first finger's, in us: the contrasts of a sample's points undone (Helmert's rows are
-// orthonormal).
+// Contact times relative to the first finger's, in us: the contrasts of a sample's points undone (Helmert's
+// rows are orthonormal).
 std::vector<double> DescriptorsUs(const PoseFreeSample& sample, int fingers) {
   std::vector<double> values;
   std::vector<double> time_s(fingers);
@@ -153,8 +153,8 @@ std::vector<ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperimen
 std::string PlanInWords(const PoseFreeExperiment& experiment, const AssumedPoses& poses, bool fitted) {
   const PoseFreeObject& first = experiment.objects[0];
   const FacesPlan faces = WithPoses(first.plan, poses).faces;
-  return absl::StrCat("faces of the bounding box, ", faces.samples_per_face, " poses a face, ", first.repeats,
-                      first.repeats == 1 ? " touch" : " touches", " a pose, tilt up to ",
+  return absl::StrCat("faces of the bounding box, ", faces.samples_per_face, " poses per face, ",
+                      first.repeats, first.repeats == 1 ? " touch" : " touches", " per pose, tilt up to ",
                       std::round(10 * faces.max_tilt_rad / kRadiansPerDegree) / 10, " deg, spread over ",
                       std::lround(100 * faces.spread), " % of the face", fitted ? " (what fits best)" : "",
                       ", standoff ", FromSi(Unit::kMillimetre, faces.standoff_m), " mm, ",

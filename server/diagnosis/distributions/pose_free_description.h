@@ -1,5 +1,5 @@
-// What is reported of a set without poses besides the test: which rows are compared, the noise that rounds show,
-// statistics and histograms beside the model's, the plan that is assumed.
+// What is reported of a set without poses besides the test: which rows are compared, the noise that rounds
+// show, statistics and histograms beside the model's, the plan that is assumed.
 #pragma once
 
 #include <cstdint>
@@ -41,11 +41,11 @@ PoseFreeRows CountRows(const PoseFreeExperiment& experiment);
 std::optional<RoundNoise> NoiseOfRounds(const PoseFreeExperiment& experiment);
 std::vector<StatisticComparison> CompareStatistics(const PoseFreeExperiment& experiment,
                                                    const PoseFreeRank& rank);
-// Descriptors and, with three fingers, curvatures: over all objects and object by object. The simulated sample is
-// the reference; the improved one is the same.
+// Descriptors and, with three fingers, curvatures: over all objects and object by object. The simulated
+// sample is the reference; the improved one is the same.
 std::vector<ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperiment& experiment,
                                                          const PoseFreeRank& rank);
-// "faces of the bounding box, 8 poses a face, ..."; `fitted`: the poses are those that fit best.
+// "faces of the bounding box, 8 poses per face, ..."; `fitted`: the poses are those that fit best.
 std::string PlanInWords(const PoseFreeExperiment& experiment, const AssumedPoses& poses, bool fitted);
 
 }  // namespace touchstone

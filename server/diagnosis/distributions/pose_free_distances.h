@@ -1,4 +1,5 @@
-// How far a set without poses is from a simulated reference, by several distance measures, and how unusual that is.
+// How far a set without poses is from a simulated reference, by several distance measures, and how unusual
+// that is.
 #pragma once
 
 #include <string>
@@ -17,8 +18,8 @@ struct PoseFreeSample {
 PoseFreeSample MakePoseFreeSample(const std::vector<double>& time_s, int fingers, double speed_m_s,
                                   double spacing_m);
 
-// Distances of a set to a reference, [measure]: the energy distance (s) first, then Kolmogorov's (0 to 1) for every
-// statistic; each over all objects, weighted by their touches.
+// Distances of a set to a reference, [measure]: the energy distance (s) first, then Kolmogorov's (0 to 1) for
+// every statistic; each over all objects, weighted by their touches.
 std::vector<double> PoseFreeDistances(const std::vector<PoseFreeSample>& set,
                                       const std::vector<PoseFreeSample>& reference);
 // Of one object.

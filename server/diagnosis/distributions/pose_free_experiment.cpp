@@ -115,8 +115,8 @@ absl::StatusOr<std::vector<double>> PoseFreeExperiment::TimesOfSet(const std::sh
   return SimulatePlan(of, like.surface, WithPoses(like.plan, poses), like.number, seed);
 }
 
-// The poses are those that the given model (with its noise) reaches, whatever model then simulates them, so that the
-// distances of two models differ because of the models alone.
+// The poses are those that the given model (with its noise) reaches, whatever model then simulates them, so
+// that the distances of two models differ because of the models alone.
 absl::StatusOr<std::shared_ptr<const PlannedTouches>> PoseFreeExperiment::TouchesOfReference(
     int object, const AssumedPoses& poses, ReferenceSize size) const {
   const auto key = std::make_tuple(object, poses.max_tilt_rad, poses.spread, size);

@@ -1,4 +1,5 @@
-// A measured set without poses, what is assumed about how it was made, and sets that a model makes in the same way.
+// A measured set without poses, what is assumed about how it was made, and sets that a model makes in the
+// same way.
 #pragma once
 
 #include <map>
@@ -16,14 +17,15 @@ namespace touchstone {
 
 // One sample per object, in the order of the set's objects.
 using PoseFreeSamples = std::vector<PoseFreeSample>;
-// A reference is a simulated sample that sets are compared with: a large one, or a small one for looking at many
-// models.
+// A reference is a simulated sample that sets are compared with: a large one, or a small one for looking at
+// many models.
 enum class ReferenceSize { kFull, kQuick };
 
 class PoseFreeExperiment {
  public:
-  // Checks the input; finds repeats, the noise where the set goes in rounds, and absurd sizes of the times. Both
-  // arguments must outlive the experiment. Errors: no touch, an object without a mesh, other numbers of fingers.
+  // Checks the input; finds repeats, the noise where the set goes in rounds, and absurd sizes of the times.
+  // Both arguments must outlive the experiment. Errors: no touch, an object without a mesh, other numbers of
+  // fingers.
   static absl::StatusOr<std::unique_ptr<PoseFreeExperiment>> Create(const DiagnosisInput& input,
                                                                     const DiagnosisContext& context);
 

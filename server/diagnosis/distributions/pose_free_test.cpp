@@ -41,7 +41,7 @@ TEST(PoseFree, ARightModelIsCompatible) {
   EXPECT_NEAR(comparison->noise->sigma_s, 0.005, 0.0006);
   EXPECT_THAT(comparison->compatible_effects, testing::IsEmpty());
   EXPECT_GT(comparison->simulated_touches, 1000);
-  EXPECT_THAT(comparison->plan, testing::HasSubstr("8 poses a face, 4 touches a pose"));
+  EXPECT_THAT(comparison->plan, testing::HasSubstr("8 poses per face, 4 touches per pose"));
   double fractions = 0;
   for (const StatisticComparison& statistic : comparison->statistics)
     if (statistic.name.substr(0, 6) == "finger") fractions += statistic.measured;

@@ -6,9 +6,9 @@
 
 namespace touchstone {
 
-// Touches as points: only differences between a touch's times are known, so n times become n - 1 numbers, their
-// orthonormal contrasts (Helmert's). Euclidean distances between points are those between the times less their
-// means.
+// Touches as points: only differences between a touch's times are known, so n times become n - 1 numbers,
+// their orthonormal contrasts (Helmert's). Euclidean distances between points are those between the times
+// less their means.
 struct TimePoints {
   int dimensions = 0;
   std::vector<double> value;  // [point * dimensions + d], s

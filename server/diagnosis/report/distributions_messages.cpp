@@ -119,8 +119,9 @@ std::string WriteNoiseChange(const PoseFreeComparison& comparison, v1::Report* r
     refit->set_effect(kNoiseEffect);
     WriteNoiseParameter(*comparison.noise, refit->add_parameters());
   }
-  return absl::StrCat("Rounds of the same poses scatter by ", TimeInWords(comparison.noise->sigma_s),
-                      is_new ? " a finger; the model has no noise. " : " a finger, not as the model says. ");
+  return absl::StrCat(
+      "Rounds of the same poses scatter by ", TimeInWords(comparison.noise->sigma_s),
+      is_new ? " per finger; the model has no noise. " : " per finger, not as the model says. ");
 }
 
 std::string CompatibleEffectsInWords(const std::vector<CompatibleEffect>& compatible) {

@@ -6,8 +6,8 @@
 
 namespace touchstone {
 
-// Appends slices, groups, finger bias, worst touches, curves, histograms, parity, surface points and outlines to the
-// report. `fingers`: how many the rig has, for their names.
+// Appends slices, groups, finger bias, worst touches, curves, histograms, parity, surface points and outlines
+// to the report. `fingers`: how many the rig has, for their names.
 void WriteResiduals(const ResidualSummary& residuals, int fingers, v1::Report* report);
 
 // Also used for sets without poses.

@@ -26,16 +26,16 @@ struct ResidualCovariate {
 std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observations,
                                                       const Prediction& prediction);
 
-// At most about `limit` of the touches that take part (used, with a residual), in order: whole poses, the same
-// ones at every call.
+// At most about `limit` of the touches that take part (used, with a residual), in order: whole poses, the
+// same ones at every call.
 std::vector<int> ThinnedTouches(const Observations& observations, const std::vector<double>& residuals,
                                 int limit);
 
 // The number of fingers of touch k that have a residual.
 int FingersCompared(const Observations& observations, const std::vector<double>& residuals, int k);
 
-// What noise of sigma_s contributes on average to the square of one finger's residual (s^2), in a touch with that
-// many compared fingers: removing the touch's mean takes away one part in n.
+// What noise of sigma_s contributes on average to the square of one finger's residual (s^2), in a touch with
+// that many compared fingers: removing the touch's mean takes away one part in n.
 inline double NoiseShare(double sigma_s, int fingers_compared) {
   return sigma_s * sigma_s * (1 - 1.0 / fingers_compared);
 }

@@ -30,8 +30,8 @@ std::vector<double> BinEnds(const ResidualCovariate& covariate, std::vector<doub
 // Running sums of one finger's cells in one bin.
 struct BinSums {
   double count = 0, value = 0, before = 0, after = 0, after_count = 0;
-  // Scatter of the poses' sums around the bin's mean: repeats of a pose share whatever the model gets wrong there,
-  // so the poses are what is independent.
+  // Scatter of the poses' sums around the bin's mean: repeats of a pose share whatever the model gets wrong
+  // there, so the poses are what is independent.
   double scatter = 0, pose_sum = 0, pose_count = 0;
   int pose = -1, poses = 0;
 

@@ -1,4 +1,5 @@
-// Residual against every covariate: a curve per finger, and whether the residual depends on the covariate at all.
+// Residual against every covariate: a curve per finger, and whether the residual depends on the covariate at
+// all.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +25,14 @@ struct ResidualCurve {
   std::string unit;       // of the covariate: "deg"; empty for ratios and categories
   std::vector<ResidualCurveBin>
       bins;  // finger by finger, in the order of the covariate; empty if it cannot be cut
-  // Probability of a dependence at least this strong if there were none: permutation of poses (or of the touches
-  // of a pose, where the covariate varies among them), times the number of curves.
+  // Probability of a dependence at least this strong if there were none: permutation of poses (or of the
+  // touches of a pose, where the covariate varies among them), times the number of curves.
   double p_value = 1;
 };
 
-// A curve for every covariate but the finger. `before` and `after` are the residuals of the initial and the improved
-// model, [k * fingers + finger], seconds, NaN where a finger takes no part. `seed` is that of the permutations.
-// Reads at most 60,000 touches, the permutations at most 20,000 poses. Deterministic.
+// A curve for every covariate but the finger. `before` and `after` are the residuals of the initial and the
+// improved model, [k * fingers + finger], seconds, NaN where a finger takes no part. `seed` is that of the
+// permutations. Reads at most 60,000 touches, the permutations at most 20,000 poses. Deterministic.
 std::vector<ResidualCurve> MakeResidualCurves(const Observations& observations, const Prediction& initial,
                                               const std::vector<double>& before,
                                               const std::vector<double>& after, uint64_t seed);

@@ -14,8 +14,8 @@ constexpr int kMaxPosesPermuted = 20000;
 constexpr int kPermutations = 200;
 constexpr double kVariesWithinPoses = 0.25;  // share of the covariate's variation that lies within poses
 
-// What changes places as a whole: a pose with all of its repeats, or one touch. Bin (-1: none) and residual (NaN:
-// none) of each finger.
+// What changes places as a whole: a pose with all of its repeats, or one touch. Bin (-1: none) and residual
+// (NaN: none) of each finger.
 struct Exchangeable {
   std::vector<int> bin;
   std::vector<double> residual_s;
@@ -112,8 +112,8 @@ ExchangeableUnits TouchesAsUnits(const std::vector<ResidualCell>& cells, const s
   return result;
 }
 
-// Between-bin sum of squares, all fingers, with the residuals of unit source[u] in the bins of unit u. `sums` is
-// working memory.
+// Between-bin sum of squares, all fingers, with the residuals of unit source[u] in the bins of unit u. `sums`
+// is working memory.
 double BetweenBinSquares(const std::vector<Exchangeable>& units, const std::vector<int>& source, int fingers,
                          int bins, std::vector<double>* sums) {
   sums->assign(2 * static_cast<size_t>(fingers) * bins, 0);

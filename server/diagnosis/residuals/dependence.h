@@ -16,12 +16,14 @@ struct ResidualCell {
 // The bin of a value among bins with the upper ends `ends` (ascending, at least one).
 int BinOf(const std::vector<double>& ends, double value);
 
-// Permutation p of the between-bin sum of squares of `before_s` over the bins `ends` of the covariate, all fingers
-// together; a finger's own mean is no dependence. Cells are sorted by pose and, within a pose, by touch.
+// Permutation p of the between-bin sum of squares of `before_s` over the bins `ends` of the covariate, all
+// fingers together; a finger's own mean is no dependence. Cells are sorted by pose and, within a pose, by
+// touch.
 //
 // If the residual does not depend on the covariate, poses may change places, each with all of its repeats. A
-// covariate that varies among the repeats of a pose (time, the previous press) is tested there instead: the mean of
-// the pose is removed and the touches of a pose change places. `number` separates the tests of one seed.
+// covariate that varies among the repeats of a pose (time, the previous press) is tested there instead: the
+// mean of the pose is removed and the touches of a pose change places. `number` separates the tests of one
+// seed.
 double DependenceP(const std::vector<ResidualCell>& cells, const std::vector<double>& ends, int fingers,
                    uint64_t seed, int number);
 

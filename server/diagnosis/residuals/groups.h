@@ -8,8 +8,8 @@
 
 namespace touchstone {
 
-// What the touches of a group have in common. kFinger groups hold one finger of every touch, kTime groups equal
-// parts of the session.
+// What the touches of a group have in common. kFinger groups hold one finger of every touch, kTime groups
+// equal parts of the session.
 enum class ErrorGroupKind { kObject, kFace, kFinger, kRound, kTime, kSpeed };
 
 struct ErrorGroup {
@@ -26,8 +26,8 @@ struct GroupedErrors {
   std::vector<double> finger_bias_s;  // [finger], mean residual; 0 for a finger that never took part
 };
 
-// residuals: [k * fingers + finger], seconds, NaN where a finger takes no part; sigma_s: noise of one finger's time.
-// Touches that are left out, or in which fewer than two fingers are compared, count nowhere.
+// residuals: [k * fingers + finger], seconds, NaN where a finger takes no part; sigma_s: noise of one
+// finger's time. Touches that are left out, or in which fewer than two fingers are compared, count nowhere.
 GroupedErrors GroupErrors(const Observations& observations, const std::vector<double>& residuals,
                           double sigma_s);
 

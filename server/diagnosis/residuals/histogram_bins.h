@@ -22,9 +22,9 @@ struct ComparedHistogram {
   double p_simulated = 1, p_improved = 1;
 };
 
-// Common edges for the values of all samples together: bins of the width of Freedman and Diaconis (1981), rounded to
-// a readable number, over the range that holds all but the outermost thousandth at either end. At most
-// kMaxHistogramBins bins. Empty if there are no values.
+// Common edges for the values of all samples together: bins of the width of Freedman and Diaconis (1981),
+// rounded to a readable number, over the range that holds all but the outermost thousandth at either end. At
+// most kMaxHistogramBins bins. Empty if there are no values.
 std::vector<double> HistogramEdges(std::vector<double> pooled);
 
 // Density of `values` over the bins, 1 / unit: the share of *all* values in a bin, over its width.

@@ -52,7 +52,8 @@ TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells
 TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles) {
   if (static_cast<int>(mesh.triangles.size()) <= max_triangles) return mesh;
   const Bounds bounds = ComputeBounds(mesh);
-  // From the coarsest grid upwards, since coarse ones are cheap. A closed surface has about 12 cells^2 triangles.
+  // From the coarsest grid upwards, since coarse ones are cheap. A closed surface has about 12 cells^2
+  // triangles.
   TriangleMesh best;
   for (int cells = 2; cells <= 64; ++cells) {
     TriangleMesh coarse = Clustered(mesh, bounds, cells);

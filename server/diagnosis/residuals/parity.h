@@ -8,8 +8,8 @@
 
 namespace touchstone {
 
-// One finger of one touch. Times are less the mean over the touch's compared fingers: only differences between
-// fingers are measured.
+// One finger of one touch. Times are less the mean over the touch's compared fingers: only differences
+// between fingers are measured.
 struct ParityPoint {
   double simulated_s = 0;  // by the initial model
   double measured_s = 0;
@@ -17,8 +17,8 @@ struct ParityPoint {
   int finger = 0;         // 0 is the first
 };
 
-// At most 2,000 points, evenly spread over the session. `before` and `after` are the residuals of the initial and
-// the improved model, [k * fingers + finger], seconds, NaN where a finger takes no part.
+// At most 2,000 points, evenly spread over the session. `before` and `after` are the residuals of the initial
+// and the improved model, [k * fingers + finger], seconds, NaN where a finger takes no part.
 std::vector<ParityPoint> MakeParity(const Observations& observations, const Prediction& initial,
                                     const std::vector<double>& before, const std::vector<double>& after);
 

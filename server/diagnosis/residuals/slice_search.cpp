@@ -150,8 +150,8 @@ class LiveCells {
   bool empty() const { return all_.count == 0; }
 
  private:
-  // Sums over the cells whose bin of covariate a is below the row and of b below the column; (bins of a + 1) rows,
-  // (bins of b + 1) columns.
+  // Sums over the cells whose bin of covariate a is below the row and of b below the column; (bins of a + 1)
+  // rows, (bins of b + 1) columns.
   std::vector<Sums> CumulativeTable(const std::vector<SliceBins>& bins, int a, int b) const;
 
   const SliceCells& cells_;

@@ -62,12 +62,12 @@ struct SliceSums {
   void operator+=(const SliceSums& other);
   SliceSums operator-(const SliceSums& other) const;
 };
-// The score of a part (s^2): its excess error beyond that of an average part of its size, plus what the difference
-// between its mean and the mean of all cells would explain.
+// The score of a part (s^2): its excess error beyond that of an average part of its size, plus what the
+// difference between its mean and the mean of all cells would explain.
 double SliceScore(const SliceSums& slice, const SliceSums& all);
 
-// The best slices of at least `min_cells` of the cells listed in `live`, best first: at most one for each set of
-// covariates, at most `max_slices` in all.
+// The best slices of at least `min_cells` of the cells listed in `live`, best first: at most one for each set
+// of covariates, at most `max_slices` in all.
 std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, const SliceCells& cells,
                                          const std::vector<int>& live, int min_cells, int max_slices);
 

@@ -19,9 +19,9 @@ constexpr int kMaxTouchesSearched = 30000;
 constexpr int kTries = 8;           // candidates per slice that are checked on the other half
 constexpr double kMinShare = 0.03;  // of the excess error, for a slice to be worth reporting
 
-// A slice is accepted if the other half shows it with a z score of at least kMinZ. Where the excess error of the
-// whole set is kCertainMisfit standard deviations above noise, a misfit is certain and the smaller score is
-// enough: a slice of a few poses cannot reach four.
+// A slice is accepted if the other half shows it with a z score of at least kMinZ. Where the excess error of
+// the whole set is kCertainMisfit standard deviations above noise, a misfit is certain and the smaller score
+// is enough: a slice of a few poses cannot reach four.
 constexpr double kMinZ = 4, kMinZIfMisfitIsCertain = 1.8, kCertainMisfit = 10;
 
 constexpr int kMinPoses = 5;            // in each half

@@ -20,13 +20,13 @@ struct ErrorSlice {
   double share_of_excess_error = 0;  // of the whole set's excess error, 0 to 1
 };
 
-// At most six slices that hold more of the excess error than their size, or a bias of their own, largest share
-// first. Excess error is the sum of squared residuals less what noise of sigma_s contributes. Each slice was
-// chosen for excess that those found before do not hold; slices may overlap.
+// At most six slices that hold more of the excess error than their size, or a bias of their own, largest
+// share first. Excess error is the sum of squared residuals less what noise of sigma_s contributes. Each
+// slice was chosen for excess that those found before do not hold; slices may overlap.
 //
-// residuals: [k * fingers + finger], seconds, NaN where a finger takes no part. Thresholds are found on half of
-// the poses and kept only if the other half agrees; the numbers are then computed from all touches. Empty if
-// nothing stands out. The search reads at most 30,000 touches (whole poses, spread over the set).
+// residuals: [k * fingers + finger], seconds, NaN where a finger takes no part. Thresholds are found on half
+// of the poses and kept only if the other half agrees; the numbers are then computed from all touches. Empty
+// if nothing stands out. The search reads at most 30,000 touches (whole poses, spread over the set).
 std::vector<ErrorSlice> FindSlices(const Observations& observations, const Prediction& prediction,
                                    const std::vector<double>& residuals, double sigma_s);
 

@@ -21,9 +21,9 @@ struct SurfaceResidual {
   int finger = 0;                  // 0 is the first
 };
 
-// Object by object, at most 4,000 points in all and 1,500 per object, evenly spread over the poses. `before` and
-// `after` are the residuals of the initial and the improved model, [k * fingers + finger], seconds, NaN where a
-// finger takes no part. Empty if the prediction has no contacts.
+// Object by object, at most 4,000 points in all and 1,500 per object, evenly spread over the poses. `before`
+// and `after` are the residuals of the initial and the improved model, [k * fingers + finger], seconds, NaN
+// where a finger takes no part. Empty if the prediction has no contacts.
 std::vector<SurfaceResidual> MakeSurfaceResiduals(const Observations& observations,
                                                   const Prediction& improved,
                                                   const std::vector<double>& before,
