@@ -1,0 +1,62 @@
+#include "server/diagnosis/selection/selection.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/diagnosis/touches/simulated_test_set.h"
+
+namespace touchstone {
+namespace {
+
+struct Selected {
+  std::unique_ptr<Workspace> workspace;
+  SelectionResult result;
+};
+
+Selected SelectFor(const DiagnosisInput& input) {
+  auto workspace = MakeWorkspace(input, {});
+  EXPECT_TRUE(workspace.ok()) << workspace.status();
+  auto result = SelectExplanation(workspace->get());
+  EXPECT_TRUE(result.ok()) << result.status();
+  return {*std::move(workspace), *std::move(result)};
+}
+
+TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
+  HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
+  const Selected selected = SelectFor(MakeTestInput(rig));
+  const SelectionResult& result = selected.result;
+  ASSERT_EQ(result.steps.size(), 1u);
+  EXPECT_EQ(result.fit.model.base().effects[result.steps[0].effect].effect->name, "tip_radius");
+  EXPECT_GT(result.steps[0].gain_nats, 50);
+  EXPECT_GT(result.steps[0].probability, 0.9);
+  EXPECT_LT(result.formula, 0);
+  EXPECT_LT(result.surface_error.gain_nats, 5);
+  EXPECT_NEAR(result.noise.sigma_s.value, rig.sigma_us * 1e-6, 0.1 * rig.sigma_us * 1e-6);
+}
+
+TEST(SelectExplanation, NamesACompetingEffectThatTheseDataCannotTellFromTheStep) {
+  HiddenRig rig;
+  rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
+  const Selected selected = SelectFor(MakeTestInput(rig));
+  ASSERT_GE(selected.result.steps.size(), 1u);
+  ASSERT_FALSE(selected.result.steps[0].competing.empty());
+  EXPECT_TRUE(selected.result.steps[0].competing[0].equivalent);
+}
+
+TEST(SelectExplanation, LeavesOutliersOutWithTheirReason) {
+  DiagnosisInput input = MakeTestInput({});
+  auto set = std::make_shared<MeasurementSet>(*input.set);
+  for (const int row : {10, 60, 110}) set->time_s[static_cast<size_t>(row) * set->fingers] += 0.5;
+  input.set = set;
+  const Selected selected = SelectFor(input);
+  const Observations& o = *selected.workspace->observations;
+  EXPECT_EQ(o.unused.count(kOutlierReason), 1u);
+  for (int k = 0; k < o.size(); ++k)
+    if (o.row[k] == 10 || o.row[k] == 60 || o.row[k] == 110) EXPECT_FALSE(o.used[k]) << o.row[k];
+  EXPECT_TRUE(selected.result.steps.empty());
+}
+
+}  // namespace
+}  // namespace touchstone

@@ -1,0 +1,70 @@
+#include "server/diagnosis/selection/workspace.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/diagnosis/touches/simulated_test_set.h"
+
+namespace touchstone {
+namespace {
+
+TEST(Workspace, SearchesAllTouchesOfASmallSet) {
+  const auto workspace = MakeWorkspace(MakeTestInput({}), {});
+  ASSERT_TRUE(workspace.ok()) << workspace.status();
+  ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
+  EXPECT_FALSE((*workspace)->thinned);
+  EXPECT_EQ((*workspace)->searched->size(), (*workspace)->observations->size());
+  EXPECT_EQ((*workspace)->likelihood->rows(), (*workspace)->rows->rows());
+}
+
+TEST(Workspace, ThinsALargeSetToWholePosesOfEveryObject) {
+  HiddenRig rig;
+  rig.samples_per_face = 50;
+  rig.rounds = 6;  // 5,400 touches
+  const auto workspace = MakeWorkspace(MakeTestInput(rig), {});
+  ASSERT_TRUE(workspace.ok()) << workspace.status();
+  ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
+  const Observations& searched = *(*workspace)->searched;
+  EXPECT_TRUE((*workspace)->thinned);
+  const int used = static_cast<int>(std::count(searched.used.begin(), searched.used.end(), 1));
+  EXPECT_LE(used, kMaxSearched);
+  EXPECT_GT(used, kMaxSearched / 2);
+  std::vector<int> of_object(searched.objects.size()), of_pose(searched.poses);
+  for (int k = 0; k < searched.size(); ++k)
+    if (searched.used[k]) ++of_object[searched.object[k]], ++of_pose[searched.pose[k]];
+  for (const int touches : of_object) EXPECT_GT(touches, used / 6);
+  for (const int touches : of_pose) EXPECT_LE(touches, 4);
+}
+
+TEST(Workspace, WeighsTheRowsOfATouchByTheRootOfItsWeight) {
+  const auto workspace = MakeWorkspace(MakeTestInput({}), {});
+  ASSERT_TRUE(workspace.ok()) << workspace.status();
+  ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
+  const Eigen::VectorXd plain = (*workspace)->rows->Residual((*workspace)->searched_nominal.time_s);
+  std::vector<double> weights((*workspace)->input.set->size(), 1.0);
+  const int first_row = (*workspace)->searched->row[(*workspace)->contrasts->touches()[0]];
+  weights[first_row] = 0.25;
+  ASSERT_TRUE(PrepareSearch(workspace->get(), weights).ok());
+  const Eigen::VectorXd weighted = (*workspace)->rows->Residual((*workspace)->searched_nominal.time_s);
+  ASSERT_EQ(weighted.size(), plain.size());
+  EXPECT_DOUBLE_EQ(weighted[0], 0.5 * plain[0]);
+  EXPECT_DOUBLE_EQ(weighted[plain.size() - 1], plain[plain.size() - 1]);
+}
+
+TEST(Workspace, LeavesOutTouchesOfWhichTheModelMissesTooManyFingers) {
+  DiagnosisInput input = MakeTestInput({});
+  auto set = std::make_shared<MeasurementSet>(*input.set);
+  // One touch, far beside the object.
+  set->target_m[0] += 0.5 * set->approach[0].cross(set->lateral[0]);
+  input.set = set;
+  const auto workspace = MakeWorkspace(input, {});
+  ASSERT_TRUE(workspace.ok()) << workspace.status();
+  const Observations& o = *(*workspace)->observations;
+  const int k = static_cast<int>(std::find(o.row.begin(), o.row.end(), 0) - o.row.begin());
+  EXPECT_FALSE(o.used[k]);
+}
+
+}  // namespace
+}  // namespace touchstone
