@@ -53,8 +53,10 @@ TEST(SelectExplanation, LeavesOutliersOutWithTheirReason) {
   const Selected selected = SelectFor(input);
   const Observations& o = *selected.workspace->observations;
   EXPECT_EQ(o.unused.count(kOutlierReason), 1u);
-  for (int k = 0; k < o.size(); ++k)
-    if (o.row[k] == 10 || o.row[k] == 60 || o.row[k] == 110) EXPECT_FALSE(o.used[k]) << o.row[k];
+  for (int k = 0; k < o.size(); ++k) {
+    if (o.row[k] != 10 && o.row[k] != 60 && o.row[k] != 110) continue;
+    EXPECT_FALSE(o.used[k]) << o.row[k];
+  }
   EXPECT_TRUE(selected.result.steps.empty());
 }
 
