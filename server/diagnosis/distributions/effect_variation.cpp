@@ -1,6 +1,5 @@
 #include "server/diagnosis/distributions/effect_variation.h"
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -77,9 +76,10 @@ std::string VariationInWords(const Model& model, const EffectDirection& directio
 }
 
 bool VisibleWithoutPoses(const Effect& effect, bool noise_is_known) {
-  if (noise_is_known && absl::EndsWith(effect.name, "_noise")) return false;
-  return effect.name != "missed_contact" && effect.name != "formula" && !effect.parameters.empty() &&
-         effect.needs.covariates.empty();
+  const bool noise = effect.role == EffectRole::kNoiseLevel || effect.role == EffectRole::kNoiseGrowth ||
+                     effect.role == EffectRole::kNoiseTails;
+  if (effect.role == EffectRole::kDropout || (noise && noise_is_known)) return false;
+  return effect.name != "formula" && !effect.parameters.empty() && effect.needs.covariates.empty();
 }
 
 std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const Effect>& effect, int fingers) {

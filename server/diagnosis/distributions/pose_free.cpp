@@ -57,7 +57,7 @@ PoseFreeComparison Prepare(const PoseFreeExperiment& experiment) {
                                                        : NoiseChange::kNone;
   comparison.model_has_noise =
       std::any_of(experiment.model->effects.begin(), experiment.model->effects.end(),
-                  [](const EffectInstance& e) { return e.effect->name == "gaussian_noise"; });
+                  [](const EffectInstance& e) { return e.effect->role == EffectRole::kNoiseLevel; });
   comparison.size_ratio = experiment.size_ratio;
   return comparison;
 }
