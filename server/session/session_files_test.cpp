@@ -275,7 +275,7 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
       for (int axis = 0; axis < 6; ++axis) EXPECT_TRUE(same(a.base_from_tip[axis], b.base_from_tip[axis]));
     }
   }
-  EXPECT_EQ(journal_->Session("again")->source, journal_->Session("s")->source);
+  EXPECT_EQ(journal_->Session("again")->provenance, journal_->Session("s")->provenance);
   ASSERT_TRUE(journal_
                   ->ForEachImage("again",
                                  [&](const JournalImage& kept) {
