@@ -20,9 +20,9 @@ constexpr ParameterRow<Parameters> kRows[] = {
 void Apply(const Parameters& p, TouchBatch& touches) {
   using Array = Eigen::ArrayXd;
   Eigen::Map<Array> reported_s(touches.reported_time_s.data(), touches.reported_time_s.size());
-  const Eigen::Map<const Array> slope_s_m(touches.time_per_travel_s_m.data(),
-                                          touches.time_per_travel_s_m.size());
-  reported_s += p.travel_m * TanIncidence(touches) * slope_s_m;
+  const Eigen::Map<const Array> inverse_speed_s_per_m(touches.time_per_travel_s_m.data(),
+                                                      touches.time_per_travel_s_m.size());
+  reported_s += p.travel_m * TanIncidence(touches) * inverse_speed_s_per_m;
 }
 
 }  // namespace

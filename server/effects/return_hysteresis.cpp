@@ -18,10 +18,10 @@ constexpr ParameterRow<Parameters> kRows[] = {
 void Apply(const Parameters& p, TouchBatch& touches) {
   using Array = Eigen::ArrayXd;
   Eigen::Map<Array> reported_s(touches.reported_time_s.data(), touches.reported_time_s.size());
-  const Eigen::Map<const Array> slope_s_m(touches.time_per_travel_s_m.data(),
-                                          touches.time_per_travel_s_m.size());
+  const Eigen::Map<const Array> inverse_speed_s_per_m(touches.time_per_travel_s_m.data(),
+                                                      touches.time_per_travel_s_m.size());
   const Eigen::Map<const Array> press_m(touches.previous_press_m.data(), touches.previous_press_m.size());
-  reported_s -= p.fraction * press_m * slope_s_m;
+  reported_s -= p.fraction * press_m * inverse_speed_s_per_m;
 }
 
 }  // namespace

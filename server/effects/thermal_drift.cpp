@@ -17,10 +17,10 @@ constexpr ParameterRow<Parameters> kRows[] = {
 void Apply(const Parameters& p, TouchBatch& touches) {
   for (int finger = 0; finger < touches.fingers(); ++finger) {
     const double rate_m_s = p.rate_m_s[finger];
-    const double* slope_s_m = touches.time_per_travel_s_m.data() + touches.At(finger, 0);
+    const double* inverse_speed_s_per_m = touches.time_per_travel_s_m.data() + touches.At(finger, 0);
     double* reported_time_s = touches.reported_time_s.data() + touches.At(finger, 0);
     for (int touch = 0; touch < touches.size(); ++touch)
-      reported_time_s[touch] += rate_m_s * touches.session_time_s[touch] * slope_s_m[touch];
+      reported_time_s[touch] += rate_m_s * touches.session_time_s[touch] * inverse_speed_s_per_m[touch];
   }
 }
 

@@ -45,18 +45,18 @@ void TravelToTime(TouchBatch* batch) {
       const double speed_m_s = batch->speed_m_s[touch] * batch->speed_factor;
       const double travel_m = batch->travel_m[begin + touch];
       double time_s = travel_m / speed_m_s;
-      double slope_s_m = 1 / speed_m_s;
+      double inverse_speed_s_per_m = 1 / speed_m_s;
       if (travel_m > 0) {
         const double ramp_m = speed_m_s * speed_m_s / (2 * acceleration);
         if (travel_m < ramp_m) {
           time_s = std::sqrt(2 * travel_m / acceleration);
-          slope_s_m = 1 / std::sqrt(2 * travel_m * acceleration);
+          inverse_speed_s_per_m = 1 / std::sqrt(2 * travel_m * acceleration);
         } else {
           time_s += speed_m_s / (2 * acceleration);
         }
       }
       batch->contact_time_s[begin + touch] = time_s;
-      batch->time_per_travel_s_m[begin + touch] = slope_s_m;
+      batch->time_per_travel_s_m[begin + touch] = inverse_speed_s_per_m;
     }
   }
 

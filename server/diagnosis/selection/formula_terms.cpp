@@ -46,8 +46,8 @@ class TermTable {
     for (int k = 0; k < o_.size(); ++k)
       for (int i = 0; i < o_.fingers; ++i) {
         const size_t e = static_cast<size_t>(k) * o_.fingers + i;
-        const double size =
-            value(k, i) * (adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre * d_.slope_s_m[e]);
+        const double size = value(k, i) * (adds_time ? kSecondsPerMicrosecond
+                                                     : kMetresPerMillimetre * d_.inverse_speed_s_per_m[e]);
         values_[e] = std::isfinite(size) ? size : 0;
       }
     return touches_.contrasts().Apply(values_);

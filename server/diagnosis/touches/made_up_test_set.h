@@ -61,7 +61,7 @@ struct MadeUpSet {
         for (int i = 0; i < 3; ++i) {
           prediction.travel_m.push_back(travel[p * 3 + i]);
           prediction.time_s.push_back(travel[p * 3 + i] / 0.02);
-          prediction.slope_s_m.push_back(50);
+          prediction.inverse_speed_s_per_m.push_back(50);
           prediction.cos_incidence.push_back(cosine[p * 3 + i]);
           prediction.previous_press_m.push_back(0.01 * random.Uniform());
           prediction.press_m.push_back(0);

@@ -16,7 +16,7 @@ struct Prediction {
   int fingers = 0;
   std::vector<double> time_s;  // reported time without noise, polling or dropouts; NaN: the model misses
   std::vector<double> travel_m;
-  std::vector<double> slope_s_m;  // time over travel at the contact
+  std::vector<double> inverse_speed_s_per_m;  // of the arm at the contact
   std::vector<double> cos_incidence;
   std::vector<double> curvature_per_m;  // mean curvature of the surface; empty unless asked for
   std::vector<double> previous_press_m;

@@ -129,7 +129,8 @@ class Predictor::Task {
     p_.fingers = o_.fingers;
     p_.time_s.assign(entries, NAN);
     if (!details_) return;
-    for (auto* column : {&p_.travel_m, &p_.slope_s_m, &p_.cos_incidence}) column->assign(entries, NAN);
+    for (auto* column : {&p_.travel_m, &p_.inverse_speed_s_per_m, &p_.cos_incidence})
+      column->assign(entries, NAN);
     for (auto* column : {&p_.previous_press_m, &p_.press_m}) column->assign(entries, 0);
     p_.contact_m.assign(entries, Eigen::Vector3d::Constant(NAN));
     p_.normal.assign(entries, Eigen::Vector3d::Zero());
@@ -190,7 +191,7 @@ class Predictor::Task {
       p_.time_s[to] = batch.reported_time_s[from];
       if (!details_) continue;
       p_.travel_m[to] = batch.travel_m[from];
-      p_.slope_s_m[to] = batch.time_per_travel_s_m[from];
+      p_.inverse_speed_s_per_m[to] = batch.time_per_travel_s_m[from];
       p_.cos_incidence[to] = batch.cos_incidence[from];
       p_.contact_m[to] = batch.contact_m[from];
       p_.normal[to] = batch.normal[from];
@@ -206,7 +207,8 @@ class Predictor::Task {
       const auto copy = [&](auto& column) { std::copy_n(&column[from], o_.fingers, &column[to]); };
       copy(p_.time_s);
       if (!details_) continue;
-      copy(p_.travel_m), copy(p_.slope_s_m), copy(p_.cos_incidence), copy(p_.contact_m), copy(p_.normal);
+      copy(p_.travel_m), copy(p_.inverse_speed_s_per_m), copy(p_.cos_incidence), copy(p_.contact_m),
+          copy(p_.normal);
       if (curvature_) copy(p_.curvature_per_m);
       p_.first_finger[k] = p_.first_finger[first];
     }

@@ -54,8 +54,8 @@ Eigen::MatrixXd DenseCovariance(const SurfaceErrorTest&, const Observations& o, 
       if (std::isnan(d.time_s[a]) || std::isnan(d.time_s[b])) continue;
       if (o.object[a / 3] != o.object[b / 3]) continue;
       const double x = std::sqrt(5.0) * (d.contact_m[a] - d.contact_m[b]).norm() / surface.length_m;
-      const double gain_a = d.slope_s_m[a] / std::max(d.cos_incidence[a], 0.1);
-      const double gain_b = d.slope_s_m[b] / std::max(d.cos_incidence[b], 0.1);
+      const double gain_a = d.inverse_speed_s_per_m[a] / std::max(d.cos_incidence[a], 0.1);
+      const double gain_b = d.inverse_speed_s_per_m[b] / std::max(d.cos_incidence[b], 0.1);
       field(a, b) = surface.amplitude_over_sigma * surface.amplitude_over_sigma * gain_a * gain_b *
                     (1 + x + x * x / 3) * std::exp(-x);
     }
@@ -98,7 +98,7 @@ TEST_F(SurfaceErrorTest, TheFieldFollowsBumpsAndNotNoise) {
   for (size_t e = 0; e < bump.size(); ++e)
     bump[e] = -0.3e-3 *
               std::exp(-(details.contact_m[e] - details.contact_m[1]).squaredNorm() / (2 * 0.02 * 0.02)) *
-              details.slope_s_m[e] / details.cos_incidence[e];
+              details.inverse_speed_s_per_m[e] / details.cos_incidence[e];
   const Eigen::VectorXd r = contrasts->Apply(bump);
   const Likelihood::Columns columns = likelihood->Prepare(r);
   double best = 0;

@@ -70,14 +70,14 @@ SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts&
     for (int i = 0; i < o.fingers; ++i) {
       if (!contrasts.TakesPart(touch, i)) continue;
       const size_t entry = static_cast<size_t>(k) * o.fingers + i;
-      geometry.mean_row_per_m += details.slope_s_m[entry];
+      geometry.mean_row_per_m += details.inverse_speed_s_per_m[entry];
       ++counted;
       if (!seen[o.pose[k]]) geometry.distinct_m[o.object[k]].push_back(details.contact_m[entry]);
       SmoothErrorSite site;
       site.position_m = details.contact_m[entry];
       site.first_row = contrasts.FirstRow(touch);
       const double time_per_m =
-          -details.slope_s_m[entry] / std::max(details.cos_incidence[entry], kMinCosine);
+          -details.inverse_speed_s_per_m[entry] / std::max(details.cos_incidence[entry], kMinCosine);
       for (int j = 0; j < h.rows(); ++j)
         site.row_per_m.push_back(contrasts.root_weights()[t] * time_per_m * h(j, i));
       geometry.sites[o.object[k]].push_back(std::move(site));
