@@ -1,7 +1,7 @@
 # Precompiled headers. Most of a file's compile time went into parsing the same headers again: gRPC and the generated
 # messages are 300,000 lines, Eigen, CLI11 and GoogleTest 60,000 each. Four sets, each compiled once, serve every target:
-# with the protocol or without it, of a library or of a test. A file still includes all that it uses: the
-# steps no_egl and tsan of deploy/test compile without precompiled headers.
+# with the protocol or without it, for libraries or for tests. A file still includes all that it uses: the steps no_egl
+# and tsan of deploy/test compile without precompiled headers.
 option(TOUCHSTONE_PRECOMPILE "Use precompiled headers" ON)
 
 set(touchstone_core_headers
@@ -63,7 +63,10 @@ function(touchstone_precompile)
   touchstone_header_set(protocol_test ${touchstone_core_headers} ${touchstone_protocol_headers}
     ${touchstone_test_headers})
   foreach(set core_test protocol_test)
+    # Programs are compiled with -fPIE and libraries with -fPIC, which no precompiled header spans.
     target_link_libraries(touchstone_headers_${set} PRIVATE GTest::gmock GTest::gtest)
+    set_target_properties(touchstone_headers_${set} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    target_compile_options(touchstone_headers_${set} PRIVATE -fPIE)
   endforeach()
   foreach(set protocol protocol_test)
     target_link_libraries(touchstone_headers_${set} PRIVATE touchstone_proto nlohmann_json::nlohmann_json)
@@ -75,13 +78,17 @@ function(touchstone_precompile)
       continue()  # the firmware's core includes nothing but the standard library
     endif()
     touchstone_links_to(protocol ${target} touchstone_proto)
-    touchstone_links_to(test ${target} GTest::gmock)
+    get_target_property(type ${target} TYPE)
     if(protocol)
       set(set protocol)
     else()
       set(set core)
     endif()
-    if(test)
+    if(type STREQUAL EXECUTABLE)
+      touchstone_links_to(test ${target} GTest::gtest)
+      if(NOT test)
+        continue()  # a main or a benchmark: one file
+      endif()
       string(APPEND set _test)
     endif()
     target_precompile_headers(${target} REUSE_FROM touchstone_headers_${set})

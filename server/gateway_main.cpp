@@ -4,8 +4,9 @@
 
 int main(int argc, char** argv) {
   using namespace touchstone;
-  return RunServer(
-      "touchstone-gateway", ParseGatewayFlags(argc, argv),
-      [](const GatewayFlags& flags) { return flags.options.common; }, "what moves is stopped; draining",
-      [](const GatewayFlags& flags) { return GatewayServer::Start(flags.options); });
+  return service::RunServer(
+      "touchstone-gateway", service::ParseGatewayFlags(argc, argv),
+      [](const service::GatewayFlags& flags) { return flags.options.common; },
+      "what moves is stopped; draining",
+      [](const service::GatewayFlags& flags) { return service::GatewayServer::Start(flags.options); });
 }

@@ -5,8 +5,8 @@
 
 int main(int argc, char** argv) {
   using namespace touchstone;
-  return RunServer(
-      "touchstone-server", ParseServerFlags(argc, argv),
-      [](const ServerFlags& flags) { return flags.options; }, "draining",
-      [](const ServerFlags& flags) { return Server::Start(flags.options); });
+  return service::RunServer(
+      "touchstone-server", service::ParseServerFlags(argc, argv),
+      [](const service::ServerFlags& flags) { return flags.options; }, "draining",
+      [](const service::ServerFlags& flags) { return service::Server::Start(flags.options); });
 }

@@ -94,8 +94,8 @@ absl::StatusOr<std::pair<std::string, std::string>> FileOfColumn(const v1::Colum
   std::string bytes;
   if (column.name() == "mask" && shape.shape.size() >= 2) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        bytes, EncodePng(reinterpret_cast<const uint8_t*>(column.data().data()),
-                         static_cast<int>(shape.shape[1]), static_cast<int>(shape.shape[0]), 1));
+        bytes, image::EncodePng(reinterpret_cast<const uint8_t*>(column.data().data()),
+                                static_cast<int>(shape.shape[1]), static_cast<int>(shape.shape[0]), 1));
     return std::make_pair(StemOf(file) + ".mask.png", bytes);
   }
   client::AppendLabValues(shape, column, 0, 1, &bytes);

@@ -183,14 +183,14 @@ absl::Status Cli::CheckFiles(const CLI::App* command) {
   const CommandFiles& files = files_[command];
   std::vector<std::string> inputs = source_.meshes;
   for (std::string& mesh : inputs) {
-    const absl::StatusOr<MeshSpec> source = ParseMeshSpec(mesh);
+    const absl::StatusOr<source::MeshSpec> source = service::ParseMeshSpec(mesh);
     mesh = source.ok() ? source->path : "";  // what is wrong with it is said where it is read
   }
   for (const CLI::Option* option : files.inputs)
     for (const std::string& path : option->results()) inputs.push_back(path);
   std::error_code error;
   if (!source_.mesh_folder.empty()) {
-    const std::vector<std::string> formats = MeshFormatNames();
+    const std::vector<std::string> formats = geometry::MeshFormatNames();
     for (const auto& entry : std::filesystem::directory_iterator(source_.mesh_folder, error)) {
       const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
       for (const std::string& format : formats)
@@ -278,12 +278,12 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
     if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
     return ConnectWithMeshes({});
   }
-  std::vector<MeshSpec> meshes;
+  std::vector<source::MeshSpec> meshes;
   if (!source_.mesh_folder.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshSpecsOfFolder(source_.mesh_folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, service::MeshSpecsOfFolder(source_.mesh_folder));
   }
   for (const std::string& text : source_.meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec mesh, ParseMeshSpec(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(source::MeshSpec mesh, service::ParseMeshSpec(text));
     meshes.push_back(std::move(mesh));
   }
   return ConnectWithMeshes(std::move(meshes));
@@ -296,7 +296,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
 }
 
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
-    std::vector<MeshSpec> meshes) const {
+    std::vector<source::MeshSpec> meshes) const {
   client::ConnectionOptions options;
   options.servers = SplitCommas(source_.servers);
   TOUCHSTONE_RETURN_IF_ERROR(Renderer().status());
@@ -314,7 +314,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     Detail("connected to " + connection->address());
     return connection;
   }
-  ServerOptions& embedded = options.embedded;
+  service::ServerOptions& embedded = options.embedded;
   embedded.meshes = std::move(meshes);
   if (source_.threads < 0)
     return absl::InvalidArgumentError(
@@ -324,13 +324,14 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
   return client::Connection::Open(std::move(options));
 }
 
-absl::StatusOr<RendererOptions> Cli::Renderer() const {
-  static const std::map<std::string, RendererKind> kinds = {
-      {"auto", RendererKind::kAuto}, {"egl", RendererKind::kEgl}, {"cpu", RendererKind::kCpu}};
+absl::StatusOr<image::RendererOptions> Cli::Renderer() const {
+  static const std::map<std::string, image::RendererKind> kinds = {{"auto", image::RendererKind::kAuto},
+                                                                   {"egl", image::RendererKind::kEgl},
+                                                                   {"cpu", image::RendererKind::kCpu}};
   std::vector<std::string> names;
   for (const auto& [name, kind] : kinds) names.push_back(name);
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, names).status());
-  RendererOptions options;
+  image::RendererOptions options;
   options.kind = kinds.at(source_.renderer);
   options.egl_device = source_.egl_device;
   return options;

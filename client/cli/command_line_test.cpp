@@ -161,12 +161,12 @@ TEST_F(CommandLineTest, AServerThatIsStartingIsWaitedFor) {
   ASSERT_EQ(::bind(probe, reinterpret_cast<sockaddr*>(&address), size), 0);
   ASSERT_EQ(::getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size), 0);
   ::close(probe);
-  ServerOptions options;
+  service::ServerOptions options;
   options.listen = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
   const pid_t child = Start({"objects", "--server", options.listen, "--wait-s", "300"});
   while (Read(".err").find("waiting for " + options.listen) == std::string::npos)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  auto server = Server::Start(options);
+  auto server = service::Server::Start(options);
   ASSERT_TRUE(server.ok()) << server.status();
   const Outcome outcome = Wait(child);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

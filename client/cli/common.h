@@ -76,10 +76,11 @@ class Cli {
   absl::StatusOr<std::unique_ptr<client::Connection>> ConnectNow() const;
   // As Connect, with these meshes in place of --mesh and --mesh-dir where the source is in this process; a
   // server has its own, and the caller may send these along.
-  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(std::vector<MeshSpec> meshes) const;
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(
+      std::vector<source::MeshSpec> meshes) const;
   const SourceOptions& source() const { return source_; }
   // What --renderer and --egl-device say; INVALID_ARGUMENT for an unknown kind.
-  absl::StatusOr<RendererOptions> Renderer() const;
+  absl::StatusOr<image::RendererOptions> Renderer() const;
   const OutputOptions& output() const { return output_; }
 
   // A line to stderr: Log unless --quiet, Detail only with --verbose.

@@ -41,7 +41,7 @@ constexpr int kMinWidth = 60, kMaxWidth = 160;
 // holds.
 struct NamedSet {
   std::string csv, session;
-  std::optional<MeasurementSet> measured;
+  std::optional<session::MeasurementSet> measured;
 };
 absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
   NamedSet set;
@@ -67,8 +67,8 @@ absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
 // The mesh files of these objects in --mesh-dir; other files there are left alone.
 absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
                                const std::vector<std::string>& objects,
-                               std::map<std::string, MeshSpec>* meshes) {
-  const std::vector<std::string> formats = MeshFormatNames();
+                               std::map<std::string, source::MeshSpec>* meshes) {
+  const std::vector<std::string> formats = geometry::MeshFormatNames();
   std::map<std::string, std::string> paths;
   std::set<std::string> twice;
   std::error_code error;
@@ -95,7 +95,7 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
     cli.Log(absl::StrCat("note: --mesh-dir: several files are named '", name, "'; ", paths[name],
                          " is taken (--mesh ", name, "=FILE takes another)"));
   for (const auto& [name, path] : paths) {
-    MeshSpec source;
+    source::MeshSpec source;
     source.name = name;
     source.path = path;
     meshes->emplace(name, source);  // --mesh comes first
@@ -104,10 +104,11 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
 }
 
 // The meshes that the set's objects need, of those that the options name.
-absl::StatusOr<std::vector<MeshSpec>> MeshesOf(const Cli& cli, const std::vector<std::string>& objects) {
-  std::map<std::string, MeshSpec> meshes;
+absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
+                                                       const std::vector<std::string>& objects) {
+  std::map<std::string, source::MeshSpec> meshes;
   for (const std::string& text : cli.source().meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const MeshSpec source, ParseMeshSpec(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const source::MeshSpec source, service::ParseMeshSpec(text));
     if (!meshes.emplace(source.name, source).second)
       return absl::InvalidArgumentError(
           absl::StrCat("--mesh: two are named '", source.name, "'; one per object was expected"));
@@ -119,7 +120,7 @@ absl::StatusOr<std::vector<MeshSpec>> MeshesOf(const Cli& cli, const std::vector
   }
   if (!cli.source().mesh_folder.empty())
     TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, &meshes));
-  std::vector<MeshSpec> list;
+  std::vector<source::MeshSpec> list;
   for (const auto& [name, source] : meshes) list.push_back(source);
   return list;
 }
@@ -161,7 +162,7 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
 absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::string, std::string>>& outputs) {
   const std::string& folder = cli.source().mesh_folder;
   if (folder.empty()) return absl::OkStatus();
-  const std::vector<std::string> formats = MeshFormatNames();
+  const std::vector<std::string> formats = geometry::MeshFormatNames();
   for (const auto& [option, path] : outputs) {
     if (path.empty() || IsStandardOutput(path)) continue;
     std::error_code error;
@@ -183,15 +184,17 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   // Files are checked here, so that errors name them.
   TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(), ParseModelRef(options.model));
   if (evidence.model().has_yaml())
-    TOUCHSTONE_RETURN_IF_ERROR(ParseModel(evidence.model().yaml(), options.model, Catalogue()).status());
+    TOUCHSTONE_RETURN_IF_ERROR(
+        model::ParseModel(evidence.model().yaml(), options.model, effects::Catalogue()).status());
   for (const std::string& path : options.also) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxModelBytes));
-    TOUCHSTONE_RETURN_IF_ERROR(ParseModel(AsModelFile(text), path, Catalogue()).status());
+    TOUCHSTONE_RETURN_IF_ERROR(
+        model::ParseModel(service::AsModelFile(text), path, effects::Catalogue()).status());
     evidence.add_also_yaml(text);
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(NamedSet set, ReadSet(cli, options.set));
   const bool served = !cli.source().servers.empty();
-  std::vector<MeshSpec> meshes;
+  std::vector<source::MeshSpec> meshes;
   if (set.session.empty()) {
     evidence.set_origin(options.set == "-" ? "stdin" : options.set);
     if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
@@ -199,15 +202,15 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
       if (set.measured.has_value()) {
         objects = set.measured->objects;
       } else {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet read,
-                                    ParseMeasurementSet(set.csv, evidence.origin()));
+        TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet read,
+                                    session::ParseMeasurementSet(set.csv, evidence.origin()));
         objects = read.objects;
       }
       TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects));
     }
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(comparison->connection_,
-                              cli.ConnectWithMeshes(served ? std::vector<MeshSpec>() : meshes));
+                              cli.ConnectWithMeshes(served ? std::vector<source::MeshSpec>() : meshes));
   if (!set.session.empty()) {
     evidence.set_session(set.session);
     v1::GetSessionRequest request;
@@ -224,7 +227,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
   if (!set.session.empty()) return comparison;
   if (set.measured.has_value()) {
-    *evidence.mutable_set() = ToProto(*set.measured);
+    *evidence.mutable_set() = service::ToProto(*set.measured);
     if (evidence.set().ByteSizeLong() <= kMaxInline) return comparison;
     TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(options.set, ""));
   }
@@ -246,21 +249,22 @@ Comparison::~Comparison() {
         absl::StrCat("session ", sent_ahead_, " is left at the server: ", deleted.status().message()));
 }
 
-absl::Status Comparison::SendMeshes(const std::vector<MeshSpec>& meshes) {
+absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes) {
   if (meshes.empty()) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
                               client::Connection::Call(&v1::Source::Stub::ListObjects, connection_->source(),
                                                        v1::ListObjectsRequest()));
   std::map<std::string, std::string> hashes;
   for (const v1::Object& object : served.objects()) hashes[object.name()] = object.mesh_hash();
-  for (const MeshSpec& source : meshes) {
-    MeshImport import;
+  for (const source::MeshSpec& source : meshes) {
+    geometry::MeshImport import;
     import.unit = source.unit;
     import.up = source.up;
     import.scale = source.scale;
     if (source.fit_mm > 0) import.fit_mm = source.fit_mm;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadMeshFile(source.path, import));
-    if (hashes[source.name] == MeshHash(mesh)) continue;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh,
+                                geometry::ReadMeshFile(source.path, import));
+    if (hashes[source.name] == geometry::MeshHash(mesh)) continue;
     cli_.Detail(absl::StrCat("sending ", source.path, ": the server lacks it"));
     v1::MeshFile* file = evidence_.add_meshes();
     file->set_name(source.name);

@@ -49,7 +49,7 @@ class Comparison {
 
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
-  absl::Status SendMeshes(const std::vector<MeshSpec>& meshes);
+  absl::Status SendMeshes(const std::vector<source::MeshSpec>& meshes);
   absl::Status SendAhead(const std::string& csv);
 
   const Cli& cli_;

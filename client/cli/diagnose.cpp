@@ -27,12 +27,14 @@ absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report&
         client::Connection::Call(&v1::Models::Stub::GetModel, comparison->connection().models(), request));
     yaml = same.yaml();
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(yaml, "the improved model", Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
+                              model::ParseModel(yaml, "the improved model", effects::Catalogue()));
   // A new model under the old one's name would be refused by a server that knows the old one.
-  const Model as_it_was = model;
+  const model::Model as_it_was = model;
   model.name = std::filesystem::path(options.save_model).stem().string();
-  if (!ParseModel(FormatModel(model), options.save_model, Catalogue()).ok()) model.name = as_it_was.name;
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.save_model, FormatModel(model)));
+  if (!model::ParseModel(model::FormatModel(model), options.save_model, effects::Catalogue()).ok())
+    model.name = as_it_was.name;
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.save_model, model::FormatModel(model)));
   const std::string hash = model.Hash().substr(0, 12);
   cli.LogWritten(options.save_model,
                  changed ? absl::StrCat(" (", model.name, ", hash ", hash, ")")

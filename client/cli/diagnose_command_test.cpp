@@ -120,7 +120,7 @@ TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
 
 TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   MakeSet();
-  ServerOptions options;
+  service::ServerOptions options;
   options.supershape_triangles = 1000;
   options.threads = 1;
   const TestServer server(options);
@@ -146,7 +146,7 @@ TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
 TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {
   Write("set.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,2\n");
   Write("other.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,3\n");
-  ServerOptions options;
+  service::ServerOptions options;
   options.supershape_triangles = 1000;
   const TestServer server(options);
   const std::string at = "--server=" + server.address();

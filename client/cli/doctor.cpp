@@ -107,19 +107,19 @@ class Doctor {
       Add("Build", false,
           absl::StrCat("uses instructions that this processor lacks: ", absl::StrJoin(missing, " "),
                        ". Configure with -DTOUCHSTONE_ARCH=native, or with an empty value"));
-    Add("Rays", true, EmbreeDescription());
+    Add("Rays", true, geometry::EmbreeDescription());
     json_["processor"] = {{"model", processor.model}, {"threads", cores}};
     json_["build"] = {
         {"version", std::string(kVersion)}, {"instructions", used}, {"instructions_missing", missing}};
-    json_["embree"] = EmbreeDescription();
+    json_["embree"] = geometry::EmbreeDescription();
   }
 
   void CheckRenderers() {
     // An unknown kind is refused where the source is connected.
-    const RendererOptions options = cli_.Renderer().value_or(RendererOptions());
-    const absl::StatusOr<std::shared_ptr<Renderer>> chosen = CreateRenderer(options);
+    const image::RendererOptions options = cli_.Renderer().value_or(image::RendererOptions());
+    const absl::StatusOr<std::shared_ptr<image::Renderer>> chosen = image::CreateRenderer(options);
     Json devices = Json::array();
-    for (const EglDevice& device : ListEglDevices()) {
+    for (const image::EglDevice& device : image::ListEglDevices()) {
       const std::string name =
           absl::StrCat("device ", device.index, ", ", device.name.empty() ? "without a name" : device.name,
                        device.vendor.empty() ? "" : " (" + device.vendor + ")");
@@ -139,7 +139,7 @@ class Doctor {
           "no device: no GPU driver and no Mesa is installed, or this build has no EGL. Images are made "
           "by the CPU renderer");
     if (chosen.ok()) {
-      const char* why = options.kind == RendererKind::kAuto ? "" : " (asked for)";
+      const char* why = options.kind == image::RendererKind::kAuto ? "" : " (asked for)";
       Add("Images", true, absl::StrCat((*chosen)->description(), why));
       json_["renderer"] = {{"name", (*chosen)->name()}, {"description", (*chosen)->description()}};
     } else {

@@ -79,13 +79,15 @@ std::string Paragraph(const std::string& title, const std::string& text) {
 // What an expression may use: the table that the formula's compiler reads.
 std::string FormulaHelp() {
   Table variables({"VARIABLE", "UNIT", "SINCE STAGE", "MEANING"});
-  for (const FormulaVariable& variable : FormulaVariables())
-    variables.Add({variable.name, variable.unit[0] == '\0' ? "-" : variable.unit, StageName(variable.since),
-                   variable.meaning});
+  for (const effects::FormulaVariable& variable : effects::FormulaVariables())
+    variables.Add({variable.name, variable.unit[0] == '\0' ? "-" : variable.unit,
+                   model::StageName(variable.since), variable.meaning});
   variables.Add({"cov_NAME", "-", "pose", "the column cov_NAME of the measurements"});
   Table functions({"FUNCTION", "MEANING"});
-  for (const FormulaWord& word : FormulaFunctions()) functions.Add({word.usage, word.meaning});
-  for (const FormulaWord& word : FormulaConstants()) functions.Add({word.usage, word.meaning});
+  for (const effects::FormulaWord& word : effects::FormulaFunctions())
+    functions.Add({word.usage, word.meaning});
+  for (const effects::FormulaWord& word : effects::FormulaConstants())
+    functions.Add({word.usage, word.meaning});
   return absl::StrCat(
       "\nIn an expression:\n\n", variables.Text(), "\n", functions.Text(),
       "\nAn expression for travel_mm may use what its stage and earlier ones know.\n"
@@ -96,16 +98,16 @@ std::string FormulaHelp() {
 
 Json FormulaJson() {
   Json variables = Json::array();
-  for (const FormulaVariable& variable : FormulaVariables())
+  for (const effects::FormulaVariable& variable : effects::FormulaVariables())
     variables.push_back({{"name", variable.name},
                          {"unit", variable.unit},
-                         {"since_stage", StageName(variable.since)},
+                         {"since_stage", model::StageName(variable.since)},
                          {"meaning", variable.meaning}});
   Json functions = Json::array();
-  for (const FormulaWord& word : FormulaFunctions())
+  for (const effects::FormulaWord& word : effects::FormulaFunctions())
     functions.push_back({{"name", word.name}, {"usage", word.usage}, {"meaning", word.meaning}});
   Json constants = Json::array();
-  for (const FormulaWord& word : FormulaConstants())
+  for (const effects::FormulaWord& word : effects::FormulaConstants())
     constants.push_back({{"name", word.name}, {"meaning", word.meaning}});
   return {{"variables", variables}, {"functions", functions}, {"constants", constants}};
 }

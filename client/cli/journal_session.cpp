@@ -15,15 +15,15 @@ bool IsJournalPath(const std::string& text) {
   return absl::EndsWith(text, ".db");
 }
 
-absl::StatusOr<std::unique_ptr<Journal>> OpenJournal(const std::string& path) {
-  return Journal::Open(path, Journal::Mode::kReadOnly);
+absl::StatusOr<std::unique_ptr<session::Journal>> OpenJournal(const std::string& path) {
+  return session::Journal::Open(path, session::Journal::Mode::kReadOnly);
 }
 
-absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::string& path,
-                                           const std::string& name) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, journal.Sessions());
+absl::StatusOr<session::JournalSession> FindSession(const session::Journal& journal, const std::string& path,
+                                                    const std::string& name) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions, journal.Sessions());
   std::vector<std::string> names;
-  for (const JournalSession& session : sessions) {
+  for (const session::JournalSession& session : sessions) {
     if (session.name == name || (name.empty() && sessions.size() == 1)) return session;
     names.push_back(session.name);
   }
@@ -38,23 +38,23 @@ absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::st
                                                  " NAME -o set.csv writes one as a measurement file"));
 }
 
-absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& journal,
+absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,
                                                              const std::string& session) {
-  return SessionMeasurements(journal, session);
+  return session::SessionMeasurements(journal, session);
 }
 
-absl::StatusOr<MeasurementSet> JournalSet(const std::string& path) {
+absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, ""));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, ""));
   if (found.done == 0)
     return absl::FailedPreconditionError(
         absl::StrCat(path, ": session '", found.name, "' has no touch that is done"));
-  return SessionMeasurementSet(*journal, found.name, path);
+  return session::SessionMeasurementSet(*journal, found.name, path);
 }
 
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> touches,
                               TouchesOf(*journal, found.name));
   if (touches.empty())
@@ -66,10 +66,10 @@ absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::strin
 absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
                                bool force) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession found, FindSession(*journal, path, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
     return WriteOutputFileBy(output, force, [&](const std::string& free_path) {
-      return ExportSessionHdf5(*journal, found.name, free_path);
+      return session::ExportSessionHdf5(*journal, found.name, free_path);
     });
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, JournalCsv(path, found.name));
   return WriteOutputFile(output, csv, force);
@@ -77,14 +77,14 @@ absl::Status ExportFromJournal(const std::string& path, const std::string& sessi
 
 absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,
                                          const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal,
-                              Journal::Open(journal_path, Journal::Mode::kCreateOrReadWrite));
-  ImportOptions options;
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const auto journal, session::Journal::Open(journal_path, session::Journal::Mode::kCreateOrReadWrite));
+  session::ImportOptions options;
   options.session = session;
   const bool hdf5 = absl::EndsWith(file_path, ".h5") || absl::EndsWith(file_path, ".hdf5");
-  TOUCHSTONE_RETURN_IF_ERROR(hdf5 ? ImportSessionHdf5(file_path, options, journal.get())
-                                  : ImportSessionCsv(file_path, options, journal.get()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession made, journal->Session(session));
+  TOUCHSTONE_RETURN_IF_ERROR(hdf5 ? session::ImportSessionHdf5(file_path, options, journal.get())
+                                  : session::ImportSessionCsv(file_path, options, journal.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession made, journal->Session(session));
   return made.touches;
 }
 

@@ -16,18 +16,18 @@ namespace touchstone::cli {
 // Whether the user means a journal: the name ends in .db.
 bool IsJournalPath(const std::string& text);
 
-absl::StatusOr<std::unique_ptr<Journal>> OpenJournal(const std::string& path);  // to read
+absl::StatusOr<std::unique_ptr<session::Journal>> OpenJournal(const std::string& path);  // to read
 
 // The session of that name; with an empty name the only one. Errors list what there is.
-absl::StatusOr<JournalSession> FindSession(const Journal& journal, const std::string& path,
-                                           const std::string& name);
+absl::StatusOr<session::JournalSession> FindSession(const session::Journal& journal, const std::string& path,
+                                                    const std::string& name);
 
 // Its touches that are done, in the order in which they were made.
-absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const Journal& journal,
+absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,
                                                              const std::string& session);
 
 // What the journal's only session measured; `path` is its origin.
-absl::StatusOr<MeasurementSet> JournalSet(const std::string& path);
+absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path);
 // The measurement file of a session.
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session);
 

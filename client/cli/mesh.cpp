@@ -28,8 +28,8 @@ struct Options {
   std::string latitude;
 };
 
-Json ReportJson(const TriangleMesh& mesh, const MeshReport& report) {
-  const Bounds bounds = ComputeBounds(mesh);
+Json ReportJson(const geometry::TriangleMesh& mesh, const geometry::MeshReport& report) {
+  const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
   const auto mm = [](const Eigen::Vector3d& v) {
     return Json{client::LabNumber(Unit::kMillimetre, v.x()), client::LabNumber(Unit::kMillimetre, v.y()),
                 client::LabNumber(Unit::kMillimetre, v.z())};
@@ -48,12 +48,13 @@ Json ReportJson(const TriangleMesh& mesh, const MeshReport& report) {
           {"degenerate_triangles", report.degenerate_triangles},
           {"duplicate_triangles", report.duplicate_triangles},
           {"unused_vertices", report.unused_vertices},
-          {"mesh_hash", MeshHash(mesh)}};
+          {"mesh_hash", geometry::MeshHash(mesh)}};
 }
 
 // What the numbers of a report mean for touching.
-std::string ReportInWords(const std::string& name, const TriangleMesh& mesh, const MeshReport& report) {
-  const Bounds bounds = ComputeBounds(mesh);
+std::string ReportInWords(const std::string& name, const geometry::TriangleMesh& mesh,
+                          const geometry::MeshReport& report) {
+  const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
   const Eigen::Vector3d size_m = bounds.max_m - bounds.min_m;
   const Eigen::Vector3d centre_m = bounds.Centre();
   const auto mm = [](double metres) { return Rounded(FromSi(Unit::kMillimetre, metres)); };
@@ -62,7 +63,7 @@ std::string ReportInWords(const std::string& name, const TriangleMesh& mesh, con
   absl::StrAppend(&text, "  Size      ", mm(size_m.x()), " x ", mm(size_m.y()), " x ", mm(size_m.z()),
                   " mm, centre at ", mm(centre_m.x()), ", ", mm(centre_m.y()), ", ", mm(centre_m.z()),
                   " mm\n");
-  absl::StrAppend(&text, "  Hash      ", MeshHash(mesh), "\n");
+  absl::StrAppend(&text, "  Hash      ", geometry::MeshHash(mesh), "\n");
   if (report.closed()) {
     constexpr double kCubicCentimetresPerCubicMetre = 1e6;
     absl::StrAppend(&text, "  Surface   closed, volume ",
@@ -95,35 +96,36 @@ std::string ReportInWords(const std::string& name, const TriangleMesh& mesh, con
   return text;
 }
 
-void Report(const Cli& cli, const std::string& name, const TriangleMesh& mesh) {
-  const MeshReport report = InspectMesh(mesh);
+void Report(const Cli& cli, const std::string& name, const geometry::TriangleMesh& mesh) {
+  const geometry::MeshReport report = geometry::InspectMesh(mesh);
   if (cli.output().json)
     PrintJson(ReportJson(mesh, report));
   else if (!cli.output().quiet)
     cli.Print(ReportInWords(name, mesh, report)).IgnoreError();
 }
 
-absl::StatusOr<TriangleMesh> Read(const Cli& cli, const Options& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--unit", options.unit, MeshUnitNames()).status());
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--up", options.up, MeshUpAxisNames()).status());
-  MeshImport import;
+absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const Options& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--unit", options.unit, geometry::MeshUnitNames()).status());
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--up", options.up, geometry::MeshUpAxisNames()).status());
+  geometry::MeshImport import;
   import.unit = options.unit;
   import.up = options.up;
   import.scale = options.scale;
   if (options.fit_mm != 0) import.fit_mm = options.fit_mm;
   std::vector<std::string> notes;
-  TOUCHSTONE_ASSIGN_OR_RETURN(TriangleMesh mesh, ReadMeshFile(options.input, import, &notes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(geometry::TriangleMesh mesh,
+                              geometry::ReadMeshFile(options.input, import, &notes));
   for (const std::string& note : notes) cli.Log("note: " + note);
   return mesh;
 }
 
-absl::Status Write(const Cli& cli, const Options& options, const TriangleMesh& mesh) {
+absl::Status Write(const Cli& cli, const Options& options, const geometry::TriangleMesh& mesh) {
   // The ending names the format; standard output gets OFF.
   const std::string extension = std::filesystem::path(options.output).extension().string();
   const std::string format = IsStandardOutput(options.output) ? "off"
                              : extension.empty()              ? ""
                                                               : absl::AsciiStrToLower(extension.substr(1));
-  const absl::StatusOr<std::string> text = MeshFileText(mesh, format);
+  const absl::StatusOr<std::string> text = geometry::MeshFileText(mesh, format);
   if (!text.ok())
     return absl::Status(text.status().code(),
                         absl::StrCat("-o: ", options.output, ": ", text.status().message()));
@@ -133,18 +135,18 @@ absl::Status Write(const Cli& cli, const Options& options, const TriangleMesh& m
 }
 
 absl::Status RunImport(const Cli& cli, const Options& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, Read(cli, options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
   return Write(cli, options, mesh);
 }
 
 absl::Status RunInfo(const Cli& cli, const Options& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, Read(cli, options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
   Report(cli, options.input, mesh);
   return absl::OkStatus();
 }
 
 // "4,10,15,10" or "4,10,15,10,1,1": m, n1, n2, n3 and, if other than 1, a and b.
-absl::StatusOr<Superformula> ParseSuperformula(const std::string& name, const std::string& text) {
+absl::StatusOr<geometry::Superformula> ParseSuperformula(const std::string& name, const std::string& text) {
   std::vector<double> values;
   for (const std::string& part : SplitCommas({text})) {
     const absl::StatusOr<double> value = ParseNumber(part);
@@ -154,7 +156,7 @@ absl::StatusOr<Superformula> ParseSuperformula(const std::string& name, const st
   if (values.size() != 4 && values.size() != 6)
     return absl::InvalidArgumentError(absl::StrCat(name, ": '", text, "' has ", values.size(),
                                                    " numbers; m,n1,n2,n3 or m,n1,n2,n3,a,b was expected"));
-  Superformula formula;
+  geometry::Superformula formula;
   formula.m = values[0];
   formula.n1 = values[1];
   formula.n2 = values[2];
@@ -164,12 +166,12 @@ absl::StatusOr<Superformula> ParseSuperformula(const std::string& name, const st
 }
 
 absl::Status RunSupershape(const Cli& cli, const Options& options) {
-  SupershapeParameters parameters;
+  geometry::SupershapeParameters parameters;
   if (!options.name.empty()) {
     if (!options.longitude.empty() || !options.latitude.empty())
       return absl::InvalidArgumentError(
           "--longitude and --latitude make a shape of your own; leave NAME out");
-    TOUCHSTONE_ASSIGN_OR_RETURN(parameters, NamedSupershape(options.name));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parameters, geometry::NamedSupershape(options.name));
   } else if (options.longitude.empty() || options.latitude.empty()) {
     return absl::InvalidArgumentError(
         "which shape? Give NAME (lat00, lat05, lat10, lat15, lat20), or --longitude and --latitude");
@@ -178,7 +180,8 @@ absl::Status RunSupershape(const Cli& cli, const Options& options) {
     TOUCHSTONE_ASSIGN_OR_RETURN(parameters.latitude, ParseSuperformula("--latitude", options.latitude));
   }
   if (options.width_mm) parameters.width_m = ToSi(Unit::kMillimetre, *options.width_mm);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const TriangleMesh mesh, MakeSupershape(parameters, options.triangles));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh,
+                              geometry::MakeSupershape(parameters, options.triangles));
   return Write(cli, options, mesh);
 }
 

@@ -20,9 +20,9 @@ struct ModelOptions {
 };
 
 // A model named by file, hash or name. Files are read here, the rest is asked of the source.
-absl::StatusOr<Model> LoadModel(const Cli& cli, const std::string& text) {
+absl::StatusOr<model::Model> LoadModel(const Cli& cli, const std::string& text) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef ref, ParseModelRef(text));
-  if (ref.has_yaml()) return ParseModel(ref.yaml(), text, Catalogue());
+  if (ref.has_yaml()) return model::ParseModel(ref.yaml(), text, effects::Catalogue());
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   v1::GetModelRequest request;
   *request.mutable_model() = ref;
@@ -33,19 +33,19 @@ absl::StatusOr<Model> LoadModel(const Cli& cli, const std::string& text) {
                                             "; a model file is given with its folder or extension: ./", text,
                                             " or ", text, ".yaml"));
   TOUCHSTONE_RETURN_IF_ERROR(model.status());
-  return ParseModel(model->yaml(), text, Catalogue());
+  return model::ParseModel(model->yaml(), text, effects::Catalogue());
 }
 
-Json ModelJson(const Model& model) {
+Json ModelJson(const model::Model& model) {
   return {{"name", model.name},
           {"hash", model.Hash()},
           {"fingers", model.fingers},
           {"spacing_mm", client::LabNumber(Unit::kMillimetre, model.spacing_m)},
-          {"yaml", FormatModel(model)}};
+          {"yaml", model::FormatModel(model)}};
 }
 
-absl::Status Save(const Cli& cli, const Model& model, const ModelOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, FormatModel(model)));
+absl::Status Save(const Cli& cli, const model::Model& model, const ModelOptions& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, model::FormatModel(model)));
   if (options.output.empty()) return absl::OkStatus();
   if (cli.output().json)
     PrintJson(ModelJson(model));
@@ -56,46 +56,49 @@ absl::Status Save(const Cli& cli, const Model& model, const ModelOptions& option
 }
 
 absl::Status RunNew(const Cli& cli, const ModelOptions& options) {
-  if (options.fingers < 1 || options.fingers > kMaxFingers)
+  if (options.fingers < 1 || options.fingers > model::kMaxFingers)
     return absl::InvalidArgumentError(
-        absl::StrCat("--fingers: ", options.fingers, " is out of range; 1 to ", kMaxFingers));
+        absl::StrCat("--fingers: ", options.fingers, " is out of range; 1 to ", model::kMaxFingers));
   if (!(options.spacing_mm > 0))
     return absl::InvalidArgumentError(
         absl::StrCat("--spacing-mm: ", ShortestNumber(options.spacing_mm), " is out of range; above 0"));
-  Model model = NominalModel(options.fingers, ToSi(Unit::kMillimetre, options.spacing_mm));
+  model::Model model = model::NominalModel(options.fingers, ToSi(Unit::kMillimetre, options.spacing_mm));
   model.name = options.name;
   // What is written is what would be read: the file's own checks apply (to the name, for instance).
-  TOUCHSTONE_RETURN_IF_ERROR(ParseModel(FormatModel(model), "the new model", Catalogue()).status());
+  TOUCHSTONE_RETURN_IF_ERROR(
+      model::ParseModel(model::FormatModel(model), "the new model", effects::Catalogue()).status());
   return Save(cli, model, options);
 }
 
 absl::Status RunShow(const Cli& cli, const ModelOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Model model, LoadModel(cli, options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, LoadModel(cli, options.model));
   if (cli.output().json) {
     PrintJson(ModelJson(model));
     return absl::OkStatus();
   }
-  return cli.Print(absl::StrCat("# hash ", model.Hash(), "\n", FormatModel(model)));
+  return cli.Print(absl::StrCat("# hash ", model.Hash(), "\n", model::FormatModel(model)));
 }
 
 absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Model before, LoadModel(cli, options.model));
-  TOUCHSTONE_ASSIGN_OR_RETURN(Model after,
-                              AddEffect(before, options.effect, options.assignments, Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      model::Model after,
+      model::AddEffect(before, options.effect, options.assignments, effects::Catalogue()));
   // A new model under the old one's name would be refused by a server that knows the old one.
   const std::string stem = std::filesystem::path(options.output).stem().string();
   if (!stem.empty() && !IsStandardOutput(options.output)) after.name = stem;
-  TOUCHSTONE_RETURN_IF_ERROR(ParseModel(FormatModel(after), options.output, Catalogue()).status());
+  TOUCHSTONE_RETURN_IF_ERROR(
+      model::ParseModel(model::FormatModel(after), options.output, effects::Catalogue()).status());
   TOUCHSTONE_RETURN_IF_ERROR(Save(cli, after, options));
   if (!cli.output().json)
-    for (const std::string& line : DiffModels(before, after)) cli.Log("  " + line);
+    for (const std::string& line : model::DiffModels(before, after)) cli.Log("  " + line);
   return absl::OkStatus();
 }
 
 absl::Status RunDiff(const Cli& cli, const ModelOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Model before, LoadModel(cli, options.model));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Model after, LoadModel(cli, options.other));
-  const std::vector<std::string> lines = DiffModels(before, after);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model after, LoadModel(cli, options.other));
+  const std::vector<std::string> lines = model::DiffModels(before, after);
   if (cli.output().json) {
     PrintJson({{"before_hash", before.Hash()}, {"after_hash", after.Hash()}, {"differences", lines}});
     return absl::OkStatus();

@@ -192,9 +192,9 @@ absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& o,
   spec.set_vertical_fov_rad(ToSi(Unit::kDegree, o.fov_deg));
   spec.set_depth(o.depth);
   spec.set_mask(o.mask);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const RendererOptions renderer, cli.Renderer());
-  if (renderer.kind == RendererKind::kEgl) spec.set_renderer(v1::RENDERER_KIND_EGL);
-  if (renderer.kind == RendererKind::kCpu) spec.set_renderer(v1::RENDERER_KIND_CPU);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const image::RendererOptions renderer, cli.Renderer());
+  if (renderer.kind == image::RendererKind::kEgl) spec.set_renderer(v1::RENDERER_KIND_EGL);
+  if (renderer.kind == image::RendererKind::kCpu) spec.set_renderer(v1::RENDERER_KIND_CPU);
   return spec;
 }
 

@@ -27,7 +27,7 @@ constexpr int kMaxTouches = 10000;
 using Options = CalibrateOptions;
 
 struct FlatTouches {
-  std::vector<FlatTouch> touches;
+  std::vector<gateway::calibration::FlatTouch> touches;
   double spacing_m = 0;
 };
 
@@ -77,7 +77,7 @@ absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const Options& options) {
 // Those of a recorded session that came straight onto a face.
 absl::StatusOr<FlatTouches> RecordedFlat(const Options& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.from));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
                               FindSession(*journal, options.from, options.motion.session));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> recorded,
                               TouchesOf(*journal, session.name));
@@ -106,12 +106,13 @@ absl::Status RunFlat(const Cli& cli, const Options& options) {
     TOUCHSTONE_ASSIGN_OR_RETURN(flat, RecordedFlat(options));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      const FlatCalibration fit,
-      CalibrateFlat(flat.touches,
-                    options.spacing_mm > 0 ? options.spacing_mm / kMillimetresPerMetre : flat.spacing_m));
-  Model base = NominalModel(fit.fingers, fit.spacing_m);
+      const gateway::calibration::FlatCalibration fit,
+      gateway::calibration::CalibrateFlat(
+          flat.touches, options.spacing_mm > 0 ? options.spacing_mm / kMillimetresPerMetre : flat.spacing_m));
+  model::Model base = model::NominalModel(fit.fingers, fit.spacing_m);
   base.name = client::SessionNameOf(options.output);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string model, CalibratedModelFile(base, fit, Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string model,
+                              gateway::calibration::CalibratedModelFile(base, fit, effects::Catalogue()));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, model));
   if (cli.output().json) {
     Json offset_mm = Json::array(), error_mm = Json::array();
@@ -145,7 +146,8 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
     return absl::InvalidArgumentError("--calibration is missing: the file that the gateway runs with now");
   if (options.poses < 4 || options.poses > 100)
     return absl::InvalidArgumentError(absl::StrCat("--poses: ", options.poses, " is out of range; 4 to 100"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(Calibration calibration, ReadCalibration(options.calibration));
+  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::calibration::Calibration calibration,
+                              gateway::calibration::ReadCalibration(options.calibration));
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   cli.Log(
       "Fix a sharp point in the rig's reach. Guide the tool by hand (free drive) so that the middle finger's "
@@ -159,13 +161,14 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
       return absl::UnavailableError("the arm is not connected, so it is unknown where the tool is");
     base_from_flange.push_back(PoseOf(state.arm().base_from_tip()) * calibration.flange_from_tip.inverse());
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ToolCalibration fit, CalibrateTool(base_from_flange));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::calibration::ToolCalibration fit,
+                              gateway::calibration::CalibrateTool(base_from_flange));
   const Eigen::Vector3d before_m = calibration.flange_from_tip.translation();
   calibration.flange_from_tip.translation() = fit.flange_from_tip_m;
   calibration.notes["date"] = Today();
   calibration.notes["how"] = absl::StrCat("tip from a pivot in ", options.poses, " poses");
   calibration.notes["rms_mm tip"] = Rounded(fit.rms_m * kMillimetresPerMetre);
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, FormatCalibration(calibration)));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, gateway::calibration::FormatCalibration(calibration)));
   if (cli.output().json) {
     const Eigen::Vector3d mm = fit.flange_from_tip_m * kMillimetresPerMetre,
                           error_mm = fit.flange_from_tip_std_error_m * kMillimetresPerMetre;
@@ -209,7 +212,7 @@ std::string Today() {
 Eigen::Isometry3d PoseOf(const v1::BasePose& pose) {
   const Eigen::Vector3d rotation(pose.rotation_rad().x(), pose.rotation_rad().y(), pose.rotation_rad().z());
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-  result.linear() = RotationFromVector(rotation);
+  result.linear() = geometry::RotationFromVector(rotation);
   result.translation() = Eigen::Vector3d(pose.position_m().x(), pose.position_m().y(), pose.position_m().z());
   return result;
 }

@@ -28,18 +28,18 @@ constexpr size_t kMaxLines = 5;
 constexpr size_t kMinTouches = 6;
 constexpr uint64_t kTriangles = 20000;
 
-absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const CalibrateOptions& options) {
-  TriangleMesh mesh;
+absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const CalibrateOptions& options) {
+  geometry::TriangleMesh mesh;
   if (!options.surface.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(mesh, ReadMeshFile(options.surface));
+    TOUCHSTONE_ASSIGN_OR_RETURN(mesh, geometry::ReadMeshFile(options.surface));
   } else {
-    const absl::StatusOr<SupershapeParameters> shape = NamedSupershape(options.object);
+    const absl::StatusOr<geometry::SupershapeParameters> shape = geometry::NamedSupershape(options.object);
     if (!shape.ok())
       return absl::InvalidArgumentError(absl::StrCat("--surface is missing: ", options.object,
                                                      " is no built-in shape, so its mesh file is needed"));
-    TOUCHSTONE_ASSIGN_OR_RETURN(mesh, MakeSupershape(*shape, kTriangles));
+    TOUCHSTONE_ASSIGN_OR_RETURN(mesh, geometry::MakeSupershape(*shape, kTriangles));
   }
-  return Surface::Create(options.object, std::move(mesh));
+  return geometry::Surface::Create(options.object, std::move(mesh));
 }
 
 // The distance from a point within the box, along the direction, to where it leaves the box. Metres.
@@ -68,9 +68,9 @@ v1::CommandedTouch TouchOf(int k, const Eigen::Vector3d& low, const Eigen::Vecto
       (low + high) / 2 +
       Eigen::Vector3d(kSpread * half.x() * round.x(), kSpread * half.y() * round.y(), kHeight * half.z());
   v1::CommandedTouch touch;
-  *touch.mutable_target_m() = ToProto(target);
-  *touch.mutable_approach() = ToProto(approach);
-  *touch.mutable_lateral() = ToProto(lateral);
+  *touch.mutable_target_m() = service::ToProto(target);
+  *touch.mutable_approach() = service::ToProto(approach);
+  *touch.mutable_lateral() = service::ToProto(lateral);
   double exit_m = 0;
   for (const double reach_m : {-outer_finger_m, 0.0, outer_finger_m})
     exit_m = std::max(exit_m, DistanceToExit(target + reach_m * lateral, -approach, low, high));
@@ -89,8 +89,9 @@ absl::StatusOr<std::vector<PlannedRow>> PlanTouches(const Cli& cli, const Calibr
     PlannedRow row;
     row.touch.object = options.object;
     row.touch.touch = k;
-    row.touch.commanded = TouchOf(k, FromProto(object.bounds_min_m()), FromProto(object.bounds_max_m()),
-                                  outer_finger_m, options.speed_mm_s / kMillimetresPerMetre);
+    row.touch.commanded =
+        TouchOf(k, service::FromProto(object.bounds_min_m()), service::FromProto(object.bounds_max_m()),
+                outer_finger_m, options.speed_mm_s / kMillimetresPerMetre);
     row.id = client::NewTouchId(k);
     all.push_back(rows.size());
     rows.push_back(std::move(row));
@@ -108,7 +109,7 @@ bool CanBeMade(const PlannedRow& row) {
 
 struct MadeTouches {
   int touches = 0;
-  std::vector<RegistrationContact> contacts;
+  std::vector<gateway::calibration::RegistrationContact> contacts;
 };
 
 absl::StatusOr<MadeTouches> MakeTouches(const Cli& cli, const CalibrateOptions& options,
@@ -147,8 +148,9 @@ absl::StatusOr<MadeTouches> MakeTouches(const Cli& cli, const CalibrateOptions& 
 }
 
 // What the registration found, for people and as JSON; `before` is where the object was assumed to lie.
-void ReportRegistration(const Cli& cli, const CalibrateOptions& options, const ObjectRegistration& fit,
-                        const Eigen::Isometry3d& before, int touches) {
+void ReportRegistration(const Cli& cli, const CalibrateOptions& options,
+                        const gateway::calibration::ObjectRegistration& fit, const Eigen::Isometry3d& before,
+                        int touches) {
   const Eigen::Vector3d moved_m = fit.base_from_object.translation() - before.translation();
   const double turned_rad =
       Eigen::AngleAxisd(Eigen::Matrix3d(fit.base_from_object.linear() * before.linear().transpose())).angle();
@@ -183,7 +185,8 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
     return absl::InvalidArgumentError("OBJECT is missing: what lies on the fixture?");
   if (options.calibration.empty())
     return absl::InvalidArgumentError("--calibration is missing: the file that the gateway runs with now");
-  TOUCHSTONE_ASSIGN_OR_RETURN(Calibration calibration, ReadCalibration(options.calibration));
+  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::calibration::Calibration calibration,
+                              gateway::calibration::ReadCalibration(options.calibration));
   const auto start = calibration.base_from_object.find(options.object);
   if (start == calibration.base_from_object.end())
     return absl::InvalidArgumentError(
@@ -210,13 +213,14 @@ absl::Status RunCalibrateObject(const Cli& cli, const CalibrateOptions& options)
                                                       " are needed, so nothing was moved"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const MadeTouches made, MakeTouches(cli, options, rig, state, rows, spacing_m));
   const Eigen::Isometry3d before = start->second;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ObjectRegistration fit, RegisterObject(*surface, made.contacts, before));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::calibration::ObjectRegistration fit,
+                              gateway::calibration::RegisterObject(*surface, made.contacts, before));
 
   calibration.base_from_object[options.object] = fit.base_from_object;
   calibration.notes["date"] = Today();
   calibration.notes["how"] = absl::StrCat(options.object, " from ", made.touches, " touches");
   calibration.notes["rms_mm " + options.object] = Rounded(fit.rms_m * kMillimetresPerMetre);
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, FormatCalibration(calibration)));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, gateway::calibration::FormatCalibration(calibration)));
   ReportRegistration(cli, options, fit, before, made.touches);
   return absl::OkStatus();
 }

@@ -53,11 +53,11 @@ v1::View ViewOf(const Eigen::Vector3d& centre, double distance_m, const Eigen::V
   const Eigen::Vector3d round = std::cos(azimuth_rad) * u + std::sin(azimuth_rad) * v;
   v1::View view;
   v1::CameraPose* camera = view.mutable_camera();
-  *camera->mutable_eye_m() = ToProto(
+  *camera->mutable_eye_m() = service::ToProto(
       Eigen::Vector3d(centre + distance_m * (std::cos(polar_rad) * top + std::sin(polar_rad) * round)));
-  *camera->mutable_at_m() = ToProto(centre);
+  *camera->mutable_at_m() = service::ToProto(centre);
   // From straight above there is no up but the ring's own.
-  *camera->mutable_up() = ToProto(polar_rad > 0 ? top : Eigen::Vector3d(-round));
+  *camera->mutable_up() = service::ToProto(polar_rad > 0 ? top : Eigen::Vector3d(-round));
   return view;
 }
 
@@ -80,7 +80,8 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
     if (known.name() == options.object) object = &known;
   }
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("OBJECT", options.object, names).status());
-  const Eigen::Vector3d low = FromProto(object->bounds_min_m()), high = FromProto(object->bounds_max_m());
+  const Eigen::Vector3d low = service::FromProto(object->bounds_min_m()),
+                        high = service::FromProto(object->bounds_max_m());
   const double distance_m =
       kMargin * (high - low).norm() / 2 / std::sin(request.image().vertical_fov_rad() / 2);
 

@@ -84,7 +84,7 @@ double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {
     v1::CommandedTouch command = touch.commanded;
     command.clear_session_time_s();
     command.clear_covariates();
-    Repeats& repeats = poses[{touch.object, CommandBytes(command)}];
+    Repeats& repeats = poses[{touch.object, session::CommandBytes(command)}];
     repeats.sum.resize(touch.time_s.size());
     repeats.sum_of_squares.resize(touch.time_s.size());
     ++repeats.count;

@@ -27,11 +27,11 @@ absl::StatusOr<std::string> JournalPathOf(const std::string& output) {
       "file, with the journal beside it)"));
 }
 
-JournalResult ResultOfMessage(const v1::TouchResult& message) {
-  JournalResult result;
+session::JournalResult ResultOfMessage(const v1::TouchResult& message) {
+  session::JournalResult result;
   const v1::Measured& measured = message.measured();
   for (int i = 0; i < message.contact_time_s_size(); ++i) {
-    JournalFinger finger;
+    session::JournalFinger finger;
     finger.contact_time_s = message.contact_time_s(i);
     finger.base_from_tip.fill(kUnknown);
     if (i < measured.base_from_tip_at_contact_size() &&
@@ -57,8 +57,9 @@ absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& pa
                                                            const v1::RigState& rig) {
   std::unique_ptr<RigRecord> record(new RigRecord);
   record->session_ = session;
-  TOUCHSTONE_ASSIGN_OR_RETURN(record->journal_, Journal::Open(path, Journal::Mode::kCreateOrReadWrite));
-  JournalSession head;
+  TOUCHSTONE_ASSIGN_OR_RETURN(record->journal_,
+                              session::Journal::Open(path, session::Journal::Mode::kCreateOrReadWrite));
+  session::JournalSession head;
   head.name = session;
   head.created_unix_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -71,25 +72,27 @@ absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& pa
 }
 
 absl::StatusOr<bool> RigRecord::Has(const std::string& id, const client::MeasuredTouch& touch) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> found, journal_->Find(session_, id));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<session::JournalTouch> found, journal_->Find(session_, id));
   if (!found.has_value()) return false;
-  if (found->object != touch.object || !SameCommand(found->command, CommandBytes(touch.commanded)))
+  if (found->object != touch.object ||
+      !session::SameCommand(found->command, session::CommandBytes(touch.commanded)))
     return absl::AlreadyExistsError(
         absl::StrCat("session '", session_, "' has another touch ", touch.touch, " of ", touch.object,
                      " than the plan: the plan was changed; choose another --session or output"));
-  return found->stage == TouchStage::kDone;
+  return found->stage == session::TouchStage::kDone;
 }
 
 absl::Status RigRecord::Begin(const std::string& id, const client::MeasuredTouch& touch,
                               const std::string& up_face) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> found, journal_->Find(session_, id));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<session::JournalTouch> found, journal_->Find(session_, id));
   // This process was killed while it waited for the result; the source knows what became of it and answers
   // under the id.
-  if (found.has_value() && (found->stage == TouchStage::kIntent || found->stage == TouchStage::kExecuting))
+  if (found.has_value() &&
+      (found->stage == session::TouchStage::kIntent || found->stage == session::TouchStage::kExecuting))
     TOUCHSTONE_RETURN_IF_ERROR(
         journal_->Failed(session_, id, "the command was interrupted; the source is asked again"));
   TOUCHSTONE_RETURN_IF_ERROR(
-      journal_->Begin(session_, id, touch.object, up_face, CommandBytes(touch.commanded)).status());
+      journal_->Begin(session_, id, touch.object, up_face, session::CommandBytes(touch.commanded)).status());
   return journal_->Executing(session_, id, 0, 0);
 }
 

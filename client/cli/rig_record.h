@@ -33,15 +33,15 @@ class RigRecord {
   // All that are done, in the order in which they were made.
   absl::StatusOr<std::vector<client::MeasuredTouch>> Touches() const;
 
-  Journal& journal() { return *journal_; }
+  session::Journal& journal() { return *journal_; }
 
  private:
-  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<session::Journal> journal_;
   std::string session_;
 };
 
 // A result as the journal keeps it.
-JournalResult ResultOfMessage(const v1::TouchResult& message);
+session::JournalResult ResultOfMessage(const v1::TouchResult& message);
 
 // Checks that the path ends in .db (a journal) or .csv (a measurement file, with the journal beside it) and
 // gives the journal's path: "set.csv" -> "set.db".

@@ -52,7 +52,7 @@ std::string InWords(const v1::Session& session) {
 
 // --- Sessions of a journal file
 
-Json JournalSessionJson(const JournalSession& session) {
+Json JournalSessionJson(const session::JournalSession& session) {
   return {{"name", session.name},
           {"source", session.provenance},
           {"created_unix_s", session.created_unix_s},
@@ -76,15 +76,15 @@ std::string UtcText(double unix_s) {
 
 absl::Status ListJournal(const Cli& cli, const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, journal->Sessions());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions, journal->Sessions());
   if (cli.output().json) {
     Json list = Json::array();
-    for (const JournalSession& session : sessions) list.push_back(JournalSessionJson(session));
+    for (const session::JournalSession& session : sessions) list.push_back(JournalSessionJson(session));
     PrintJson({{"sessions", list}});
     return absl::OkStatus();
   }
   Table table({"SESSION", "TOUCHES", "DONE", "PICTURES", "CREATED", "OBJECTS"});
-  for (const JournalSession& session : sessions)
+  for (const session::JournalSession& session : sessions)
     table.Add({session.name, std::to_string(session.touches), std::to_string(session.done),
                std::to_string(session.images), UtcText(session.created_unix_s),
                absl::StrJoin(session.objects, ", ")});
@@ -93,7 +93,7 @@ absl::Status ListJournal(const Cli& cli, const std::string& path) {
 
 absl::Status ShowJournal(const Cli& cli, const Options& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
                               FindSession(*journal, options.name, options.in_journal));
   if (cli.output().json) {
     PrintJson(JournalSessionJson(session));
@@ -111,7 +111,8 @@ absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {
     return absl::InvalidArgumentError(
         absl::StrCat(options.name, ": which session? touchstone session delete ", options.name,
                      " SESSION (touchstone session list ", options.name, " lists them)"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, Journal::Open(options.name, Journal::Mode::kReadWrite));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal,
+                              session::Journal::Open(options.name, session::Journal::Mode::kReadWrite));
   TOUCHSTONE_RETURN_IF_ERROR(FindSession(*journal, options.name, options.in_journal).status());
   TOUCHSTONE_RETURN_IF_ERROR(journal->DeleteSession(options.in_journal));
   cli.Log(absl::StrCat("deleted ", options.in_journal, " from ", options.name));

@@ -13,9 +13,9 @@ namespace touchstone::cli {
 
 class TestServer {
  public:
-  explicit TestServer(ServerOptions options = {}) {
+  explicit TestServer(service::ServerOptions options = {}) {
     options.listen = "127.0.0.1:0";
-    auto server = Server::Start(std::move(options));
+    auto server = service::Server::Start(std::move(options));
     TOUCHSTONE_CHECK(server.ok());
     server_ = *std::move(server);
   }
@@ -23,7 +23,7 @@ class TestServer {
   std::string address() const { return absl::StrCat("127.0.0.1:", server_->port()); }
 
  private:
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<service::Server> server_;
 };
 
 }  // namespace touchstone::cli

@@ -38,7 +38,7 @@ bool OnlyFingersDiffer(const google::protobuf::RepeatedPtrField<v1::ParameterVal
   });
 }
 
-// One row an effect, and one more for each further parameter.
+// One row per effect, and one more for each further parameter.
 template <typename Effect>
 void AddEffect(const Effect& effect, const std::string& name, double probability, const std::string& change,
                const std::string& note, TextLayout::Style style, std::vector<std::vector<Cell>>* rows) {

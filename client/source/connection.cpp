@@ -40,9 +40,9 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(ConnectionOptions o
   std::unique_ptr<Connection> connection(new Connection);
   connection->options_ = std::move(options);
   if (connection->options_.servers.empty()) {
-    ServerOptions embedded = connection->options_.embedded;
+    service::ServerOptions embedded = connection->options_.embedded;
     embedded.listen.clear();
-    TOUCHSTONE_ASSIGN_OR_RETURN(connection->server_, Server::Start(std::move(embedded)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(connection->server_, service::Server::Start(std::move(embedded)));
     connection->address_ = "this process";
     connection->channel_ = connection->server_->InProcessChannel();
     connection->MakeStubs();

@@ -35,7 +35,7 @@ inline constexpr int kMaxMessageBytes = 256 << 20;
 
 struct ConnectionOptions {
   std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process
-  ServerOptions embedded;            // of the source in this process; `listen` is ignored
+  service::ServerOptions embedded;   // of the source in this process; `listen` is ignored
   double connect_timeout_s = 5;      // for one server
   double wait_s = 0;                 // Open tries again for so long while none answers: one may be starting
   std::function<void(const std::string&)> on_wait;  // called once, with what is waited for; may be null
@@ -86,7 +86,7 @@ class Connection {
   void MakeStubs();
 
   ConnectionOptions options_;
-  std::unique_ptr<Server> server_;  // in this process; outlives the channel
+  std::unique_ptr<service::Server> server_;  // in this process; outlives the channel
   int server_index_ = 0;
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;

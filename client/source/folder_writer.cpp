@@ -45,7 +45,7 @@ class FolderWriter : public ShardWriter {
     std::filesystem::create_directory(part_, error);
     if (error) return FileError(error.value(), part_, "cannot be made");
     TOUCHSTONE_ASSIGN_OR_RETURN(csv_, SyncedFile::Create(part_ + "/touches.csv", Durability::kInFolder));
-    TOUCHSTONE_RETURN_IF_ERROR(csv_->Write(MeasurementHeader(layout_.fingers, {})));
+    TOUCHSTONE_RETURN_IF_ERROR(csv_->Write(session::MeasurementHeader(layout_.fingers, {})));
     const bool contact_times = layout_.FindColumn("contact_time_s") != nullptr;
     for (const FileColumn& column : layout_.columns) {
       std::unique_ptr<SyncedFile> file;

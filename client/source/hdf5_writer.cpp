@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t kChunkBytes = 64 << 10;
 constexpr unsigned kImageDeflateLevel = 1;
 
-using Handle = Hdf5Handle;
+using Handle = session::Hdf5Handle;
 
 hid_t Hdf5Type(v1::DataType type) {
   switch (type) {

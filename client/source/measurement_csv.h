@@ -6,11 +6,11 @@
 
 namespace touchstone::client {
 
-using touchstone::FormatMeasurements;
-using touchstone::MeasuredTouch;
-using touchstone::MeasurementHeader;
-using touchstone::MeasurementRow;
-using touchstone::ParseMeasurements;
-using touchstone::TimeColumnName;
+using touchstone::session::FormatMeasurements;
+using touchstone::session::MeasuredTouch;
+using touchstone::session::MeasurementHeader;
+using touchstone::session::MeasurementRow;
+using touchstone::session::ParseMeasurements;
+using touchstone::session::TimeColumnName;
 
 }  // namespace touchstone::client

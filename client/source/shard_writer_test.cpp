@@ -176,7 +176,7 @@ TEST_F(ShardWriterTest, AFoldersTableIsAMeasurementFile) {
   const DatasetLayout layout = Layout(ShardFormat::kFolder, "folder");
   Write(layout, 7);
   const std::string path = layout.folder + "/shard-000001/";
-  const auto touches = ParseMeasurements(*ReadFile(path + "touches.csv"), "touches.csv");
+  const auto touches = session::ParseMeasurements(*ReadFile(path + "touches.csv"), "touches.csv");
   ASSERT_TRUE(touches.ok()) << touches.status();
   ASSERT_EQ(touches->size(), 10u);
   EXPECT_EQ((*touches)[3].touch, 13u);

@@ -7,7 +7,7 @@
 #include "server/image/encode.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 using Writer = BatchColumns::Writer;
@@ -24,7 +24,7 @@ void PutDescriptor(const Writer& writer, const TouchSampler::Block& block) {
   const double* const times_s = block.batch.reported_time_s.data();
   ForAccepted(block, [&](int touch, uint32_t slot) {
     char* const row = writer.At(slot);
-    ForDescriptor(times_s + touch, size, fingers, [row](int finger, double relative_s) {
+    touch::ForDescriptor(times_s + touch, size, fingers, [row](int finger, double relative_s) {
       const float value_s = static_cast<float>(relative_s);
       std::memcpy(row + finger * sizeof(float), &value_s, sizeof(float));
     });
@@ -39,7 +39,7 @@ void PutContactTime(const Writer& writer, const TouchSampler::Block& block) {
   });
 }
 
-template <std::vector<Eigen::Vector3d> TouchBatch::*kField>
+template <std::vector<Eigen::Vector3d> effects::TouchBatch::*kField>
 void PutFingerVectors(const Writer& writer, const TouchSampler::Block& block) {
   ForAccepted(block, [&](int touch, uint32_t slot) {
     for (int finger = 0; finger < block.batch.fingers(); ++finger)
@@ -47,7 +47,7 @@ void PutFingerVectors(const Writer& writer, const TouchSampler::Block& block) {
   });
 }
 
-template <Eigen::Vector3d TouchPose::*kField>
+template <Eigen::Vector3d touch::TouchPose::*kField>
 void PutPoseVector(const Writer& writer, const TouchSampler::Block& block) {
   ForAccepted(block, [&](int touch, uint32_t slot) { writer.PutVector(slot, 0, block.Pose(touch).*kField); });
 }
@@ -71,13 +71,13 @@ struct NamedPut {
 constexpr NamedPut kTouchColumns[] = {
     {"descriptor_s", PutDescriptor},
     {"contact_time_s", PutContactTime},
-    {"target_m", PutPoseVector<&TouchPose::target_m>},
-    {"approach", PutPoseVector<&TouchPose::approach>},
-    {"lateral", PutPoseVector<&TouchPose::lateral>},
+    {"target_m", PutPoseVector<&touch::TouchPose::target_m>},
+    {"approach", PutPoseVector<&touch::TouchPose::approach>},
+    {"lateral", PutPoseVector<&touch::TouchPose::lateral>},
     {"standoff_m", PutStandoff},
     {"speed_m_s", PutSpeed},
-    {"contact_point_m", PutFingerVectors<&TouchBatch::contact_m>},
-    {"normal", PutFingerVectors<&TouchBatch::normal>},
+    {"contact_point_m", PutFingerVectors<&effects::TouchBatch::contact_m>},
+    {"normal", PutFingerVectors<&effects::TouchBatch::normal>},
 };
 
 }  // namespace
@@ -124,15 +124,15 @@ void BatchColumns::PutTouches(const TouchSampler::Block& block) const {
   for (const auto& [writer, put] : puts_) put(writer, block);
 }
 
-absl::Status BatchColumns::AppendPicture(const Image& picture, const DatasetImage& image,
+absl::Status BatchColumns::AppendPicture(const image::Image& picture, const DatasetImage& image,
                                          DatasetBatch* batch) const {
   for (size_t column = 0; column < columns_.size(); ++column)
-    TOUCHSTONE_RETURN_IF_ERROR(touchstone::AppendPicture(picture, image, columns_[column].name,
-                                                         &batch->data[column], &batch->offsets[column]));
+    TOUCHSTONE_RETURN_IF_ERROR(touchstone::dataset::AppendPicture(
+        picture, image, columns_[column].name, &batch->data[column], &batch->offsets[column]));
   return absl::OkStatus();
 }
 
-absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
+absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image, const std::string& column,
                            std::string* data, std::vector<uint64_t>* offsets) {
   const auto append = [data](const auto& values) {
     data->append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
@@ -148,8 +148,8 @@ absl::Status AppendPicture(const Image& picture, const DatasetImage& image, cons
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const std::string file,
         image.encoding == ImageEncoding::kPng
-            ? EncodePng(pixels, picture.width, picture.height, picture.channels)
-            : EncodeJpeg(pixels, picture.width, picture.height, picture.channels, image.jpeg_quality));
+            ? image::EncodePng(pixels, picture.width, picture.height, picture.channels)
+            : image::EncodeJpeg(pixels, picture.width, picture.height, picture.channels, image.jpeg_quality));
     if (offsets->empty()) offsets->push_back(0);
     data->append(file);
     offsets->push_back(data->size());
@@ -157,4 +157,4 @@ absl::Status AppendPicture(const Image& picture, const DatasetImage& image, cons
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

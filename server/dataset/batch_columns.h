@@ -13,7 +13,7 @@
 #include "server/dataset/sampler.h"
 #include "server/dataset/specification.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 // One batch: samples start_index .. start_index + rows - 1.
 struct DatasetBatch {
@@ -33,7 +33,8 @@ class BatchColumns {
   void PutTouches(const TouchSampler::Block& block) const;
 
   // What a picture gives to the columns of images: called sample after sample.
-  absl::Status AppendPicture(const Image& picture, const DatasetImage& image, DatasetBatch* batch) const;
+  absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image,
+                             DatasetBatch* batch) const;
 
   // Writes numbers of one column at the row of a sample, whichever of the batches it falls into.
   class Writer {
@@ -63,7 +64,7 @@ class BatchColumns {
 
 // Appends what a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
 // values, or an encoded file and the offset of its end, the first one after a 0.
-absl::Status AppendPicture(const Image& picture, const DatasetImage& image, const std::string& column,
+absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image, const std::string& column,
                            std::string* data, std::vector<uint64_t>* offsets);
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

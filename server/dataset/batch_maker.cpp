@@ -1,7 +1,7 @@
 #include "server/base/status.h"
 #include "server/dataset/stream.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 BatchMaker::BatchMaker(std::shared_ptr<const DatasetSpecification> specification)
     : specification_(std::move(specification)),
@@ -17,7 +17,7 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
     for (uint32_t row = 0; row < batch.rows; ++row) indices.push_back(batch.start_index + row);
 
   const BatchColumns columns(columns_, specification_->objects.size(), batches);
-  std::vector<TouchPose> poses(specification_->columns.image ? indices.size() : 0);
+  std::vector<touch::TouchPose> poses(specification_->columns.image ? indices.size() : 0);
   TOUCHSTONE_RETURN_IF_ERROR(
       sampler_.Sample(indices, cancelled, workspace, [&](const TouchSampler::Block& block) {
         columns.PutTouches(block);
@@ -30,23 +30,25 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
 }
 
 absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const BatchColumns& columns,
-                                    absl::Span<const TouchPose> poses,
+                                    absl::Span<const touch::TouchPose> poses,
                                     const std::atomic<bool>& cancelled) const {
   const DatasetImage& image = specification_->image;
   size_t slot = 0;
   for (DatasetBatch& batch : batches) {
     for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
-      const TouchPose& pose = poses[slot];
-      Camera camera = CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
+      const touch::TouchPose& pose = poses[slot];
+      image::Camera camera =
+          image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
       camera.vertical_fov_rad = image.vertical_fov_rad;
       const auto& object =
           specification_->objects[(batch.start_index + row) % specification_->objects.size()];
-      TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture, image.renderer->Render(object, camera, image.options));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
+                                  image.renderer->Render(object, camera, image.options));
       TOUCHSTONE_RETURN_IF_ERROR(columns.AppendPicture(picture, image, &batch));
     }
   }
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

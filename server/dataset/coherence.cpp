@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 constexpr int kBitsPerDimension = 8;
@@ -46,11 +46,11 @@ inline uint64_t CoherentOrder::Range::Quantise(double value) const {
   return static_cast<uint32_t>(static_cast<int32_t>(std::min(std::max(scaled, 0.0), 255.0)));
 }
 
-void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
+void CoherentOrder::Begin(absl::Span<const touch::TouchPose> sample) {
   keys_.clear();
   for (int axis = 0; axis < 3; ++axis) {
     double start_min = INFINITY, start_max = -INFINITY, target_min = INFINITY, target_max = -INFINITY;
-    for (const TouchPose& pose : sample) {
+    for (const touch::TouchPose& pose : sample) {
       const double start = pose.target_m[axis] - pose.approach[axis] * pose.standoff_m;
       start_min = std::min(start_min, start), start_max = std::max(start_max, start);
       target_min = std::min(target_min, pose.target_m[axis]);
@@ -61,12 +61,12 @@ void CoherentOrder::Begin(absl::Span<const TouchPose> sample) {
   }
 }
 
-void CoherentOrder::Add(absl::Span<const TouchPose> poses) {
+void CoherentOrder::Add(absl::Span<const touch::TouchPose> poses) {
   const Range lateral = {-1, 127.999};
   const size_t before = keys_.size();
   keys_.resize(before + poses.size());
   for (size_t k = 0; k < poses.size(); ++k) {
-    const TouchPose& pose = poses[k];
+    const touch::TouchPose& pose = poses[k];
     uint64_t key =
         Spread(lateral.Quantise(pose.lateral.x())) << 1 | Spread(lateral.Quantise(pose.lateral.z()));
     for (int axis = 0; axis < 3; ++axis) {
@@ -106,4 +106,4 @@ absl::Span<const uint32_t> CoherentOrder::Sort() {
   return order_;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

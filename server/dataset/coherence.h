@@ -9,14 +9,14 @@
 
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 class CoherentOrder {
  public:
   // Forgets all poses. `sample` are some of those to come: they set the scale of the keys.
-  void Begin(absl::Span<const TouchPose> sample);
+  void Begin(absl::Span<const touch::TouchPose> sample);
   // Appends poses, in the order of their numbers 0, 1, 2, ...
-  void Add(absl::Span<const TouchPose> poses);
+  void Add(absl::Span<const touch::TouchPose> poses);
   // The numbers in the order in which to simulate. Equal poses keep their order. Valid until Begin.
   absl::Span<const uint32_t> Sort();
 
@@ -30,4 +30,4 @@ class CoherentOrder {
   std::vector<uint32_t> order_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

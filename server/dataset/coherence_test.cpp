@@ -7,22 +7,22 @@
 
 #include "server/touch/plan.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
-std::vector<TouchPose> Poses(int count) {
-  Bounds bounds;
+std::vector<touch::TouchPose> Poses(int count) {
+  geometry::Bounds bounds;
   bounds.min_m = {-0.075, -0.075, -0.07};
   bounds.max_m = {0.075, 0.075, 0.07};
-  Plan plan;
+  touch::Plan plan;
   std::vector<uint64_t> numbers(count);
   std::iota(numbers.begin(), numbers.end(), 0);
-  std::vector<TouchPose> poses(count);
-  MakePoseGenerator(plan, bounds, 3)->Draw(numbers, 0, poses.data());
+  std::vector<touch::TouchPose> poses(count);
+  touch::MakePoseGenerator(plan, bounds, 3)->Draw(numbers, 0, poses.data());
   return poses;
 }
 
-std::vector<uint32_t> Order(const std::vector<TouchPose>& poses) {
+std::vector<uint32_t> Order(const std::vector<touch::TouchPose>& poses) {
   CoherentOrder order;
   order.Begin(absl::MakeConstSpan(poses).subspan(0, 100));
   order.Add(poses);
@@ -32,7 +32,7 @@ std::vector<uint32_t> Order(const std::vector<TouchPose>& poses) {
 
 TEST(CoherentOrder, IsAPermutation) {
   for (int count : {0, 1, 31, 32, 5000}) {
-    const std::vector<TouchPose> poses = Poses(count);
+    const std::vector<touch::TouchPose> poses = Poses(count);
     std::vector<uint32_t> order = Order(poses);
     std::sort(order.begin(), order.end());
     for (int k = 0; k < count; ++k) ASSERT_EQ(order[k], static_cast<uint32_t>(k));
@@ -40,7 +40,7 @@ TEST(CoherentOrder, IsAPermutation) {
 }
 
 TEST(CoherentOrder, BringsNeighboursTogether) {
-  const std::vector<TouchPose> poses = Poses(20000);
+  const std::vector<touch::TouchPose> poses = Poses(20000);
   std::vector<uint32_t> order = Order(poses);
   double before = 0, after = 0;
   for (size_t k = 1; k < poses.size(); ++k) {
@@ -51,10 +51,10 @@ TEST(CoherentOrder, BringsNeighboursTogether) {
 }
 
 TEST(CoherentOrder, TakesEqualPosesInTheirOrder) {
-  const std::vector<TouchPose> poses(100);
+  const std::vector<touch::TouchPose> poses(100);
   std::vector<uint32_t> order = Order(poses);
   for (uint32_t k = 0; k < 100; ++k) EXPECT_EQ(order[k], k);
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -9,7 +9,7 @@
 #include "server/geometry/mesh_file.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 class EverydayModel : public testing::TestWithParam<const char*> {};
@@ -17,23 +17,23 @@ class EverydayModel : public testing::TestWithParam<const char*> {};
 TEST_P(EverydayModel, IsReadScaledAndTouched) {
   const std::string path = std::string(TOUCHSTONE_SHARED_DATA) + "/psb10/" + GetParam() + ".off";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here";
-  MeshImport import;
+  geometry::MeshImport import;
   import.fit_mm = 150;
-  auto mesh = ReadMeshFile(path, import);
+  auto mesh = geometry::ReadMeshFile(path, import);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
-  auto surface = Surface::Create(GetParam(), *std::move(mesh));
+  auto surface = geometry::Surface::Create(GetParam(), *std::move(mesh));
   ASSERT_TRUE(surface.ok()) << surface.status();
   EXPECT_NEAR(((*surface)->bounds().max_m - (*surface)->bounds().min_m).maxCoeff(), 0.150, 1e-6);
 
   // Narrow fingers, since some of the models are slim.
   DatasetSpecification specification = SmallDataset(500, "");
   specification.objects = {*surface};
-  specification.model = std::make_shared<const Model>(NominalModel(3, 0.008));
+  specification.model = std::make_shared<const model::Model>(model::NominalModel(3, 0.008));
   const std::vector<std::string> columns = Columns(specification, {}, 2);
   std::vector<float> contact_m(columns[9].size() / sizeof(float));
   std::memcpy(contact_m.data(), columns[9].data(), columns[9].size());
   ASSERT_EQ(contact_m.size(), 500u * 9u);
-  const Bounds& bounds = (*surface)->bounds();
+  const geometry::Bounds& bounds = (*surface)->bounds();
   for (size_t k = 0; k < contact_m.size(); ++k) {
     EXPECT_GE(contact_m[k], bounds.min_m[k % 3] - 1e-6);
     EXPECT_LE(contact_m[k], bounds.max_m[k % 3] + 1e-6);
@@ -46,4 +46,4 @@ INSTANTIATE_TEST_SUITE_P(Psb, EverydayModel,
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -11,7 +11,7 @@
 #include "server/base/units.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 // Touches that go through the stages together: their arrays stay in the second-level cache.
@@ -24,13 +24,13 @@ constexpr uint32_t kProbeAfter = 16;
 TouchSampler::TouchSampler(const DatasetSpecification& specification)
     : specification_(specification), simulator_(specification.model) {
   for (const auto& object : specification.objects)
-    generators_.push_back(MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+    generators_.push_back(touch::MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
   plan_ends_ = generators_[0]->Count() != 0;
-  const std::vector<CommandedTouch>& list = specification.plan.list;
-  if (specification.plan.kind == Plan::Kind::kList)
+  const std::vector<touch::CommandedTouch>& list = specification.plan.list;
+  if (specification.plan.kind == touch::Plan::Kind::kList)
     for (const std::string& name : simulator_.needed_covariates())
       if (std::all_of(list.begin(), list.end(),
-                      [&](const CommandedTouch& touch) { return touch.covariates.count(name) != 0; }))
+                      [&](const touch::CommandedTouch& touch) { return touch.covariates.count(name) != 0; }))
         list_covariates_.push_back(name);
 }
 
@@ -135,7 +135,7 @@ void TouchSampler::DrawBlock(size_t object, absl::Span<const uint64_t> indices, 
 absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> indices, Until until,
                                     absl::Span<const double> previous_press_m, Workspace* workspace) const {
   FillBatch(object, indices, previous_press_m, workspace);
-  TouchBatch& batch = workspace->batch;
+  effects::TouchBatch& batch = workspace->batch;
   TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
   workspace->accepted.assign(batch.size(), 1);
   if (!generators_[object]->Accepts(false))
@@ -148,19 +148,19 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
 
 void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
                              absl::Span<const double> previous_press_m, Workspace* workspace) const {
-  const Plan& plan = specification_.plan;
+  const touch::Plan& plan = specification_.plan;
   const std::vector<uint32_t>& block = workspace->block_slots;
-  TouchBatch& batch = workspace->batch;
+  effects::TouchBatch& batch = workspace->batch;
   simulator_.Prepare(static_cast<int>(block.size()), &batch);
   batch.surface = specification_.objects[object];
   batch.seed = specification_.seed;
   for (size_t k = 0; k < block.size(); ++k) {
-    const TouchPose& pose = workspace->poses[k];
+    const touch::TouchPose& pose = workspace->poses[k];
     const uint32_t slot = block[k];
-    if (plan.kind == Plan::Kind::kList)
-      SetTouch(plan.list[NumberOf(indices[slot]) % plan.list.size()], indices[slot], k, &batch);
+    if (plan.kind == touch::Plan::Kind::kList)
+      touch::SetTouch(plan.list[NumberOf(indices[slot]) % plan.list.size()], indices[slot], k, &batch);
     else
-      SetTouch(pose, plan.speed_m_s, plan.touch_interval_s * indices[slot], indices[slot], k, &batch);
+      touch::SetTouch(pose, plan.speed_m_s, plan.touch_interval_s * indices[slot], indices[slot], k, &batch);
   }
   // A covariate that some touch of the list lacks stays out: the simulation says that it is missing.
   for (const std::string& name : list_covariates_) {
@@ -176,9 +176,9 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
 }
 
 absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
-  const Surface& surface = *specification_.objects[object];
+  const geometry::Surface& surface = *specification_.objects[object];
   const Eigen::Vector3d size_mm = (surface.bounds().max_m - surface.bounds().min_m) / kMetresPerMillimetre;
-  const Model& model = *specification_.model;
+  const model::Model& model = *specification_.model;
   return absl::FailedPreconditionError(absl::StrCat(
       "object '", surface.name(), "', sample ", index, ": in ", specification_.max_draws,
       " draws no touch met it with all ", model.fingers, " fingers; they span ",
@@ -191,15 +191,15 @@ absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
 // All further draws of one index at once.
 absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt,
                                       Workspace* workspace) const {
-  TouchBatch batch;
-  TouchWorkspace touch_workspace;
+  effects::TouchBatch batch;
+  touch::TouchWorkspace touch_workspace;
   const uint64_t number = NumberOf(index);
   for (uint32_t attempt = first_attempt; attempt < specification_.max_draws; ++attempt) {
-    TouchPose pose;
+    touch::TouchPose pose;
     generators_[object]->Draw({&number, 1}, attempt, &pose);
     simulator_.Prepare(1, &batch);
     batch.surface = specification_.objects[object];
-    SetTouch(pose, specification_.plan.speed_m_s, 0, 0, 0, &batch);
+    touch::SetTouch(pose, specification_.plan.speed_m_s, 0, 0, 0, &batch);
     TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &touch_workspace));
     bool complete = true;
     for (double travel_m : batch.travel_m) complete &= !std::isnan(travel_m);
@@ -208,4 +208,4 @@ absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t fi
   return Hopeless(object, index);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

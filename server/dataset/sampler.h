@@ -15,7 +15,7 @@
 #include "server/dataset/specification.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 class TouchSampler {
  public:
@@ -28,23 +28,23 @@ class TouchSampler {
     std::vector<uint32_t> slots, missed;  // samples that are still to be accepted
     std::vector<uint32_t> block_slots;    // the block in hand: its samples,
     std::vector<uint64_t> numbers;        // their numbers in the plan
-    std::vector<TouchPose> poses;         // and poses as commanded
+    std::vector<touch::TouchPose> poses;  // and poses as commanded
     std::vector<uint64_t> previous_indices;
     std::vector<uint8_t> accepted;
     std::vector<double> previous_press_m;
     CoherentOrder order;
-    TouchBatch batch;
-    TouchWorkspace touch;
+    effects::TouchBatch batch;
+    touch::TouchWorkspace touch;
   };
 
   // A simulated block. Touch t of the batch is sample indices[slots[t]] if accepted[t]; else it missed and is
   // drawn again. Pose(t) is as commanded; effects may have changed the batch's own vectors.
   struct Block {
-    const TouchBatch& batch;
+    const effects::TouchBatch& batch;
     absl::Span<const uint32_t> slots;
     absl::Span<const uint8_t> accepted;
-    absl::Span<const TouchPose> poses;
-    const TouchPose& Pose(int touch) const { return poses[touch]; }
+    absl::Span<const touch::TouchPose> poses;
+    const touch::TouchPose& Pose(int touch) const { return poses[touch]; }
   };
   // Called for every block, in no particular order.
   using Sink = std::function<void(const Block& block)>;
@@ -71,10 +71,10 @@ class TouchSampler {
   uint64_t NumberOf(uint64_t index) const;
 
   const DatasetSpecification& specification_;
-  const TouchSimulator simulator_;
-  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one per object
+  const touch::TouchSimulator simulator_;
+  std::vector<std::unique_ptr<touch::PoseGenerator>> generators_;  // one per object
   bool plan_ends_ = false;
   std::vector<std::string> list_covariates_;  // that the model needs and every touch of a list carries
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -6,7 +6,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 struct ColumnName {
@@ -25,10 +25,10 @@ constexpr ColumnName kColumnNames[] = {
 
 absl::Status ValidateImage(const DatasetImage& image, ImageOrigin origin) {
   // Any camera will do: sizes and the field of view are what is checked here.
-  Camera camera;
+  image::Camera camera;
   camera.eye_m = {1, 0, 0};
   camera.vertical_fov_rad = image.vertical_fov_rad;
-  TOUCHSTONE_RETURN_IF_ERROR(ValidateImageRequest(camera, image.options));
+  TOUCHSTONE_RETURN_IF_ERROR(image::ValidateImageRequest(camera, image.options));
   if (image.jpeg_quality < 1 || image.jpeg_quality > 100)
     return absl::InvalidArgumentError(
         absl::StrCat("image.jpeg_quality = ", image.jpeg_quality, ": must be from 1 to 100"));
@@ -66,14 +66,14 @@ absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin im
   if (specification->objects.size() > 10000)
     return absl::InvalidArgumentError(
         absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
-  TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&specification->plan));
+  TOUCHSTONE_RETURN_IF_ERROR(touch::ValidatePlan(&specification->plan));
   if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image, images));
   if (specification->max_draws < 1 || specification->max_draws > 1'000'000)
     return absl::InvalidArgumentError(
         absl::StrCat("max_draws = ", specification->max_draws, ": must be from 1 to 1000000"));
 
   const auto generator =
-      MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);
+      touch::MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);
   const uint64_t available = generator->Count() * specification->objects.size();
   if (specification->samples == 0) specification->samples = available;
   if (specification->samples == 0)
@@ -132,7 +132,7 @@ std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage
   }
   if (choice.image) {
     const uint32_t width = image.options.width, height = image.options.height;
-    const uint32_t channels = image.options.format == PixelFormat::kRgb ? 3 : 1;
+    const uint32_t channels = image.options.format == image::PixelFormat::kRgb ? 3 : 1;
     columns.push_back({"image",
                        image.encoding == ImageEncoding::kRaw ? ColumnType::kUint8 : ColumnType::kBytes,
                        {height, width, channels}});
@@ -142,4 +142,4 @@ std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage
   return columns;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -14,18 +14,18 @@
 #include "server/model/model.h"
 #include "server/touch/plan.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 enum class ImageEncoding { kRaw, kPng, kJpeg };
 
 // How the column "image" is made.
 struct DatasetImage {
-  ImageOptions options;
+  image::ImageOptions options;
   ImageEncoding encoding = ImageEncoding::kRaw;
   int jpeg_quality = 90;
   double vertical_fov_rad = 0.78539816339744831;
-  RendererKind renderer_kind = RendererKind::kAuto;  // asked for
-  std::shared_ptr<Renderer> renderer;                // that renders; null where a camera takes the images
+  image::RendererKind renderer_kind = image::RendererKind::kAuto;  // asked for
+  std::shared_ptr<image::Renderer> renderer;  // that renders; null where a camera takes the images
 };
 
 // Which groups of columns a batch carries.
@@ -43,9 +43,9 @@ struct ColumnChoice {
 };
 
 struct DatasetSpecification {
-  std::vector<std::shared_ptr<const Surface>> objects;  // sample i shows objects[i mod count]
-  Plan plan;
-  std::shared_ptr<const Model> model;
+  std::vector<std::shared_ptr<const geometry::Surface>> objects;  // sample i shows objects[i mod count]
+  touch::Plan plan;
+  std::shared_ptr<const model::Model> model;
   uint64_t seed = 0;
   uint64_t samples = 0;  // 0 with a plan that ends: all of its touches, for every object
   ColumnChoice columns;
@@ -81,4 +81,4 @@ struct ColumnInfo {
 std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int fingers);
 std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification);  // with the model's fingers
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -4,7 +4,7 @@
 
 #include "server/dataset/test_support.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 using testing::HasSubstr;
@@ -23,14 +23,14 @@ TEST(DatasetSpecification, RefusesWhatCannotBeDrawnByName) {
   EXPECT_THAT(Refusal(blind), HasSubstr("no renderer"));
   blind.image.options.width = 20000;
   EXPECT_THAT(Refusal(blind), HasSubstr("20000"));
-  many.plan.kind = Plan::Kind::kFaces;
+  many.plan.kind = touch::Plan::Kind::kFaces;
   many.samples = 577;
   EXPECT_THAT(Refusal(many), HasSubstr("at most 576"));
 }
 
 TEST(DatasetSpecification, APlanThatEndsTakesAllOfItsTouchesForEveryObject) {
   DatasetSpecification specification = SmallDataset(0);
-  specification.plan.kind = Plan::Kind::kFaces;
+  specification.plan.kind = touch::Plan::Kind::kFaces;
   ASSERT_TRUE(ValidateDataset(&specification).ok());
   EXPECT_EQ(specification.samples, 3u * 192u);
 }
@@ -49,4 +49,4 @@ TEST(ColumnsOf, EveryNumberColumnTellsItsUnitAndShape) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::dataset

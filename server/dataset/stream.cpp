@@ -6,7 +6,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 // Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more
@@ -135,4 +135,4 @@ absl::StatusOr<std::optional<DatasetBatch>> DatasetStream::Next(const std::funct
   return std::optional<DatasetBatch>(std::move(chunk.batches[chunk.taken++]));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -18,7 +18,7 @@
 #include "server/dataset/sampler.h"
 #include "server/dataset/specification.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
 // Which samples, and cut how.
 struct DatasetPart {
@@ -42,7 +42,7 @@ class BatchMaker {
 
  private:
   absl::Status MakeImages(absl::Span<DatasetBatch> batches, const BatchColumns& columns,
-                          absl::Span<const TouchPose> poses, const std::atomic<bool>& cancelled) const;
+                          absl::Span<const touch::TouchPose> poses, const std::atomic<bool>& cancelled) const;
 
   std::shared_ptr<const DatasetSpecification> specification_;
   std::vector<ColumnInfo> columns_;
@@ -86,4 +86,4 @@ class DatasetStream {
   std::deque<std::shared_ptr<Chunk>> chunks_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -11,7 +11,7 @@
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 namespace {
 
 constexpr uint64_t kSamples = 30000;
@@ -105,21 +105,22 @@ TEST(DatasetStream, EverySampleIsCompleteAndItsFirstFingerReadsZero) {
 TEST(DatasetStream, ResultsAreThoseOfTouchesMadeOneByOne) {
   const DatasetSpecification specification = SmallDataset(300);
   const std::vector<std::string> columns = Columns(specification, {}, 2);
-  const TouchSimulator simulator(specification.model);
-  TouchBatch batch;
-  TouchWorkspace workspace;
+  const touch::TouchSimulator simulator(specification.model);
+  effects::TouchBatch batch;
+  touch::TouchWorkspace workspace;
   for (uint64_t index = 0; index < 300; ++index) {
     const auto& surface = specification.objects[index % 3];
-    const auto generator = MakePoseGenerator(specification.plan, surface->bounds(), specification.seed);
+    const auto generator =
+        touch::MakePoseGenerator(specification.plan, surface->bounds(), specification.seed);
     double descriptor_s[3] = {NAN, NAN, NAN};
     for (uint32_t attempt = 0; std::isnan(descriptor_s[0] + descriptor_s[1] + descriptor_s[2]); ++attempt) {
-      const CommandedTouch touch = TouchOfPlan(specification.plan, *generator, index, attempt);
+      const touch::CommandedTouch touch = touch::TouchOfPlan(specification.plan, *generator, index, attempt);
       simulator.Prepare(1, &batch);
       batch.surface = surface;
       batch.seed = specification.seed;
-      SetTouch(touch, index, 0, &batch);
+      touch::SetTouch(touch, index, 0, &batch);
       ASSERT_TRUE(simulator.Run(&batch, &workspace).ok());
-      Descriptor(batch, 0, descriptor_s);
+      touch::Descriptor(batch, 0, descriptor_s);
     }
     float streamed[3];
     std::memcpy(streamed, columns[2].data() + 12 * index, 12);
@@ -141,7 +142,7 @@ TEST(DatasetStream, HistoryReachesAcrossPartsAndBatches) {
 
 TEST(DatasetStream, FacesRoundsAreRepeatsOfTheSamePoses) {
   DatasetSpecification specification = SmallDataset(0);
-  specification.plan.kind = Plan::Kind::kFaces;
+  specification.plan.kind = touch::Plan::Kind::kFaces;
   const std::vector<std::string> columns = Columns(specification, {}, 2);
   const std::string& approach = columns[5];
   ASSERT_EQ(approach.size(), 3u * 192u * 12u);
@@ -152,9 +153,9 @@ TEST(DatasetStream, FacesRoundsAreRepeatsOfTheSamePoses) {
 
 TEST(DatasetStream, AnObjectThatNoTouchCanMeetFailsSoonAndSaysWhy) {
   DatasetSpecification specification = SmallDataset(100000);
-  TriangleMesh small = specification.objects[0]->mesh();
+  geometry::TriangleMesh small = specification.objects[0]->mesh();
   for (Eigen::Vector3f& vertex : small.vertices_m) vertex *= 0.01f;
-  specification.objects = {*Surface::Create("crumb", small)};
+  specification.objects = {*geometry::Surface::Create("crumb", small)};
   auto shared = std::make_shared<DatasetSpecification>(specification);
   ASSERT_TRUE(ValidateDataset(shared.get()).ok());
   ThreadPool pool(2);
@@ -167,8 +168,8 @@ TEST(DatasetStream, AnObjectThatNoTouchCanMeetFailsSoonAndSaysWhy) {
 
 TEST(DatasetStream, ExplicitTouchesThatMissAreReportedAsNotANumber) {
   DatasetSpecification specification = SmallDataset(0);
-  specification.plan.kind = Plan::Kind::kList;
-  CommandedTouch touch;
+  specification.plan.kind = touch::Plan::Kind::kList;
+  touch::CommandedTouch touch;
   touch.target_m = {0.07, 0, 0};  // the last finger passes the object
   specification.plan.list = {touch};
   const std::vector<std::string> columns = Columns(specification, {}, 1);
@@ -217,7 +218,7 @@ TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
   specification.image.options.width = 64;
   specification.image.options.height = 48;
   specification.image.options.mask = true;
-  specification.image.renderer = *CreateCpuRenderer();
+  specification.image.renderer = *image::CreateCpuRenderer();
   DatasetPart part;
   part.batch_size = 7;
   const std::vector<std::string> columns = Columns(specification, part, 2);
@@ -229,8 +230,8 @@ TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
   std::memcpy(lateral, columns[2].data() + 12 * k, 12);
   std::memcpy(&standoff, columns[3].data() + 4 * k, 4);
   const auto vector = [](const float* v) { return Eigen::Vector3d(v[0], v[1], v[2]); };
-  const Camera camera =
-      CameraOfTouch(vector(target), vector(approach).normalized(), vector(lateral).normalized(), standoff);
+  const image::Camera camera = image::CameraOfTouch(vector(target), vector(approach).normalized(),
+                                                    vector(lateral).normalized(), standoff);
   const auto image =
       specification.image.renderer->Render(specification.objects[k % 3], camera, specification.image.options);
   ASSERT_TRUE(image.ok());
@@ -242,4 +243,4 @@ TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::dataset

@@ -11,20 +11,21 @@
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"
 
-namespace touchstone {
+namespace touchstone::dataset {
 
-inline std::shared_ptr<const Surface> Supershape(const std::string& name, uint64_t triangles = 2000) {
-  auto mesh = MakeSupershape(*NamedSupershape(name), triangles);
+inline std::shared_ptr<const geometry::Surface> Supershape(const std::string& name,
+                                                           uint64_t triangles = 2000) {
+  auto mesh = geometry::MakeSupershape(*geometry::NamedSupershape(name), triangles);
   EXPECT_TRUE(mesh.ok()) << mesh.status();
-  return *Surface::Create(name, *std::move(mesh));
+  return *geometry::Surface::Create(name, *std::move(mesh));
 }
 
-inline std::shared_ptr<const Model> ModelOf(const std::string& effects) {
+inline std::shared_ptr<const model::Model> ModelOf(const std::string& effects) {
   std::string yaml = "touchstone: model/1\nname: test\nend_effector: {fingers: 3, spacing_mm: 30}\n";
   if (!effects.empty()) yaml += "effects:\n" + effects;
-  auto model = ParseModel(yaml, "test", Catalogue());
+  auto model = model::ParseModel(yaml, "test", effects::Catalogue());
   EXPECT_TRUE(model.ok()) << model.status();
-  return std::make_shared<const Model>(*std::move(model));
+  return std::make_shared<const model::Model>(*std::move(model));
 }
 
 inline DatasetSpecification SmallDataset(
@@ -56,4 +57,4 @@ inline std::vector<std::string> Columns(const DatasetSpecification& specificatio
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::dataset

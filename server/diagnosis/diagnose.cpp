@@ -14,7 +14,7 @@
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/selection/ladder.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis {
 namespace {
 
 constexpr int kMaxCompetingModels = 4;
@@ -56,38 +56,40 @@ double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-double ReducibleShare(const NoiseFloor& floor, const Quality& initial) {
+double ReducibleShare(const selection::NoiseFloor& floor, const selection::Quality& initial) {
   const double noise_s2 = floor.sigma_s * floor.sigma_s, error_s2 = initial.rmse_s * initial.rmse_s;
   return error_s2 > 0 ? std::clamp(1 - noise_s2 / error_s2, 0.0, 1.0) : 0;
 }
 
 // The residuals of the initial and of the improved model, described.
-ResidualSummary DescribeBoth(const Workspace& workspace, const std::vector<double>& before,
-                             const Prediction& improved, const std::vector<double>& after, double sigma_s) {
-  return DescribeResiduals(*workspace.observations, workspace.nominal, improved, before, after,
-                           {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
+residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
+                                        const std::vector<double>& before,
+                                        const touches::Prediction& improved, const std::vector<double>& after,
+                                        double sigma_s) {
+  return residuals::DescribeResiduals(*workspace.observations, workspace.nominal, improved, before, after,
+                                      {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
 }
 
-Diagnosis Begin(const Workspace& workspace) {
-  Diagnosis diagnosis;
+report::Diagnosis Begin(const selection::Workspace& workspace) {
+  report::Diagnosis diagnosis;
   diagnosis.model_name = workspace.input.model->name;
   diagnosis.model_hash = workspace.input.model->Hash();
-  diagnosis.data = SummarizeData(*workspace.observations);
+  diagnosis.data = touches::SummarizeData(*workspace.observations);
   diagnosis.warnings = workspace.warnings;
   return diagnosis;
 }
 
-void AddSentences(Diagnosis* diagnosis) {
-  for (std::string& warning : DataWarnings(diagnosis->data))
+void AddSentences(report::Diagnosis* diagnosis) {
+  for (std::string& warning : report::DataWarnings(diagnosis->data))
     diagnosis->warnings.push_back(std::move(warning));
-  diagnosis->summary = Summarize(*diagnosis);
+  diagnosis->summary = report::Summarize(*diagnosis);
 }
 
 // The step with the closest competing effect decides what further touches are to tell. Null: no step has one.
 // `always`: even if the data can tell the two apart already.
-const SelectedStep* MostConfounded(const SelectionResult& selection, bool always) {
-  const SelectedStep* closest = nullptr;
-  for (const SelectedStep& step : selection.steps) {
+const selection::SelectedStep* MostConfounded(const selection::SelectionResult& selection, bool always) {
+  const selection::SelectedStep* closest = nullptr;
+  for (const selection::SelectedStep& step : selection.steps) {
     if (step.competing.empty() || !(always || step.competing[0].equivalent)) continue;
     if (closest == nullptr ||
         step.competing[0].relative_log_evidence > closest->competing[0].relative_log_evidence)
@@ -97,48 +99,53 @@ const SelectedStep* MostConfounded(const SelectionResult& selection, bool always
 }
 
 // The improved model, named after the step, and the models that compete with it.
-std::vector<CompetingModel> ModelsToTellApart(const SelectionResult& selection, const SelectedStep& step,
-                                              const Model& improved) {
-  std::vector<CompetingModel> models = {{NameOf(*selection.fit.model.base().effects[step.effect].effect),
-                                         std::make_shared<const Model>(improved)}};
-  for (const CompetingEffect& other : step.competing) {
+std::vector<design::CompetingModel> ModelsToTellApart(const selection::SelectionResult& selection,
+                                                      const selection::SelectedStep& step,
+                                                      const model::Model& improved) {
+  std::vector<design::CompetingModel> models = {
+      {inference::NameOf(*selection.fit.model.base().effects[step.effect].effect),
+       std::make_shared<const model::Model>(improved)}};
+  for (const selection::CompetingEffect& other : step.competing) {
     if (!other.equivalent && models.size() > 1) break;
     if (static_cast<int>(models.size()) == kMaxCompetingModels) break;
-    models.push_back({other.name, std::make_shared<const Model>(other.model)});
+    models.push_back({other.name, std::make_shared<const model::Model>(other.model)});
   }
   return models;
 }
 
 // Touches that would tell what fits equally well apart. Always asked for by Propose; Diagnose asks only where
 // something is confounded.
-absl::Status AddNextTouches(const Workspace& workspace, const SelectionResult& selection,
-                            const Ladder& ladder, int max_touches, bool always, Diagnosis* diagnosis) {
-  const SelectedStep* closest = MostConfounded(selection, always);
+absl::Status AddNextTouches(const selection::Workspace& workspace,
+                            const selection::SelectionResult& selection, const selection::Ladder& ladder,
+                            int max_touches, bool always, report::Diagnosis* diagnosis) {
+  const selection::SelectedStep* closest = MostConfounded(selection, always);
   if (closest == nullptr && !always) return absl::OkStatus();
-  std::vector<CompetingModel> models = {
-      {"the model as it is", std::make_shared<const Model>(ladder.improved)}};
+  std::vector<design::CompetingModel> models = {
+      {"the model as it is", std::make_shared<const model::Model>(ladder.improved)}};
   if (closest != nullptr) models = ModelsToTellApart(selection, *closest, ladder.improved);
-  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis->next_touches,
-                              ProposeTouches(*workspace.searched, models, ladder.noise_floor.sigma_s,
-                                             max_touches, workspace.input.seed, workspace.context.pool));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      diagnosis->next_touches,
+      design::ProposeTouches(*workspace.searched, models, ladder.noise_floor.sigma_s, max_touches,
+                             workspace.input.seed, workspace.context.pool));
   if (!always || !diagnosis->next_touches.empty()) return absl::OkStatus();
   diagnosis->warnings.push_back(
       closest == nullptr ? "No touch would tell more than those at hand."
                          : "No touch of this rig tells " + models[0].name + " from " + models[1].name + ": " +
-                               DiscriminatingMeasurement({models[0].name, models[1].name}));
+                               selection::DiscriminatingMeasurement({models[0].name, models[1].name}));
   return absl::OkStatus();
 }
 
-absl::StatusOr<Diagnosis> DiagnosePoseFree(const DiagnosisInput& input, const DiagnosisContext& context,
-                                           bool with_verdict) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(PoseFreeComparison comparison, ComparePoseFree(input, context, with_verdict));
-  Diagnosis diagnosis;
-  diagnosis.pose_free = PoseFreeDiagnosis{input, std::move(comparison)};
+absl::StatusOr<report::Diagnosis> DiagnosePoseFree(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context, bool with_verdict) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(distributions::PoseFreeComparison comparison,
+                              distributions::ComparePoseFree(input, context, with_verdict));
+  report::Diagnosis diagnosis;
+  diagnosis.pose_free = report::PoseFreeDiagnosis{input, std::move(comparison)};
   return diagnosis;
 }
 
 // What a selection says, without the residuals.
-void AddLadder(const Ladder& ladder, Diagnosis* diagnosis) {
+void AddLadder(const selection::Ladder& ladder, report::Diagnosis* diagnosis) {
   diagnosis->verdict = ladder.verdict;
   diagnosis->noise_floor = ladder.noise_floor;
   diagnosis->final = ladder.final;
@@ -149,35 +156,37 @@ void AddLadder(const Ladder& ladder, Diagnosis* diagnosis) {
   diagnosis->candidates = ladder.candidates;
   diagnosis->unexplained = ladder.unexplained;
   if (!ladder.changed) return;
-  diagnosis->improved_model_yaml = FormatModel(ladder.improved);
+  diagnosis->improved_model_yaml = model::FormatModel(ladder.improved);
   diagnosis->improved_model_hash = ladder.improved.Hash();
 }
 
 // `always`: Propose, which names touches even where nothing is confounded.
-absl::StatusOr<Diagnosis> DiagnoseTouches(const DiagnosisInput& input, int max_touches, bool always,
-                                          const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, int max_touches, bool always,
+                                                  const DiagnosisContext& context) {
   if (!input.set->has_poses) return DiagnosePoseFree(input, context, true);
   const double began = Now();
   ProgressGate gate(context);
   DiagnosisContext gated = context;
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, gated));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
+                              selection::MakeWorkspace(input, gated));
   workspace->experiment.cancelled = [&gate] { return !gate.Continue(); };
   if (!gate.Enter("fitting", 0.1)) return absl::CancelledError(kCancelled);
-  const Observations& o = *workspace->observations;
+  const touches::Observations& o = *workspace->observations;
   if (std::none_of(o.used.begin(), o.used.end(), [](char used) { return used; })) {
-    Diagnosis diagnosis = Begin(*workspace);
+    report::Diagnosis diagnosis = Begin(*workspace);
     diagnosis.warnings.clear();  // nothing was compared
-    diagnosis.verdict = Verdict::kAdequate;
+    diagnosis.verdict = selection::Verdict::kAdequate;
     AddSentences(&diagnosis);
     return diagnosis;
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const SelectionResult selection, SelectExplanation(workspace.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::SelectionResult selection,
+                              selection::SelectExplanation(workspace.get()));
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
-  Diagnosis diagnosis = Begin(*workspace);
-  const std::vector<double> before = Residuals(o, workspace->nominal);
-  diagnosis.initial = QualityOf(*workspace, selection.initial_model, before);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Ladder ladder, BuildLadder(*workspace, selection));
+  report::Diagnosis diagnosis = Begin(*workspace);
+  const std::vector<double> before = touches::Residuals(o, workspace->nominal);
+  diagnosis.initial = selection::QualityOf(*workspace, selection.initial_model, before);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   AddLadder(ladder, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   diagnosis.residuals =
@@ -191,20 +200,21 @@ absl::StatusOr<Diagnosis> DiagnoseTouches(const DiagnosisInput& input, int max_t
 
 }  // namespace
 
-absl::StatusOr<Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
   if (!input.set->has_poses) return DiagnosePoseFree(input, context, false);
   const double began = Now();
   ProgressGate gate(context);
   DiagnosisContext gated = context;
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, gated));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
+                              selection::MakeWorkspace(input, gated));
   if (!gate.Enter("comparing", 0.3)) return absl::CancelledError(kCancelled);
-  const Observations& o = *workspace->observations;
-  Diagnosis diagnosis = Begin(*workspace);
-  const std::vector<double> residuals = Residuals(o, workspace->nominal);
-  const double rmse_s = Rmse(o, residuals);
-  diagnosis.noise_floor = NoiseFloorOf(o, residuals, 0);
-  diagnosis.initial = {rmse_s, rmse_s, LackOfFitP(o, residuals, 0)};
+  const touches::Observations& o = *workspace->observations;
+  report::Diagnosis diagnosis = Begin(*workspace);
+  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
+  const double rmse_s = touches::Rmse(o, residuals);
+  diagnosis.noise_floor = selection::NoiseFloorOf(o, residuals, 0);
+  diagnosis.initial = {rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)};
   diagnosis.final = diagnosis.initial;
   diagnosis.reducible_share = ReducibleShare(*diagnosis.noise_floor, *diagnosis.initial);
   if (diagnosis.data.touches > 0)
@@ -215,13 +225,13 @@ absl::StatusOr<Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisCo
   return diagnosis;
 }
 
-absl::StatusOr<Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
   return DiagnoseTouches(input, kDefaultTouches, false, context);
 }
 
-absl::StatusOr<Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
-                                  const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
+                                          const DiagnosisContext& context) {
   return DiagnoseTouches(input, max_touches, true, context);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis

@@ -11,17 +11,17 @@
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/report/diagnosis.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis {
 
 // How wrong and where. The verdict is kNone.
-absl::StatusOr<Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context);
+absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context);
 
 // Also why, what to add, and what the error becomes.
-absl::StatusOr<Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context);
+absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context);
 
 // Diagnose, with at most `max_touches` further touches that would tell the explanations that are left apart, or
 // improve the values where only one is left.
-absl::StatusOr<Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
-                                  const DiagnosisContext& context);
+absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
+                                          const DiagnosisContext& context);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis

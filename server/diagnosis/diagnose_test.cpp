@@ -7,28 +7,28 @@
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis {
 namespace {
 
 using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-Diagnosis DiagnoseRig(const HiddenRig& rig) {
-  const absl::StatusOr<Diagnosis> diagnosis = Diagnose(MakeTestInput(rig), {});
+report::Diagnosis DiagnoseRig(const touches::HiddenRig& rig) {
+  const absl::StatusOr<report::Diagnosis> diagnosis = Diagnose(touches::MakeTestInput(rig), {});
   EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
-  return diagnosis.ok() ? *diagnosis : Diagnosis();
+  return diagnosis.ok() ? *diagnosis : report::Diagnosis();
 }
 
-std::vector<std::string> StepNames(const Diagnosis& report) {
+std::vector<std::string> StepNames(const report::Diagnosis& report) {
   std::vector<std::string> names;
-  for (const LadderStep& step : report.steps) names.push_back(step.effect);
+  for (const selection::LadderStep& step : report.steps) names.push_back(step.effect);
   return names;
 }
 
 TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
-  const Diagnosis report = DiagnoseRig({});
-  EXPECT_EQ(report.verdict, Verdict::kAdequate) << report.summary;
+  const report::Diagnosis report = DiagnoseRig({});
+  EXPECT_EQ(report.verdict, selection::Verdict::kAdequate) << report.summary;
   EXPECT_EQ(report.steps.size(), 0u);
   EXPECT_NEAR(report.noise_floor->sigma_s, 2000e-6, 150e-6);
   EXPECT_GT(report.initial->lack_of_fit_p, 0.001);
@@ -36,34 +36,35 @@ TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
 }
 
 TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
-  const Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, Verdict::kMissingEffects);
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"tip_radius"});
-  const ParameterEstimate& radius = report.steps[0].parameters[0];
+  const inference::ParameterEstimate& radius = report.steps[0].parameters[0];
   EXPECT_NEAR(radius.value, 1.5, 4 * radius.std_error);
   EXPECT_LT(radius.std_error, 0.05);
   EXPECT_LT(report.final->rmse_s, 1.06 * report.noise_floor->sigma_s);
   EXPECT_GT(report.initial->rmse_s, 3 * report.noise_floor->sigma_s);
   // The improved model is a file that holds the effect.
-  const absl::StatusOr<Model> better = ParseModel(report.improved_model_yaml, "better", Catalogue());
+  const absl::StatusOr<model::Model> better =
+      model::ParseModel(report.improved_model_yaml, "better", effects::Catalogue());
   ASSERT_TRUE(better.ok()) << better.status();
   EXPECT_EQ(better->Hash(), report.improved_model_hash);
   EXPECT_EQ(better->effects.back().effect->name, "tip_radius");
 }
 
 TEST(Diagnose, FindsTwoEffectsAtOnce) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}, {"object_push", {"shift_mm=0.4"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   EXPECT_THAT(StepNames(report), ::testing::UnorderedElementsAre("oblique_slip", "object_push"));
 }
 
 TEST(Diagnose, SaysWhatTheDataCannotTellApartAndWhatWould) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_GE(report.steps.size(), 1u);
   std::vector<std::string> equivalent = report.steps[0].equivalent;
   equivalent.push_back(report.steps[0].effect);
@@ -74,11 +75,11 @@ TEST(Diagnose, SaysWhatTheDataCannotTellApartAndWhatWould) {
 }
 
 TEST(Diagnose, SaysThatAValueOfTheModelIsWrong) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=2"}}};
   rig.known = {{"tip_radius", {"radius_mm=1"}}};
-  const Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, Verdict::kWrongValues) << report.summary;
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kWrongValues) << report.summary;
   ASSERT_EQ(report.refitted.size(), 1u);
   EXPECT_EQ(report.refitted[0].effect, "tip_radius");
   EXPECT_NEAR(report.refitted[0].parameters[0].value, 2, 0.1);
@@ -86,13 +87,13 @@ TEST(Diagnose, SaysThatAValueOfTheModelIsWrong) {
 }
 
 TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 6;
   rig.hidden = {{"formula",
                  {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
                   "k_min=-1", "k_max=1"}}};
-  const Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, Verdict::kUnexplained) << report.summary;
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kUnexplained) << report.summary;
   ASSERT_GE(report.unexplained->covariates.size(), 1u);
   EXPECT_EQ(report.unexplained->covariates[0].name, "approach_z");
   EXPECT_THAT(report.unexplained->formula, HasSubstr("approach_z"));
@@ -101,104 +102,104 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
   const std::string yaml =
       "touchstone: model/1\nname: m\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n" +
       report.unexplained->formula_yaml;
-  EXPECT_TRUE(ParseModel(yaml, "formula", Catalogue()).ok()) << yaml;
+  EXPECT_TRUE(model::ParseModel(yaml, "formula", effects::Catalogue()).ok()) << yaml;
 }
 
 TEST(Diagnose, LetsAFormulaOfTheUserCompete) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"formula",
                  {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
                   "k_min=-1", "k_max=1"}}};
-  DiagnosisInput input = MakeTestInput(rig);
-  const Model mine =
-      WithEffects(NominalModel(), {{"formula",
-                                    {"name=mine", "adds=travel_mm", "expression=c*(finger==0)*approach_z",
-                                     "c=0", "c_unit=mm", "c_min=-1", "c_max=1"}}});
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  const model::Model mine = touches::WithEffects(
+      model::NominalModel(), {{"formula",
+                               {"name=mine", "adds=travel_mm", "expression=c*(finger==0)*approach_z", "c=0",
+                                "c_unit=mm", "c_min=-1", "c_max=1"}}});
   input.also = {mine.effects[0].effect};
-  const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, Verdict::kMissingEffects);
+  EXPECT_EQ(report->verdict, selection::Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(*report), std::vector<std::string>{"formula mine"});
   EXPECT_NEAR(report->steps[0].parameters[0].value, 0.4, 0.05);
 }
 
 TEST(Diagnose, FindsTheTicksOfAPollingLoop) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.sigma_us = 300;
   rig.hidden = {{"poll_interval", {"interval_us=8000"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_THAT(StepNames(report), Contains("poll_interval")) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 8000, 1);
 }
 
 TEST(Diagnose, FindsHeavyTails) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.rounds = 4;
   rig.hidden = {{"heavy_tail_noise", {"degrees_of_freedom=3"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"heavy_tail_noise"}) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 3, 1);
 }
 
 TEST(Diagnose, FindsNoiseThatGrowsOnSlopes) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.rounds = 4;
   rig.hidden = {{"incidence_noise", {"slope=2"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"incidence_noise"}) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 2, 0.7);
 }
 
 TEST(Diagnose, FindsMissedContacts) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"missed_contact", {"probability=0.1"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"missed_contact"}) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 0.1, 0.04);
 }
 
 TEST(Diagnose, FindsHysteresisFromTheCourseOfTheSession) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"return_hysteresis", {"fraction=0.05"}}};
-  const Diagnosis report = DiagnoseRig(rig);
+  const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"return_hysteresis"}) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 0.05, 0.01);
 }
 
 TEST(Diagnose, GivesTheSameReportTwiceAndWithThreads) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"tool_tilt", {"angle_deg=0.5"}}};
-  const DiagnosisInput input = MakeTestInput(rig);
+  const DiagnosisInput input = touches::MakeTestInput(rig);
   ThreadPool pool(2);
   DiagnosisContext threads;
   threads.pool = &pool;
-  absl::StatusOr<Diagnosis> a = Diagnose(input, {}), b = Diagnose(input, threads);
+  absl::StatusOr<report::Diagnosis> a = Diagnose(input, {}), b = Diagnose(input, threads);
   ASSERT_TRUE(a.ok() && b.ok());
   a->duration_s = b->duration_s = 0;
   // Every value, whatever it is: the message holds them all.
-  EXPECT_EQ(ToReport(*a).SerializeAsString(), ToReport(*b).SerializeAsString());
+  EXPECT_EQ(report::ToReport(*a).SerializeAsString(), report::ToReport(*b).SerializeAsString());
 }
 
 TEST(Diagnose, EndsWhenItIsCancelled) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1"}}};
   DiagnosisContext context;
   int calls = 0;
   context.progress = [&](const std::string&, double) { return ++calls < 10; };
-  EXPECT_EQ(Diagnose(MakeTestInput(rig), context).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(Diagnose(touches::MakeTestInput(rig), context).status().code(), absl::StatusCode::kCancelled);
 }
 
 TEST(Diagnose, RefusesAnObjectWithoutAMesh) {
-  DiagnosisInput input = MakeTestInput({});
+  DiagnosisInput input = touches::MakeTestInput({});
   input.surfaces.erase("lat10");
   EXPECT_THAT(std::string(Diagnose(input, {}).status().message()), HasSubstr("--mesh lat10=FILE"));
 }
 
 TEST(Diagnose, RefusesTimesInTheWrongUnit) {
-  DiagnosisInput input = MakeTestInput({});
-  auto set = std::make_shared<MeasurementSet>(*input.set);
+  DiagnosisInput input = touches::MakeTestInput({});
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
   for (double& time_s : set->time_s) time_s *= 1e-3;
   input.set = set;
   const absl::Status status = Diagnose(input, {}).status();
@@ -207,11 +208,11 @@ TEST(Diagnose, RefusesTimesInTheWrongUnit) {
 }
 
 TEST(Diagnose, RefusesAMeshThatMostTouchesMiss) {
-  DiagnosisInput input = MakeTestInput({});
+  DiagnosisInput input = touches::MakeTestInput({});
   for (const float scale : {0.1f, 1000.0f}) {  // cm for mm; m for mm
-    TriangleMesh other = TestSurface("lat10")->mesh();
+    geometry::TriangleMesh other = touches::TestSurface("lat10")->mesh();
     for (Eigen::Vector3f& vertex : other.vertices_m) vertex *= scale;
-    input.surfaces["lat10"] = *Surface::Create("lat10", other);
+    input.surfaces["lat10"] = *geometry::Surface::Create("lat10", other);
     const absl::Status status = Diagnose(input, {}).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << scale;
     EXPECT_THAT(std::string(status.message()), HasSubstr("object 'lat10'"));
@@ -219,29 +220,29 @@ TEST(Diagnose, RefusesAMeshThatMostTouchesMiss) {
 }
 
 TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
-  const DiagnosisInput all = MakeTestInput({});
+  const DiagnosisInput all = touches::MakeTestInput({});
   for (const int touches : {1, 2, 5, 20}) {
-    auto set = std::make_shared<MeasurementSet>(*all.set);
+    auto set = std::make_shared<session::MeasurementSet>(*all.set);
     for (auto* column : {&set->target_m, &set->approach, &set->lateral}) column->resize(touches);
     for (auto* column : {&set->standoff_m, &set->speed_m_s, &set->session_time_s}) column->resize(touches);
     set->touch.resize(touches), set->object.resize(touches), set->line.resize(touches);
     set->time_s.resize(touches * 3);
     DiagnosisInput input = all;
     input.set = set;
-    const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
+    const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict, Verdict::kAdequate) << touches << ": " << report->summary;
+    EXPECT_EQ(report->verdict, selection::Verdict::kAdequate) << touches << ": " << report->summary;
     EXPECT_GE(report->warnings.size(), 1u);
   }
 }
 
 TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
-  const DiagnosisInput all = MakeTestInput({});
-  auto set = std::make_shared<MeasurementSet>(*all.set);
+  const DiagnosisInput all = touches::MakeTestInput({});
+  auto set = std::make_shared<session::MeasurementSet>(*all.set);
   for (double& time_s : set->time_s) time_s = NAN;
   DiagnosisInput input = all;
   input.set = set;
-  const absl::StatusOr<Diagnosis> report = Diagnose(input, {});
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->data.touches, 0);
   ASSERT_EQ(report->data.unused.size(), 1u);
@@ -249,12 +250,12 @@ TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
 }
 
 TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
-  const absl::StatusOr<Diagnosis> report = Propose(MakeTestInput(rig), 12, {});
+  const absl::StatusOr<report::Diagnosis> report = Propose(touches::MakeTestInput(rig), 12, {});
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->next_touches.size(), 12u);
-  for (const ProposedTouch& touch : report->next_touches) {
+  for (const design::ProposedTouch& touch : report->next_touches) {
     EXPECT_GT(std::abs(touch.touch.speed_m_s - 0.02), 0.005);
     EXPECT_GT(touch.separation_sigmas, 0);
     EXPECT_FALSE(touch.purpose.empty());
@@ -262,21 +263,21 @@ TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
 }
 
 TEST(Propose, NamesTouchesEvenWhereNothingIsAmbiguous) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.known = {{"tip_radius", {"radius_mm=1"}}};
   rig.hidden = rig.known;
-  const absl::StatusOr<Diagnosis> report = Propose(MakeTestInput(rig), 5, {});
+  const absl::StatusOr<report::Diagnosis> report = Propose(touches::MakeTestInput(rig), 5, {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_TRUE(report->next_touches.size() == 5 || report->warnings.size() > 0);
 }
 
 TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.hidden = {{"finger_length", {"offset_mm=0.4,-0.2,-0.2"}}};
-  const absl::StatusOr<Diagnosis> report = Compare(MakeTestInput(rig), {});
+  const absl::StatusOr<report::Diagnosis> report = Compare(touches::MakeTestInput(rig), {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, Verdict::kNone);
+  EXPECT_EQ(report->verdict, selection::Verdict::kNone);
   EXPECT_NEAR(report->noise_floor->sigma_s, 2000e-6, 200e-6);
   EXPECT_GT(report->reducible_share, 0.9);
   ASSERT_GE(report->residuals.slices.size(), 1u);
@@ -285,4 +286,4 @@ TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis

@@ -12,13 +12,14 @@
 #include "server/model/model.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis {
 
 struct DiagnosisInput {
-  std::shared_ptr<const Model> model;
-  std::shared_ptr<const MeasurementSet> set;
-  std::map<std::string, std::shared_ptr<const Surface>> surfaces;  // by the set's object names
-  std::vector<std::shared_ptr<const Effect>> also;  // formulas of the user that compete with the catalogue
+  std::shared_ptr<const model::Model> model;
+  std::shared_ptr<const session::MeasurementSet> set;
+  std::map<std::string, std::shared_ptr<const geometry::Surface>> surfaces;  // by the set's object names
+  std::vector<std::shared_ptr<const model::Effect>>
+      also;  // formulas of the user that compete with the catalogue
   uint64_t seed = 0;
 };
 
@@ -28,4 +29,4 @@ struct DiagnosisContext {
   std::function<bool(const std::string& stage, double done)> progress;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis

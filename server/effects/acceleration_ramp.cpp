@@ -4,7 +4,7 @@
 // off.
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 constexpr double kNoRampMmS2 = 1e6;
@@ -26,10 +26,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect AccelerationRamp() {
+model::Effect AccelerationRamp() {
   return DefineEffect<Parameters>({
       .name = "acceleration_ramp",
-      .stage = Stage::kMotion,
+      .stage = model::Stage::kMotion,
       .meaning = "The arm starts at rest and needs a distance v^2 / (2 a) to reach its speed.",
       .signature =
           "Time differences are stretched on touches whose contact comes early in the travel; once all "
@@ -42,4 +42,4 @@ Effect AccelerationRamp() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

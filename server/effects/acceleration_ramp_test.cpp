@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(AccelerationRamp, SetsTheAcceleration) {
@@ -18,4 +18,4 @@ TEST(AccelerationRamp, IsOffAtItsUpperBound) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

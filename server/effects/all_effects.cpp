@@ -36,51 +36,52 @@
   /* any stage */                        \
   EFFECT(Formula)
 
-namespace touchstone {
+namespace touchstone::effects {
 
-#define TOUCHSTONE_DECLARE(function) Effect function();
+#define TOUCHSTONE_DECLARE(function) model::Effect function();
 TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_DECLARE)
 #undef TOUCHSTONE_DECLARE
 
 namespace {
 
-class BuiltInCatalogue : public EffectCatalogue {
+class BuiltInCatalogue : public model::EffectCatalogue {
  public:
   BuiltInCatalogue() {
-#define TOUCHSTONE_ADD(function) effects_.push_back(std::make_shared<const Effect>(function()));
+#define TOUCHSTONE_ADD(function) effects_.push_back(std::make_shared<const model::Effect>(function()));
     TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_ADD)
 #undef TOUCHSTONE_ADD
   }
 
-  std::vector<std::shared_ptr<const Effect>> All() const override {
+  std::vector<std::shared_ptr<const model::Effect>> All() const override {
     return effects_;
   }
 
-  std::shared_ptr<const Effect> Find(const std::string& name) const override {
+  std::shared_ptr<const model::Effect> Find(const std::string& name) const override {
     for (const auto& effect : effects_)
       if (effect->name == name) return effect;
     return nullptr;
   }
 
-  absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const override {
+  absl::StatusOr<std::shared_ptr<const model::Effect>> MakeFormula(
+      const model::FormulaSpec& spec) const override {
     return MakeFormulaEffect(spec);
   }
 
  private:
-  std::vector<std::shared_ptr<const Effect>> effects_;
+  std::vector<std::shared_ptr<const model::Effect>> effects_;
 };
 
 }  // namespace
 
-const EffectCatalogue& Catalogue() {
+const model::EffectCatalogue& Catalogue() {
   static const BuiltInCatalogue& catalogue = *new BuiltInCatalogue;
   return catalogue;
 }
 
-std::shared_ptr<const Effect> FindByRole(EffectRole role) {
+std::shared_ptr<const model::Effect> FindByRole(model::EffectRole role) {
   for (const auto& effect : Catalogue().All())
     if (effect->role == role) return effect;
   return nullptr;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

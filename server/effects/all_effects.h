@@ -4,13 +4,13 @@
 
 #include "server/model/effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 // The catalogue that model files are read with: the built-in effects, and formulas. Made at the first call,
 // never changed; any thread may use it.
-const EffectCatalogue& Catalogue();
+const model::EffectCatalogue& Catalogue();
 
 // The one effect of the catalogue with this role; not for kSystematic, of which there are many.
-std::shared_ptr<const Effect> FindByRole(EffectRole role);
+std::shared_ptr<const model::Effect> FindByRole(model::EffectRole role);
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   t_i += latency_i,  sum of the latencies 0: what all channels share cannot be seen in relative times
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -24,10 +24,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ChannelLatency() {
+model::Effect ChannelLatency() {
   return DefineEffect<Parameters>({
       .name = "channel_latency",
-      .stage = Stage::kSensor,
+      .stage = model::Stage::kSensor,
       .meaning = "Each finger's switch, wiring and input report with a delay of their own.",
       .signature = "A constant time per finger on every touch, the same at every speed. finger_length looks "
                    "the same at "
@@ -49,4 +49,4 @@ Effect ChannelLatency() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ChannelLatency, DelaysEachFingersReport) {
@@ -17,4 +17,4 @@ TEST(ChannelLatency, DelaysEachFingersReport) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   reported times are multiplied by (1 + relative)
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ClockSkew() {
+model::Effect ClockSkew() {
   return DefineEffect<Parameters>({
       .name = "clock_skew",
-      .stage = Stage::kSensor,
+      .stage = model::Stage::kSensor,
       .meaning =
           "The clock of the end effector runs fast or slow, so all times are stretched by a constant share.",
       .signature = "The error grows in proportion to the time difference. Relative times cannot tell it from "
@@ -42,4 +42,4 @@ Effect ClockSkew() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

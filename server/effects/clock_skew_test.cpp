@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ClockSkew, MultipliesReportedTimes) {
@@ -12,4 +12,4 @@ TEST(ClockSkew, MultipliesReportedTimes) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

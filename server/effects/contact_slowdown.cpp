@@ -2,7 +2,7 @@
 //   speed after the first contact = (1 - fraction) * speed
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ContactSlowdown() {
+model::Effect ContactSlowdown() {
   return DefineEffect<Parameters>({
       .name = "contact_slowdown",
-      .stage = Stage::kMotion,
+      .stage = model::Stage::kMotion,
       .meaning = "The first contact slows the arm down; the other fingers go on at a lower speed.",
       .signature =
           "Delays that grow in proportion to the gap to the first finger. object_push delays by the same "
@@ -36,4 +36,4 @@ Effect ContactSlowdown() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -11,20 +11,20 @@
 #include "server/effects/all_effects.h"
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 // The fields that effects of a stage may change.
-std::set<std::string> FieldsOf(Stage stage) {
+std::set<std::string> FieldsOf(model::Stage stage) {
   switch (stage) {
-    case Stage::kPose:
+    case model::Stage::kPose:
       return {"lateral",       "spacing_m",        "travel_offset_m",      "tip_displacement_m",
               "surface_scale", "surface_rotation", "surface_translation_m"};
-    case Stage::kContact:
+    case model::Stage::kContact:
       return {"tip_radius_m", "travel_m", "contact_m"};
-    case Stage::kMotion:
+    case model::Stage::kMotion:
       return {"travel_m", "speed_factor", "acceleration_m_s2", "slowdown_fraction"};
-    case Stage::kSensor:
+    case model::Stage::kSensor:
       return {"reported_time_s",    "noise_sigma_s", "noise_growth",    "any_noise",
               "degrees_of_freedom", "clock_factor",  "poll_interval_s", "missed_probability"};
   }
@@ -33,15 +33,15 @@ std::set<std::string> FieldsOf(Stage stage) {
 
 // One step of the typical size away from neutral, kept within bounds and with zero sum where that is asked
 // for.
-FileValues TypicalValues(const Effect& effect, int fingers, double steps) {
+FileValues TypicalValues(const model::Effect& effect, int fingers, double steps) {
   FileValues values;
-  for (const ParameterInfo& p : effect.parameters) {
+  for (const model::ParameterInfo& p : effect.parameters) {
     std::vector<double> own;
     const int count = p.Count(fingers);
     for (int i = 0; i < count; ++i) {
       // A parameter whose neutral value is its upper bound stands for "none"; its typical value is a size.
       double value = p.neutral == p.upper ? p.typical : p.neutral + steps * p.typical;
-      if (p.arity == Arity::kPerFinger) value = steps * p.typical * (i - 0.5 * (count - 1)) / count;
+      if (p.arity == model::Arity::kPerFinger) value = steps * p.typical * (i - 0.5 * (count - 1)) / count;
       own.push_back(std::min(std::max(value, p.lower), p.upper));
     }
     values.emplace_back(p.name, own);
@@ -49,9 +49,9 @@ FileValues TypicalValues(const Effect& effect, int fingers, double steps) {
   return values;
 }
 
-class EffectContract : public testing::TestWithParam<std::shared_ptr<const Effect>> {
+class EffectContract : public testing::TestWithParam<std::shared_ptr<const model::Effect>> {
  protected:
-  const Effect& effect() const { return *GetParam(); }
+  const model::Effect& effect() const { return *GetParam(); }
   bool is_formula() const { return effect().name == "formula"; }
 };
 
@@ -61,11 +61,11 @@ TEST_P(EffectContract, HasTextsForPeople) {
     EXPECT_GE(text.size(), 30u);
     EXPECT_TRUE(absl::EndsWith(text, ".") || absl::EndsWith(text, "?")) << text;
   }
-  for (const ParameterInfo& parameter : effect().parameters) EXPECT_GE(parameter.meaning.size(), 10u);
+  for (const model::ParameterInfo& parameter : effect().parameters) EXPECT_GE(parameter.meaning.size(), 10u);
 }
 
 TEST_P(EffectContract, NamesEndInTheirUnit) {
-  for (const ParameterInfo& p : effect().parameters) {
+  for (const model::ParameterInfo& p : effect().parameters) {
     EXPECT_TRUE(absl::EndsWith(p.name, std::string(UnitSuffix(p.unit)))) << p.name;
     if (p.unit != Unit::kNone) continue;
     for (const char* suffix : {"_mm", "_deg", "_us", "_s", "_mm_s", "_mm_s2", "_mm_per_h", "_per_m"})
@@ -74,14 +74,14 @@ TEST_P(EffectContract, NamesEndInTheirUnit) {
 }
 
 TEST_P(EffectContract, HasOrderedBoundsAroundItsNeutralValue) {
-  for (const ParameterInfo& p : effect().parameters) {
+  for (const model::ParameterInfo& p : effect().parameters) {
     EXPECT_LT(p.lower, p.upper) << p.name;
     EXPECT_GE(p.neutral, p.lower) << p.name;
     EXPECT_LE(p.neutral, p.upper) << p.name;
     EXPECT_GT(p.typical, 0) << p.name;
     EXPECT_LE(p.typical, p.upper - p.lower) << p.name;
     if (p.sum_zero) {
-      EXPECT_EQ(p.arity, Arity::kPerFinger) << p.name;
+      EXPECT_EQ(p.arity, model::Arity::kPerFinger) << p.name;
     }
   }
 }
@@ -172,7 +172,7 @@ TEST_P(EffectContract, ChangesTheExpectationOrTheScatterAsItsRoleSays) {
   TouchBatch after = before;
   ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &after);
   for (const std::string& field : ChangedFields(before, after)) {
-    if (effect().role == EffectRole::kSmoothError) continue;  // drawn anew for every object, see below
+    if (effect().role == model::EffectRole::kSmoothError) continue;  // drawn anew for every object, see below
     EXPECT_EQ(ScatterFields().count(field) == 1, effect().random()) << field;
   }
 }
@@ -184,7 +184,7 @@ TEST_P(EffectContract, DependsOnTheSeedOnlyIfItIsRandom) {
   ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &one);
   ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &other);
   one.seed = other.seed;
-  if (effect().role == EffectRole::kSmoothError) {
+  if (effect().role == model::EffectRole::kSmoothError) {
     EXPECT_THAT(ChangedFields(one, other), testing::Not(testing::IsEmpty()));
   } else {
     EXPECT_THAT(ChangedFields(one, other), testing::IsEmpty());
@@ -205,32 +205,33 @@ TEST_P(EffectContract, DependsOnSessionTimeAndOnTheLastTouchOnlyIfItSaysSo) {
 }
 
 TEST_P(EffectContract, ReciprocalParametersStandAtTheirUpperBoundWhereTheyChangeNothing) {
-  for (const ParameterInfo& p : effect().parameters) {
+  for (const model::ParameterInfo& p : effect().parameters) {
     if (!p.reciprocal) continue;
     EXPECT_EQ(p.neutral, p.upper) << p.name;
     EXPECT_GT(p.lower, 0) << p.name;
-    EXPECT_EQ(p.arity, Arity::kScalar) << p.name;
+    EXPECT_EQ(p.arity, model::Arity::kScalar) << p.name;
   }
 }
 
 TEST_P(EffectContract, NamesWhatItIsConfoundedWithAndWhatTellsThemApart) {
-  for (const ConfoundedEffect& confounded : effect().confounded_with) {
+  for (const model::ConfoundedEffect& confounded : effect().confounded_with) {
     EXPECT_TRUE(absl::EndsWith(confounded.discriminating_measurement, ".")) << confounded.effect;
     EXPECT_GE(confounded.discriminating_measurement.size(), 30u) << confounded.effect;
     if (confounded.effect.empty()) continue;
     const auto other = Catalogue().Find(confounded.effect);
     ASSERT_NE(other, nullptr) << confounded.effect;
     EXPECT_NE(other->name, effect().name);
-    for (const ConfoundedEffect& back : other->confounded_with)
+    for (const model::ConfoundedEffect& back : other->confounded_with)
       EXPECT_NE(back.effect, effect().name) << "declared on both sides, which may contradict each other";
   }
 }
 
 TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
-  std::map<EffectRole, int> effects;
+  std::map<model::EffectRole, int> effects;
   for (const auto& effect : Catalogue().All()) ++effects[effect->role];
-  for (const EffectRole role : {EffectRole::kNoiseLevel, EffectRole::kNoiseGrowth, EffectRole::kNoiseTails,
-                                EffectRole::kQuantisation, EffectRole::kDropout, EffectRole::kSmoothError})
+  for (const model::EffectRole role :
+       {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
+        model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
@@ -263,4 +264,4 @@ TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -16,10 +16,10 @@
 #include "server/model/effect.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 // A parameter with one value per finger; entries from the batch's number of fingers on are zero.
-using PerFinger = std::array<double, kMaxFingers>;
+using PerFinger = std::array<double, model::kMaxFingers>;
 
 // One parameter of an effect whose values live in the struct P. Numbers here are in the unit of files;
 // the field gets SI. The kind of field (one number, a vector, one number per finger) follows from its type.
@@ -40,8 +40,8 @@ struct ParameterRow {
 template <typename P>
 struct EffectDefinition {
   const char* name;
-  Stage stage;
-  EffectRole role = EffectRole::kSystematic;
+  model::Stage stage;
+  model::EffectRole role = model::EffectRole::kSystematic;
   bool always_per_object = false;
   bool often_per_object = false;
   bool before_cast = false;
@@ -49,9 +49,9 @@ struct EffectDefinition {
   const char* signature;
   const char* check_on_rig;
   const char* remedy;
-  std::vector<ConfoundedEffect> confounded_with = {};
+  std::vector<model::ConfoundedEffect> confounded_with = {};
   absl::Span<const ParameterRow<P>> rows;
-  EffectNeeds needs = {};
+  model::EffectNeeds needs = {};
   void (*apply)(const P& parameters, TouchBatch& touches);
 };
 
@@ -70,7 +70,7 @@ template <typename P>
       for (int axis = 0; axis < 3; ++axis) (parameters->*(*vector))[axis] = values.at(next++);
     } else {
       PerFinger& entries = parameters->*(std::get<PerFinger P::*>(row.field));
-      for (int finger = 0; finger < kMaxFingers; ++finger)
+      for (int finger = 0; finger < model::kMaxFingers; ++finger)
         entries[finger] = finger < fingers ? values.at(next++) : 0.0;
     }
   }
@@ -80,8 +80,8 @@ template <typename P>
 }  // namespace define_effect_internal
 
 template <typename P>
-Effect DefineEffect(const EffectDefinition<P>& definition) {
-  Effect effect;
+model::Effect DefineEffect(const EffectDefinition<P>& definition) {
+  model::Effect effect;
   effect.name = definition.name;
   effect.stage = definition.stage;
   effect.role = definition.role;
@@ -95,12 +95,12 @@ Effect DefineEffect(const EffectDefinition<P>& definition) {
   effect.confounded_with = definition.confounded_with;
   effect.needs = definition.needs;
   for (const ParameterRow<P>& row : definition.rows) {
-    ParameterInfo info;
+    model::ParameterInfo info;
     info.name = row.name;
     info.unit = row.unit;
-    info.arity = std::holds_alternative<double P::*>(row.field)            ? Arity::kScalar
-                 : std::holds_alternative<Eigen::Vector3d P::*>(row.field) ? Arity::kVector3
-                                                                           : Arity::kPerFinger;
+    info.arity = std::holds_alternative<double P::*>(row.field)            ? model::Arity::kScalar
+                 : std::holds_alternative<Eigen::Vector3d P::*>(row.field) ? model::Arity::kVector3
+                                                                           : model::Arity::kPerFinger;
     info.lower = row.lower;
     info.upper = row.upper;
     info.neutral = row.neutral;
@@ -120,4 +120,4 @@ Effect DefineEffect(const EffectDefinition<P>& definition) {
   return effect;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

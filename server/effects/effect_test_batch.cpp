@@ -8,7 +8,7 @@
 #include "server/effects/all_effects.h"
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 Eigen::Vector3d RandomDirection(RandomStream* random) {
@@ -41,15 +41,16 @@ bool Same(const std::vector<T>& a, const std::vector<T>& b) {
 
 }  // namespace
 
-std::shared_ptr<const Surface> TestCube() {
-  static const std::shared_ptr<const Surface> cube = [] {
-    TriangleMesh mesh;
+std::shared_ptr<const geometry::Surface> TestCube() {
+  static const std::shared_ptr<const geometry::Surface> cube = [] {
+    geometry::TriangleMesh mesh;
     for (const float z : {-0.05f, 0.05f})
       for (const float y : {-0.05f, 0.05f})
         for (const float x : {-0.05f, 0.05f}) mesh.vertices_m.emplace_back(x, y, z);
     mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-    absl::StatusOr<std::shared_ptr<const Surface>> made = Surface::Create("cube", std::move(mesh));
+    absl::StatusOr<std::shared_ptr<const geometry::Surface>> made =
+        geometry::Surface::Create("cube", std::move(mesh));
     TOUCHSTONE_CHECK(made.ok());
     return *std::move(made);
   }();
@@ -104,15 +105,15 @@ TouchBatch TestBatch(int size, int fingers, uint64_t seed, bool all_hit) {
 }
 
 void ApplyByName(const std::string& name, const FileValues& values, TouchBatch* touches) {
-  const std::shared_ptr<const Effect> effect = Catalogue().Find(name);
+  const std::shared_ptr<const model::Effect> effect = Catalogue().Find(name);
   TOUCHSTONE_CHECK(effect != nullptr);
   ApplyEffect(*effect, values, touches);
 }
 
-void ApplyEffect(const Effect& effect, const FileValues& values, TouchBatch* touches) {
+void ApplyEffect(const model::Effect& effect, const FileValues& values, TouchBatch* touches) {
   std::vector<double> flat;
   size_t used = 0;
-  for (const ParameterInfo& parameter : effect.parameters) {
+  for (const model::ParameterInfo& parameter : effect.parameters) {
     std::vector<double> own(parameter.Count(touches->fingers()), parameter.neutral);
     for (const auto& [name, given] : values)
       if (name == parameter.name) own = given, ++used;
@@ -173,4 +174,4 @@ std::vector<std::string> ChangedFields(const TouchBatch& a, const TouchBatch& b)
   return changed;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

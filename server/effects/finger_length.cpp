@@ -2,7 +2,7 @@
 //   d_i += offset_i,  sum of the offsets 0: a length that all fingers share cannot be seen in relative times
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -25,10 +25,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect FingerLength() {
+model::Effect FingerLength() {
   return DefineEffect<Parameters>({
       .name = "finger_length",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .meaning = "The fingers differ in length, so each has its own constant distance to add.",
       .signature =
           "A constant distance per finger on every touch and object: times shift by offset / speed, so twice "
@@ -43,4 +43,4 @@ Effect FingerLength() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(FingerLength, LetsEachFingerTravelItsOwnOffset) {
@@ -16,4 +16,4 @@ TEST(FingerLength, LetsEachFingerTravelItsOwnOffset) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

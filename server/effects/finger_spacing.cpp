@@ -2,7 +2,7 @@
 //   real spacing = nominal + delta
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect FingerSpacing() {
+model::Effect FingerSpacing() {
   return DefineEffect<Parameters>({
       .name = "finger_spacing",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .meaning = "The real distance between neighbouring fingers differs from the nominal one.",
       .signature =
           "Grows with the slope and the curvature along the row of fingers: on a slope the outer fingers err "
@@ -41,4 +41,4 @@ Effect FingerSpacing() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -17,13 +17,13 @@
 #include "server/base/text.h"
 #include "server/effects/formula_program.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 // The catalogue's entry, which only describes; MakeFormulaEffect makes effects that act.
-Effect Formula() {
-  Effect effect;
+model::Effect Formula() {
+  model::Effect effect;
   effect.name = "formula";
-  effect.stage = Stage::kMotion;
+  effect.stage = model::Stage::kMotion;
   effect.meaning =
       "An effect of your own: an expression over the touch that adds travel_mm or time_us to each finger. It "
       "needs a name, an expression and its parameters.";
@@ -45,7 +45,7 @@ struct Input {
 };
 
 struct CompiledFormula {
-  std::shared_ptr<const FormulaSpec> spec;
+  std::shared_ptr<const model::FormulaSpec> spec;
   std::shared_ptr<const FormulaProgram> program;
   std::vector<Input> inputs;
 };
@@ -64,14 +64,14 @@ std::string DescribeFailure(const CompiledFormula& formula, const TouchBatch& to
 }
 
 // The array that the formula adds to.
-std::vector<double>& Target(const FormulaSpec& spec, TouchBatch& touches) {
-  if (spec.stage == Stage::kPose) return touches.travel_offset_m;
-  return spec.stage == Stage::kSensor ? touches.reported_time_s : touches.travel_m;
+std::vector<double>& Target(const model::FormulaSpec& spec, TouchBatch& touches) {
+  if (spec.stage == model::Stage::kPose) return touches.travel_offset_m;
+  return spec.stage == model::Stage::kSensor ? touches.reported_time_s : touches.travel_m;
 }
 
 void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> values, TouchBatch& touches) {
   if (!touches.formula_error.empty()) return;
-  const FormulaSpec& spec = *formula.spec;
+  const model::FormulaSpec& spec = *formula.spec;
   FormulaProgram::Loan evaluator(*formula.program);
   double* inputs = evaluator->inputs();
 
@@ -92,7 +92,7 @@ void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> value
   }
 
   std::vector<double>& target = Target(spec, touches);
-  const bool needs_contact = spec.stage != Stage::kPose;
+  const bool needs_contact = spec.stage != model::Stage::kPose;
   const double si_factor = spec.adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre;
   for (int finger = 0; finger < touches.fingers(); ++finger) {
     for (int touch = 0; touch < touches.size(); ++touch) {
@@ -110,7 +110,7 @@ void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> value
         return;
       }
       double added = value * si_factor;
-      if (spec.stage == Stage::kSensor && !spec.adds_time) added *= touches.time_per_travel_s_m[entry];
+      if (spec.stage == model::Stage::kSensor && !spec.adds_time) added *= touches.time_per_travel_s_m[entry];
       target[entry] += added;
     }
   }
@@ -133,7 +133,7 @@ bool IsTaken(const std::string& name) {
          std::any_of(constants.begin(), constants.end(), same) || absl::StartsWith(name, "cov_");
 }
 
-absl::Status CheckParameters(const FormulaSpec& spec) {
+absl::Status CheckParameters(const model::FormulaSpec& spec) {
   if (spec.parameters.size() > kMaxFormulaParameters)
     return absl::InvalidArgumentError(absl::StrCat("it has ", spec.parameters.size(), " parameters; at most ",
                                                    kMaxFormulaParameters, " are taken"));
@@ -141,7 +141,7 @@ absl::Status CheckParameters(const FormulaSpec& spec) {
     return absl::InvalidArgumentError(absl::StrCat("it has ", spec.parameters.size(), " parameters and ",
                                                    spec.values.size(), " values; every parameter needs one"));
   for (size_t i = 0; i < spec.parameters.size(); ++i) {
-    const ParameterInfo& parameter = spec.parameters[i];
+    const model::ParameterInfo& parameter = spec.parameters[i];
     const std::string& name = parameter.name;
     if (!IsPlainName(name))
       return absl::InvalidArgumentError(absl::StrCat(
@@ -167,7 +167,7 @@ absl::Status CheckParameters(const FormulaSpec& spec) {
 }
 
 // Finds what each name of the expression means in the formula's stage.
-absl::Status Resolve(const FormulaSpec& spec, CompiledFormula* formula, EffectNeeds* needs) {
+absl::Status Resolve(const model::FormulaSpec& spec, CompiledFormula* formula, model::EffectNeeds* needs) {
   std::vector<bool> used(spec.parameters.size(), false);
   for (const UsedName& name : formula->program->names()) {
     const auto wrong = [&](absl::string_view what) {
@@ -181,8 +181,8 @@ absl::Status Resolve(const FormulaSpec& spec, CompiledFormula* formula, EffectNe
       known.push_back(variable.name);
       if (name.name != variable.name) continue;
       if (variable.since > spec.stage)
-        return wrong(absl::StrCat(name.name, " is known from the ", StageName(variable.since),
-                                  " stage on, and this formula acts in the ", StageName(spec.stage),
+        return wrong(absl::StrCat(name.name, " is known from the ", model::StageName(variable.since),
+                                  " stage on, and this formula acts in the ", model::StageName(spec.stage),
                                   " stage"));
       input.read = variable.read;
     }
@@ -192,7 +192,7 @@ absl::Status Resolve(const FormulaSpec& spec, CompiledFormula* formula, EffectNe
       input.covariate = name.name;
       needs->covariates.push_back(name.name);
     } else if (input.read == nullptr) {
-      for (const ParameterInfo& parameter : spec.parameters) known.push_back(parameter.name);
+      for (const model::ParameterInfo& parameter : spec.parameters) known.push_back(parameter.name);
       return wrong(absl::StrCat("unknown variable '", name.name, "'", DidYouMean(name.name, known)));
     }
     needs->curvature |= name.name == "curvature_per_m";
@@ -207,19 +207,19 @@ absl::Status Resolve(const FormulaSpec& spec, CompiledFormula* formula, EffectNe
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<const Effect>> Make(const FormulaSpec& spec) {
+absl::StatusOr<std::shared_ptr<const model::Effect>> Make(const model::FormulaSpec& spec) {
   if (!IsPlainName(spec.name))
     return absl::InvalidArgumentError("a name has letters, digits and '_', and starts with a letter");
-  if (spec.adds_time && spec.stage != Stage::kSensor)
+  if (spec.adds_time && spec.stage != model::Stage::kSensor)
     return absl::InvalidArgumentError(
-        absl::StrCat("time_us can be added in the sensor stage only, not in the ", StageName(spec.stage),
-                     " stage; there add travel_mm"));
+        absl::StrCat("time_us can be added in the sensor stage only, not in the ",
+                     model::StageName(spec.stage), " stage; there add travel_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckParameters(spec));
 
   auto formula = std::make_shared<CompiledFormula>();
-  formula->spec = std::make_shared<const FormulaSpec>(spec);
+  formula->spec = std::make_shared<const model::FormulaSpec>(spec);
   absl::StatusOr<std::shared_ptr<const FormulaProgram>> program = FormulaProgram::Compile(spec.expression);
-  auto effect = std::make_shared<Effect>(Formula());
+  auto effect = std::make_shared<model::Effect>(Formula());
   absl::Status resolved = program.status();
   if (resolved.ok()) {
     formula->program = *std::move(program);
@@ -234,7 +234,7 @@ absl::StatusOr<std::shared_ptr<const Effect>> Make(const FormulaSpec& spec) {
       absl::StrCat("Adds ", spec.adds_time ? "time_us" : "travel_mm", " = ", spec.expression, ".");
   effect->formula = formula->spec;
   for (size_t i = 0; i < spec.parameters.size(); ++i) {
-    ParameterInfo parameter = spec.parameters[i];
+    model::ParameterInfo parameter = spec.parameters[i];
     parameter.neutral = spec.values[i];
     parameter.typical = (parameter.upper - parameter.lower) / 4;
     effect->parameters.push_back(std::move(parameter));
@@ -243,15 +243,15 @@ absl::StatusOr<std::shared_ptr<const Effect>> Make(const FormulaSpec& spec) {
                       absl::Span<const double> values, TouchBatch& touches) {
     ApplyFormula(*formula, values, touches);
   };
-  return std::shared_ptr<const Effect>(std::move(effect));
+  return std::shared_ptr<const model::Effect>(std::move(effect));
 }
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const Effect>> MakeFormulaEffect(const FormulaSpec& spec) {
-  absl::StatusOr<std::shared_ptr<const Effect>> effect = Make(spec);
+absl::StatusOr<std::shared_ptr<const model::Effect>> MakeFormulaEffect(const model::FormulaSpec& spec) {
+  absl::StatusOr<std::shared_ptr<const model::Effect>> effect = Make(spec);
   if (effect.ok()) return effect;
   return absl::InvalidArgumentError(absl::StrCat("formula '", spec.name, "': ", effect.status().message()));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

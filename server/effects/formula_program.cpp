@@ -13,7 +13,7 @@
 #include "server/base/units.h"
 #include "server/effects/formula.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 double Sin(double x) {
@@ -247,4 +247,4 @@ FormulaProgram::Loan::~Loan() {
   program_.idle_.push_back(std::move(evaluator_));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

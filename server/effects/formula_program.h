@@ -9,7 +9,7 @@
 
 #include <absl/status/statusor.h>
 
-namespace touchstone {
+namespace touchstone::effects {
 
 // Names in the order of their first use in an expression, each with the place of that use.
 struct UsedName {
@@ -56,4 +56,4 @@ class FormulaProgram {
   mutable std::vector<std::unique_ptr<Evaluator>> idle_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -9,22 +9,22 @@
 #include "server/base/units.h"
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 using testing::HasSubstr;
 
-FormulaSpec Spec(const std::string& expression, Stage stage = Stage::kMotion) {
-  FormulaSpec spec;
+model::FormulaSpec Spec(const std::string& expression, model::Stage stage = model::Stage::kMotion) {
+  model::FormulaSpec spec;
   spec.name = "mine";
   spec.expression = expression;
   spec.stage = stage;
   return spec;
 }
 
-void Declare(FormulaSpec* spec, const std::string& name, double value, Unit unit, double lower,
+void Declare(model::FormulaSpec* spec, const std::string& name, double value, Unit unit, double lower,
              double upper) {
-  ParameterInfo parameter;
+  model::ParameterInfo parameter;
   parameter.name = name;
   parameter.unit = unit;
   parameter.lower = lower;
@@ -33,17 +33,17 @@ void Declare(FormulaSpec* spec, const std::string& name, double value, Unit unit
   spec->values.push_back(value);
 }
 
-std::string ErrorOf(const FormulaSpec& spec) {
+std::string ErrorOf(const model::FormulaSpec& spec) {
   const auto effect = MakeFormulaEffect(spec);
   return effect.ok() ? "no error" : std::string(effect.status().message());
 }
 
-std::string ErrorOf(const std::string& expression, Stage stage = Stage::kMotion) {
+std::string ErrorOf(const std::string& expression, model::Stage stage = model::Stage::kMotion) {
   return ErrorOf(Spec(expression, stage));
 }
 
 TEST(Formula, ReproducesALeadScrewInTheUnitsOfFiles) {
-  FormulaSpec spec = Spec("k * sin(2*pi*travel_mm/lead)");
+  model::FormulaSpec spec = Spec("k * sin(2*pi*travel_mm/lead)");
   Declare(&spec, "k", 0.1, Unit::kMillimetre, -1, 1);
   Declare(&spec, "lead", 4, Unit::kMillimetre, 2, 10);
   const auto effect = MakeFormulaEffect(spec);
@@ -59,16 +59,16 @@ TEST(Formula, ReproducesALeadScrewInTheUnitsOfFiles) {
 
 TEST(Formula, ActsInTheStageThatItNames) {
   const struct {
-    Stage stage;
+    model::Stage stage;
     bool adds_time;
     const char* field;
-  } cases[] = {{Stage::kPose, false, "travel_offset_m"},
-               {Stage::kContact, false, "travel_m"},
-               {Stage::kMotion, false, "travel_m"},
-               {Stage::kSensor, false, "reported_time_s"},
-               {Stage::kSensor, true, "reported_time_s"}};
+  } cases[] = {{model::Stage::kPose, false, "travel_offset_m"},
+               {model::Stage::kContact, false, "travel_m"},
+               {model::Stage::kMotion, false, "travel_m"},
+               {model::Stage::kSensor, false, "reported_time_s"},
+               {model::Stage::kSensor, true, "reported_time_s"}};
   for (const auto& c : cases) {
-    FormulaSpec spec = Spec("1 + finger", c.stage);
+    model::FormulaSpec spec = Spec("1 + finger", c.stage);
     spec.adds_time = c.adds_time;
     const auto effect = MakeFormulaEffect(spec);
     ASSERT_TRUE(effect.ok()) << effect.status();
@@ -81,7 +81,7 @@ TEST(Formula, ActsInTheStageThatItNames) {
 }
 
 TEST(Formula, TurnsAddedTravelIntoTimeInTheSensorStage) {
-  FormulaSpec spec = Spec("2", Stage::kSensor);
+  model::FormulaSpec spec = Spec("2", model::Stage::kSensor);
   TouchBatch before = TestBatch(4, 3);
   TouchBatch after = before;
   ApplyEffect(**MakeFormulaEffect(spec), {}, &after);
@@ -126,7 +126,7 @@ TEST(Formula, KnowsEveryVariableWithItsMeaning) {
       {"cov_humidity", 0.5}};
   ASSERT_EQ(expected.size(), FormulaVariables().size() + 1);
   for (const auto& [name, value] : expected) {
-    FormulaSpec spec = Spec(name, Stage::kSensor);
+    model::FormulaSpec spec = Spec(name, model::Stage::kSensor);
     spec.adds_time = true;
     const auto effect = MakeFormulaEffect(spec);
     ASSERT_TRUE(effect.ok()) << effect.status();
@@ -166,7 +166,7 @@ TEST(Formula, KnowsEveryFunctionAndConstantThatItLists) {
                                                                 {"e", std::exp(1)}};
   ASSERT_EQ(expected.size(), FormulaFunctions().size() + FormulaConstants().size());
   for (const auto& [expression, value] : expected) {
-    FormulaSpec spec = Spec(expression, Stage::kPose);
+    model::FormulaSpec spec = Spec(expression, model::Stage::kPose);
     const auto effect = MakeFormulaEffect(spec);
     ASSERT_TRUE(effect.ok()) << effect.status();
     TouchBatch after = touches;
@@ -177,8 +177,9 @@ TEST(Formula, KnowsEveryFunctionAndConstantThatItLists) {
 
 TEST(Formula, ComparesAndChooses) {
   TouchBatch touches = TestBatch(1, 3);
-  ApplyEffect(**MakeFormulaEffect(Spec("finger > 0 ? 1 : (finger == 0 && 2 >= 2 ? 5 : -2^2)", Stage::kPose)),
-              {}, &touches);
+  ApplyEffect(
+      **MakeFormulaEffect(Spec("finger > 0 ? 1 : (finger == 0 && 2 >= 2 ? 5 : -2^2)", model::Stage::kPose)),
+      {}, &touches);
   EXPECT_NEAR(touches.travel_offset_m[0], -0.004, 1e-15);
   EXPECT_NEAR(touches.travel_offset_m[1], 0.005, 1e-15);
   EXPECT_NEAR(touches.travel_offset_m[2], 0.001, 1e-15);
@@ -186,7 +187,7 @@ TEST(Formula, ComparesAndChooses) {
 
 TEST(Formula, SaysWhatItNeeds) {
   const auto needs = [](const char* expression) {
-    return (*MakeFormulaEffect(Spec(expression, Stage::kSensor)))->needs;
+    return (*MakeFormulaEffect(Spec(expression, model::Stage::kSensor)))->needs;
   };
   EXPECT_TRUE(needs("curvature_per_m").curvature);
   EXPECT_FALSE(needs("travel_mm").curvature);
@@ -213,29 +214,30 @@ TEST(Formula, RefusesWhatIsNotArithmeticWithThePlace) {
 }
 
 TEST(Formula, RefusesVariablesThatItsStageDoesNotKnow) {
-  EXPECT_THAT(ErrorOf("travel_mm", Stage::kPose), HasSubstr("travel_mm is known from the contact stage on"));
-  EXPECT_THAT(ErrorOf("first", Stage::kContact), HasSubstr("first is known from the motion stage on"));
-  EXPECT_EQ(ErrorOf("first + travel_mm", Stage::kMotion), "no error");
-  FormulaSpec spec = Spec("1", Stage::kMotion);
+  EXPECT_THAT(ErrorOf("travel_mm", model::Stage::kPose),
+              HasSubstr("travel_mm is known from the contact stage on"));
+  EXPECT_THAT(ErrorOf("first", model::Stage::kContact), HasSubstr("first is known from the motion stage on"));
+  EXPECT_EQ(ErrorOf("first + travel_mm", model::Stage::kMotion), "no error");
+  model::FormulaSpec spec = Spec("1", model::Stage::kMotion);
   spec.adds_time = true;
   EXPECT_THAT(ErrorOf(spec), HasSubstr("time_us can be added in the sensor stage only"));
 }
 
 TEST(Formula, RefusesParametersThatMakeNoSense) {
-  FormulaSpec unused = Spec("finger");
+  model::FormulaSpec unused = Spec("finger");
   Declare(&unused, "k", 0, Unit::kMillimetre, -1, 1);
   EXPECT_THAT(ErrorOf(unused), HasSubstr("parameter 'k' is not used"));
-  FormulaSpec outside = Spec("k");
+  model::FormulaSpec outside = Spec("k");
   Declare(&outside, "k", 2, Unit::kMillimetre, -1, 1);
   EXPECT_THAT(ErrorOf(outside), HasSubstr("value 2 must lie in -1 to 1 mm"));
-  FormulaSpec taken = Spec("finger");
+  model::FormulaSpec taken = Spec("finger");
   Declare(&taken, "finger", 0, Unit::kNone, -1, 1);
   EXPECT_THAT(ErrorOf(taken), HasSubstr("take another"));
-  FormulaSpec twice = Spec("k");
+  model::FormulaSpec twice = Spec("k");
   Declare(&twice, "k", 0, Unit::kNone, -1, 1);
   Declare(&twice, "k", 0, Unit::kNone, -1, 1);
   EXPECT_THAT(ErrorOf(twice), HasSubstr("declared twice"));
-  FormulaSpec reversed = Spec("k");
+  model::FormulaSpec reversed = Spec("k");
   Declare(&reversed, "k", 0, Unit::kNone, 1, -1);
   EXPECT_THAT(ErrorOf(reversed), HasSubstr("must be below max"));
 }
@@ -257,7 +259,7 @@ TEST(Formula, ReportsValuesThatAreNotFiniteAndSkipsMisses) {
 }
 
 TEST(Formula, GivesTheSameFromManyThreadsAtOnce) {
-  FormulaSpec spec = Spec("k * sin(travel_mm) + finger * incidence_deg");
+  model::FormulaSpec spec = Spec("k * sin(travel_mm) + finger * incidence_deg");
   Declare(&spec, "k", 1, Unit::kMillimetre, -10, 10);
   const auto effect = *MakeFormulaEffect(spec);
   std::vector<TouchBatch> batches;
@@ -275,4 +277,4 @@ TEST(Formula, GivesTheSameFromManyThreadsAtOnce) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -4,7 +4,7 @@
 
 #include "server/effects/formula.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 constexpr double kMillimetres = 1.0 / kMetresPerMillimetre;
@@ -54,32 +54,34 @@ double FirstFinger(const TouchBatch& b, int, int touch) {
 }
 
 constexpr FormulaVariable kVariables[] = {
-    {"finger", "", Stage::kPose, "place of the finger in units of the spacing: -1, 0, 1 for l, m, r", Finger},
-    {"speed_mm_s", "mm/s", Stage::kPose, "commanded speed", SpeedMmS},
-    {"session_time_s", "s", Stage::kPose, "time since the session began", SessionTimeS},
-    {"previous_press_mm", "mm", Stage::kPose,
+    {"finger", "", model::Stage::kPose, "place of the finger in units of the spacing: -1, 0, 1 for l, m, r",
+     Finger},
+    {"speed_mm_s", "mm/s", model::Stage::kPose, "commanded speed", SpeedMmS},
+    {"session_time_s", "s", model::Stage::kPose, "time since the session began", SessionTimeS},
+    {"previous_press_mm", "mm", model::Stage::kPose,
      "how far this finger was pressed in by the session's previous touch; 0 for the first", PreviousPressMm},
-    {"approach_x", "", Stage::kPose, "direction of motion, unit vector in the object frame", Approach<0>},
-    {"approach_y", "", Stage::kPose, "", Approach<1>},
-    {"approach_z", "", Stage::kPose, "", Approach<2>},
-    {"lateral_x", "", Stage::kPose,
+    {"approach_x", "", model::Stage::kPose, "direction of motion, unit vector in the object frame",
+     Approach<0>},
+    {"approach_y", "", model::Stage::kPose, "", Approach<1>},
+    {"approach_z", "", model::Stage::kPose, "", Approach<2>},
+    {"lateral_x", "", model::Stage::kPose,
      "direction from the first finger to the last, unit vector (after tool_yaw)", Lateral<0>},
-    {"lateral_y", "", Stage::kPose, "", Lateral<1>},
-    {"lateral_z", "", Stage::kPose, "", Lateral<2>},
-    {"travel_mm", "mm", Stage::kContact,
+    {"lateral_y", "", model::Stage::kPose, "", Lateral<1>},
+    {"lateral_z", "", model::Stage::kPose, "", Lateral<2>},
+    {"travel_mm", "mm", model::Stage::kContact,
      "travel of the finger until contact, with what effects above have added", TravelMm},
-    {"incidence_deg", "deg", Stage::kContact, "angle between the approach and the inward surface normal",
-     IncidenceDeg},
-    {"curvature_per_m", "1/m", Stage::kContact, "mean curvature of the surface, positive where convex",
+    {"incidence_deg", "deg", model::Stage::kContact,
+     "angle between the approach and the inward surface normal", IncidenceDeg},
+    {"curvature_per_m", "1/m", model::Stage::kContact, "mean curvature of the surface, positive where convex",
      CurvaturePerM},
-    {"normal_x", "", Stage::kContact, "outward surface normal at the contact, unit vector", Normal<0>},
-    {"normal_y", "", Stage::kContact, "", Normal<1>},
-    {"normal_z", "", Stage::kContact, "", Normal<2>},
-    {"contact_x_mm", "mm", Stage::kContact, "place of the contact in the object frame", ContactMm<0>},
-    {"contact_y_mm", "mm", Stage::kContact, "", ContactMm<1>},
-    {"contact_z_mm", "mm", Stage::kContact, "", ContactMm<2>},
-    {"first", "", Stage::kMotion, "1 for the finger that touched first, else 0", First},
-    {"first_finger", "", Stage::kMotion, "place of the finger that touched first, like `finger`",
+    {"normal_x", "", model::Stage::kContact, "outward surface normal at the contact, unit vector", Normal<0>},
+    {"normal_y", "", model::Stage::kContact, "", Normal<1>},
+    {"normal_z", "", model::Stage::kContact, "", Normal<2>},
+    {"contact_x_mm", "mm", model::Stage::kContact, "place of the contact in the object frame", ContactMm<0>},
+    {"contact_y_mm", "mm", model::Stage::kContact, "", ContactMm<1>},
+    {"contact_z_mm", "mm", model::Stage::kContact, "", ContactMm<2>},
+    {"first", "", model::Stage::kMotion, "1 for the finger that touched first, else 0", First},
+    {"first_finger", "", model::Stage::kMotion, "place of the finger that touched first, like `finger`",
      FirstFinger},
 };
 
@@ -125,4 +127,4 @@ absl::Span<const FormulaWord> FormulaConstants() {
   return kConstants;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

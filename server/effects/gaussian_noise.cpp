@@ -4,7 +4,7 @@
 // heavy_tail_noise act on it wherever they stand in the stack.
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -28,11 +28,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect GaussianNoise() {
+model::Effect GaussianNoise() {
   return DefineEffect<Parameters>({
       .name = "gaussian_noise",
-      .stage = Stage::kSensor,
-      .role = EffectRole::kNoiseLevel,
+      .stage = model::Stage::kSensor,
+      .role = model::EffectRole::kNoiseLevel,
       .meaning = "Each finger's time scatters independently, with a normal distribution.",
       .signature = "Repeats of the same touch differ, everywhere alike, and their mean settles with the "
                    "number of repeats. "
@@ -45,4 +45,4 @@ Effect GaussianNoise() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

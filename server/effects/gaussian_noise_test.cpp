@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(GaussianNoise, GivesEveryFingerTheSameSigma) {
@@ -20,4 +20,4 @@ TEST(GaussianNoise, AddsInQuadratureToNoiseThatIsThere) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

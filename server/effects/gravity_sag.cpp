@@ -2,7 +2,7 @@
 //   every tip is moved by drop along -z of the object frame, whatever the approach
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect GravitySag() {
+model::Effect GravitySag() {
   return DefineEffect<Parameters>({
       .name = "gravity_sag",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .meaning = "The finger tips hang lower than commanded, along -z of the object frame.",
       .signature =
           "Shows on sloping or curved side faces touched horizontally, with one sign all around the object; "
@@ -44,4 +44,4 @@ Effect GravitySag() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

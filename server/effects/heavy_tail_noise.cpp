@@ -6,7 +6,7 @@
 // there on the noise is exactly Gaussian. The order in the stack does not matter.
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 constexpr double kGaussianDegrees = 1000;
@@ -26,11 +26,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect HeavyTailNoise() {
+model::Effect HeavyTailNoise() {
   return DefineEffect<Parameters>({
       .name = "heavy_tail_noise",
-      .stage = Stage::kSensor,
-      .role = EffectRole::kNoiseTails,
+      .stage = model::Stage::kSensor,
+      .role = model::EffectRole::kNoiseTails,
       .meaning = "The noise has outliers: Student's t instead of a normal distribution.",
       .signature = "Most repeats agree well and a few are far off; the standard deviation jumps from batch "
                    "to batch and "
@@ -43,4 +43,4 @@ Effect HeavyTailNoise() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

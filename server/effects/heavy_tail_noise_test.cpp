@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(HeavyTailNoise, SetsTheDegreesOfFreedom) {
@@ -18,4 +18,4 @@ TEST(HeavyTailNoise, IsGaussianAtItsUpperBound) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -5,7 +5,7 @@
 
 #include "server/effects/touch_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 // Below this cosine (89.94 deg) the tangent of the incidence is held: it would grow without bound.
 inline constexpr double kMinCosIncidence = 1e-3;
@@ -18,4 +18,4 @@ inline auto TanIncidence(const TouchBatch& touches) {
   return ((1.0 - held * held).max(0.0).sqrt() / held).eval();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

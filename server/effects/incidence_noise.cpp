@@ -5,7 +5,7 @@
 #include "server/effects/define_effect.h"
 #include "server/effects/incidence.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -26,11 +26,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect IncidenceNoise() {
+model::Effect IncidenceNoise() {
   return DefineEffect<Parameters>({
       .name = "incidence_noise",
-      .stage = Stage::kSensor,
-      .role = EffectRole::kNoiseGrowth,
+      .stage = model::Stage::kSensor,
+      .role = model::EffectRole::kNoiseGrowth,
       .meaning = "The scatter of a finger's time grows with the obliqueness of its contact.",
       .signature =
           "Repeats scatter more on slopes than head-on, while their means stay right; a model with constant "
@@ -43,4 +43,4 @@ Effect IncidenceNoise() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -3,7 +3,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(IncidenceNoise, GrowsSigmaByOnePlusSlopeTimesTangent) {
@@ -26,4 +26,4 @@ TEST(IncidenceNoise, ActsWhereverItStandsInTheStack) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   each finger's report is lost with this probability, independently (the stage draws)
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,11 +20,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect MissedContact() {
+model::Effect MissedContact() {
   return DefineEffect<Parameters>({
       .name = "missed_contact",
-      .stage = Stage::kSensor,
-      .role = EffectRole::kDropout,
+      .stage = model::Stage::kSensor,
+      .role = model::EffectRole::kDropout,
       .meaning = "Now and then a finger that touches reports nothing.",
       .signature =
           "Empty times at places where repeats of the same touch have one. Fingers that miss the object are "
@@ -36,4 +36,4 @@ Effect MissedContact() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -10,13 +10,13 @@
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 using testing::HasSubstr;
 
 // A value within bounds: often round, as people write, and often of full precision, as fits end.
-double RandomSi(const ParameterInfo& p, RandomStream* random) {
+double RandomSi(const model::ParameterInfo& p, RandomStream* random) {
   const double lower = std::max(p.lower, p.neutral - 10 * p.typical);
   const double upper = std::min(p.upper, p.neutral + 10 * p.typical);
   if (random->Below(4) == 0) return ToSi(p.unit, p.neutral);
@@ -26,14 +26,14 @@ double RandomSi(const ParameterInfo& p, RandomStream* random) {
   return ToSi(p.unit, random->Below(2) == 0 ? std::min(std::max(rounded, lower), upper) : value);
 }
 
-std::vector<double> RandomValues(const Effect& effect, int fingers, RandomStream* random) {
+std::vector<double> RandomValues(const model::Effect& effect, int fingers, RandomStream* random) {
   std::vector<double> values;
-  for (const ParameterInfo& p : effect.parameters) {
+  for (const model::ParameterInfo& p : effect.parameters) {
     const int count = p.Count(fingers);
     for (int i = 0; i < count; ++i)
-      values.push_back(p.arity == Arity::kPerFinger ? 0.0 : RandomSi(p, random));
+      values.push_back(p.arity == model::Arity::kPerFinger ? 0.0 : RandomSi(p, random));
     // Pairs of opposite values sum to 0 exactly.
-    if (p.arity == Arity::kPerFinger && count > 1) {
+    if (p.arity == model::Arity::kPerFinger && count > 1) {
       const double value = 0.1 * RandomSi(p, random);
       values[values.size() - 1] = value;
       values[values.size() - 2] = -value;
@@ -42,23 +42,23 @@ std::vector<double> RandomValues(const Effect& effect, int fingers, RandomStream
   return values;
 }
 
-Model RandomModel(uint64_t seed) {
+model::Model RandomModel(uint64_t seed) {
   RandomStream random(seed, RandomDomain::kTest);
-  Model model;
+  model::Model model;
   const char* names[] = {"nominal", "a b: c", "\"quoted\" \\ back", "null", "3", "t\xc3\xa4st #1", "- x"};
   model.name = names[random.Below(7)];
   model.fingers = 1 + static_cast<int>(random.Below(16));
   model.spacing_m = random.Uniform(0.005, 0.05);
   for (const auto& effect : Catalogue().All()) {
     if (random.Below(2) == 0) continue;
-    EffectInstance instance;
+    model::EffectInstance instance;
     instance.effect = effect;
     if (effect->name == "formula") {
-      FormulaSpec spec;
+      model::FormulaSpec spec;
       spec.name = "lead_screw";
       spec.expression = "k * sin(2*pi*travel_mm/lead)";
       for (const char* name : {"k", "lead"}) {
-        ParameterInfo p;
+        model::ParameterInfo p;
         p.name = name;
         p.unit = random.Below(2) == 0 ? Unit::kMillimetre : Unit::kNone;
         p.lower = random.Uniform(-3, -1);
@@ -67,7 +67,9 @@ Model RandomModel(uint64_t seed) {
         spec.values.push_back(random.Uniform(-1, 1));
       }
       spec.adds_time = random.Below(2) == 0;
-      spec.stage = spec.adds_time ? Stage::kSensor : random.Below(2) == 0 ? Stage::kMotion : Stage::kContact;
+      spec.stage = spec.adds_time         ? model::Stage::kSensor
+                   : random.Below(2) == 0 ? model::Stage::kMotion
+                                          : model::Stage::kContact;
       instance.effect = *Catalogue().MakeFormula(spec);
       instance.values = instance.effect->NeutralValues(model.fingers);
     } else {
@@ -85,19 +87,19 @@ Model RandomModel(uint64_t seed) {
 
 TEST(ModelFile, ReadsBackWhatItWroteToTheSameHash) {
   for (uint64_t seed = 0; seed < 300; ++seed) {
-    const Model model = RandomModel(seed);
-    const std::string text = FormatModel(model);
-    const absl::StatusOr<Model> read = ParseModel(text, "model.yaml", Catalogue());
+    const model::Model model = RandomModel(seed);
+    const std::string text = model::FormatModel(model);
+    const absl::StatusOr<model::Model> read = model::ParseModel(text, "model.yaml", Catalogue());
     ASSERT_TRUE(read.ok()) << read.status() << "\n" << text;
     EXPECT_EQ(read->Hash(), model.Hash()) << text;
     EXPECT_EQ(read->name, model.name);
-    EXPECT_EQ(FormatModel(*read), text);
-    EXPECT_TRUE(DiffModels(model, *read).empty());
+    EXPECT_EQ(model::FormatModel(*read), text);
+    EXPECT_TRUE(model::DiffModels(model, *read).empty());
   }
 }
 
 TEST(ModelFile, ReadsTheExampleOfTheDesign) {
-  const absl::StatusOr<Model> model = ParseModel(R"yaml(
+  const absl::StatusOr<model::Model> model = model::ParseModel(R"yaml(
 touchstone: model/1
 name: nominal
 end_effector: {fingers: 3, spacing_mm: 30}
@@ -109,14 +111,14 @@ effects:
       expression: "k * sin(2*pi*travel_mm/lead)"
       parameters: {k: {value: 0, unit: mm, min: -1, max: 1}, lead: {value: 4, unit: mm, min: 2, max: 10}}
 )yaml",
-                                                 "example.yaml", Catalogue());
+                                                               "example.yaml", Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
   EXPECT_EQ(model->fingers, 3);
   EXPECT_DOUBLE_EQ(model->spacing_m, 0.03);
   ASSERT_EQ(model->effects.size(), 2u);
   EXPECT_THAT(model->effects[0].values, testing::ElementsAre(0.005));
   EXPECT_EQ(model->effects[1].effect->formula->name, "lead_screw");
-  EXPECT_EQ(FormatModel(*model), R"yaml(touchstone: model/1
+  EXPECT_EQ(model::FormatModel(*model), R"yaml(touchstone: model/1
 name: nominal
 end_effector: {fingers: 3, spacing_mm: 30}
 effects:
@@ -132,15 +134,15 @@ effects:
 }
 
 TEST(ModelFile, GivesSingleObjectsTheirOwnValues) {
-  const absl::StatusOr<Model> model = ParseModel(R"yaml(
+  const absl::StatusOr<model::Model> model = model::ParseModel(R"yaml(
 touchstone: model/1
 name: placed
 effects:
   - object_pose: {scope: object, translation_mm: [0, 0, 1], objects: {lat00: {translation_mm: [1, 0, 0]}, lat20: {rotation_deg: [0, 0, 2]}}}
 )yaml",
-                                                 "placed.yaml", Catalogue());
+                                                               "placed.yaml", Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
-  const EffectInstance& pose = model->effects[0];
+  const model::EffectInstance& pose = model->effects[0];
   EXPECT_TRUE(pose.per_object);
   EXPECT_THAT(pose.ValuesFor("lat00"), testing::ElementsAre(0.001, 0, 0, 0, 0, 0));
   EXPECT_THAT(pose.ValuesFor("lat05"), testing::ElementsAre(0, 0, 0.001, 0, 0, 0));
@@ -149,19 +151,19 @@ effects:
 }
 
 TEST(AddEffect, BuildsFormulasFromTheCommandLine) {
-  const absl::StatusOr<Model> model = AddEffect(
-      NominalModel(), "formula",
+  const absl::StatusOr<model::Model> model = model::AddEffect(
+      model::NominalModel(), "formula",
       {"name=drag", "adds=time_us", "expression=k * speed_mm_s", "k=3", "k_unit=us", "k_min=0", "k_max=10"},
       Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
-  const Effect& effect = *model->effects[0].effect;
-  EXPECT_EQ(effect.stage, Stage::kSensor);
+  const model::Effect& effect = *model->effects[0].effect;
+  EXPECT_EQ(effect.stage, model::Stage::kSensor);
   EXPECT_EQ(effect.parameters[0].unit, Unit::kMicrosecond);
   EXPECT_THAT(model->effects[0].values, testing::ElementsAre(testing::DoubleEq(3e-6)));
-  const auto missing =
-      AddEffect(NominalModel(), "formula", {"name=drag", "adds=time_us", "expression=k", "k=3"}, Catalogue());
+  const auto missing = model::AddEffect(model::NominalModel(), "formula",
+                                        {"name=drag", "adds=time_us", "expression=k", "k=3"}, Catalogue());
   EXPECT_THAT(std::string(missing.status().message()), HasSubstr("parameter k: 'unit' is missing"));
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

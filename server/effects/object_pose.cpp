@@ -4,7 +4,7 @@
 #include "server/effects/define_effect.h"
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,7 +20,7 @@ constexpr ParameterRow<Parameters> kRows[] = {
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {
-  const Eigen::Matrix3d rotation = RotationFromVector(p.rotation_rad);
+  const Eigen::Matrix3d rotation = geometry::RotationFromVector(p.rotation_rad);
   // On top of what the surface has gone through already.
   touches.surface_rotation = rotation * touches.surface_rotation;
   touches.surface_translation_m = rotation * touches.surface_translation_m + p.translation_m;
@@ -28,10 +28,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ObjectPose() {
+model::Effect ObjectPose() {
   return DefineEffect<Parameters>({
       .name = "object_pose",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .often_per_object = true,
       .meaning = "The object lies moved or turned against the frame that the touches are commanded in.",
       .signature =
@@ -47,4 +47,4 @@ Effect ObjectPose() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

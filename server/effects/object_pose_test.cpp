@@ -3,7 +3,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ObjectPose, RotatesAboutTheMeshOriginAndThenMoves) {
@@ -23,4 +23,4 @@ TEST(ObjectPose, TurnsByTheLengthOfTheRotationVector) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   d_j += shift   for every finger j but the first
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -23,10 +23,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ObjectPush() {
+model::Effect ObjectPush() {
   return DefineEffect<Parameters>({
       .name = "object_push",
-      .stage = Stage::kMotion,
+      .stage = model::Stage::kMotion,
       .meaning = "The first contact shifts the object; the other fingers have farther to go.",
       .signature = "A step: the same delay on every later finger, however small the gap. A slowdown grows "
                    "with the gap.",
@@ -43,4 +43,4 @@ Effect ObjectPush() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

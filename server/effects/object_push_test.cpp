@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ObjectPush, DelaysEveryFingerButTheFirst) {
@@ -18,4 +18,4 @@ TEST(ObjectPush, DelaysEveryFingerButTheFirst) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   surface = (1 + relative) * mesh, about the mesh origin
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ObjectScale() {
+model::Effect ObjectScale() {
   return DefineEffect<Parameters>({
       .name = "object_scale",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .often_per_object = true,
       .meaning = "The object is larger or smaller than its mesh by the same share in every "
                  "direction (a print that shrank).",
@@ -43,4 +43,4 @@ Effect ObjectScale() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

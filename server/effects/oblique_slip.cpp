@@ -5,7 +5,7 @@
 #include "server/effects/define_effect.h"
 #include "server/effects/incidence.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -27,10 +27,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ObliqueSlip() {
+model::Effect ObliqueSlip() {
   return DefineEffect<Parameters>({
       .name = "oblique_slip",
-      .stage = Stage::kSensor,
+      .stage = model::Stage::kSensor,
       .meaning = "On an oblique surface the finger slides before it triggers, so it reports late.",
       .signature =
           "Late by travel * tan(incidence): nothing head-on, visible from a few degrees on. tip_radius comes "
@@ -44,4 +44,4 @@ Effect ObliqueSlip() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

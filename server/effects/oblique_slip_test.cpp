@@ -3,7 +3,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ObliqueSlip, AddsTravelTimesTheTangentOfTheIncidence) {
@@ -26,4 +26,4 @@ TEST(ObliqueSlip, StaysFiniteWhereTheFingerGrazes) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

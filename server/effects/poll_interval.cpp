@@ -2,7 +2,7 @@
 //   times are rounded up to ticks of the interval; the loop's phase is random, one draw per touch (the stage's)
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,11 +20,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect PollInterval() {
+model::Effect PollInterval() {
   return DefineEffect<Parameters>({
       .name = "poll_interval",
-      .stage = Stage::kSensor,
-      .role = EffectRole::kQuantisation,
+      .stage = model::Stage::kSensor,
+      .role = model::EffectRole::kQuantisation,
       .meaning = "Contacts are noticed only at the ticks of a polling loop.",
       .signature = "Time differences are multiples of the interval: a histogram of them is a comb; close "
                    "contacts come out as exactly equal.",
@@ -37,4 +37,4 @@ Effect PollInterval() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

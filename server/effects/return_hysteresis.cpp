@@ -3,7 +3,7 @@
 // A finger that stands a little too far in has less of its own way to go before its switch trips.
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -26,10 +26,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ReturnHysteresis() {
+model::Effect ReturnHysteresis() {
   return DefineEffect<Parameters>({
       .name = "return_hysteresis",
-      .stage = Stage::kSensor,
+      .stage = model::Stage::kSensor,
       .meaning = "A finger that was pressed far in by the previous touch has not fully sprung back and "
                  "reports early.",
       .signature =
@@ -50,4 +50,4 @@ Effect ReturnHysteresis() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ReturnHysteresis, ShortensTravelByAShareOfThePreviousPress) {
@@ -17,4 +17,4 @@ TEST(ReturnHysteresis, ShortensTravelByAShareOfThePreviousPress) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

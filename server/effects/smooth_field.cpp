@@ -5,7 +5,7 @@
 #include "server/base/random.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 SmoothField::SmoothField(uint64_t seed, uint64_t object_id, double length_m,
                          absl::Span<const Eigen::Vector3d> points_m) {
@@ -59,4 +59,4 @@ double SmoothField::At(const Eigen::Vector3d& point_m) const {
   return scale_ * total;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -12,7 +12,7 @@
 #include <absl/types/span.h>
 #include <Eigen/Core>
 
-namespace touchstone {
+namespace touchstone::effects {
 
 class SmoothField {
  public:
@@ -33,4 +33,4 @@ class SmoothField {
   double scale_ = 1;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -6,7 +6,7 @@
 
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(SmoothField, HasTheMaternCovariance) {
@@ -60,4 +60,4 @@ TEST(SmoothField, IsAPureFunctionOfSeedObjectAndLength) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 //   real speed = commanded * (1 + relative)
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -20,10 +20,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect SpeedError() {
+model::Effect SpeedError() {
   return DefineEffect<Parameters>({
       .name = "speed_error",
-      .stage = Stage::kMotion,
+      .stage = model::Stage::kMotion,
       .meaning = "The arm's real speed differs from the commanded one by a constant share.",
       .signature =
           "Every time difference is stretched or shrunk by the same share, so the error grows with the "
@@ -45,4 +45,4 @@ Effect SpeedError() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(SpeedError, MultipliesTheSpeed) {
@@ -12,4 +12,4 @@ TEST(SpeedError, MultipliesTheSpeed) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

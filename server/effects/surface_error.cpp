@@ -14,7 +14,7 @@
 #include "server/effects/smooth_field.h"
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 constexpr double kMinCosine = 0.1;
@@ -42,7 +42,7 @@ uint64_t ObjectId(const std::string& name) {
 }
 
 // Points spread evenly over the area of a mesh: one from each of kSurfacePoints equal shares of it.
-std::vector<Eigen::Vector3d> PointsOnSurface(const TriangleMesh& mesh) {
+std::vector<Eigen::Vector3d> PointsOnSurface(const geometry::TriangleMesh& mesh) {
   std::vector<double> area_until(mesh.triangles.size());
   double area = 0;
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -70,7 +70,7 @@ std::vector<Eigen::Vector3d> PointsOnSurface(const TriangleMesh& mesh) {
 // cache of pure functions: eviction changes the speed alone.
 class FieldCache {
  public:
-  std::shared_ptr<const SmoothField> Get(const Surface& surface, uint64_t seed, double length_m) {
+  std::shared_ptr<const SmoothField> Get(const geometry::Surface& surface, uint64_t seed, double length_m) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const Key key(surface.hash(), surface.name(), seed, length_m);
     auto field = fields_.find(key);
@@ -113,11 +113,11 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect SurfaceError() {
+model::Effect SurfaceError() {
   return DefineEffect<Parameters>({
       .name = "surface_error",
-      .stage = Stage::kContact,
-      .role = EffectRole::kSmoothError,
+      .stage = model::Stage::kContact,
+      .role = model::EffectRole::kSmoothError,
       .always_per_object = true,
       .meaning = "The real surface departs from its mesh by smooth bumps along the normal: "
                  "a bad print, a dent, paint.",
@@ -137,4 +137,4 @@ Effect SurfaceError() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -7,7 +7,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 // Points spread over the faces of the cube, each met at `cosine`.
@@ -84,7 +84,7 @@ TEST(SurfaceError, DiffersFromObjectToObjectAndFromSeedToSeed) {
   const TouchBatch before = CubeTouches(50, 1);
   TouchBatch cube = before;
   TouchBatch other_name = before;
-  other_name.surface = *Surface::Create("another", TestCube()->mesh());
+  other_name.surface = *geometry::Surface::Create("another", TestCube()->mesh());
   TouchBatch other_seed = before;
   other_seed.seed = 99;
   for (TouchBatch* touches : {&cube, &other_name, &other_seed})
@@ -94,4 +94,4 @@ TEST(SurfaceError, DiffersFromObjectToObjectAndFromSeedToSeed) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

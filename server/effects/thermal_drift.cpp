@@ -2,7 +2,7 @@
 //   d_i += rate_i * session time,  sum of the rates 0
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -26,10 +26,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ThermalDrift() {
+model::Effect ThermalDrift() {
   return DefineEffect<Parameters>({
       .name = "thermal_drift",
-      .stage = Stage::kSensor,
+      .stage = model::Stage::kSensor,
       .meaning = "The fingers' trigger points wander apart while the rig warms up.",
       .signature =
           "The error of each finger grows in a straight line with session_time_s and starts anew with every "
@@ -49,4 +49,4 @@ Effect ThermalDrift() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -2,7 +2,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ThermalDrift, AddsRateTimesSessionTimeAsTravel) {
@@ -20,4 +20,4 @@ TEST(ThermalDrift, AddsRateTimesSessionTimeAsTravel) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -4,7 +4,7 @@
 //   radius (1 / cos(inc) - 1) less than a point would. The stage casts the sphere (geometry/surface.h).
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -22,10 +22,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect TipRadius() {
+model::Effect TipRadius() {
   return DefineEffect<Parameters>({
       .name = "tip_radius",
-      .stage = Stage::kContact,
+      .stage = model::Stage::kContact,
       .before_cast = true,
       .meaning = "The finger tips are spheres: contact is when the swept sphere first touches the surface.",
       .signature =
@@ -44,4 +44,4 @@ Effect TipRadius() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -5,7 +5,7 @@
 
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -29,10 +29,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ToolTilt() {
+model::Effect ToolTilt() {
   return DefineEffect<Parameters>({
       .name = "tool_tilt",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .meaning = "The row of finger tips is not square to the approach: one outer finger "
                  "arrives early, the other equally late.",
       .signature =
@@ -52,4 +52,4 @@ Effect ToolTilt() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

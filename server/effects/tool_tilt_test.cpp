@@ -3,7 +3,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ToolTilt, LengthensTravelByPositionTimesTangent) {
@@ -25,4 +25,4 @@ TEST(ToolTilt, UsesTheRealSpacingWhereFingerSpacingStandsAboveIt) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -4,7 +4,7 @@
 
 #include "server/effects/define_effect.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 struct Parameters {
@@ -28,10 +28,10 @@ void Apply(const Parameters& p, TouchBatch& touches) {
 
 }  // namespace
 
-Effect ToolYaw() {
+model::Effect ToolYaw() {
   return DefineEffect<Parameters>({
       .name = "tool_yaw",
-      .stage = Stage::kPose,
+      .stage = model::Stage::kPose,
       .meaning =
           "The end effector is mounted turned about the approach: the outer fingers meet the surface beside "
           "the places that were commanded.",
@@ -53,4 +53,4 @@ Effect ToolYaw() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

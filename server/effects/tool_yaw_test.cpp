@@ -3,7 +3,7 @@
 
 #include "server/effects/effect_test_batch.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 namespace {
 
 TEST(ToolYaw, TurnsTheRowOfFingersRightHandedAboutTheApproach) {
@@ -25,4 +25,4 @@ TEST(ToolYaw, KeepsTheRowAUnitVectorSquareToTheApproach) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::effects

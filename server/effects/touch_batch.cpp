@@ -2,7 +2,7 @@
 
 #include "server/base/check.h"
 
-namespace touchstone {
+namespace touchstone::effects {
 
 void TouchBatch::Reset(int size, int fingers) {
   TOUCHSTONE_CHECK(size >= 0 && fingers >= 1);
@@ -58,4 +58,4 @@ void TouchBatch::Reset(int size, int fingers) {
   formula_error.clear();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

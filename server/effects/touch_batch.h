@@ -15,9 +15,11 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace touchstone {
-
+namespace touchstone::geometry {
 class Surface;
+}
+
+namespace touchstone::effects {
 
 class TouchBatch {
  public:
@@ -35,11 +37,11 @@ class TouchBatch {
   double FingerPosition(int finger) const { return finger - 0.5 * (fingers_ - 1); }
 
   // --- Given: the commanded touches ---
-  std::shared_ptr<const Surface> surface;  // the nominal mesh
-  uint64_t seed = 0;                       // of the dataset or session
-  std::vector<uint64_t> index;             // per touch: its number in the dataset or session
-  std::vector<Eigen::Vector3d> target_m;   // per touch: T
-  std::vector<Eigen::Vector3d> approach;   // per touch: unit vector a
+  std::shared_ptr<const geometry::Surface> surface;  // the nominal mesh
+  uint64_t seed = 0;                                 // of the dataset or session
+  std::vector<uint64_t> index;                       // per touch: its number in the dataset or session
+  std::vector<Eigen::Vector3d> target_m;             // per touch: T
+  std::vector<Eigen::Vector3d> approach;             // per touch: unit vector a
   std::vector<Eigen::Vector3d>
       lateral;                         // per touch: unit vector s; the pose stage turns it into the real one
   std::vector<double> standoff_m;      // per touch
@@ -97,4 +99,4 @@ class TouchBatch {
   int fingers_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::effects

@@ -14,7 +14,7 @@
 
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 using Eigen::Vector3d;
 
@@ -204,4 +204,4 @@ inline Lines AimedLines(const TriangleMesh& mesh, int count, unsigned seed) {
   return lines;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -5,7 +5,7 @@
 
 #include "server/geometry/search.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 std::vector<float> VertexMeanCurvaturePerM(const TriangleMesh& mesh) {
   const size_t count = mesh.vertices_m.size();
@@ -75,4 +75,4 @@ double Surface::Search::MeanCurvaturePerM(uint32_t triangle, const Eigen::Vector
   return sum > 0 ? value / sum : 0;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -5,7 +5,7 @@
 #include "server/geometry/brute_force_oracle.h"
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 Vector3d Middle(const TriangleMesh& mesh, uint32_t t) {
@@ -92,4 +92,4 @@ TEST(MeanCurvature, MayBeAskedByManyThreadsAtOnce) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

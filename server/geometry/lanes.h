@@ -13,7 +13,7 @@
 #include <immintrin.h>
 #endif
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 typedef float Float8 __attribute__((vector_size(32)));
 typedef int32_t Mask8 __attribute__((vector_size(32)));  // -1 or 0 per lane, from comparisons
@@ -122,4 +122,4 @@ Triple<Number> Cross(const Triple<Number>& a, const Triple<Number>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

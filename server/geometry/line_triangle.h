@@ -7,7 +7,7 @@
 
 #include "server/geometry/lanes.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // The border counts this far beyond: more than double precision may be off within a kilometre, so that no
 // line slips between triangles that meet in an edge or at a vertex.
@@ -76,4 +76,4 @@ Triple<Number> NormalAgainst(const LineTriangle<Number>& hit) {
   return hit.area_vector * ((hit.facing > 0 ? Number{} - 1.0 : Number{} + 1.0) / length);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -11,7 +11,7 @@
 #include "server/base/check.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // The bits of a position; -0 and 0 are the same place.
@@ -185,4 +185,4 @@ std::string MeshHash(const TriangleMesh& mesh) {
   return Sha256Hex(bytes);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 struct TriangleMesh {
   std::vector<Eigen::Vector3f> vertices_m;
@@ -62,4 +62,4 @@ bool IsDegenerate(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eige
 // datasets, sessions and reports.
 std::string MeshHash(const TriangleMesh& mesh);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

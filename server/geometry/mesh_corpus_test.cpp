@@ -10,7 +10,7 @@
 #include "server/geometry/mesh_file.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 const char kCorpus[] = TOUCHSTONE_SHARED_DATA "/meshes";
@@ -100,4 +100,4 @@ TEST(MeshCorpus, EverydayModelsLoadAndScale) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

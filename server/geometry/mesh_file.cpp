@@ -13,7 +13,7 @@
 #include "server/base/units.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // Coordinates beyond this are a wrong unit or a broken file; single precision would not carry them either.
@@ -187,4 +187,4 @@ absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string
   return mesh;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -16,7 +16,7 @@
 
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // How the numbers of a mesh file become metres in the object frame (right-handed, z up).
 struct MeshImport {
@@ -56,4 +56,4 @@ absl::Status WriteMeshFile(const std::string& path, const TriangleMesh& mesh);
 // The text of such a file.
 absl::StatusOr<std::string> MeshFileText(const TriangleMesh& mesh, absl::string_view format);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -10,7 +10,7 @@
 #include "server/base/random.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using testing::HasSubstr;
@@ -184,4 +184,4 @@ TEST_F(MeshFile, WritesNothingThatItCouldNotRead) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -12,7 +12,7 @@
 #include "server/geometry/mesh_file.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -171,4 +171,4 @@ TEST_F(MeshMutation, EveryTruncationOfACompleteTextFileIsRefused) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

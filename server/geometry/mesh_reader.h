@@ -12,7 +12,7 @@
 
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // A mesh as it stands in the file: its own unit and axes, faces with three corners or more.
 struct PolygonMesh {
@@ -113,4 +113,4 @@ inline constexpr uint64_t kMaxTriangulationWork = 4'000'000'000;
 void Triangulate(const std::vector<Eigen::Vector3d>& points, absl::Span<const uint32_t> polygon,
                  std::vector<std::array<uint32_t, 3>>* triangles, uint64_t* work);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

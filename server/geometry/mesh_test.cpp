@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // A tetrahedron at a right-angled corner, legs of 1 m, wound outwards.
@@ -133,4 +133,4 @@ TEST(Mesh, HashTellsMeshesApart) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

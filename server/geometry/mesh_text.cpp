@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 bool IsBlank(char c) {
@@ -167,4 +167,4 @@ std::vector<std::string> MeshReading::Notes() const {
   return notes;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -12,7 +12,7 @@
 #include "server/base/units.h"
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // Appends the shortest number of millimetres that reads back as the same float of metres. A float's
@@ -105,4 +105,4 @@ absl::Status WriteMeshFile(const std::string& path, const TriangleMesh& mesh) {
   return WriteFileAtomically(path, *text);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -4,7 +4,7 @@
 
 #include "server/geometry/search.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 struct Corners {
@@ -88,4 +88,4 @@ bool Surface::Search::NearCoincident(uint32_t triangle) const {
   return state == 2;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

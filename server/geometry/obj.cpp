@@ -11,7 +11,7 @@
 #include "server/base/text.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // Statements that the format knows and that do not matter here.
@@ -151,4 +151,4 @@ absl::Status ReadObj(MeshReading* reading) {
   return ObjReader(reading).Read();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -3,7 +3,7 @@
 
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using testing::HasSubstr;
@@ -88,4 +88,4 @@ TEST(Obj, TellsOfFreeFormSurfacesOnce) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

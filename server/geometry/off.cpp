@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 struct Counts {
@@ -149,4 +149,4 @@ absl::Status ReadOff(MeshReading* reading) {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -3,7 +3,7 @@
 
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using testing::HasSubstr;
@@ -81,4 +81,4 @@ TEST(Off, TellsWhatItPassesOver) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -11,7 +11,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace ply {
 namespace {
 
@@ -141,4 +141,4 @@ absl::Status ReadPly(MeshReading* reading) {
   return ply::BodyReader(header, rows.get(), reading).Read();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

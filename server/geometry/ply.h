@@ -12,7 +12,7 @@
 
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone::ply {
+namespace touchstone::geometry::ply {
 
 enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 inline constexpr int kTypeBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
@@ -76,4 +76,4 @@ class Rows {
 std::unique_ptr<Rows> MakeTextRows(const MeshReading& reading, const Header& header);
 std::unique_ptr<Rows> MakeBinaryRows(const MeshReading& reading, const Header& header);
 
-}  // namespace touchstone::ply
+}  // namespace touchstone::geometry::ply

@@ -3,7 +3,7 @@
 #include "server/base/status.h"
 #include "server/geometry/ply.h"
 
-namespace touchstone::ply {
+namespace touchstone::geometry::ply {
 namespace {
 
 bool TypeFromName(absl::string_view name, Type* type) {
@@ -132,4 +132,4 @@ absl::StatusOr<Header> ReadHeader(const MeshReading& reading) {
   return HeaderReader(reading).Read();
 }
 
-}  // namespace touchstone::ply
+}  // namespace touchstone::geometry::ply

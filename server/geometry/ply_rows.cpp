@@ -4,7 +4,7 @@
 
 #include "server/geometry/ply.h"
 
-namespace touchstone::ply {
+namespace touchstone::geometry::ply {
 namespace {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "BinaryRows swaps for big-endian files only");
@@ -158,4 +158,4 @@ std::unique_ptr<Rows> MakeBinaryRows(const MeshReading& reading, const Header& h
   return std::make_unique<BinaryRows>(reading, header);
 }
 
-}  // namespace touchstone::ply
+}  // namespace touchstone::geometry::ply

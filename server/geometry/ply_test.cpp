@@ -7,7 +7,7 @@
 
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST(Ply, CutOffBytesAreRefusedAtEveryPlace) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

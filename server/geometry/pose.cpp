@@ -1,6 +1,6 @@
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 Eigen::Matrix3d RotationFromVector(const Eigen::Vector3d& rotation_rad) {
   const double angle_rad = rotation_rad.norm();
@@ -25,4 +25,4 @@ std::array<double, 6> PoseVectorOf(const Eigen::Isometry3d& pose) {
   return {p.x(), p.y(), p.z(), r.x(), r.y(), r.z()};
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

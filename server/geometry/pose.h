@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // Right-hand rule; exactly the identity for the vector 0.
 Eigen::Matrix3d RotationFromVector(const Eigen::Vector3d& rotation_rad);
@@ -16,4 +16,4 @@ Eigen::Vector3d RotationVectorOf(const Eigen::Matrix3d& rotation);
 Eigen::Isometry3d PoseFromVector(const std::array<double, 6>& vector);
 std::array<double, 6> PoseVectorOf(const Eigen::Isometry3d& pose);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 TEST(Pose, AQuarterTurnAboutZTakesXToY) {
@@ -29,4 +29,4 @@ TEST(Pose, ARotationBeyondHalfATurnIsTheShorterOneTheOtherWay) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

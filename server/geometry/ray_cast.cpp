@@ -8,7 +8,7 @@
 #include "server/base/check.h"
 #include "server/geometry/search.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -302,4 +302,4 @@ void Surface::Search::Cast(absl::Span<const Eigen::Vector3d> origins_m,
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -8,7 +8,7 @@
 
 #include "server/base/check.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // Embree counts its memory a device; builds and releases take turns, so that the difference is one scene's.
@@ -160,4 +160,4 @@ uint64_t Surface::Search::MemoryBytes() const {
          curvature_bytes_.load(std::memory_order_acquire);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -16,7 +16,7 @@
 #include "server/geometry/surface.h"
 #include "server/geometry/triangle_tree.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // A line in the mesh frame; travel counts from the origin.
 struct Line {
@@ -142,4 +142,4 @@ int EmbreePacketWidth();
 // Mean curvature at every vertex, 1/m, positive where convex; 0 on borders and where it cannot be determined.
 std::vector<float> VertexMeanCurvaturePerM(const TriangleMesh& mesh);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -10,7 +10,7 @@
 #include "server/geometry/search.h"
 #include "server/geometry/swept_triangle.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -252,4 +252,4 @@ void Surface::SweepSpheres(absl::Span<const Eigen::Vector3d> origins_m,
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

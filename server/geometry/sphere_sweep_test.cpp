@@ -8,7 +8,7 @@
 #include "server/geometry/supershape.h"
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 constexpr double kLongestM = 1.0;
@@ -185,4 +185,4 @@ TEST(SweepSpheres, HangOnNothingButTheLine) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -14,7 +14,7 @@
 #include "server/base/status.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "binary STL is little-endian");
@@ -187,4 +187,4 @@ absl::Status ReadStl(MeshReading* reading) {
   return IsText(reading->bytes()) ? TextReader(reading).Read() : ReadBinary(reading);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

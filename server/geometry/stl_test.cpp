@@ -5,7 +5,7 @@
 
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using testing::HasSubstr;
@@ -104,4 +104,4 @@ TEST(Stl, TellsOfBytesBehindTheLastTriangle) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

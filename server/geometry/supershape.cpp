@@ -10,7 +10,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 struct CosSin {
@@ -272,4 +272,4 @@ absl::StatusOr<TriangleMesh> MakeSupershape(const SupershapeParameters& paramete
   return mesh;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

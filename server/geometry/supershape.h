@@ -16,7 +16,7 @@
 
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 struct Superformula {
   double m = 4;  // symmetry
@@ -76,4 +76,4 @@ struct NamedText {
 absl::StatusOr<std::vector<NamedText>> SupershapeFolderFiles();
 absl::Status WriteSupershapeFolder(const std::string& folder);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

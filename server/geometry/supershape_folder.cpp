@@ -8,7 +8,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -61,4 +61,4 @@ absl::Status WriteSupershapeFolder(const std::string& folder) {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

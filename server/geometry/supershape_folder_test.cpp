@@ -8,7 +8,7 @@
 #include "server/geometry/supershape.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 const std::string kFolder = TOUCHSTONE_SOURCE_DIR "/meshes/";
@@ -61,4 +61,4 @@ TEST(SupershapeFolder, CanBeWrittenAnywhereAndSaysWhereItCannot) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

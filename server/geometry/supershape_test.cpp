@@ -9,7 +9,7 @@
 #include "server/geometry/mesh_file.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 // How far a point is from a surface along the line from the origin, in metres; written anew from the formula,
@@ -208,4 +208,4 @@ TEST(Supershape, AgreesWithMeshesMadeElsewhere) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -7,7 +7,7 @@
 #include "server/base/status.h"
 #include "server/geometry/search.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 absl::Status CheckMesh(const std::string& name, const TriangleMesh& mesh) {
@@ -90,4 +90,4 @@ uint64_t Surface::MemoryBytes() const {
          mesh_.triangles.capacity() * sizeof(mesh_.triangles[0]) + search_->MemoryBytes();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

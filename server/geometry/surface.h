@@ -19,7 +19,7 @@
 
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
 
@@ -87,4 +87,4 @@ class Surface {
 // "AVX2", "AVX512", ... and the packet width used, for `doctor`.
 std::string EmbreeDescription();
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -11,7 +11,7 @@
 #include "server/geometry/line_triangle.h"
 #include "server/geometry/supershape.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 constexpr double kLongestM = 1.0;
@@ -246,4 +246,4 @@ TEST(Surface, HoldsAtMostHundredBytesATriangle) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

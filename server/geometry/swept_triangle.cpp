@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 using Eigen::Vector3d;
 
@@ -99,4 +99,4 @@ bool SweepTriangle(const Vector3d& direction, double radius, const Vector3d& a, 
   return found;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

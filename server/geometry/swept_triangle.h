@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // The point of triangle a b c that is nearest to the coordinates' origin (Ericson, "Real-Time Collision
 // Detection", 2005, section 5.1.5).
@@ -20,4 +20,4 @@ bool SweepTriangle(const Eigen::Vector3d& direction, double radius, const Eigen:
                    const Eigen::Vector3d& b, const Eigen::Vector3d& c, double max_t, double* t,
                    Eigen::Vector3d* touch);
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -6,7 +6,7 @@
 
 #include "server/base/check.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 // A triangle's box while the tree is built; moved about instead of an index, so that memory is read in order.
 struct TriangleTree::Primitive {
@@ -194,4 +194,4 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh, int threads) {
   for (uint32_t i = 0; i < count; ++i) order_[i] = primitives[i].triangle;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

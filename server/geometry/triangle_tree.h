@@ -15,7 +15,7 @@
 #include "server/geometry/lanes.h"
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 
 class TriangleTree {
  public:
@@ -198,4 +198,4 @@ void TriangleTree::VisitInBox(const Eigen::Vector3f& min_m, const Eigen::Vector3
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

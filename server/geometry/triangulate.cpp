@@ -10,7 +10,7 @@
 
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using Point2 = Eigen::Vector2d;
@@ -161,4 +161,4 @@ void Triangulate(const std::vector<Eigen::Vector3d>& points, absl::Span<const ui
   EarClipper(std::move(flat), work).Run(emit);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -10,7 +10,7 @@
 #include "server/base/random.h"
 #include "server/geometry/mesh_reader.h"
 
-namespace touchstone {
+namespace touchstone::geometry {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
@@ -160,4 +160,4 @@ TEST(Triangulate, StopsThinkingWhenAFileAsksTooMuch) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::geometry

@@ -10,7 +10,7 @@
 #include "server/image/image.h"
 #include "server/image/renderer.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 // Beyond this the single-precision meshes of tools have no pixel-sized detail left.
@@ -91,4 +91,4 @@ absl::Status ValidateImageRequest(const Camera& camera, const ImageOptions& opti
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -8,7 +8,7 @@
 #include "server/image/renderer.h"
 #include "server/image/view.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 using testing::HasSubstr;
@@ -21,8 +21,8 @@ Camera GoodCamera() {
   return camera;
 }
 
-Bounds BoxOf(double half_m) {
-  Bounds bounds;
+geometry::Bounds BoxOf(double half_m) {
+  geometry::Bounds bounds;
   bounds.min_m = Eigen::Vector3d::Constant(-half_m);
   bounds.max_m = Eigen::Vector3d::Constant(half_m);
   return bounds;
@@ -91,7 +91,7 @@ TEST(View, PixelVectorsAndProjectionAreInverse) {
 }
 
 TEST(View, PlanesEncloseTheObjectUnlessSet) {
-  const Bounds box = BoxOf(0.05);
+  const geometry::Bounds box = BoxOf(0.05);
   const double radius_m = 0.05 * std::sqrt(3.0);
   Camera camera = GoodCamera();
   View view = MakeView(camera, box, {});
@@ -118,7 +118,7 @@ TEST(View, PlanesEncloseTheObjectUnlessSet) {
 }
 
 TEST(View, BoxOfPixelsHoldsEveryCorner) {
-  const Bounds box = BoxOf(0.02);
+  const geometry::Bounds box = BoxOf(0.02);
   Camera camera = GoodCamera();
   camera.eye_m = {0.3, 0.2, 0.1};
   camera.at_m = {0, 0.05, 0};
@@ -185,4 +185,4 @@ TEST(ImageRequest, RefusesCamerasThatSeeNothing) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 Vec3f ToFloat(const Eigen::Vector3d& v) {
@@ -11,7 +11,7 @@ Vec3f ToFloat(const Eigen::Vector3d& v) {
 
 }  // namespace
 
-CpuFrame MakeCpuFrame(const Surface& surface, const ShadingMesh& mesh, const Camera& camera,
+CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh, const Camera& camera,
                       const ImageOptions& options) {
   CpuFrame frame;
   frame.surface = &surface;
@@ -45,7 +45,7 @@ Visibility::Visibility(const PixelBox& pixel_box) : box(pixel_box) {
   const int columns = std::max(0, box.last_column - box.first_column);
   const int rows = std::max(0, box.last_row - box.first_row);
   stride = columns + kPadding;
-  triangle.assign(static_cast<size_t>(rows) * stride, kNoTriangle);
+  triangle.assign(static_cast<size_t>(rows) * stride, geometry::kNoTriangle);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

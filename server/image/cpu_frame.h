@@ -10,7 +10,7 @@
 #include "server/image/shading_mesh.h"
 #include "server/image/view.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 struct Vec3f {
   float x, y, z;
@@ -18,7 +18,7 @@ struct Vec3f {
 
 // All that stays the same over one image.
 struct CpuFrame {
-  const Surface* surface;
+  const geometry::Surface* surface;
   const ShadingMesh* mesh;
   View view;
   PixelBox box;  // outside it there is no object
@@ -38,7 +38,7 @@ struct CpuFrame {
 // near plane.
 inline constexpr double kFarEyeRadii = 100;
 
-CpuFrame MakeCpuFrame(const Surface& surface, const ShadingMesh& mesh, const Camera& camera,
+CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh, const Camera& camera,
                       const ImageOptions& options);
 
 // The triangle seen through each pixel's centre, for the pixels of a frame's box.
@@ -64,4 +64,4 @@ bool CanDrawTriangles(const CpuFrame& frame);
 // Shades what is seen into the image, whose arrays have their background already.
 void ShadeVisible(const CpuFrame& frame, Visibility& visibility, Image* image);  // cpu_shading.cpp
 
-}  // namespace touchstone
+}  // namespace touchstone::image

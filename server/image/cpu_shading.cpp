@@ -7,7 +7,7 @@
 
 #include "server/image/cpu_frame.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 // By value, unlike std::min: what the vectoriser understands.
@@ -153,7 +153,7 @@ void ShadeVisible(const CpuFrame& frame, Visibility& visibility, Image* image) {
       for (int i = first; i < std::min(first + Hits::kMax / 2, columns); ++i) {
         hits->pixel[count] = first_pixel + i;
         hits->triangle[count] = static_cast<int>(3 * triangle[i]);
-        count += triangle[i] != kNoTriangle;
+        count += triangle[i] != geometry::kNoTriangle;
       }
       hits->count = count;
       if (hits->count > Hits::kMax / 2) finish();
@@ -162,4 +162,4 @@ void ShadeVisible(const CpuFrame& frame, Visibility& visibility, Image* image) {
   finish();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -11,7 +11,7 @@
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 constexpr EGLint kMaxDevices = 64;
@@ -199,4 +199,4 @@ std::vector<EglDevice> ListEglDevices() {
   return devices;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

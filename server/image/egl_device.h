@@ -12,7 +12,7 @@
 
 #include "server/image/renderer.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 // A device that could be asked for a context, whether or not it gives one.
 struct EglDisplay {
@@ -45,4 +45,4 @@ class EglContext {
 // Whether this GL_RENDERER draws on the processor.
 bool IsSoftwareRenderer(const std::string& gl_renderer);
 
-}  // namespace touchstone
+}  // namespace touchstone::image

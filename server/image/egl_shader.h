@@ -1,7 +1,7 @@
 // The shading model of shading.h in GLSL, statement by statement as in cpu_shading.cpp.
 #pragma once
 
-namespace touchstone {
+namespace touchstone::image {
 
 inline constexpr char kVertexShader[] = R"(#version 330 core
 layout(location = 0) in vec3 position;
@@ -39,4 +39,4 @@ void main() {
 }
 )";
 
-}  // namespace touchstone
+}  // namespace touchstone::image

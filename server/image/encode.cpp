@@ -10,7 +10,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 struct SpngDelete {
@@ -130,4 +130,4 @@ absl::StatusOr<Image> DecodePng(const std::string& png) {
   return image;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -7,7 +7,7 @@
 
 #include "server/image/image.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 // `channels` 1 or 3, rows from the top. Fast rather than small: libspng, compression level 1, filter SUB.
 absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int height, int channels);
@@ -17,4 +17,4 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 // For tests and clients; refuses more than kMaxImageSide per side.
 absl::StatusOr<Image> DecodePng(const std::string& png);
 
-}  // namespace touchstone
+}  // namespace touchstone::image

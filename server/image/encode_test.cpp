@@ -5,7 +5,7 @@
 
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 using testing::HasSubstr;
@@ -84,4 +84,4 @@ TEST(Png, RefusesBrokenData) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

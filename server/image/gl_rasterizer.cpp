@@ -12,7 +12,7 @@
 #include "server/image/shading.h"
 #include "server/image/view.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 absl::StatusOr<GLuint> CompileShader(GLenum kind, const char* source) {
@@ -149,14 +149,14 @@ void GlRasterizer::Delete(const Buffers& buffers) {
   glDeleteBuffers(1, &buffers.corners);
 }
 
-absl::StatusOr<uint32_t> GlRasterizer::VertexArrayOf(const std::shared_ptr<const Surface>& surface,
+absl::StatusOr<uint32_t> GlRasterizer::VertexArrayOf(const std::shared_ptr<const geometry::Surface>& surface,
                                                      const ShadingMesh& mesh) {
   // Buffers of destroyed surfaces are freed; the one asked for moves to the front.
   uint64_t bytes = 0;
   bool found = false;
   for (auto entry = meshes_.begin(); entry != meshes_.end();) {
     const auto next = std::next(entry);
-    const std::shared_ptr<const Surface> owner = entry->surface.lock();
+    const std::shared_ptr<const geometry::Surface> owner = entry->surface.lock();
     if (owner == nullptr) {
       Delete(*entry);
       meshes_.erase(entry);
@@ -234,7 +234,7 @@ void GlRasterizer::ReadBack(const ImageOptions& options, Image* image) {
   }
 }
 
-absl::StatusOr<Image> GlRasterizer::Draw(const std::shared_ptr<const Surface>& surface,
+absl::StatusOr<Image> GlRasterizer::Draw(const std::shared_ptr<const geometry::Surface>& surface,
                                          const ShadingMesh& mesh, const Camera& camera,
                                          const ImageOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(PrepareTarget({options.width, options.height, options.depth, options.mask}));
@@ -278,4 +278,4 @@ absl::StatusOr<Image> GlRasterizer::Draw(const std::shared_ptr<const Surface>& s
   return image;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

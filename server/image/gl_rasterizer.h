@@ -16,7 +16,7 @@
 #include "server/image/image.h"
 #include "server/image/shading_mesh.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 class GlRasterizer {
  public:
@@ -29,13 +29,13 @@ class GlRasterizer {
   const std::string& gl_renderer() const { return gl_renderer_; }
 
   // The request must be valid. `mesh` is the surface's.
-  absl::StatusOr<Image> Draw(const std::shared_ptr<const Surface>& surface, const ShadingMesh& mesh,
+  absl::StatusOr<Image> Draw(const std::shared_ptr<const geometry::Surface>& surface, const ShadingMesh& mesh,
                              const Camera& camera, const ImageOptions& options);
 
  private:
   // A mesh in the driver's memory, kept while its surface lives, within limits.
   struct Buffers {
-    std::weak_ptr<const Surface> surface;
+    std::weak_ptr<const geometry::Surface> surface;
     uint32_t vertex_array = 0;
     uint32_t vertices = 0;
     uint32_t corners = 0;
@@ -59,7 +59,7 @@ class GlRasterizer {
   absl::Status CompileProgram();
   absl::Status PrepareTarget(const Target& target);
   void DeleteTarget();
-  absl::StatusOr<uint32_t> VertexArrayOf(const std::shared_ptr<const Surface>& surface,
+  absl::StatusOr<uint32_t> VertexArrayOf(const std::shared_ptr<const geometry::Surface>& surface,
                                          const ShadingMesh& mesh);
   static void Delete(const Buffers& buffers);
   void ReadBack(const ImageOptions& options, Image* image);
@@ -73,4 +73,4 @@ class GlRasterizer {
   std::list<Buffers> meshes_;  // the one drawn last comes first
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::image

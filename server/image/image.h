@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-namespace touchstone {
+namespace touchstone::image {
 
 // A pinhole camera in the object frame, metres. The image's first row is the top.
 struct Camera {
@@ -50,4 +50,4 @@ struct Image {
   std::vector<uint8_t> mask;  // height x width, 255 object, 0 background; empty if not asked
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::image {
 
 Intrinsics PinholeIntrinsics(int width, int height, double vertical_fov_rad) {
   Intrinsics intrinsics;
@@ -12,4 +12,4 @@ Intrinsics PinholeIntrinsics(int width, int height, double vertical_fov_rad) {
   return intrinsics;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::image {
 
 struct Frame {
   int width = 0, height = 0;
@@ -24,4 +24,4 @@ struct Intrinsics {
 // An ideal pinhole of this vertical field of view (radians), its axis through the middle of the picture.
 Intrinsics PinholeIntrinsics(int width, int height, double vertical_fov_rad);
 
-}  // namespace touchstone
+}  // namespace touchstone::image

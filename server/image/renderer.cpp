@@ -12,13 +12,13 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 // A wavy sphere of about 10,000 triangles: as many as an object of a usual data set has in sight.
-absl::StatusOr<std::shared_ptr<const Surface>> TimingSurface() {
+absl::StatusOr<std::shared_ptr<const geometry::Surface>> TimingSurface() {
   constexpr uint32_t kRings = 72, kSectors = 72;
-  TriangleMesh mesh;
+  geometry::TriangleMesh mesh;
   for (uint32_t ring = 0; ring <= kRings; ++ring) {
     for (uint32_t sector = 0; sector < kSectors; ++sector) {
       const double latitude = kPi * (ring / double{kRings} - 0.5), longitude = 2 * kPi * sector / kSectors;
@@ -39,11 +39,12 @@ absl::StatusOr<std::shared_ptr<const Surface>> TimingSurface() {
       if (ring + 1 < kRings) mesh.triangles.push_back({a, d, c});
     }
   }
-  return Surface::Create("timing", std::move(mesh));
+  return geometry::Surface::Create("timing", std::move(mesh));
 }
 
 // Images per second on one thread: the best of several, after two that warm up.
-absl::StatusOr<double> ImagesPerSecond(Renderer& renderer, const std::shared_ptr<const Surface>& surface) {
+absl::StatusOr<double> ImagesPerSecond(Renderer& renderer,
+                                       const std::shared_ptr<const geometry::Surface>& surface) {
   Camera camera;
   camera.eye_m = {0.25, 0.12, 0.08};
   const ImageOptions options;
@@ -64,7 +65,7 @@ class ChosenRenderer final : public Renderer {
       : renderer_(std::move(renderer)), reason_(std::move(reason)) {}
   std::string name() const override { return renderer_->name(); }
   std::string description() const override { return absl::StrCat(renderer_->description(), "; ", reason_); }
-  absl::StatusOr<Image> Render(const std::shared_ptr<const Surface>& surface, const Camera& camera,
+  absl::StatusOr<Image> Render(const std::shared_ptr<const geometry::Surface>& surface, const Camera& camera,
                                const ImageOptions& options) override {
     return renderer_->Render(surface, camera, options);
   }
@@ -83,7 +84,7 @@ absl::StatusOr<std::shared_ptr<Renderer>> ChooseFaster(int egl_device) {
   absl::StatusOr<std::shared_ptr<Renderer>> egl = CreateEglRenderer(egl_device);
   if (!egl.ok())
     return choose(cpu, absl::StrCat("chosen since EGL is not to be had: ", egl.status().message()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const Surface> surface, TimingSurface());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const geometry::Surface> surface, TimingSurface());
   const absl::StatusOr<double> egl_speed = ImagesPerSecond(**egl, surface);
   if (!egl_speed.ok())
     return choose(cpu, absl::StrCat("chosen since EGL failed to draw: ", egl_speed.status().message()));
@@ -111,4 +112,4 @@ absl::StatusOr<std::shared_ptr<Renderer>> CreateRenderer(const RendererOptions& 
       absl::StrCat("renderer kind is ", static_cast<int>(options.kind), "; must be auto, egl or cpu"));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

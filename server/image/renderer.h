@@ -14,7 +14,7 @@
 #include "server/geometry/surface.h"
 #include "server/image/image.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 class Renderer {
  public:
@@ -23,8 +23,8 @@ class Renderer {
   virtual std::string description() const = 0;  // "EGL on llvmpipe (LLVM 15.0.6, 256 bits)", for people
   // Safe to call from several threads at once (an implementation may serialise). The surface's mesh data is
   // prepared at the first call and kept while the surface lives.
-  virtual absl::StatusOr<Image> Render(const std::shared_ptr<const Surface>& surface, const Camera& camera,
-                                       const ImageOptions& options) = 0;
+  virtual absl::StatusOr<Image> Render(const std::shared_ptr<const geometry::Surface>& surface,
+                                       const Camera& camera, const ImageOptions& options) = 0;
 };
 
 enum class RendererKind { kAuto, kEgl, kCpu };
@@ -55,4 +55,4 @@ std::vector<EglDevice> ListEglDevices();
 // Checks sizes and camera vectors; the error names field, value and what would be right.
 absl::Status ValidateImageRequest(const Camera& camera, const ImageOptions& options);
 
-}  // namespace touchstone
+}  // namespace touchstone::image

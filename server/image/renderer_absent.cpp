@@ -1,7 +1,7 @@
 // What stands in for renderer_egl.cpp in a build without EGL (TOUCHSTONE_EGL=OFF).
 #include "server/image/renderer.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int /*device*/) {
   return absl::UnimplementedError(
@@ -13,4 +13,4 @@ std::vector<EglDevice> ListEglDevices() {
   return {};
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

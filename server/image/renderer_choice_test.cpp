@@ -4,7 +4,7 @@
 
 #include "server/image/test_scene.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 using testing::HasSubstr;
@@ -81,4 +81,4 @@ TEST(EglDevices, RefusesAnIndexThatDoesNotExist) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

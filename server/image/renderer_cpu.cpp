@@ -13,7 +13,7 @@
 #include "server/image/renderer.h"
 #include "server/image/shading_mesh.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 // Up to this many triangles for a pixel of the object's box, drawing is faster than casting: measured, 2.7
@@ -30,10 +30,11 @@ class CpuRenderer final : public Renderer {
  public:
   std::string name() const override { return "cpu"; }
   std::string description() const override {
-    return absl::StrCat("CPU: coarse meshes by triangles, fine ones by rays (", EmbreeDescription(), ")");
+    return absl::StrCat("CPU: coarse meshes by triangles, fine ones by rays (", geometry::EmbreeDescription(),
+                        ")");
   }
 
-  absl::StatusOr<Image> Render(const std::shared_ptr<const Surface>& surface, const Camera& camera,
+  absl::StatusOr<Image> Render(const std::shared_ptr<const geometry::Surface>& surface, const Camera& camera,
                                const ImageOptions& options) override {
     TOUCHSTONE_RETURN_IF_ERROR(ValidateImageRequest(camera, options));
     const std::shared_ptr<const ShadingMesh> mesh = meshes_.Get(surface);
@@ -70,4 +71,4 @@ absl::StatusOr<std::shared_ptr<Renderer>> CreateCpuRenderer() {
   return std::shared_ptr<Renderer>(std::make_shared<CpuRenderer>());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

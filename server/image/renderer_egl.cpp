@@ -22,7 +22,7 @@
 #include "server/image/renderer.h"
 #include "server/image/shading_mesh.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 class EglRenderer final : public Renderer {
@@ -48,7 +48,7 @@ class EglRenderer final : public Renderer {
   std::string name() const override { return "egl"; }
   std::string description() const override { return absl::StrCat("EGL on ", gl_renderer_); }
 
-  absl::StatusOr<Image> Render(const std::shared_ptr<const Surface>& surface, const Camera& camera,
+  absl::StatusOr<Image> Render(const std::shared_ptr<const geometry::Surface>& surface, const Camera& camera,
                                const ImageOptions& options) override {
     TOUCHSTONE_RETURN_IF_ERROR(ValidateImageRequest(camera, options));
     Job job{surface, meshes_.Get(surface), camera, options, {}};
@@ -63,7 +63,7 @@ class EglRenderer final : public Renderer {
 
  private:
   struct Job {
-    std::shared_ptr<const Surface> surface;
+    std::shared_ptr<const geometry::Surface> surface;
     std::shared_ptr<const ShadingMesh> mesh;
     const Camera& camera;
     const ImageOptions& options;
@@ -138,4 +138,4 @@ absl::StatusOr<std::shared_ptr<Renderer>> CreateEglRenderer(int device) {
   return EglRenderer::Create(chosen.index);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -12,7 +12,7 @@
 #include "server/image/shading.h"
 #include "server/image/test_scene.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 using testing::HasSubstr;
@@ -33,7 +33,7 @@ class RendererTest : public testing::TestWithParam<const char*> {
       GTEST_SKIP() << "no " << GetParam() << " renderer here: " << found->second.second;
   }
 
-  Image MustRender(const std::shared_ptr<const Surface>& surface, const Camera& camera,
+  Image MustRender(const std::shared_ptr<const geometry::Surface>& surface, const Camera& camera,
                    const ImageOptions& options) {
     absl::StatusOr<Image> image = renderer_->Render(surface, camera, options);
     if (!image.ok()) {
@@ -63,7 +63,8 @@ TEST_P(RendererTest, MasksAreThoseOfExactRays) {
     int object = 0, wrong = 0, unsteady = 0;
     for (int y = 0; y < 47; ++y) {
       for (int x = 0; x < 61; ++x) {
-        const bool seen = LookAtPixel(surface->mesh(), view, x + 0.5, y + 0.5).triangle != kNoTriangle;
+        const bool seen =
+            LookAtPixel(surface->mesh(), view, x + 0.5, y + 0.5).triangle != geometry::kNoTriangle;
         const uint8_t mask = image.mask[y * 61 + x];
         ASSERT_TRUE(mask == 0 || mask == 255);
         object += seen;
@@ -94,7 +95,7 @@ TEST_P(RendererTest, DepthsAreThoseOfExactRays) {
         EXPECT_EQ(depth_m == 0, image.mask[y * 40 + x] == 0);
         if (depth_m == 0 || !IsSteady(surface->mesh(), view, x + 0.5, y + 0.5, 0.1, true)) continue;
         const SeenPoint seen = LookAtPixel(surface->mesh(), view, x + 0.5, y + 0.5);
-        if (seen.triangle == kNoTriangle) continue;  // counted by the mask's test
+        if (seen.triangle == geometry::kNoTriangle) continue;  // counted by the mask's test
         worst_m = std::max(worst_m, std::abs(depth_m - seen.depth_m));
         ++compared;
       }
@@ -122,7 +123,7 @@ Extent ExtentOf(const Image& image) {
 
 TEST_P(RendererTest, UpIsUpAndNothingIsMirrored) {
   // From -y, z up: +x is to the right. A small box up and to the right.
-  TriangleMesh mesh;
+  geometry::TriangleMesh mesh;
   AddBox({0.02, -0.01, 0.03}, {0.04, 0.01, 0.06}, &mesh);
   const auto surface = MakeSurface("box", mesh);
   Camera camera = CameraAt({0, -0.3, 0});
@@ -141,7 +142,7 @@ TEST_P(RendererTest, UpIsUpAndNothingIsMirrored) {
 }
 
 TEST_P(RendererTest, GreyOfAFlatFaceFollowsTheDocumentedModel) {
-  TriangleMesh mesh;
+  geometry::TriangleMesh mesh;
   AddBox({-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}, &mesh);
   const auto surface = MakeSurface("cube", mesh);
   const Camera camera = CameraAt({0, -0.4, 0});
@@ -255,9 +256,9 @@ TEST_P(RendererTest, RefusesBadRequests) {
 }
 
 TEST_P(RendererTest, GivesTheSameBytesFromOneAndFourThreads) {
-  const std::vector<std::shared_ptr<const Surface>> surfaces = {MakeSurface("letter", LetterMesh()),
-                                                                MakeSurface("ball", BallMesh(0.07, 40, 60)),
-                                                                MakeSurface("bowl", BowlMesh())};
+  const std::vector<std::shared_ptr<const geometry::Surface>> surfaces = {
+      MakeSurface("letter", LetterMesh()), MakeSurface("ball", BallMesh(0.07, 40, 60)),
+      MakeSurface("bowl", BowlMesh())};
   constexpr int kImages = 24;
   const auto draw = [&](int i) {
     ImageOptions options = WithAll(i % 4 == 0 ? 96 : 64, 64);
@@ -290,4 +291,4 @@ TEST_P(RendererTest, SurvivesTheDeathOfSurfaces) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -21,7 +21,7 @@
 #include "server/image/image.h"
 #include "server/image/view.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 // Neighbouring triangles that meet at a sharper angle than this do not share a normal: the edge stays
 // visible.
@@ -49,7 +49,7 @@ struct Lighting {
   uint8_t background = 0;
 };
 
-inline Lighting MakeLighting(const View& view, const Bounds& bounds, ShadingStyle style) {
+inline Lighting MakeLighting(const View& view, const geometry::Bounds& bounds, ShadingStyle style) {
   Lighting lighting;
   const double radius_m = 0.5 * bounds.DiagonalM();
   for (size_t i = 0; i < kLights.size(); ++i) {
@@ -66,4 +66,4 @@ inline Lighting MakeLighting(const View& view, const Bounds& bounds, ShadingStyl
   return lighting;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

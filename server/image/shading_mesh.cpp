@@ -9,13 +9,13 @@
 #include "server/base/random.h"
 #include "server/image/shading.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 constexpr uint32_t kNone = 0xFFFFFFFFu;
 
 // For each vertex the first one with bit-equal coordinates (-0 counts as 0).
-std::vector<uint32_t> WeldVertices(const TriangleMesh& mesh) {
+std::vector<uint32_t> WeldVertices(const geometry::TriangleMesh& mesh) {
   struct Key {
     std::array<uint32_t, 3> bits;
     uint32_t vertex;
@@ -75,7 +75,8 @@ uint32_t NextCorner(uint32_t corner) {
 }
 
 // Every half edge of the mesh, those of the same two vertices side by side.
-std::vector<HalfEdge> SortedHalfEdges(const TriangleMesh& mesh, const std::vector<uint32_t>& welded) {
+std::vector<HalfEdge> SortedHalfEdges(const geometry::TriangleMesh& mesh,
+                                      const std::vector<uint32_t>& welded) {
   std::vector<HalfEdge> edges(3 * mesh.triangles.size());
   for (uint32_t corner = 0; corner < edges.size(); ++corner) {
     const uint32_t next = NextCorner(corner);
@@ -113,7 +114,7 @@ bool JoinSmoothEdges(const std::vector<HalfEdge>& edges, const std::vector<Eigen
 
 // Whether any ray from outside meets a back face first: inverted parts, walls that cross each other. Rays
 // between random points of the bounding sphere and of the sphere inside it; the same ones for every mesh.
-bool ShowsBackFaces(const Surface& surface, double sign) {
+bool ShowsBackFaces(const geometry::Surface& surface, double sign) {
   constexpr int kProbes = 8192;
   const double radius_m = 0.5 * surface.bounds().DiagonalM();
   const Eigen::Vector3d centre_m = surface.bounds().Centre();
@@ -126,12 +127,12 @@ bool ShowsBackFaces(const Surface& surface, double sign) {
     origins_m[i] = centre_m + 1.01 * radius_m * start.normalized();
     directions[i] = (centre_m + radius_m * end - origins_m[i]).normalized();
   }
-  Contacts contacts;
+  geometry::Contacts contacts;
   surface.CastLines(origins_m, directions, 4 * radius_m, &contacts);
-  const TriangleMesh& mesh = surface.mesh();
+  const geometry::TriangleMesh& mesh = surface.mesh();
   for (int i = 0; i < kProbes; ++i) {
     const uint32_t triangle = contacts.triangle[i];
-    if (triangle == kNoTriangle) continue;
+    if (triangle == geometry::kNoTriangle) continue;
     const Eigen::Vector3d a = mesh.Corner(triangle, 0);
     const Eigen::Vector3d normal =
         sign * (mesh.Corner(triangle, 1) - a).cross(mesh.Corner(triangle, 2) - a).normalized();
@@ -142,8 +143,8 @@ bool ShowsBackFaces(const Surface& surface, double sign) {
 
 }  // namespace
 
-ShadingMesh MakeShadingMesh(const Surface& surface) {
-  const TriangleMesh& mesh = surface.mesh();
+ShadingMesh MakeShadingMesh(const geometry::Surface& surface) {
+  const geometry::TriangleMesh& mesh = surface.mesh();
   const size_t triangles = mesh.triangles.size();
   const std::vector<uint32_t> welded = WeldVertices(mesh);
 
@@ -193,7 +194,8 @@ ShadingMesh MakeShadingMesh(const Surface& surface) {
   return result;
 }
 
-std::shared_ptr<const ShadingMesh> ShadingMeshCache::Get(const std::shared_ptr<const Surface>& surface) {
+std::shared_ptr<const ShadingMesh> ShadingMeshCache::Get(
+    const std::shared_ptr<const geometry::Surface>& surface) {
   std::promise<std::shared_ptr<const ShadingMesh>> promise;
   std::shared_future<std::shared_ptr<const ShadingMesh>> mesh;
   bool compute = false;
@@ -229,7 +231,7 @@ size_t ShadingMeshCache::size() const {
   return entries_.size();
 }
 
-void ShadingMeshCache::DropSome(const Surface* newest) {
+void ShadingMeshCache::DropSome(const geometry::Surface* newest) {
   uint64_t bytes = 0;
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     if (entry->second.surface.expired()) {
@@ -250,4 +252,4 @@ void ShadingMeshCache::DropSome(const Surface* newest) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -10,7 +10,7 @@
 
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 struct ShadingMesh {
   struct Vertex {
@@ -31,7 +31,7 @@ struct ShadingMesh {
 // Normals: around a vertex position, triangles are joined across every edge whose two triangles turn by less
 // than kCreaseRad (and run along it in opposite directions); a joined group shares the area-weighted mean of
 // its triangles' normals. Positions that are equal bit for bit count as one, however the file indexed them.
-ShadingMesh MakeShadingMesh(const Surface& surface);
+ShadingMesh MakeShadingMesh(const geometry::Surface& surface);
 
 // Shading meshes of the surfaces that were drawn last, each computed once. An entry goes when its surface has
 // died (seen at the next call), when there are more than kMaxEntries, or when together they take more than
@@ -41,21 +41,21 @@ class ShadingMeshCache {
   static constexpr size_t kMaxEntries = 64;
   static constexpr uint64_t kMaxBytes = uint64_t{1} << 30;
 
-  std::shared_ptr<const ShadingMesh> Get(const std::shared_ptr<const Surface>& surface);
+  std::shared_ptr<const ShadingMesh> Get(const std::shared_ptr<const geometry::Surface>& surface);
   size_t size() const;
 
  private:
   struct Entry {
-    std::weak_ptr<const Surface> surface;
+    std::weak_ptr<const geometry::Surface> surface;
     std::shared_future<std::shared_ptr<const ShadingMesh>> mesh;
     uint64_t last_use = 0;
     uint64_t bytes = 0;
   };
-  void DropSome(const Surface* newest);
+  void DropSome(const geometry::Surface* newest);
 
   mutable std::mutex mutex_;
-  std::unordered_map<const Surface*, Entry> entries_;
+  std::unordered_map<const geometry::Surface*, Entry> entries_;
   uint64_t uses_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::image

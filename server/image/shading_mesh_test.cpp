@@ -8,11 +8,11 @@
 #include "server/image/shading.h"
 #include "server/image/test_scene.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
-TriangleMesh CubeMesh() {
-  TriangleMesh mesh;
+geometry::TriangleMesh CubeMesh() {
+  geometry::TriangleMesh mesh;
   AddBox({-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}, &mesh);
   return mesh;
 }
@@ -54,7 +54,7 @@ TEST(ShadingMesh, SmoothsABall) {
 TEST(ShadingMesh, SplitsExactlyBeyondTheCrease) {
   // Two squares that meet along the y axis at a dihedral turn of `turn_rad`.
   const auto vertices_at = [](double turn_rad) {
-    TriangleMesh mesh;
+    geometry::TriangleMesh mesh;
     const float x = static_cast<float>(std::cos(turn_rad)), z = static_cast<float>(-std::sin(turn_rad));
     mesh.vertices_m = {{-1, 0, 0}, {0, 0, 0}, {0, 1, 0}, {-1, 1, 0}, {x, 0, z}, {x, 1, z}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {1, 4, 5}, {1, 5, 2}};
@@ -65,8 +65,8 @@ TEST(ShadingMesh, SplitsExactlyBeyondTheCrease) {
 }
 
 TEST(ShadingMesh, WeldsPositionsThatTheFileRepeats) {
-  const TriangleMesh ball = BallMesh(0.05, 24, 48);
-  TriangleMesh soup;  // as an STL file has it: three vertices per triangle
+  const geometry::TriangleMesh ball = BallMesh(0.05, 24, 48);
+  geometry::TriangleMesh soup;  // as an STL file has it: three vertices per triangle
   for (const auto& triangle : ball.triangles) {
     const uint32_t first = static_cast<uint32_t>(soup.vertices_m.size());
     for (uint32_t vertex : triangle) soup.vertices_m.push_back(ball.vertices_m[vertex]);
@@ -87,8 +87,8 @@ TEST(ShadingMesh, TurnsWhatIsInsideOut) {
 TEST(ShadingMesh, IsNotOutwardWhereBackFacesShow) {
   EXPECT_FALSE(MakeShadingMesh(*MakeSurface("bowl", BowlMesh())).outward);
   // One of two spheres inside out: every edge is closed and consistent, only rays tell.
-  TriangleMesh pair = BallMesh(0.05, 24, 48);
-  const TriangleMesh second = InsideOut(BallMesh(0.03, 24, 48));
+  geometry::TriangleMesh pair = BallMesh(0.05, 24, 48);
+  const geometry::TriangleMesh second = InsideOut(BallMesh(0.03, 24, 48));
   const uint32_t first = static_cast<uint32_t>(pair.vertices_m.size());
   for (const Eigen::Vector3f& vertex : second.vertices_m)
     pair.vertices_m.push_back(vertex + Eigen::Vector3f(0.1f, 0, 0));
@@ -98,7 +98,7 @@ TEST(ShadingMesh, IsNotOutwardWhereBackFacesShow) {
 
 TEST(ShadingMeshCache, ComputesOnceForAllThreads) {
   ShadingMeshCache cache;
-  const std::shared_ptr<const Surface> surface = MakeSurface("ball", BallMesh(0.05, 48, 96));
+  const std::shared_ptr<const geometry::Surface> surface = MakeSurface("ball", BallMesh(0.05, 48, 96));
   std::vector<std::shared_ptr<const ShadingMesh>> meshes(4);
   std::vector<std::thread> threads;
   for (auto& mesh : meshes) threads.emplace_back([&] { mesh = cache.Get(surface); });
@@ -109,7 +109,7 @@ TEST(ShadingMeshCache, ComputesOnceForAllThreads) {
 
 TEST(ShadingMeshCache, ForgetsDeadSurfacesAndTheOldest) {
   ShadingMeshCache cache;
-  std::vector<std::shared_ptr<const Surface>> surfaces;
+  std::vector<std::shared_ptr<const geometry::Surface>> surfaces;
   for (size_t i = 0; i < ShadingMeshCache::kMaxEntries + 3; ++i) {
     surfaces.push_back(MakeSurface("cube", CubeMesh()));
     cache.Get(surfaces.back());
@@ -124,4 +124,4 @@ TEST(ShadingMeshCache, ForgetsDeadSurfacesAndTheOldest) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -14,11 +14,11 @@
 #include "server/image/renderer.h"
 #include "server/image/view.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 // A sphere of 2 * rings * sectors triangles, less those at the poles; closed.
-inline TriangleMesh BallMesh(double radius_m, uint32_t rings, uint32_t sectors) {
-  TriangleMesh mesh;
+inline geometry::TriangleMesh BallMesh(double radius_m, uint32_t rings, uint32_t sectors) {
+  geometry::TriangleMesh mesh;
   const auto add = [&mesh](double x, double y, double z) {
     mesh.vertices_m.emplace_back(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
   };
@@ -46,7 +46,7 @@ inline TriangleMesh BallMesh(double radius_m, uint32_t rings, uint32_t sectors) 
 }
 
 // Adds a closed box.
-inline void AddBox(const Eigen::Vector3d& min_m, const Eigen::Vector3d& max_m, TriangleMesh* mesh) {
+inline void AddBox(const Eigen::Vector3d& min_m, const Eigen::Vector3d& max_m, geometry::TriangleMesh* mesh) {
   const uint32_t first = static_cast<uint32_t>(mesh->vertices_m.size());
   for (uint32_t corner = 0; corner < 8; ++corner) {
     mesh->vertices_m.push_back(Eigen::Vector3d((corner & 1) ? max_m.x() : min_m.x(),
@@ -64,8 +64,8 @@ inline void AddBox(const Eigen::Vector3d& min_m, const Eigen::Vector3d& max_m, T
 }
 
 // Boxes that touch nowhere and look different from every side: a letter F without joints.
-inline TriangleMesh LetterMesh() {
-  TriangleMesh mesh;
+inline geometry::TriangleMesh LetterMesh() {
+  geometry::TriangleMesh mesh;
   AddBox({-0.05, -0.02, -0.06}, {-0.02, 0.02, 0.06}, &mesh);
   AddBox({-0.015, -0.02, 0.035}, {0.05, 0.02, 0.06}, &mesh);
   AddBox({-0.015, -0.01, -0.005}, {0.03, 0.02, 0.015}, &mesh);
@@ -73,8 +73,8 @@ inline TriangleMesh LetterMesh() {
 }
 
 // The lower half of a sphere: open, seen from inside and outside.
-inline TriangleMesh BowlMesh() {
-  TriangleMesh ball = BallMesh(0.06, 24, 30), bowl;
+inline geometry::TriangleMesh BowlMesh() {
+  geometry::TriangleMesh ball = BallMesh(0.06, 24, 30), bowl;
   bowl.vertices_m = ball.vertices_m;
   for (const auto& triangle : ball.triangles) {
     float highest = -1;
@@ -84,13 +84,13 @@ inline TriangleMesh BowlMesh() {
   return bowl;
 }
 
-inline TriangleMesh InsideOut(TriangleMesh mesh) {
+inline geometry::TriangleMesh InsideOut(geometry::TriangleMesh mesh) {
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   return mesh;
 }
 
-inline std::shared_ptr<const Surface> MakeSurface(const char* name, TriangleMesh mesh) {
-  auto surface = Surface::Create(name, std::move(mesh));
+inline std::shared_ptr<const geometry::Surface> MakeSurface(const char* name, geometry::TriangleMesh mesh) {
+  auto surface = geometry::Surface::Create(name, std::move(mesh));
   if (!surface.ok()) {
     ADD_FAILURE() << surface.status().message();
     return nullptr;
@@ -108,7 +108,7 @@ inline Camera CameraAt(const Eigen::Vector3d& eye_m) {
 // away.
 struct Scene {
   const char* name;
-  TriangleMesh mesh;
+  geometry::TriangleMesh mesh;
   Camera camera;
 };
 
@@ -144,10 +144,10 @@ inline ImageOptions WithAll(int width, int height) {
 // What the ray from the eye through an image point (pixels, fractions allowed) meets first: every triangle is
 // tried, in double precision.
 struct SeenPoint {
-  uint32_t triangle = kNoTriangle;
+  uint32_t triangle = geometry::kNoTriangle;
   double depth_m = std::numeric_limits<double>::infinity();
 };
-inline SeenPoint LookAtPixel(const TriangleMesh& mesh, const View& view, double x, double y) {
+inline SeenPoint LookAtPixel(const geometry::TriangleMesh& mesh, const View& view, double x, double y) {
   const Eigen::Vector3d direction = view.forward + (x - 0.5 * view.width) * view.step * view.right +
                                     (0.5 * view.height - y) * view.step * view.up;
   SeenPoint seen;
@@ -167,12 +167,13 @@ inline SeenPoint LookAtPixel(const TriangleMesh& mesh, const View& view, double 
 
 // Whether the picture is the same all around the point: no silhouette, no edge within `radius` pixels (as far
 // as four points tell).
-inline bool IsSteady(const TriangleMesh& mesh, const View& view, double x, double y, double radius,
+inline bool IsSteady(const geometry::TriangleMesh& mesh, const View& view, double x, double y, double radius,
                      bool same_face) {
   const SeenPoint centre = LookAtPixel(mesh, view, x, y);
   for (const auto& [dx, dy] : {std::pair(-1, -1), std::pair(-1, 1), std::pair(1, -1), std::pair(1, 1)}) {
     const SeenPoint beside = LookAtPixel(mesh, view, x + radius * dx, y + radius * dy);
-    if ((beside.triangle == kNoTriangle) != (centre.triangle == kNoTriangle)) return false;
+    if ((beside.triangle == geometry::kNoTriangle) != (centre.triangle == geometry::kNoTriangle))
+      return false;
     if (same_face && beside.triangle != centre.triangle) return false;
   }
   return true;
@@ -188,4 +189,4 @@ inline std::shared_ptr<Renderer> RendererNamed(const std::string& name, std::str
   return nullptr;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
-Eigen::Vector3d CornerOf(const Bounds& bounds, int corner) {
+Eigen::Vector3d CornerOf(const geometry::Bounds& bounds, int corner) {
   return {(corner & 1) ? bounds.max_m.x() : bounds.min_m.x(),
           (corner & 2) ? bounds.max_m.y() : bounds.min_m.y(),
           (corner & 4) ? bounds.max_m.z() : bounds.min_m.z()};
 }
 
-double SmallestDepthM(const View& view, const Bounds& bounds) {
+double SmallestDepthM(const View& view, const geometry::Bounds& bounds) {
   double smallest = view.DepthM(CornerOf(bounds, 0));
   for (int corner = 1; corner < 8; ++corner)
     smallest = std::min(smallest, view.DepthM(CornerOf(bounds, corner)));
@@ -31,7 +31,7 @@ Eigen::Vector3d View::PixelVector(int column, int row) const {
   return forward + (column + 0.5 - 0.5 * width) * step * right + (0.5 * height - row - 0.5) * step * up;
 }
 
-View MakeView(const Camera& camera, const Bounds& bounds, const ImageOptions& options) {
+View MakeView(const Camera& camera, const geometry::Bounds& bounds, const ImageOptions& options) {
   View view;
   view.width = options.width;
   view.height = options.height;
@@ -54,7 +54,7 @@ View MakeView(const Camera& camera, const Bounds& bounds, const ImageOptions& op
   return view;
 }
 
-PixelBox ProjectBounds(const View& view, const Bounds& bounds) {
+PixelBox ProjectBounds(const View& view, const geometry::Bounds& bounds) {
   if (SmallestDepthM(view, bounds) < 0.5 * view.near_m) return {0, 0, view.width, view.height};
   Eigen::Vector2d min_pixel = view.Project(CornerOf(bounds, 0));
   Eigen::Vector2d max_pixel = min_pixel;
@@ -71,10 +71,10 @@ PixelBox ProjectBounds(const View& view, const Bounds& bounds) {
           clip(std::ceil(max_pixel.x()) + 1, view.width), clip(std::ceil(max_pixel.y()) + 1, view.height)};
 }
 
-bool SeesOnlyOutside(const View& view, const Bounds& bounds) {
+bool SeesOnlyOutside(const View& view, const geometry::Bounds& bounds) {
   const bool eye_in_box = (view.eye_m.array() >= bounds.min_m.array()).all() &&
                           (view.eye_m.array() <= bounds.max_m.array()).all();
   return !eye_in_box && SmallestDepthM(view, bounds) >= view.near_m;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

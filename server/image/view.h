@@ -12,7 +12,7 @@
 #include "server/geometry/mesh.h"
 #include "server/image/image.h"
 
-namespace touchstone {
+namespace touchstone::image {
 
 struct View {
   int width = 0;
@@ -36,7 +36,7 @@ struct View {
 
 // Where a plane of the camera is 0, it is chosen so that the sphere around `bounds` is enclosed. The near
 // plane is never behind the eye. The request must be valid (ValidateImageRequest).
-View MakeView(const Camera& camera, const Bounds& bounds, const ImageOptions& options);
+View MakeView(const Camera& camera, const geometry::Bounds& bounds, const ImageOptions& options);
 
 // A whole number of pixels that holds the projection of `bounds`, clipped to the image: first column and row,
 // and one past the last. Empty (first >= last) if the box is beside the image; the whole image if it reaches
@@ -47,10 +47,10 @@ struct PixelBox {
   int last_column = 0;
   int last_row = 0;
 };
-PixelBox ProjectBounds(const View& view, const Bounds& bounds);
+PixelBox ProjectBounds(const View& view, const geometry::Bounds& bounds);
 
 // True if no part of the box is cut off by the near plane and the eye is outside it: of a closed surface only
 // outer faces can then be seen.
-bool SeesOnlyOutside(const View& view, const Bounds& bounds);
+bool SeesOnlyOutside(const View& view, const geometry::Bounds& bounds);
 
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -6,7 +6,7 @@
 
 #include "server/image/cpu_frame.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 constexpr int kTileSide = 4;
@@ -115,4 +115,4 @@ void CastPixels(const CpuFrame& frame, Visibility* visibility) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

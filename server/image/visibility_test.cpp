@@ -4,12 +4,12 @@
 #include "server/image/cpu_frame.h"
 #include "server/image/test_scene.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 struct Case {
   const char* name;
-  TriangleMesh mesh;
+  geometry::TriangleMesh mesh;
   Camera camera;
   int width;
   int height;
@@ -43,7 +43,7 @@ TEST(Visibility, OfDrawnTrianglesIsThatOfRays) {
       for (int x = frame.box.first_column; x < frame.box.last_column; ++x) {
         const uint32_t a = cast.Row(y)[x - frame.box.first_column],
                        b = drawn.Row(y)[x - frame.box.first_column];
-        hits += a != kNoTriangle;
+        hits += a != geometry::kNoTriangle;
         if (a == b) continue;
         ++different;
         EXPECT_FALSE(IsSteady(surface->mesh(), frame.view, x + 0.5, y + 0.5, 2e-3, true)) << x << ", " << y;
@@ -70,7 +70,7 @@ TEST(Visibility, HasNoHoleInAClosedSurface) {
       for (int x = frame.box.first_column; x < frame.box.last_column; ++x) {
         const Eigen::Vector3d ray = frame.view.PixelVector(x, y).normalized();
         const double off_axis_m = frame.view.eye_m.cross(ray).norm();
-        const bool covered = drawn.Row(y)[x - frame.box.first_column] != kNoTriangle;
+        const bool covered = drawn.Row(y)[x - frame.box.first_column] != geometry::kNoTriangle;
         if (off_axis_m < 0.0695) {
           ASSERT_TRUE(covered) << i << ": " << x << ", " << y;
         } else if (off_axis_m > 0.0701) {
@@ -93,4 +93,4 @@ TEST(Visibility, IsCastWhereTrianglesWouldNeedClipping) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::image

@@ -10,7 +10,7 @@
 
 #include "server/image/cpu_frame.h"
 
-namespace touchstone {
+namespace touchstone::image {
 namespace {
 
 // GCC's vectors: compiled to whatever the target has.
@@ -76,7 +76,7 @@ Edge MakeEdge(Corner a, Corner b, float inside) {
 bool CanDrawTriangles(const CpuFrame& frame) {
   // Nothing to be clipped, no corner so far beside the image that its pixel is blurred, and depths that
   // differ.
-  const Bounds& bounds = frame.surface->bounds();
+  const geometry::Bounds& bounds = frame.surface->bounds();
   if (frame.start_depth_m != 0) return false;  // a far eye
   constexpr double kFarthestPixel = 8192;
   for (int i = 0; i < 8; ++i) {
@@ -148,4 +148,4 @@ void DrawTriangles(const CpuFrame& frame, Visibility* visibility) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::image

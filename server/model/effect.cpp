@@ -2,7 +2,7 @@
 
 #include "server/base/check.h"
 
-namespace touchstone {
+namespace touchstone::model {
 
 const char* StageName(Stage stage) {
   switch (stage) {
@@ -32,4 +32,4 @@ std::vector<double> Effect::NeutralValues(int fingers) const {
   return values;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -14,9 +14,11 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::effects {
+class TouchBatch;
+}
 
-class TouchBatch;  // effects/touch_batch.h
+namespace touchstone::model {
 
 enum class Stage { kPose, kContact, kMotion, kSensor };
 const char* StageName(Stage stage);  // "pose", ...
@@ -99,7 +101,7 @@ struct Effect {
   std::shared_ptr<const FormulaSpec> formula;  // set for formulas only
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
-  std::function<void(absl::Span<const double> values, TouchBatch& batch)> apply;
+  std::function<void(absl::Span<const double> values, effects::TouchBatch& batch)> apply;
 
   // Its draws differ from touch to touch or from object to object: it changes no expectation.
   bool random() const { return role != EffectRole::kSystematic; }
@@ -119,4 +121,4 @@ class EffectCatalogue {
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -3,11 +3,11 @@
 
 #include <string>
 
-namespace touchstone {
+namespace touchstone::model {
 
 // "l", "m", "r" for three fingers, else "0", "1", ...
 inline std::string FingerName(int finger, int fingers) {
   return fingers == 3 ? std::string(1, "lmr"[finger]) : std::to_string(finger);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -5,7 +5,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 absl::Status Missing(absl::string_view what, absl::string_view example) {
@@ -74,4 +74,4 @@ absl::StatusOr<FormulaSpec> FormulaFields::ToSpec() const {
   return spec;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

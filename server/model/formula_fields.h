@@ -9,7 +9,7 @@
 
 #include "server/model/effect.h"
 
-namespace touchstone {
+namespace touchstone::model {
 
 struct FormulaFields {
   struct Parameter {
@@ -26,4 +26,4 @@ struct FormulaFields {
   absl::StatusOr<FormulaSpec> ToSpec() const;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::model

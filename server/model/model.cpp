@@ -5,7 +5,7 @@
 #include "server/base/text.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 void AppendValues(const EffectInstance& instance, const std::vector<double>& values, int fingers,
@@ -63,4 +63,4 @@ Model NominalModel(int fingers, double spacing_m) {
   return model;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -10,7 +10,7 @@
 
 #include "server/model/effect.h"
 
-namespace touchstone {
+namespace touchstone::model {
 
 inline constexpr int kMaxFingers = 16;
 
@@ -55,4 +55,4 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
 // What changed from `before` to `after`, a line each, in words and units; empty if the hashes are equal.
 std::vector<std::string> DiffModels(const Model& before, const Model& after);
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -8,7 +8,7 @@
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 std::string WithUnit(const ParameterInfo& parameter, const std::string& numbers) {
@@ -136,4 +136,4 @@ std::vector<std::string> DiffModels(const Model& before, const Model& after) {
   return lines;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

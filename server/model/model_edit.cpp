@@ -12,7 +12,7 @@
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 struct Assignment {
@@ -148,4 +148,4 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
   return result;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -13,7 +13,7 @@
 #include "server/model/parameter_values.h"
 #include "server/model/yaml_tree.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 using Kind = YamlNode::Kind;
@@ -266,4 +266,4 @@ absl::StatusOr<Model> ParseModel(const std::string& yaml, const std::string& ori
   return ModelReader(origin, catalogue).Read(root);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

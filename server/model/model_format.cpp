@@ -10,7 +10,7 @@
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 // In double quotes, with what YAML would take apart escaped.
@@ -106,4 +106,4 @@ std::string FormatModel(const Model& model) {
   return text;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -7,7 +7,7 @@
 
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 using testing::ElementsAre;
@@ -231,4 +231,4 @@ TEST(DiffModels, SaysInWordsWhatChanged) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 // Values that should sum to 0 may miss it by what was lost in writing nine digits.
@@ -149,4 +149,4 @@ absl::Status CheckAddition(const Model& model, const Effect& effect) {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

@@ -11,7 +11,7 @@
 
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::model {
 
 // The SI value as a number of files: the one of fewest digits (15 to 17) that reads back to the same SI
 // value, "30" for 0.030 m. Where no number of files does (a fit may end there), the nearest one; that reads
@@ -42,4 +42,4 @@ absl::Status CheckAddition(const Model& model, const Effect& effect);
 inline constexpr int kMaxEffects = 64;
 inline constexpr double kMaxSpacingMm = 1000;
 
-}  // namespace touchstone
+}  // namespace touchstone::model

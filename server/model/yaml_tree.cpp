@@ -8,7 +8,7 @@
 #include <sstream>
 #include <unordered_set>
 
-namespace touchstone {
+namespace touchstone::model {
 namespace {
 
 // Thrown through yaml-cpp's parser and caught in ParseYaml: the parser has no other way to be stopped.
@@ -176,4 +176,4 @@ absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& o
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::model

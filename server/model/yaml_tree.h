@@ -10,7 +10,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::model {
 
 struct YamlNode {
   enum class Kind { kNull, kScalar, kSequence, kMap };
@@ -37,4 +37,4 @@ absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& o
 // An error at a node.
 absl::Status ErrorAt(const std::string& origin, const YamlNode& node, absl::string_view message);
 
-}  // namespace touchstone
+}  // namespace touchstone::model

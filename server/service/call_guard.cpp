@@ -2,10 +2,10 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
-MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
-                    const std::string& lease_token) {
+source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
+                            const std::string& lease_token) {
   return [=]() -> absl::Status {
     if (context->IsCancelled())
       return absl::CancelledError("the client is gone, or the call's deadline has passed");
@@ -15,8 +15,8 @@ MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, co
   };
 }
 
-MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
-                             const LeaseBook* leases, const std::string& lease_token) {
+source::MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
+                                     const LeaseBook* leases, const std::string& lease_token) {
   return [resources, stops_before = resources->stop_count.load(),
           guard = GuardOf(context, resources, leases, lease_token)]() -> absl::Status {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
@@ -25,4 +25,4 @@ MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* reso
   };
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -9,15 +9,15 @@
 #include "server/service/resources.h"
 #include "server/source/motion_guard.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // The client is still there, and where a lease is needed, the process is not draining and the lease holds. All must
 // outlive the guard.
-MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
-                    const std::string& lease_token);
+source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
+                            const std::string& lease_token);
 
 // The same, and that nobody has called Control.Stop since the guard was made.
-MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
-                             const LeaseBook* leases, const std::string& lease_token);
+source::MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
+                                     const LeaseBook* leases, const std::string& lease_token);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

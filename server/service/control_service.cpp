@@ -6,7 +6,7 @@
 #include "server/base/status.h"
 #include "server/service/convert.h"
 
-namespace touchstone {
+namespace touchstone::service {
 grpc::Status ControlService::AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request,
                                           v1::Lease* response) {
   auto lease = leases_->Acquire(request->holder(), request->take());
@@ -70,4 +70,4 @@ grpc::Status ControlService::GetState(grpc::ServerContext*, const v1::GetStateRe
   return grpc::Status::OK;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -5,7 +5,7 @@
 #include "server/service/resources.h"
 #include "touchstone/v1/control.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // INVALID_ARGUMENT unless it says who and why.
 absl::Status CheckReset(const v1::ResetRequest& request);
@@ -28,4 +28,4 @@ class ControlService : public v1::Control::Service {
   LeaseBook* leases_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

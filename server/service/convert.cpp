@@ -6,7 +6,7 @@
 #include "server/effects/all_effects.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 grpc::Status ToGrpc(const absl::Status& status) {
   // The two enumerations share their numbers.
@@ -23,13 +23,13 @@ Eigen::Vector3d FromProto(const v1::Vector3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where) {
+absl::StatusOr<touch::CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where) {
   for (const auto& [present, name] :
        {std::pair(message.has_target_m(), "target_m"), std::pair(message.has_approach(), "approach"),
         std::pair(message.has_lateral(), "lateral")})
     if (!present)
       return absl::InvalidArgumentError(absl::StrCat(where, ".", name, " is missing: a touch needs it"));
-  CommandedTouch touch;
+  touch::CommandedTouch touch;
   touch.target_m = FromProto(message.target_m());
   touch.approach = FromProto(message.approach());
   touch.lateral = FromProto(message.lateral());
@@ -38,24 +38,25 @@ absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, cons
   if (message.has_stroke_m()) touch.stroke_m = message.stroke_m();
   if (message.has_session_time_s()) touch.session_time_s = message.session_time_s();
   touch.covariates.insert(message.covariates().begin(), message.covariates().end());
-  TOUCHSTONE_RETURN_IF_ERROR(MakeExact(&touch, where));
+  TOUCHSTONE_RETURN_IF_ERROR(touch::MakeExact(&touch, where));
   return touch;
 }
 
-v1::CommandedTouch ToProto(const CommandedTouch& touch) {
-  return CommandMessage(touch);
+v1::CommandedTouch ToProto(const touch::CommandedTouch& touch) {
+  return session::CommandMessage(touch);
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message,
-                                                       const Resources& resources) {
+absl::StatusOr<std::shared_ptr<const model::Model>> FromProto(const v1::ModelRef& message,
+                                                              const Resources& resources) {
   switch (message.ref_case()) {
     case v1::ModelRef::kName:
       return resources.models->FindByName(message.name());
     case v1::ModelRef::kHash:
       return resources.models->FindByHash(message.hash());
     case v1::ModelRef::kYaml: {
-      TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(message.yaml(), "model.yaml", Catalogue()));
-      return std::make_shared<const Model>(std::move(model));
+      TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
+                                  model::ParseModel(message.yaml(), "model.yaml", effects::Catalogue()));
+      return std::make_shared<const model::Model>(std::move(model));
     }
     case v1::ModelRef::REF_NOT_SET:
       break;
@@ -65,27 +66,27 @@ absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& messa
 
 namespace {
 
-v1::EffectStage StageToProto(Stage stage) {
+v1::EffectStage StageToProto(model::Stage stage) {
   switch (stage) {
-    case Stage::kPose:
+    case model::Stage::kPose:
       return v1::EFFECT_STAGE_POSE;
-    case Stage::kContact:
+    case model::Stage::kContact:
       return v1::EFFECT_STAGE_CONTACT;
-    case Stage::kMotion:
+    case model::Stage::kMotion:
       return v1::EFFECT_STAGE_MOTION;
-    case Stage::kSensor:
+    case model::Stage::kSensor:
       return v1::EFFECT_STAGE_SENSOR;
   }
   return v1::EFFECT_STAGE_UNSPECIFIED;
 }
 
-v1::ParameterArity ArityToProto(Arity arity) {
+v1::ParameterArity ArityToProto(model::Arity arity) {
   switch (arity) {
-    case Arity::kScalar:
+    case model::Arity::kScalar:
       return v1::PARAMETER_ARITY_SCALAR;
-    case Arity::kVector3:
+    case model::Arity::kVector3:
       return v1::PARAMETER_ARITY_VECTOR3;
-    case Arity::kPerFinger:
+    case model::Arity::kPerFinger:
       return v1::PARAMETER_ARITY_PER_FINGER;
   }
   return v1::PARAMETER_ARITY_UNSPECIFIED;
@@ -93,7 +94,7 @@ v1::ParameterArity ArityToProto(Arity arity) {
 
 }  // namespace
 
-v1::Effect ToProto(const Effect& effect) {
+v1::Effect ToProto(const model::Effect& effect) {
   v1::Effect message;
   message.set_name(effect.name);
   message.set_stage(StageToProto(effect.stage));
@@ -101,7 +102,7 @@ v1::Effect ToProto(const Effect& effect) {
   message.set_signature(effect.signature);
   message.set_check_on_rig(effect.check_on_rig);
   message.set_remedy(effect.remedy);
-  for (const ParameterInfo& info : effect.parameters) {
+  for (const model::ParameterInfo& info : effect.parameters) {
     v1::Parameter* parameter = message.add_parameters();
     parameter->set_name(info.name);
     parameter->set_unit(std::string(UnitSymbol(info.unit)));
@@ -116,14 +117,14 @@ v1::Effect ToProto(const Effect& effect) {
   return message;
 }
 
-v1::Model ToProto(const Model& model) {
+v1::Model ToProto(const model::Model& model) {
   v1::Model message;
   message.set_name(model.name);
   message.set_hash(model.Hash());
-  message.set_yaml(FormatModel(model));
+  message.set_yaml(model::FormatModel(model));
   message.set_fingers(model.fingers);
   message.set_spacing_m(model.spacing_m);
   return message;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

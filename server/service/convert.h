@@ -12,19 +12,19 @@
 #include "touchstone/v1/models.pb.h"
 #include "touchstone/v1/types.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 grpc::Status ToGrpc(const absl::Status& status);
 
-absl::StatusOr<CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where);
-v1::CommandedTouch ToProto(const CommandedTouch& touch);
+absl::StatusOr<touch::CommandedTouch> FromProto(const v1::CommandedTouch& message, const std::string& where);
+v1::CommandedTouch ToProto(const touch::CommandedTouch& touch);
 
-absl::StatusOr<std::shared_ptr<const Model>> FromProto(const v1::ModelRef& message,
-                                                       const Resources& resources);
+absl::StatusOr<std::shared_ptr<const model::Model>> FromProto(const v1::ModelRef& message,
+                                                              const Resources& resources);
 
-v1::Effect ToProto(const Effect& effect);
-v1::Model ToProto(const Model& model);
+v1::Effect ToProto(const model::Effect& effect);
+v1::Model ToProto(const model::Model& model);
 v1::Vector3 ToProto(const Eigen::Vector3d& v);
 Eigen::Vector3d FromProto(const v1::Vector3& v);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

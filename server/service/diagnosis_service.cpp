@@ -16,10 +16,11 @@
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
-using Work = std::function<absl::StatusOr<Diagnosis>(const DiagnosisInput&, const DiagnosisContext&)>;
+using Work = std::function<absl::StatusOr<diagnosis::report::Diagnosis>(const diagnosis::DiagnosisInput&,
+                                                                        const diagnosis::DiagnosisContext&)>;
 constexpr std::chrono::milliseconds kProgressInterval{250};
 constexpr int kDefaultProposedTouches = 24;
 
@@ -27,9 +28,10 @@ constexpr int kDefaultProposedTouches = 24;
 // the work is at, and a client that reads slowly does not hold it up.
 class Worker {
  public:
-  explicit Worker(std::function<absl::StatusOr<v1::Report>(const DiagnosisContext&)> work, ThreadPool* pool)
+  explicit Worker(std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisContext&)> work,
+                  ThreadPool* pool)
       : thread_([this, work = std::move(work), pool] {
-          DiagnosisContext context;
+          diagnosis::DiagnosisContext context;
           context.pool = pool;
           context.progress = [this](const std::string& stage, double done) { return Note(stage, done); };
           absl::StatusOr<v1::Report> report = work(context);
@@ -82,11 +84,12 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
                      " sets already (max_diagnoses): try again, or at another server"));
   const auto begin = std::chrono::steady_clock::now();
   Worker worker(
-      [&](const DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+      [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
-        TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, ReadEvidence(evidence, *resources));
-        TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, work(input, how));
-        return ToReport(diagnosis);
+        TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
+                                    ReadEvidence(evidence, *resources));
+        TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, work(input, how));
+        return diagnosis::report::ToReport(diagnosis);
       },
       resources->pool.get());
   v1::Progress progress;
@@ -118,13 +121,13 @@ absl::Status RunAndSend(grpc::ServerContext* context, const v1::Evidence& eviden
 
 // The improved model, or the same one if nothing changed, under a name of the client's.
 absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& request, Resources* resources) {
-  Model model;
+  model::Model model;
   if (report.improved_model_yaml().empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto same, FromProto(request.evidence().model(), *resources));
     model = *same;
   } else {
-    TOUCHSTONE_ASSIGN_OR_RETURN(model,
-                                ParseModel(report.improved_model_yaml(), "improved_model_yaml", Catalogue()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        model, model::ParseModel(report.improved_model_yaml(), "improved_model_yaml", effects::Catalogue()));
   }
   model.name = request.save_model();
   const absl::Status status = resources->models->Create(model);
@@ -138,7 +141,8 @@ absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& requ
 grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                        grpc::ServerWriter<v1::CompareResponse>* writer) {
   v1::Report report;
-  return ToGrpc(RunAndSend(context, request->evidence(), touchstone::Compare, resources_, writer, &report));
+  return ToGrpc(
+      RunAndSend(context, request->evidence(), touchstone::diagnosis::Compare, resources_, writer, &report));
 }
 
 grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::DiagnoseRequest* request,
@@ -150,7 +154,7 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   v1::Report report;
   absl::Status status =
-      RunAndSend(context, request->evidence(), touchstone::Diagnose, resources_, writer, &report);
+      RunAndSend(context, request->evidence(), touchstone::diagnosis::Diagnose, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
   if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);
   return ToGrpc(status);
@@ -164,11 +168,12 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
         absl::InvalidArgumentError(absl::StrCat("touches = ", request->touches(), ": at most ", most)));
   const int touches =
       request->touches() == 0 ? kDefaultProposedTouches : static_cast<int>(request->touches());
-  const Work work = [touches](const DiagnosisInput& input, const DiagnosisContext& how) {
-    return touchstone::Propose(input, touches, how);
+  const Work work = [touches](const diagnosis::DiagnosisInput& input,
+                              const diagnosis::DiagnosisContext& how) {
+    return touchstone::diagnosis::Propose(input, touches, how);
   };
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -4,7 +4,7 @@
 #include "server/service/resources.h"
 #include "touchstone/v1/diagnosis.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class DiagnosisService final : public v1::Diagnosis::Service {
  public:
@@ -21,4 +21,4 @@ class DiagnosisService final : public v1::Diagnosis::Service {
   Resources* resources_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,7 +11,7 @@
 #include "touchstone/v1/diagnosis.grpc.pb.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using ::testing::HasSubstr;
@@ -187,4 +187,4 @@ TEST(Evidence, AnEffectAloneBecomesAModelFile) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -15,23 +15,23 @@
 #include "server/service/convert.h"
 #include "server/service/measured_set_message.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 constexpr int kMaxAlso = 64;     // model files
 constexpr size_t kMaxNamed = 5;  // objects in a message
 constexpr size_t kMaxAlsoBytes = 1 << 20;
 
-absl::StatusOr<MeasurementSet> ReadSet(const v1::Evidence& message, const Resources& resources) {
+absl::StatusOr<session::MeasurementSet> ReadSet(const v1::Evidence& message, const Resources& resources) {
   const std::string origin = message.origin().empty() ? "measurements" : message.origin();
   switch (message.measurements_case()) {
     case v1::Evidence::kSession: {
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> csv,
                                   resources.sessions->Bytes(message.session()));
-      return ParseMeasurementSet(*csv, message.origin().empty() ? message.session() : origin);
+      return session::ParseMeasurementSet(*csv, message.origin().empty() ? message.session() : origin);
     }
     case v1::Evidence::kCsv:
-      return ParseMeasurementSet(message.csv(), origin);
+      return session::ParseMeasurementSet(message.csv(), origin);
     case v1::Evidence::kSet:
       return FromProto(message.set(), origin);
     case v1::Evidence::MEASUREMENTS_NOT_SET:
@@ -40,9 +40,9 @@ absl::StatusOr<MeasurementSet> ReadSet(const v1::Evidence& message, const Resour
   return absl::InvalidArgumentError("evidence.measurements is empty: set session, csv or set");
 }
 
-absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const v1::MeshFile& file) {
+absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::MeshFile& file) {
   const std::string place = absl::StrCat("mesh '", file.name(), "'");
-  MeshImport import;
+  geometry::MeshImport import;
   if (!file.unit().empty()) import.unit = file.unit();
   if (!file.up().empty()) import.up = file.up();
   if (file.scale() != 0) import.scale = file.scale();
@@ -50,16 +50,17 @@ absl::StatusOr<std::shared_ptr<const Surface>> ReadSurface(const v1::MeshFile& f
   const auto in_place = [&](const absl::Status& status) {
     return absl::Status(status.code(), absl::StrCat(place, ": ", status.message()));
   };
-  auto mesh = ReadMeshBytes(absl::StrCat(file.name(), ".", file.format()),
-                            absl::AsciiStrToLower(file.format()), file.data(), import);
+  auto mesh = geometry::ReadMeshBytes(absl::StrCat(file.name(), ".", file.format()),
+                                      absl::AsciiStrToLower(file.format()), file.data(), import);
   if (!mesh.ok()) return in_place(mesh.status());
-  auto surface = Surface::Create(file.name(), *std::move(mesh));
+  auto surface = geometry::Surface::Create(file.name(), *std::move(mesh));
   if (!surface.ok()) return in_place(surface.status());
   return surface;
 }
 
 // One surface an object of the set; every object without one is named.
-absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resources, DiagnosisInput* input) {
+absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resources,
+                          diagnosis::DiagnosisInput* input) {
   std::map<std::string, const v1::MeshFile*> files;
   for (const v1::MeshFile& file : message.meshes())
     if (!files.emplace(file.name(), &file).second)
@@ -84,7 +85,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
   for (const auto& [name, object] : resources.objects.all())
     if (files.count(name) == 0) known.push_back(name);
   // Where the name stands in the file.
-  const MeasurementSet& set = *input->set;
+  const session::MeasurementSet& set = *input->set;
   const auto object = std::find(set.objects.begin(), set.objects.end(), missing[0]) - set.objects.begin();
   const auto row = std::find(set.object.begin(), set.object.end(), object) - set.object.begin();
   const std::string others =
@@ -99,7 +100,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
                                           "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
 }
 
-absl::Status ReadAlso(const v1::Evidence& message, DiagnosisInput* input) {
+absl::Status ReadAlso(const v1::Evidence& message, diagnosis::DiagnosisInput* input) {
   if (message.also_yaml_size() > kMaxAlso)
     return absl::InvalidArgumentError(
         absl::StrCat("also_yaml has ", message.also_yaml_size(), " files: at most ", kMaxAlso));
@@ -108,12 +109,12 @@ absl::Status ReadAlso(const v1::Evidence& message, DiagnosisInput* input) {
     if (message.also_yaml(k).size() > kMaxAlsoBytes)
       return absl::InvalidArgumentError(
           absl::StrCat(place, " has ", message.also_yaml(k).size(), " bytes: at most ", kMaxAlsoBytes));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Model model,
-                                ParseModel(AsModelFile(message.also_yaml(k)), place, Catalogue()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, model::ParseModel(AsModelFile(message.also_yaml(k)),
+                                                                            place, effects::Catalogue()));
     if (model.effects.empty())
       return absl::InvalidArgumentError(
           absl::StrCat(place, ": has no effects; at least one that may be missing was expected"));
-    for (const EffectInstance& instance : model.effects) input->also.push_back(instance.effect);
+    for (const model::EffectInstance& instance : model.effects) input->also.push_back(instance.effect);
   }
   return absl::OkStatus();
 }
@@ -139,18 +140,19 @@ std::string AsModelFile(const std::string& yaml) {
   return text;
 }
 
-absl::StatusOr<DiagnosisInput> ReadEvidence(const v1::Evidence& message, const Resources& resources) {
-  DiagnosisInput input;
+absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
+                                                       const Resources& resources) {
+  diagnosis::DiagnosisInput input;
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
   TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, &input));
-  TOUCHSTONE_ASSIGN_OR_RETURN(MeasurementSet set, ReadSet(message, resources));
+  TOUCHSTONE_ASSIGN_OR_RETURN(session::MeasurementSet set, ReadSet(message, resources));
   if (set.fingers == 0)
     return absl::InvalidArgumentError(
         absl::StrCat(set.origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
-  input.set = std::make_shared<const MeasurementSet>(std::move(set));
+  input.set = std::make_shared<const session::MeasurementSet>(std::move(set));
   TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
   return input;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -9,14 +9,15 @@
 #include "server/service/resources.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // Objects of the set are looked up among the evidence's own meshes first, then among the server's. Errors
 // name the field, or file and line of what was sent.
-absl::StatusOr<DiagnosisInput> ReadEvidence(const v1::Evidence& message, const Resources& resources);
+absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
+                                                       const Resources& resources);
 
 // The user's own effects as a model file: `yaml` itself if it is one, else a model file round an effect that
 // stands alone as it would under `effects:` ("formula:" and what belongs to it).
 std::string AsModelFile(const std::string& yaml);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,7 +11,7 @@
 #include "server/service/option_table.h"
 #include "server/service/resources.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // Options in the units of files, and lists that become arrays, before they are checked.
@@ -122,11 +122,11 @@ absl::Status TakeList(const std::vector<double>& list, double si_per_unit, const
 absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   GatewayOptions& o = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSpec> sources, MeshSpecsOfFolder(folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<source::MeshSpec> sources, MeshSpecsOfFolder(folder));
     o.common.meshes.insert(o.common.meshes.end(), sources.begin(), sources.end());
   }
   for (const std::string& text : raw.mesh) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec source, ParseMeshSpec(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(source::MeshSpec source, ParseMeshSpec(text));
     o.common.meshes.push_back(std::move(source));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(raw.fingers, 1, 8, "effector.fingers"));
@@ -139,21 +139,22 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
     return absl::InvalidArgumentError(absl::StrCat("effector.sensor has ", raw.sensor.size(),
                                                    " names: one, or one for each of ", raw.fingers,
                                                    " fingers"));
-  EffectorFinger finger;
+  gateway::effector::EffectorFinger finger;
   finger.active_high = raw.active_high;
   finger.debounce_s = raw.debounce_ms / 1000;
   finger.threshold = raw.threshold;
   finger.hysteresis = raw.hysteresis;
   o.effector.fingers.assign(raw.fingers, finger);
   for (int k = 0; k < raw.fingers && !raw.sensor.empty(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(o.effector.fingers[k].sensor,
-                                ParseSensor(raw.sensor[raw.sensor.size() == 1 ? 0 : k],
-                                            absl::StrCat("effector.sensor: finger ", k + 1)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        o.effector.fingers[k].sensor,
+        gateway::effector::ParseSensor(raw.sensor[raw.sensor.size() == 1 ? 0 : k],
+                                       absl::StrCat("effector.sensor: finger ", k + 1)));
   }
   o.effector.time_scale = o.time_scale;
 
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
-  MotionLimits& limits = o.limits;
+  gateway::arm::MotionLimits& limits = o.limits;
   limits.max_speed_m_s = raw.max_speed_mm_s / 1000;
   limits.transit_speed_m_s = raw.transit_speed_mm_s / 1000;
   limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
@@ -213,4 +214,4 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
   return flags;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

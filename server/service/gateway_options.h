@@ -12,7 +12,7 @@
 #include "server/gateway/effector/effector.h"
 #include "server/service/server_options.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 struct ArmOptions {
   std::string model = "ur3e";  // or "ur3"
@@ -33,11 +33,11 @@ struct GatewayOptions {
   std::vector<std::string> mount_command;
   double mount_timeout_s = 120;
   ArmOptions arm;
-  EffectorOptions effector;
+  gateway::effector::EffectorOptions effector;
   double spacing_mm = 30;
   double max_overtravel_mm = 45;
-  CameraOptions camera;
-  MotionLimits limits;
+  gateway::camera::CameraOptions camera;
+  gateway::arm::MotionLimits limits;
 
   GatewayOptions() { common.listen = "127.0.0.1:50061"; }
 };
@@ -53,4 +53,4 @@ struct GatewayFlags {
 // line and key.
 absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

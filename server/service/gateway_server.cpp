@@ -13,21 +13,23 @@
 #include "server/source/physical_source.h"
 #include "server/source/recorded_rig.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
-absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
-  RigParts parts;
-  parts.changes = std::make_unique<ChangeNotifier>();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Calibration calibration, ReadCalibration(options.calibration));
-  MotionLimits limits = options.limits;
+absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& options) {
+  gateway::RigParts parts;
+  parts.changes = std::make_unique<gateway::timing::ChangeNotifier>();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::calibration::Calibration calibration,
+                              gateway::calibration::ReadCalibration(options.calibration));
+  gateway::arm::MotionLimits limits = options.limits;
   limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner, MotionPlanner::Create(options.arm.model, limits, calibration));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.journal,
-                              Journal::Open(options.journal, Journal::Mode::kCreateOrReadWrite));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, AuditLog::Open(options.audit_log));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner,
+                              gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      parts.journal, session::Journal::Open(options.journal, session::Journal::Mode::kCreateOrReadWrite));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, gateway::audit::AuditLog::Open(options.audit_log));
 
-  UrArmOptions arm;
+  gateway::arm::UrArmOptions arm;
   arm.model = options.arm.model;
   arm.address = options.arm.address;
   arm.dashboard_port = options.arm.dashboard_port;
@@ -41,17 +43,19 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
   arm.script.watchdog_hz = options.arm.watchdog_hz;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, ConnectUrArm(arm, parts.changes.get()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector, Effector::Open(options.effector, parts.changes.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, gateway::arm::ConnectUrArm(arm, parts.changes.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector,
+                              gateway::effector::Effector::Open(options.effector, parts.changes.get()));
   if (!options.camera.uri.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(parts.camera, CameraDevice::Open(options.camera));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts.camera, gateway::camera::CameraDevice::Open(options.camera));
     parts.vertical_fov_rad = options.camera.vertical_fov_rad;
     if (!options.camera.intrinsics.empty()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(parts.intrinsics, ReadIntrinsics(options.camera.intrinsics));
+      TOUCHSTONE_ASSIGN_OR_RETURN(parts.intrinsics,
+                                  gateway::camera::ReadIntrinsics(options.camera.intrinsics));
     }
   }
 
-  RigOptions rig;
+  gateway::RigOptions rig;
   rig.fingers = static_cast<int>(options.effector.fingers.size());
   rig.spacing_m = options.spacing_mm / 1000;
   rig.time_scale = options.time_scale;
@@ -60,15 +64,15 @@ absl::StatusOr<std::unique_ptr<Rig>> OpenRig(const GatewayOptions& options) {
   rig.mount_timeout_s = options.mount_timeout_s;
   rig.provenance_note = options.provenance_note;
   rig.effector_port = options.effector.port;
-  return Rig::Create(std::move(rig), std::move(parts));
+  return gateway::Rig::Create(std::move(rig), std::move(parts));
 }
 
 }  // namespace
 
 struct GatewayServer::Parts {
   Resources resources;
-  std::unique_ptr<PhysicalSource> source;
-  Rig* rig = nullptr;  // the source's device, if it is one
+  std::unique_ptr<source::PhysicalSource> source;
+  gateway::Rig* rig = nullptr;  // the source's device, if it is one
   std::unique_ptr<LeaseBook> leases;
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
@@ -88,24 +92,25 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   resources.options = options.common;
   resources.pool = std::make_unique<ThreadPool>(0);
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      resources.objects,
-      ObjectStore::Load(options.common.meshes, options.common.supershape_triangles, resources.pool.get()));
+      resources.objects, source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles,
+                                                   resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(""));
-  Journal* journal = nullptr;
-  std::unique_ptr<RigDevice> device;
+  session::Journal* journal = nullptr;
+  std::unique_ptr<source::RigDevice> device;
   if (options.replay.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<Rig> rig, OpenRig(options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::Rig> rig, OpenRig(options));
     parts.rig = rig.get();
     journal = &rig->journal();
     device = std::move(rig);
   } else {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedRig> recorded, RecordedRig::Open(options.replay));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<source::RecordedRig> recorded,
+                                source::RecordedRig::Open(options.replay));
     journal = &recorded->journal();
     device = std::move(recorded);
   }
   const bool moves = device->moves();
-  parts.source = std::make_unique<PhysicalSource>(&resources.objects, options.common.Limits(),
-                                                  std::move(device), Rectify);
+  parts.source = std::make_unique<source::PhysicalSource>(&resources.objects, options.common.Limits(),
+                                                          std::move(device), gateway::camera::Rectify);
   parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.sessions = std::make_unique<JournalSessionsService>(journal, moves);
@@ -136,7 +141,7 @@ int GatewayServer::port() const {
   return parts_->port;
 }
 
-RigDevice& GatewayServer::device() {
+source::RigDevice& GatewayServer::device() {
   return parts_->source->device();
 }
 
@@ -146,4 +151,4 @@ void GatewayServer::Drain() {
   StopServing(parts_->resources.options, parts_->server.get());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

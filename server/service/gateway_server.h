@@ -8,7 +8,7 @@
 #include "server/service/gateway_options.h"
 #include "server/source/rig_device.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class GatewayServer {
  public:
@@ -20,7 +20,7 @@ class GatewayServer {
 
   int port() const;
   // For tests: the rig, or the recording.
-  RigDevice& device();
+  source::RigDevice& device();
   // Takes no more calls, reports NOT_SERVING, ends the motion under way, and waits up to drain_s for running
   // calls.
   void Drain();
@@ -31,4 +31,4 @@ class GatewayServer {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -5,13 +5,13 @@
 #include "server/service/convert.h"
 #include "server/session/session_measurements.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 constexpr size_t kPiece = 1 << 20;
 
 // What the journal knows of a session; without the size and hash of its file.
-v1::Session SessionToProto(const JournalSession& session) {
+v1::Session SessionToProto(const session::JournalSession& session) {
   v1::Session message;
   message.set_name(session.name);
   message.set_touches(session.done);
@@ -21,10 +21,10 @@ v1::Session SessionToProto(const JournalSession& session) {
   return message;
 }
 
-absl::StatusOr<std::string> Csv(const Journal& journal, const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches,
-                              SessionMeasurements(journal, session));
-  return FormatMeasurements(touches);
+absl::StatusOr<std::string> Csv(const session::Journal& journal, const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::MeasuredTouch> touches,
+                              session::SessionMeasurements(journal, session));
+  return session::FormatMeasurements(touches);
 }
 
 }  // namespace
@@ -42,7 +42,8 @@ grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1
                                                   v1::ListSessionsResponse* response) {
   const auto sessions = journal_->Sessions();
   if (!sessions.ok()) return ToGrpc(sessions.status());
-  for (const JournalSession& session : *sessions) *response->add_sessions() = SessionToProto(session);
+  for (const session::JournalSession& session : *sessions)
+    *response->add_sessions() = SessionToProto(session);
   return grpc::Status::OK;
 }
 
@@ -78,4 +79,4 @@ grpc::Status JournalSessionsService::DeleteSession(grpc::ServerContext*,
   return ToGrpc(journal_->DeleteSession(request->name()));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -4,11 +4,11 @@
 #include "server/session/journal.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class JournalSessionsService final : public v1::Sessions::Service {
  public:
-  JournalSessionsService(Journal* journal, bool writable) : journal_(journal), writable_(writable) {}
+  JournalSessionsService(session::Journal* journal, bool writable) : journal_(journal), writable_(writable) {}
 
   // A rig's sessions come from touching; UNIMPLEMENTED says so.
   grpc::Status CreateSession(grpc::ServerContext*, grpc::ServerReader<v1::CreateSessionRequest>*,
@@ -23,8 +23,8 @@ class JournalSessionsService final : public v1::Sessions::Service {
                              v1::DeleteSessionResponse*) override;
 
  private:
-  Journal* journal_;
+  session::Journal* journal_;
   const bool writable_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -5,7 +5,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // 128 random bits: a token cannot be guessed.
@@ -96,4 +96,4 @@ uint64_t LeaseBook::epoch() const {
   return epoch_;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

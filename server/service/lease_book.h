@@ -9,7 +9,7 @@
 
 #include "touchstone/v1/control.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // One writer at a time, by a token that goes stale when another lease is granted or the window passes.
 class LeaseBook {
@@ -46,4 +46,4 @@ class LeaseBook {
   Clock::time_point until_{};
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/session/session_measurements.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using Doubles = google::protobuf::RepeatedField<double>;
@@ -26,7 +26,7 @@ std::vector<Eigen::Vector3d> VectorsOf(const Doubles& field) {
 
 }  // namespace
 
-v1::MeasuredSet ToProto(const MeasurementSet& set) {
+v1::MeasuredSet ToProto(const session::MeasurementSet& set) {
   v1::MeasuredSet message;
   message.mutable_objects()->Add(set.objects.begin(), set.objects.end());
   message.mutable_touch()->Add(set.touch.begin(), set.touch.end());
@@ -47,8 +47,8 @@ v1::MeasuredSet ToProto(const MeasurementSet& set) {
   return message;
 }
 
-absl::StatusOr<MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin) {
-  MeasurementSet set;
+absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin) {
+  session::MeasurementSet set;
   set.origin = origin;
   if (message.fingers() < 1 || message.fingers() > std::numeric_limits<uint16_t>::max())
     return absl::InvalidArgumentError(
@@ -77,8 +77,8 @@ absl::StatusOr<MeasurementSet> FromProto(const v1::MeasuredSet& message, const s
   }
   set.time_s.assign(message.contact_time_s().begin(), message.contact_time_s().end());
   for (int row = 0; row < set.size(); ++row) set.line.push_back(row + 2);  // below a header
-  TOUCHSTONE_RETURN_IF_ERROR(CheckMeasurementSet(&set));
+  TOUCHSTONE_RETURN_IF_ERROR(session::CheckMeasurementSet(&set));
   return set;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -8,12 +8,12 @@
 #include "server/session/measurement_set.h"
 #include "touchstone/v1/sessions.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // Of a set with poses.
-v1::MeasuredSet ToProto(const MeasurementSet& set);
+v1::MeasuredSet ToProto(const session::MeasurementSet& set);
 
 // INVALID_ARGUMENT, with `origin` and the line that the touch would have in a file, for what no file could hold.
-absl::StatusOr<MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin);
+absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using testing::HasSubstr;
@@ -19,7 +19,7 @@ constexpr char kCsv[] =
     "3,cup,10,60,0,0,0,0,0,-1,1,0,0,3000000,3000100,3000200.125,9.25,1,0,\n";
 
 TEST(MeasuredSetMessage, ASetComesBackAsItWas) {
-  const auto set = ParseMeasurementSet(kCsv, "s");
+  const auto set = session::ParseMeasurementSet(kCsv, "s");
   ASSERT_TRUE(set.ok()) << set.status();
   const auto back = FromProto(ToProto(*set), "s");
   ASSERT_TRUE(back.ok()) << back.status();
@@ -44,7 +44,7 @@ TEST(MeasuredSetMessage, ASetComesBackAsItWas) {
 }
 
 TEST(MeasuredSetMessage, RefusesWhatNoFileCouldHold) {
-  const v1::MeasuredSet good = ToProto(*ParseMeasurementSet(kCsv, "s"));
+  const v1::MeasuredSet good = ToProto(*session::ParseMeasurementSet(kCsv, "s"));
   const auto refusal = [&](const std::function<void(v1::MeasuredSet*)>& change) {
     v1::MeasuredSet bad = good;
     change(&bad);
@@ -68,4 +68,4 @@ TEST(MeasuredSetMessage, RefusesWhatNoFileCouldHold) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -5,11 +5,11 @@
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 grpc::Status ModelsService::ListEffects(grpc::ServerContext*, const v1::ListEffectsRequest*,
                                         v1::ListEffectsResponse* response) {
-  for (const auto& effect : Catalogue().All()) *response->add_effects() = ToProto(*effect);
+  for (const auto& effect : effects::Catalogue().All()) *response->add_effects() = ToProto(*effect);
   return grpc::Status::OK;
 }
 
@@ -29,7 +29,7 @@ grpc::Status ModelsService::GetModel(grpc::ServerContext*, const v1::GetModelReq
 
 grpc::Status ModelsService::CreateModel(grpc::ServerContext*, const v1::CreateModelRequest* request,
                                         v1::Model* response) {
-  const auto model = ParseModel(request->yaml(), "yaml", Catalogue());
+  const auto model = model::ParseModel(request->yaml(), "yaml", effects::Catalogue());
   if (!model.ok()) return ToGrpc(model.status());
   if (!request->validate_only()) {
     if (const absl::Status status = resources_->models->Create(*model); !status.ok()) return ToGrpc(status);
@@ -39,4 +39,4 @@ grpc::Status ModelsService::CreateModel(grpc::ServerContext*, const v1::CreateMo
   return grpc::Status::OK;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

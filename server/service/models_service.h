@@ -4,7 +4,7 @@
 #include "server/service/resources.h"
 #include "touchstone/v1/models.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class ModelsService final : public v1::Models::Service {
  public:
@@ -21,4 +21,4 @@ class ModelsService final : public v1::Models::Service {
   Resources* resources_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

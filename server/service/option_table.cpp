@@ -13,7 +13,7 @@
 #include "server/base/text.h"
 #include "server/service/resources.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 template <typename Value, typename Read>
@@ -194,4 +194,4 @@ absl::Status CheckRange(double value, double lower, double upper, const std::str
                                                  ShortestNumber(lower), " to ", ShortestNumber(upper)));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

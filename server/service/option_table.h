@@ -13,7 +13,7 @@ namespace CLI {
 class App;
 }
 
-namespace touchstone {
+namespace touchstone::service {
 
 // One option. A key "arm.address" stands in the file's table [arm]; its flag is --arm-address.
 struct Option {
@@ -58,4 +58,4 @@ absl::Status CheckLogLevel(const std::string& level);
 // "must be from 1 to 9".
 absl::Status CheckRange(double value, double lower, double upper, const std::string& name);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

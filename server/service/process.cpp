@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <memory>
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // A log message as a JSON string.
@@ -84,4 +84,4 @@ void LogStopped() {
   spdlog::info("stopped");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -7,7 +7,7 @@
 
 #include "server/service/server_options.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // Lines, or JSON objects, of at least this level ("info").
 void SetUpLog(const std::string& level, bool json);
@@ -45,4 +45,4 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
   return 0;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

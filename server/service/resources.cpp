@@ -10,12 +10,12 @@
 #include "server/effects/all_effects.h"
 #include "server/source/request_checks.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& folder) {
   auto store = std::make_unique<ModelStore>();
   store->folder_ = folder;
-  auto nominal = std::make_shared<Model>(NominalModel());
+  auto nominal = std::make_shared<model::Model>(model::NominalModel());
   nominal->name = "nominal";
   store->models_["nominal"] = nominal;
   if (folder.empty()) return store;
@@ -25,9 +25,10 @@ absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& 
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".yaml") continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(entry.path().string(), 1 << 20));
-    TOUCHSTONE_ASSIGN_OR_RETURN(Model model, ParseModel(text, entry.path().string(), Catalogue()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
+                                model::ParseModel(text, entry.path().string(), effects::Catalogue()));
     model.name = entry.path().stem().string();
-    store->models_[model.name] = std::make_shared<const Model>(std::move(model));
+    store->models_[model.name] = std::make_shared<const model::Model>(std::move(model));
   }
   return store;
 }
@@ -41,14 +42,14 @@ void ModelStore::Refresh() const {
     if (entry.path().extension() != ".yaml" || models_.count(name)) continue;
     const auto text = ReadFile(entry.path().string(), 1 << 20);
     if (!text.ok()) continue;
-    auto model = ParseModel(*text, entry.path().string(), Catalogue());
+    auto model = model::ParseModel(*text, entry.path().string(), effects::Catalogue());
     if (!model.ok()) continue;
     model->name = name;
-    models_[name] = std::make_shared<const Model>(*std::move(model));
+    models_[name] = std::make_shared<const model::Model>(*std::move(model));
   }
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByName(const std::string& name) const {
+absl::StatusOr<std::shared_ptr<const model::Model>> ModelStore::FindByName(const std::string& name) const {
   std::lock_guard<std::mutex> lock(mutex_);
   if (!models_.count(name)) Refresh();
   const auto found = models_.find(name);
@@ -58,7 +59,7 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByName(const std::s
   return absl::NotFoundError(absl::StrCat("model: no model is named '", name, "'", DidYouMean(name, names)));
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::string& prefix) const {
+absl::StatusOr<std::shared_ptr<const model::Model>> ModelStore::FindByHash(const std::string& prefix) const {
   if (prefix.size() < 8)
     return absl::InvalidArgumentError(
         absl::StrCat("model.hash = '", prefix, "': give at least its first 8 digits"));
@@ -75,10 +76,10 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelStore::FindByHash(const std::s
 }
 
 absl::Status ModelStore::CheckName(const std::string& name) {
-  return CheckResourceName(name, "model.name");
+  return source::CheckResourceName(name, "model.name");
 }
 
-absl::Status ModelStore::Create(const Model& model) {
+absl::Status ModelStore::Create(const model::Model& model) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(model.name));
   std::lock_guard<std::mutex> lock(mutex_);
   Refresh();
@@ -93,17 +94,17 @@ absl::Status ModelStore::Create(const Model& model) {
     return absl::ResourceExhaustedError("the store holds 10000 models; remove some from models_dir");
   if (!folder_.empty())
     TOUCHSTONE_RETURN_IF_ERROR(
-        WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), FormatModel(model)));
-  models_[model.name] = std::make_shared<const Model>(model);
+        WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), model::FormatModel(model)));
+  models_[model.name] = std::make_shared<const model::Model>(model);
   return absl::OkStatus();
 }
 
-std::vector<std::shared_ptr<const Model>> ModelStore::All() const {
+std::vector<std::shared_ptr<const model::Model>> ModelStore::All() const {
   std::lock_guard<std::mutex> lock(mutex_);
   Refresh();
-  std::vector<std::shared_ptr<const Model>> all;
+  std::vector<std::shared_ptr<const model::Model>> all;
   for (const auto& [name, model] : models_) all.push_back(model);
   return all;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

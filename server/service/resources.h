@@ -18,7 +18,7 @@
 #include "server/service/session_store.h"
 #include "server/source/object_store.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so
 // that replicas that share it serve the same ones.
@@ -26,28 +26,28 @@ class ModelStore {
  public:
   static absl::StatusOr<std::unique_ptr<ModelStore>> Open(const std::string& folder);
 
-  absl::StatusOr<std::shared_ptr<const Model>> FindByName(const std::string& name) const;
-  absl::StatusOr<std::shared_ptr<const Model>> FindByHash(const std::string& prefix) const;
+  absl::StatusOr<std::shared_ptr<const model::Model>> FindByName(const std::string& name) const;
+  absl::StatusOr<std::shared_ptr<const model::Model>> FindByHash(const std::string& prefix) const;
   // 1 to 64 letters, digits, '_', '-' or '.', not '.' first.
   static absl::Status CheckName(const std::string& name);
-  absl::Status Create(const Model& model);
-  std::vector<std::shared_ptr<const Model>> All() const;
+  absl::Status Create(const model::Model& model);
+  std::vector<std::shared_ptr<const model::Model>> All() const;
 
  private:
   void Refresh() const;  // reads files that appeared
 
   std::string folder_;
   mutable std::mutex mutex_;
-  mutable std::map<std::string, std::shared_ptr<const Model>> models_;
+  mutable std::map<std::string, std::shared_ptr<const model::Model>> models_;
 };
 
 struct Resources {
   ServerOptions options;
   std::unique_ptr<ThreadPool> pool;
-  ObjectStore objects;
+  source::ObjectStore objects;
   std::unique_ptr<ModelStore> models;
   std::unique_ptr<SessionStore> sessions;
-  std::shared_ptr<const Model> default_model;  // null: this process simulates nothing
+  std::shared_ptr<const model::Model> default_model;  // null: this process simulates nothing
 
   std::atomic<bool> draining{false};
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
@@ -71,4 +71,4 @@ class RunningGuard {
   std::atomic<uint32_t>* counter_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

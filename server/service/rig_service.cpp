@@ -11,43 +11,43 @@
 #include "server/service/call_guard.h"
 #include "server/service/convert.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   v1::BasePose message;
   *message.mutable_position_m() = ToProto(Eigen::Vector3d(pose.translation()));
-  *message.mutable_rotation_rad() = ToProto(RotationVectorOf(pose.linear()));
+  *message.mutable_rotation_rad() = ToProto(geometry::RotationVectorOf(pose.linear()));
   return message;
 }
 
-v1::ArmStatus ArmStatusOf(const Arm& arm, double time_scale) {
+v1::ArmStatus ArmStatusOf(const gateway::arm::Arm& arm, double time_scale) {
   v1::ArmStatus status;
   status.set_model(arm.Model());
   status.set_address(arm.Address());
   status.set_version(arm.Version());
   status.set_rate_hz(arm.StateRateHz());
-  const absl::StatusOr<ArmState> now = arm.State();
+  const absl::StatusOr<gateway::arm::ArmState> now = arm.State();
   status.set_connected(now.ok());
   if (now.ok()) {
     status.set_robot_mode(static_cast<v1::RobotMode>(now->robot_mode));
     status.set_safety_mode(static_cast<v1::SafetyMode>(now->safety_mode));
-    status.set_state_age_s(HostNowS() - now->host_time_s);
+    status.set_state_age_s(gateway::timing::HostNowS() - now->host_time_s);
     *status.mutable_base_from_tip() = PoseToProto(now->base_from_tip);
     for (const double q : now->joints_rad) status.add_joints_rad(q);
     status.set_program_id(now->program_id);
     status.set_phase(static_cast<v1::MotionPhase>(now->phase));
     status.set_speed_scaling(now->speed_scaling);
   }
-  if (const ClockEstimate clock = arm.ControllerClock(); clock.valid) {
+  if (const gateway::timing::ClockEstimate clock = arm.ControllerClock(); clock.valid) {
     status.set_clock_drift(clock.rate / time_scale - 1);
     status.set_clock_uncertainty_s(clock.offset_uncertainty_s);
   }
   return status;
 }
 
-v1::EffectorStatus EffectorStatusOf(const Rig& rig) {
-  const EffectorState effector = rig.effector().State();
+v1::EffectorStatus EffectorStatusOf(const gateway::Rig& rig) {
+  const gateway::effector::EffectorState effector = rig.effector().State();
   const double time_scale = rig.options().time_scale;
   v1::EffectorStatus status;
   status.set_connected(effector.connected);
@@ -55,7 +55,7 @@ v1::EffectorStatus EffectorStatusOf(const Rig& rig) {
   status.set_firmware(effector.firmware);
   status.set_fingers(rig.options().fingers);
   for (const bool pressed : effector.pressed) status.add_pressed(pressed);
-  if (const ClockEstimate clock = rig.effector().Clock(); clock.valid) {
+  if (const gateway::timing::ClockEstimate clock = rig.effector().Clock(); clock.valid) {
     status.set_clock_drift(clock.rate / time_scale - 1);
     status.set_clock_drift_uncertainty(clock.rate_uncertainty / time_scale);
     status.set_clock_uncertainty_s(clock.offset_uncertainty_s);
@@ -68,7 +68,8 @@ v1::EffectorStatus EffectorStatusOf(const Rig& rig) {
   return status;
 }
 
-v1::CameraStatus CameraStatusOf(const CameraDevice& camera, const SourceStatus& source) {
+v1::CameraStatus CameraStatusOf(const gateway::camera::CameraDevice& camera,
+                                const source::SourceStatus& source) {
   v1::CameraStatus status;
   status.set_connected(true);
   status.set_kind(static_cast<v1::CameraKind>(camera.kind()));
@@ -137,14 +138,14 @@ grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1:
 }
 
 void RigService::Describe(v1::RigState* state) const {
-  const SourceStatus status = rig_->Status();
+  const source::SourceStatus status = rig_->Status();
   *state->mutable_arm() = ArmStatusOf(rig_->arm(), rig_->options().time_scale);
   *state->mutable_effector() = EffectorStatusOf(*rig_);
   if (rig_->camera() != nullptr) *state->mutable_camera() = CameraStatusOf(*rig_->camera(), status);
-  const absl::StatusOr<ArmState> arm = rig_->arm().State();
-  const EffectorState effector = rig_->effector().State();
+  const absl::StatusOr<gateway::arm::ArmState> arm = rig_->arm().State();
+  const gateway::effector::EffectorState effector = rig_->effector().State();
   state->set_object(status.object);
-  if (const std::optional<UpFace> up_face = rig_->MountedUpFace(); up_face.has_value())
+  if (const std::optional<gateway::calibration::UpFace> up_face = rig_->MountedUpFace(); up_face.has_value())
     state->set_up_face(static_cast<v1::UpFace>(*up_face));
   state->set_mounts_itself(!rig_->options().mount_command.empty());
   state->set_recovered_touches(status.recovered_touches);
@@ -156,7 +157,7 @@ void RigService::Describe(v1::RigState* state) const {
   state->set_fingers(rig_->fingers());
   state->set_spacing_m(rig_->spacing_m());
   state->set_provenance(rig_->Provenance());
-  state->set_calibration(FormatCalibration(rig_->planner().calibration()));
+  state->set_calibration(gateway::calibration::FormatCalibration(rig_->planner().calibration()));
   state->set_safety_notice(
       "Stop is a software stop: it is not safety-rated. Keep the emergency stop within reach.");
 }
@@ -172,17 +173,19 @@ grpc::Status RigService::CheckTouches(grpc::ServerContext*, const v1::CheckTouch
 }
 
 absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckTouchCount(request.touches_size(), resources_->options.Limits(), 0));
-  TOUCHSTONE_ASSIGN_OR_RETURN(ArmState from, rig_->arm().State());
-  const Bounds bounds = object->surface->bounds();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      source::CheckTouchCount(request.touches_size(), resources_->options.Limits(), 0));
+  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::arm::ArmState from, rig_->arm().State());
+  const geometry::Bounds bounds = object->surface->bounds();
   for (int k = 0; k < request.touches_size(); ++k) {
     const std::string where = absl::StrCat("touches[", k, "]");
-    TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(request.touches(k), where));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touch::CommandedTouch touch, FromProto(request.touches(k), where));
     v1::TouchCheck* check = response->add_checks();
-    check->set_up_face(static_cast<v1::UpFace>(UpFaceFor(touch.approach)));
-    const absl::StatusOr<PlannedTouch> plan = rig_->Check(request.object(), bounds, touch, &from, where);
+    check->set_up_face(static_cast<v1::UpFace>(gateway::calibration::UpFaceFor(touch.approach)));
+    const absl::StatusOr<gateway::arm::PlannedTouch> plan =
+        rig_->Check(request.object(), bounds, touch, &from, where);
     check->set_possible(plan.ok());
     if (!plan.ok()) {
       check->set_reason(std::string(plan.status().message()));
@@ -213,8 +216,10 @@ absl::Status RigService::DoMount(grpc::ServerContext* context, const v1::MountOb
   if (request.up_face() < v1::UP_FACE_UNSPECIFIED || request.up_face() > v1::UP_FACE_MINUS_Z)
     return absl::InvalidArgumentError(absl::StrCat("up_face = ", static_cast<int>(request.up_face()),
                                                    ": the face that points up, 1 (+x) to 6 (-z)"));
-  const UpFace up_face =
-      request.up_face() == v1::UP_FACE_UNSPECIFIED ? UpFace::kPlusZ : static_cast<UpFace>(request.up_face());
+  const gateway::calibration::UpFace up_face =
+      request.up_face() == v1::UP_FACE_UNSPECIFIED
+          ? gateway::calibration::UpFace::kPlusZ
+          : static_cast<gateway::calibration::UpFace>(request.up_face());
   return rig_->Mount(request.object(), up_face, GuardOf(context, resources_, leases_, request.lease_token()));
 }
 
@@ -234,4 +239,4 @@ grpc::Status RigService::Home(grpc::ServerContext* context, const v1::HomeReques
   return ToGrpc(status);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

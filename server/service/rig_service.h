@@ -5,12 +5,12 @@
 #include "server/service/control_service.h"
 #include "touchstone/v1/rig.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // Leases as everywhere; stopping and the state are the rig's.
 class RigControlService final : public ControlService {
  public:
-  RigControlService(Resources* resources, LeaseBook* leases, Rig* rig)
+  RigControlService(Resources* resources, LeaseBook* leases, gateway::Rig* rig)
       : ControlService(resources, leases), rig_(rig) {}
 
   grpc::Status AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest*, v1::Lease*) override;
@@ -22,12 +22,12 @@ class RigControlService final : public ControlService {
   grpc::Status GetState(grpc::ServerContext*, const v1::GetStateRequest*, v1::State*) override;
 
  private:
-  Rig* rig_;
+  gateway::Rig* rig_;
 };
 
 class RigService final : public v1::Rig::Service {
  public:
-  RigService(Resources* resources, LeaseBook* leases, Rig* rig)
+  RigService(Resources* resources, LeaseBook* leases, gateway::Rig* rig)
       : resources_(resources), leases_(leases), rig_(rig) {}
 
   grpc::Status GetRig(grpc::ServerContext*, const v1::GetRigRequest*, v1::RigState*) override;
@@ -44,7 +44,7 @@ class RigService final : public v1::Rig::Service {
 
   Resources* resources_;
   LeaseBook* leases_;
-  Rig* rig_;
+  gateway::Rig* rig_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

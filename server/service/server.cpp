@@ -16,7 +16,7 @@
 #include "server/service/source_service.h"
 #include "server/source/virtual_source.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 absl::Status CheckOptions(const ServerOptions& options) {
@@ -31,10 +31,10 @@ absl::Status CheckOptions(const ServerOptions& options) {
 }
 
 // A model by name, or the file of one.
-absl::StatusOr<std::shared_ptr<const Model>> DefaultModel(const std::string& name, ModelStore* store) {
+absl::StatusOr<std::shared_ptr<const model::Model>> DefaultModel(const std::string& name, ModelStore* store) {
   if (!absl::EndsWith(name, ".yaml")) return store->FindByName(name);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(name, 1 << 20));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Model model, ParseModel(text, name, Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, model::ParseModel(text, name, effects::Catalogue()));
   TOUCHSTONE_RETURN_IF_ERROR(store->Create(model));
   return store->FindByName(model.name);
 }
@@ -44,7 +44,7 @@ absl::StatusOr<std::shared_ptr<const Model>> DefaultModel(const std::string& nam
 struct Server::Parts {
   Resources resources;
   std::unique_ptr<LeaseBook> leases;
-  std::unique_ptr<Source> source;
+  std::unique_ptr<source::Source> source;
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<ModelsService> models;
@@ -65,13 +65,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects,
-      ObjectStore::Load(options.meshes, options.supershape_triangles, resources.pool.get()));
+      source::ObjectStore::Load(options.meshes, options.supershape_triangles, resources.pool.get()));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.models, ModelStore::Open(options.models_dir));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.sessions, SessionStore::Open(options));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
                               DefaultModel(options.default_model, resources.models.get()));
   parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
-  parts.source = std::make_unique<VirtualSource>(
+  parts.source = std::make_unique<source::VirtualSource>(
       &resources.objects, options.Limits(), resources.default_model, options.renderer, resources.pool.get());
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
@@ -112,4 +112,4 @@ void Server::Drain() {
   StopServing(parts_->resources.options, parts_->server.get());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,7 +11,7 @@
 
 #include "server/service/server_options.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class Server {
  public:
@@ -34,4 +34,4 @@ class Server {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

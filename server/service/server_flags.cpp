@@ -10,7 +10,7 @@
 #include "server/service/option_table.h"
 #include "server/service/resources.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // What the user says of meshes and renderers before it is checked.
@@ -59,17 +59,17 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
 absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
   ServerOptions& options = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeshSpec> sources, MeshSpecsOfFolder(folder));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<source::MeshSpec> sources, MeshSpecsOfFolder(folder));
     options.meshes.insert(options.meshes.end(), sources.begin(), sources.end());
   }
   for (const std::string& text : raw.mesh) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(MeshSpec source, ParseMeshSpec(text));
+    TOUCHSTONE_ASSIGN_OR_RETURN(source::MeshSpec source, ParseMeshSpec(text));
     options.meshes.push_back(std::move(source));
   }
   if (raw.renderer == "egl") {
-    options.renderer.kind = RendererKind::kEgl;
+    options.renderer.kind = image::RendererKind::kEgl;
   } else if (raw.renderer == "cpu") {
-    options.renderer.kind = RendererKind::kCpu;
+    options.renderer.kind = image::RendererKind::kCpu;
   } else if (raw.renderer != "auto") {
     return absl::InvalidArgumentError(
         absl::StrCat("renderer = '", raw.renderer, "'", DidYouMean(raw.renderer, {"auto", "egl", "cpu"})));
@@ -107,4 +107,4 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
   return flags;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

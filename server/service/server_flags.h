@@ -8,7 +8,7 @@
 
 #include "server/service/server_options.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 struct ServerFlags {
   ServerOptions options;
@@ -22,4 +22,4 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv);
 // Reads the keys of a TOML text into the options that flags did not set; `origin` stands in errors.
 absl::Status ApplyToml(const std::string& text, const std::string& origin, ServerFlags* flags);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,7 +11,7 @@
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 absl::Status CheckName(const std::string& name, const std::string& text) {
@@ -25,7 +25,7 @@ absl::Status CheckName(const std::string& name, const std::string& text) {
 
 }  // namespace
 
-absl::StatusOr<MeshSpec> ParseMeshSpec(const std::string& text) {
+absl::StatusOr<source::MeshSpec> ParseMeshSpec(const std::string& text) {
   // FILE[,key=value...] behind NAME=; a comma in a path looks like a key, so it is refused by the
   // key check.
   const std::vector<std::string> parts = absl::StrSplit(text, ',');
@@ -33,7 +33,7 @@ absl::StatusOr<MeshSpec> ParseMeshSpec(const std::string& text) {
   if (head.second.empty())
     return absl::InvalidArgumentError(
         absl::StrCat("mesh '", text, "': write NAME=FILE, for instance cup=cup.off,fit_mm=150,up=y"));
-  MeshSpec source;
+  source::MeshSpec source;
   source.name = head.first;
   source.path = head.second;
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(source.name, text));
@@ -56,15 +56,15 @@ absl::StatusOr<MeshSpec> ParseMeshSpec(const std::string& text) {
   return source;
 }
 
-absl::StatusOr<std::vector<MeshSpec>> MeshSpecsOfFolder(const std::string& folder) {
+absl::StatusOr<std::vector<source::MeshSpec>> MeshSpecsOfFolder(const std::string& folder) {
   std::error_code error;
-  std::vector<MeshSpec> sources;
-  const std::vector<std::string> formats = MeshFormatNames();
+  std::vector<source::MeshSpec> sources;
+  const std::vector<std::string> formats = geometry::MeshFormatNames();
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::string extension = entry.path().extension().string();
     const std::string format = extension.empty() ? "" : absl::AsciiStrToLower(extension.substr(1));
     if (std::find(formats.begin(), formats.end(), format) == formats.end()) continue;
-    MeshSpec source;
+    source::MeshSpec source;
     source.name = entry.path().stem().string();
     source.path = entry.path().string();
     TOUCHSTONE_RETURN_IF_ERROR(CheckName(source.name, source.path));
@@ -73,7 +73,7 @@ absl::StatusOr<std::vector<MeshSpec>> MeshSpecsOfFolder(const std::string& folde
   if (error) return absl::InvalidArgumentError(absl::StrCat("mesh_dir '", folder, "': ", error.message()));
   // The same shape in two formats is one object: the first by name of the file.
   std::sort(sources.begin(), sources.end(),
-            [](const MeshSpec& a, const MeshSpec& b) { return a.path < b.path; });
+            [](const source::MeshSpec& a, const source::MeshSpec& b) { return a.path < b.path; });
   for (size_t k = 1; k < sources.size(); ++k)
     if (sources[k].name == sources[k - 1].name)
       return absl::InvalidArgumentError(absl::StrCat("mesh_dir '", folder, "': ", sources[k - 1].path,
@@ -82,4 +82,4 @@ absl::StatusOr<std::vector<MeshSpec>> MeshSpecsOfFolder(const std::string& folde
   return sources;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,24 +11,24 @@
 #include "server/source/object_store.h"
 #include "server/source/request_checks.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 // "lat10=lat10.off", or with what the file does not say "cup=cup.off,fit_mm=150,up=y,unit=m,scale=2".
 // Errors say what was found and what would be right.
-absl::StatusOr<MeshSpec> ParseMeshSpec(const std::string& text);
+absl::StatusOr<source::MeshSpec> ParseMeshSpec(const std::string& text);
 
 // Every readable mesh file of a folder, sorted, named by its stem.
-absl::StatusOr<std::vector<MeshSpec>> MeshSpecsOfFolder(const std::string& folder);
+absl::StatusOr<std::vector<source::MeshSpec>> MeshSpecsOfFolder(const std::string& folder);
 
 struct ServerOptions {
   std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
-  std::vector<MeshSpec> meshes;            // besides the five built-in supershapes
+  std::vector<source::MeshSpec> meshes;    // besides the five built-in supershapes
   int supershape_triangles = 20000;        // about; of each built-in
   std::string models_dir;                  // where models are kept; empty: in memory
   std::string sessions_dir;                // where sessions are kept; empty: in memory
   std::string default_model = "nominal";
   int threads = 0;  // that simulate; 0: one per core
-  RendererOptions renderer;
+  image::RendererOptions renderer;
   // Limits: every one in this place.
   int max_batch_size = 65536;
   int max_touches_per_request = 100000;
@@ -42,7 +42,9 @@ struct ServerOptions {
   double lease_window_s = 2;
   double drain_s = 10;  // what running calls get after SIGTERM
 
-  SourceLimits Limits() const { return {max_touches_per_request, max_images_per_request, max_batch_size}; }
+  source::SourceLimits Limits() const {
+    return {max_touches_per_request, max_images_per_request, max_batch_size};
+  }
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -8,7 +8,7 @@
 #include "server/service/option_table.h"
 #include "server/service/server_flags.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using testing::HasSubstr;
@@ -39,7 +39,7 @@ TEST(ServerFlags, FlagsWinOverTheFile) {
   ASSERT_TRUE(flags.ok()) << flags.status();
   EXPECT_EQ(flags->options.listen, "127.0.0.1:7");
   EXPECT_EQ(flags->options.threads, 5);
-  EXPECT_EQ(flags->options.renderer.kind, RendererKind::kCpu);
+  EXPECT_EQ(flags->options.renderer.kind, image::RendererKind::kCpu);
   EXPECT_EQ(flags->options.meshes.size(), 2u);
 }
 
@@ -77,4 +77,4 @@ TEST(OptionTable, AFlagWinsOverItsFormerKeyInAFile) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -14,7 +14,7 @@
 #include "touchstone/v1/models.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using testing::HasSubstr;
@@ -193,4 +193,4 @@ TEST(Server, RefusesToStartOnWhatItCannotServe) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/service/option_table.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // Health checking and reflection are process-wide switches of gRPC.
@@ -68,4 +68,4 @@ void StopServing(const ServerOptions& options, grpc::Server* server) {
   server->Wait();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -10,7 +10,7 @@
 
 #include "server/service/server_options.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 struct ServedService {
   std::string name;  // "touchstone.v1.Source"
@@ -29,4 +29,4 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options,
 // NOT_SERVING, no more calls, up to drain_s for running ones.
 void StopServing(const ServerOptions& options, grpc::Server* server);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -16,7 +16,7 @@
 #include "server/session/measurement_set.h"
 #include "server/source/request_checks.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 constexpr char kExtension[] = ".csv";
@@ -59,12 +59,12 @@ absl::Status SessionStore::Upload::Append(absl::string_view piece) {
 }
 
 absl::Status SessionStore::CheckName(const std::string& name) {
-  return CheckResourceName(name, "name");
+  return source::CheckResourceName(name, "name");
 }
 
 absl::StatusOr<v1::Session> SessionStore::Describe(const std::string& name, absl::string_view csv,
                                                    const std::string& origin) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet set, ParseMeasurementSet(csv, origin));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet set, session::ParseMeasurementSet(csv, origin));
   if (set.fingers == 0)
     return absl::InvalidArgumentError(
         absl::StrCat(origin, ":1: has no column t_*_us: it is a plan; a session holds what was measured"));
@@ -267,4 +267,4 @@ absl::Status SessionStore::Delete(const std::string& name) {
   return deleted ? absl::OkStatus() : NoSession(name);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -19,7 +19,7 @@
 #include "server/service/server_options.h"
 #include "touchstone/v1/sessions.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class SessionStore {
  public:
@@ -90,4 +90,4 @@ class SessionStore {
   std::map<std::string, Known> known_;  // with a folder only a cache
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -11,7 +11,7 @@
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 using ::testing::HasSubstr;
@@ -144,4 +144,4 @@ TEST(SessionStoreFolder, IsSharedByReplicasAndLeavesStrangeFilesAlone) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -6,7 +6,7 @@
 #include "server/base/status.h"
 #include "server/service/convert.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 grpc::Status SessionsService::CreateSession(grpc::ServerContext* context,
                                             grpc::ServerReader<v1::CreateSessionRequest>* reader,
@@ -79,4 +79,4 @@ grpc::Status SessionsService::DeleteSession(grpc::ServerContext*, const v1::Dele
   return ToGrpc(status);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

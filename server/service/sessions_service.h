@@ -4,7 +4,7 @@
 #include "server/service/resources.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class SessionsService final : public v1::Sessions::Service {
  public:
@@ -27,4 +27,4 @@ class SessionsService final : public v1::Sessions::Service {
   Resources* resources_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

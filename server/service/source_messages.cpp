@@ -6,26 +6,26 @@
 #include "server/service/convert.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
-v1::Column ColumnToProto(const ColumnInfo& info) {
+v1::Column ColumnToProto(const dataset::ColumnInfo& info) {
   v1::Column column;
   column.set_name(info.name);
   switch (info.type) {
-    case ColumnType::kFloat32:
+    case dataset::ColumnType::kFloat32:
       column.set_type(v1::DATA_TYPE_FLOAT32);
       break;
-    case ColumnType::kUint8:
+    case dataset::ColumnType::kUint8:
       column.set_type(v1::DATA_TYPE_UINT8);
       break;
-    case ColumnType::kInt32:
+    case dataset::ColumnType::kInt32:
       column.set_type(v1::DATA_TYPE_INT32);
       break;
-    case ColumnType::kUint64:
+    case dataset::ColumnType::kUint64:
       column.set_type(v1::DATA_TYPE_UINT64);
       break;
-    case ColumnType::kBytes:
+    case dataset::ColumnType::kBytes:
       column.set_type(v1::DATA_TYPE_BYTES);
       break;
   }
@@ -39,23 +39,23 @@ v1::RendererKind RendererKindOf(const std::string& name) {
                          : v1::RENDERER_KIND_CPU;
 }
 
-const char* PlanName(Plan::Kind kind) {
+const char* PlanName(touch::Plan::Kind kind) {
   switch (kind) {
-    case Plan::Kind::kSphere:
+    case touch::Plan::Kind::kSphere:
       return "sphere";
-    case Plan::Kind::kFaces:
+    case touch::Plan::Kind::kFaces:
       return "faces";
-    case Plan::Kind::kList:
+    case touch::Plan::Kind::kList:
       break;
   }
   return "list";
 }
 
 // How a physical source made a touch.
-v1::Measured MeasuredToProto(const JournalTouch& touch, const std::string& session) {
+v1::Measured MeasuredToProto(const session::JournalTouch& touch, const std::string& session) {
   v1::Measured measured;
-  const JournalResult& result = touch.result;
-  for (const JournalFinger& finger : result.fingers) {
+  const session::JournalResult& result = touch.result;
+  for (const session::JournalFinger& finger : result.fingers) {
     v1::BasePose* pose = measured.add_base_from_tip_at_contact();
     const auto& p = finger.base_from_tip;
     if (std::isnan(p[0])) continue;
@@ -76,11 +76,12 @@ v1::Measured MeasuredToProto(const JournalTouch& touch, const std::string& sessi
 
 }  // namespace
 
-v1::DescribeResponse ToProto(const SourceInfo& info, const SourceLimits& limits) {
+v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::SourceLimits& limits) {
   v1::DescribeResponse message;
-  message.set_kind(info.kind == SourceKind::kPhysical ? v1::SOURCE_KIND_PHYSICAL : v1::SOURCE_KIND_VIRTUAL);
+  message.set_kind(info.kind == source::SourceKind::kPhysical ? v1::SOURCE_KIND_PHYSICAL
+                                                              : v1::SOURCE_KIND_VIRTUAL);
   message.set_version(kVersion);
-  for (const Plan::Kind plan : info.plans) message.add_plans(PlanName(plan));
+  for (const touch::Plan::Kind plan : info.plans) message.add_plans(PlanName(plan));
   if (info.default_model != nullptr) {
     message.set_default_model(info.default_model->name);
     message.set_default_model_hash(info.default_model->Hash());
@@ -89,7 +90,7 @@ v1::DescribeResponse ToProto(const SourceInfo& info, const SourceLimits& limits)
   message.set_renderer_description(info.renderer_description);
   message.set_max_touches_per_request(limits.max_touches_per_request);
   message.set_max_images_per_request(info.makes_images ? limits.max_images_per_request : 0);
-  message.set_max_image_side(info.makes_images ? kMaxImageSide : 0);
+  message.set_max_image_side(info.makes_images ? image::kMaxImageSide : 0);
   message.set_max_batch_size(limits.max_batch_size);
   message.set_max_fingers(info.max_fingers);
   message.set_lease_required(info.moves);
@@ -98,7 +99,7 @@ v1::DescribeResponse ToProto(const SourceInfo& info, const SourceLimits& limits)
   return message;
 }
 
-v1::ListObjectsResponse ToProto(const ObjectStore& objects) {
+v1::ListObjectsResponse ToProto(const source::ObjectStore& objects) {
   v1::ListObjectsResponse message;
   for (const auto& [name, served] : objects.all()) {
     v1::Object* object = message.add_objects();
@@ -114,15 +115,15 @@ v1::ListObjectsResponse ToProto(const ObjectStore& objects) {
   return message;
 }
 
-v1::TouchResponse ToProto(const TouchResults& results) {
+v1::TouchResponse ToProto(const source::TouchResults& results) {
   v1::TouchResponse message;
   if (results.model != nullptr) message.set_model_hash(results.model->Hash());
   for (size_t touch = 0; touch < results.size(); ++touch) {
     v1::TouchResult* result = message.add_results();
     const size_t first = touch * results.fingers;
     result->set_complete(
-        ForDescriptor(results.contact_time_s.data() + first, 1, results.fingers,
-                      [result](int, double relative_s) { result->add_descriptor_s(relative_s); }));
+        touch::ForDescriptor(results.contact_time_s.data() + first, 1, results.fingers,
+                             [result](int, double relative_s) { result->add_descriptor_s(relative_s); }));
     for (size_t k = first; k < first + results.fingers; ++k) {
       result->add_contact_time_s(results.contact_time_s[k]);
       if (!results.travel_m.empty()) result->add_travel_m(results.travel_m[k]);
@@ -137,7 +138,7 @@ v1::TouchResponse ToProto(const TouchResults& results) {
   return message;
 }
 
-v1::CaptureResponse ToProto(CaptureResults results) {
+v1::CaptureResponse ToProto(source::CaptureResults results) {
   v1::CaptureResponse message;
   v1::Batch batch = ToProto(std::move(results.batch), results.columns);
   message.set_rows(batch.rows());
@@ -145,24 +146,24 @@ v1::CaptureResponse ToProto(CaptureResults results) {
   return message;
 }
 
-v1::DatasetHeader ToProto(const SampleHeader& header) {
+v1::DatasetHeader ToProto(const source::SampleHeader& header) {
   v1::DatasetHeader message;
   message.set_samples(header.samples);
   if (header.model != nullptr) {
     message.set_model_name(header.model->name);
     message.set_model_hash(header.model->Hash());
-    message.set_model_yaml(FormatModel(*header.model));
+    message.set_model_yaml(model::FormatModel(*header.model));
   }
   for (const std::string& hash : header.mesh_hashes) message.add_mesh_hashes(hash);
   message.set_fingers(header.fingers);
   message.set_spacing_m(header.spacing_m);
-  for (const ColumnInfo& column : header.columns) *message.add_columns() = ColumnToProto(column);
+  for (const dataset::ColumnInfo& column : header.columns) *message.add_columns() = ColumnToProto(column);
   message.set_renderer(RendererKindOf(header.renderer));
   message.set_version(kVersion);
   return message;
 }
 
-v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns) {
+v1::Batch ToProto(dataset::DatasetBatch batch, const std::vector<dataset::ColumnInfo>& columns) {
   v1::Batch message;
   message.set_start_index(batch.start_index);
   message.set_rows(batch.rows);
@@ -175,4 +176,4 @@ v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns) {
   return message;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -9,22 +9,23 @@
 #include "server/source/source.h"
 #include "touchstone/v1/source.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
-absl::StatusOr<Camera> FromProto(const v1::View& message, const std::string& where);
-absl::StatusOr<Plan> FromProto(const v1::Plan& message);
-absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message);  // with its defaults
+absl::StatusOr<image::Camera> FromProto(const v1::View& message, const std::string& where);
+absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message);
+absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message);  // with its defaults
 
-absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
-absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
-absl::StatusOr<CaptureRequest> FromProto(const v1::CaptureRequest& message);
-absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message, const Resources& resources);
+absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
+absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
+absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message);
+absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
+                                                const Resources& resources);
 
-v1::DescribeResponse ToProto(const SourceInfo& info, const SourceLimits& limits);
-v1::ListObjectsResponse ToProto(const ObjectStore& objects);
-v1::TouchResponse ToProto(const TouchResults& results);
-v1::CaptureResponse ToProto(CaptureResults results);
-v1::DatasetHeader ToProto(const SampleHeader& header);
-v1::Batch ToProto(DatasetBatch batch, const std::vector<ColumnInfo>& columns);
+v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::SourceLimits& limits);
+v1::ListObjectsResponse ToProto(const source::ObjectStore& objects);
+v1::TouchResponse ToProto(const source::TouchResults& results);
+v1::CaptureResponse ToProto(source::CaptureResults results);
+v1::DatasetHeader ToProto(const source::SampleHeader& header);
+v1::Batch ToProto(dataset::DatasetBatch batch, const std::vector<dataset::ColumnInfo>& columns);
 
-}  // namespace touchstone
+}  // namespace touchstone::service

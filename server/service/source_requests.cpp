@@ -10,15 +10,16 @@
 #include "server/service/convert.h"
 #include "server/service/source_messages.h"
 
-namespace touchstone {
-absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where) {
+namespace touchstone::service {
+absl::StatusOr<image::Camera> FromProto(const v1::View& view, const std::string& where) {
   switch (view.view_case()) {
     case v1::View::kTouch: {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const CommandedTouch touch, FromProto(view.touch(), where + ".touch"));
-      return CameraOfTouch(touch.target_m, touch.approach, touch.lateral, touch.standoff_m);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const touch::CommandedTouch touch,
+                                  FromProto(view.touch(), where + ".touch"));
+      return image::CameraOfTouch(touch.target_m, touch.approach, touch.lateral, touch.standoff_m);
     }
     case v1::View::kCamera: {
-      Camera camera;
+      image::Camera camera;
       camera.eye_m = FromProto(view.camera().eye_m());
       camera.at_m = FromProto(view.camera().at_m());
       camera.up = FromProto(view.camera().up());
@@ -32,13 +33,13 @@ absl::StatusOr<Camera> FromProto(const v1::View& view, const std::string& where)
   return absl::InvalidArgumentError(absl::StrCat(where, " is empty: set touch or camera"));
 }
 
-absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
-  Plan plan;
+absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
+  touch::Plan plan;
   if (message.speed_m_s() != 0) plan.speed_m_s = message.speed_m_s();
   plan.touch_interval_s = message.touch_interval_s();
   switch (message.plan_case()) {
     case v1::Plan::kSphere: {
-      plan.kind = Plan::Kind::kSphere;
+      plan.kind = touch::Plan::Kind::kSphere;
       const v1::SpherePlan& sphere = message.sphere();
       if (sphere.step_angle_rad() != 0) plan.sphere.step_angle_rad = sphere.step_angle_rad();
       plan.sphere.roll_step_rad = sphere.roll_step_rad();
@@ -46,7 +47,7 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
       break;
     }
     case v1::Plan::kFaces: {
-      plan.kind = Plan::Kind::kFaces;
+      plan.kind = touch::Plan::Kind::kFaces;
       const v1::FacesPlan& faces = message.faces();
       constexpr uint32_t kMax = 1'000'000;  // beyond, the plan's check refuses, whatever the number
       if (faces.samples_per_face() != 0)
@@ -58,10 +59,10 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
       break;
     }
     case v1::Plan::kList: {
-      plan.kind = Plan::Kind::kList;
+      plan.kind = touch::Plan::Kind::kList;
       for (int k = 0; k < message.list().touches_size(); ++k) {
         TOUCHSTONE_ASSIGN_OR_RETURN(
-            CommandedTouch touch,
+            touch::CommandedTouch touch,
             FromProto(message.list().touches(k), absl::StrCat("plan.list.touches[", k, "]")));
         plan.list.push_back(std::move(touch));
       }
@@ -70,27 +71,28 @@ absl::StatusOr<Plan> FromProto(const v1::Plan& message) {
     case v1::Plan::PLAN_NOT_SET:
       return absl::InvalidArgumentError("plan is missing: set plan.sphere, plan.faces or plan.list");
   }
-  TOUCHSTONE_RETURN_IF_ERROR(ValidatePlan(&plan));
+  TOUCHSTONE_RETURN_IF_ERROR(touch::ValidatePlan(&plan));
   return plan;
 }
 
-absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message) {
-  DatasetImage image;
+absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message) {
+  dataset::DatasetImage image;
   // Out-of-range numbers reach the check as what they are: no wrap-around.
   const auto side = [](uint32_t value) {
     return value == 0 ? 224 : static_cast<int>(std::min<uint32_t>(value, 1u << 30));
   };
   image.options.width = side(message.width());
   image.options.height = side(message.height());
-  image.options.format = message.format() == v1::PIXEL_FORMAT_RGB ? PixelFormat::kRgb : PixelFormat::kGrey;
+  image.options.format =
+      message.format() == v1::PIXEL_FORMAT_RGB ? image::PixelFormat::kRgb : image::PixelFormat::kGrey;
   image.options.shading_style = message.shading_style() == v1::SHADING_STYLE_DARK_ON_WHITE
-                                    ? ShadingStyle::kDarkOnWhite
-                                    : ShadingStyle::kShaded;
+                                    ? image::ShadingStyle::kDarkOnWhite
+                                    : image::ShadingStyle::kShaded;
   image.options.depth = message.depth();
   image.options.mask = message.mask();
-  image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? ImageEncoding::kPng
-                   : message.encoding() == v1::IMAGE_ENCODING_JPEG ? ImageEncoding::kJpeg
-                                                                   : ImageEncoding::kRaw;
+  image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? dataset::ImageEncoding::kPng
+                   : message.encoding() == v1::IMAGE_ENCODING_JPEG ? dataset::ImageEncoding::kJpeg
+                                                                   : dataset::ImageEncoding::kRaw;
   if (message.jpeg_quality() != 0)
     image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
   if (message.vertical_fov_rad() != 0) image.vertical_fov_rad = message.vertical_fov_rad();
@@ -103,9 +105,9 @@ absl::StatusOr<DatasetImage> FromProto(const v1::ImageSpec& message) {
     if (!valid)
       return absl::InvalidArgumentError(
           absl::StrCat("image.", name, " = ", value, ": is no value of its enumeration"));
-  image.renderer_kind = message.renderer() == v1::RENDERER_KIND_EGL   ? RendererKind::kEgl
-                        : message.renderer() == v1::RENDERER_KIND_CPU ? RendererKind::kCpu
-                                                                      : RendererKind::kAuto;
+  image.renderer_kind = message.renderer() == v1::RENDERER_KIND_EGL   ? image::RendererKind::kEgl
+                        : message.renderer() == v1::RENDERER_KIND_CPU ? image::RendererKind::kCpu
+                                                                      : image::RendererKind::kAuto;
   return image;
 }
 
@@ -135,8 +137,8 @@ std::string DatasetKey(const v1::DatasetSpec& spec) {
 
 }  // namespace
 
-absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
-  PlanRequest request;
+absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
+  source::PlanRequest request;
   TOUCHSTONE_ASSIGN_OR_RETURN(request.plan, FromProto(message.plan()));
   request.object = message.object();
   request.seed = message.seed();
@@ -145,14 +147,14 @@ absl::StatusOr<PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
   return request;
 }
 
-absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources) {
-  TouchRequest request;
+absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources) {
+  source::TouchRequest request;
   request.object = message.object();
   if (message.has_model() && Simulates(resources)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
   }
   for (int k = 0; k < message.touches_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(CommandedTouch touch,
+    TOUCHSTONE_ASSIGN_OR_RETURN(touch::CommandedTouch touch,
                                 FromProto(message.touches(k), absl::StrCat("touches[", k, "]")));
     request.touches.push_back(std::move(touch));
   }
@@ -163,31 +165,33 @@ absl::StatusOr<TouchRequest> FromProto(const v1::TouchRequest& message, const Re
   return request;
 }
 
-absl::StatusOr<CaptureRequest> FromProto(const v1::CaptureRequest& message) {
-  CaptureRequest request;
+absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message) {
+  source::CaptureRequest request;
   request.object = message.object();
   TOUCHSTONE_ASSIGN_OR_RETURN(request.image, FromProto(message.image()));
   for (int k = 0; k < message.views_size(); ++k) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Camera camera, FromProto(message.views(k), absl::StrCat("views[", k, "]")));
+    TOUCHSTONE_ASSIGN_OR_RETURN(image::Camera camera,
+                                FromProto(message.views(k), absl::StrCat("views[", k, "]")));
     camera.vertical_fov_rad = request.image.vertical_fov_rad;
     request.cameras.push_back(camera);
   }
   return request;
 }
 
-absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message, const Resources& resources) {
+absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
+                                                const Resources& resources) {
   const v1::DatasetSpec& spec = message.spec();
-  SampleRequest request;
+  source::SampleRequest request;
   request.objects.assign(spec.objects().begin(), spec.objects().end());
-  DatasetSpecification& specification = request.specification;
+  dataset::DatasetSpecification& specification = request.specification;
   TOUCHSTONE_ASSIGN_OR_RETURN(specification.plan, FromProto(spec.plan()));
   if (spec.has_model() && Simulates(resources)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.model, FromProto(spec.model(), resources));
   }
   specification.seed = spec.seed();
   specification.samples = spec.samples();
-  TOUCHSTONE_ASSIGN_OR_RETURN(specification.columns,
-                              ColumnChoice::FromNames({spec.columns().begin(), spec.columns().end()}));
+  TOUCHSTONE_ASSIGN_OR_RETURN(specification.columns, dataset::ColumnChoice::FromNames(
+                                                         {spec.columns().begin(), spec.columns().end()}));
   if (specification.columns.image) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.image, FromProto(spec.image()));
   }
@@ -198,4 +202,4 @@ absl::StatusOr<SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
   return request;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -7,7 +7,7 @@
 #include "server/service/convert.h"
 #include "server/service/source_messages.h"
 
-namespace touchstone {
+namespace touchstone::service {
 namespace {
 
 // The answer of a call that may have failed.
@@ -33,11 +33,11 @@ grpc::Status SourceService::ListObjects(grpc::ServerContext*, const v1::ListObje
 
 grpc::Status SourceService::ExpandPlan(grpc::ServerContext*, const v1::ExpandPlanRequest* message,
                                        v1::ExpandPlanResponse* response) {
-  const absl::StatusOr<PlanRequest> request = FromProto(*message);
+  const absl::StatusOr<source::PlanRequest> request = FromProto(*message);
   if (!request.ok()) return ToGrpc(request.status());
-  const absl::StatusOr<std::vector<CommandedTouch>> touches = source_->ExpandPlan(*request);
+  const absl::StatusOr<std::vector<touch::CommandedTouch>> touches = source_->ExpandPlan(*request);
   if (!touches.ok()) return ToGrpc(touches.status());
-  for (const CommandedTouch& touch : *touches) *response->add_touches() = ToProto(touch);
+  for (const touch::CommandedTouch& touch : *touches) *response->add_touches() = ToProto(touch);
   return grpc::Status::OK;
 }
 
@@ -50,9 +50,9 @@ absl::StatusOr<v1::TouchResponse> SourceService::DoTouch(grpc::ServerContext* co
                                                          const v1::TouchRequest& message) {
   const RunningGuard running(&resources_->running_requests);
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(message.lease_token()));
-  const MotionGuard guard = StoppableGuardOf(context, resources_, leases_, message.lease_token());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const TouchRequest request, FromProto(message, *resources_));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const TouchResults results, source_->Touch(request, guard));
+  const source::MotionGuard guard = StoppableGuardOf(context, resources_, leases_, message.lease_token());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::TouchRequest request, FromProto(message, *resources_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::TouchResults results, source_->Touch(request, guard));
   resources_->touches += results.size();
   return ToProto(results);
 }
@@ -66,9 +66,9 @@ absl::StatusOr<v1::CaptureResponse> SourceService::DoCapture(grpc::ServerContext
                                                              const v1::CaptureRequest& message) {
   const RunningGuard running(&resources_->running_requests);
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(message.lease_token()));
-  const MotionGuard guard = StoppableGuardOf(context, resources_, leases_, message.lease_token());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const CaptureRequest request, FromProto(message));
-  TOUCHSTONE_ASSIGN_OR_RETURN(CaptureResults results, source_->Capture(request, guard));
+  const source::MotionGuard guard = StoppableGuardOf(context, resources_, leases_, message.lease_token());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::CaptureRequest request, FromProto(message));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source::CaptureResults results, source_->Capture(request, guard));
   resources_->images += results.batch.rows;
   return ToProto(std::move(results));
 }
@@ -87,15 +87,15 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
         absl::StrCat("this source runs ", resources_->options.max_streams,
                      " dataset streams already (max_streams): try again later, or at another one"));
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(message.lease_token()));
-  const MotionGuard guard = GuardOf(context, resources_, leases_, message.lease_token());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const SampleRequest request, FromProto(message, *resources_));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<SampleStream> stream, source_->Stream(request));
+  const source::MotionGuard guard = GuardOf(context, resources_, leases_, message.lease_token());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::SampleRequest request, FromProto(message, *resources_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<source::SampleStream> stream, source_->Stream(request));
   v1::StreamDatasetResponse response;
   *response.mutable_header() = ToProto(stream->header());
   if (!writer->Write(response)) return absl::CancelledError("the client is gone");
   response.clear_header();
   for (;;) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<DatasetBatch> batch, stream->Next(guard));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<dataset::DatasetBatch> batch, stream->Next(guard));
     if (!batch.has_value()) return absl::OkStatus();
     const uint32_t rows = batch->rows;
     *response.mutable_batch() = ToProto(*std::move(batch), stream->header().columns);
@@ -105,4 +105,4 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -6,11 +6,11 @@
 #include "server/source/source.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
-namespace touchstone {
+namespace touchstone::service {
 
 class SourceService final : public v1::Source::Service {
  public:
-  SourceService(Resources* resources, LeaseBook* leases, Source* source)
+  SourceService(Resources* resources, LeaseBook* leases, source::Source* source)
       : resources_(resources), leases_(leases), source_(source) {}
 
   grpc::Status Describe(grpc::ServerContext*, const v1::DescribeRequest*, v1::DescribeResponse*) override;
@@ -32,7 +32,7 @@ class SourceService final : public v1::Source::Service {
 
   Resources* resources_;
   LeaseBook* leases_;
-  Source* source_;
+  source::Source* source_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::service

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 bool Near(double a, double b) {
@@ -44,7 +44,7 @@ std::optional<v1::CommandedTouch> ParseCommandBytes(const std::string& bytes) {
   return command;
 }
 
-v1::CommandedTouch CommandMessage(const CommandedTouch& touch) {
+v1::CommandedTouch CommandMessage(const touch::CommandedTouch& touch) {
   v1::CommandedTouch message;
   const auto set = [](const Eigen::Vector3d& from, v1::Vector3* to) {
     to->set_x(from.x()), to->set_y(from.y()), to->set_z(from.z());
@@ -54,13 +54,13 @@ v1::CommandedTouch CommandMessage(const CommandedTouch& touch) {
   set(touch.lateral, message.mutable_lateral());
   message.set_standoff_m(touch.standoff_m);
   message.set_speed_m_s(touch.speed_m_s);
-  if (touch.stroke_m < kNoStrokeLimitM) message.set_stroke_m(touch.stroke_m);
+  if (touch.stroke_m < touch::kNoStrokeLimitM) message.set_stroke_m(touch.stroke_m);
   message.set_session_time_s(touch.session_time_s);
   message.mutable_covariates()->insert(touch.covariates.begin(), touch.covariates.end());
   return message;
 }
 
-std::string CommandBytes(const CommandedTouch& touch) {
+std::string CommandBytes(const touch::CommandedTouch& touch) {
   v1::CommandedTouch command = CommandMessage(touch);
   command.clear_session_time_s();
   return CommandBytes(command);
@@ -89,4 +89,4 @@ bool SameCommand(const std::string& a, const std::string& b) {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

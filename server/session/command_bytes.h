@@ -7,7 +7,7 @@
 #include "server/touch/commanded_touch.h"
 #include "touchstone/v1/types.pb.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // Two commands whose numbers (SI) differ by no more than this are the same touch.
 inline constexpr double kCommandTolerance = 1e-9;
@@ -20,11 +20,11 @@ std::string CommandBytes(const v1::CommandedTouch& command);
 std::optional<v1::CommandedTouch> ParseCommandBytes(const std::string& bytes);
 
 // A touch as the protocol writes it; without a limit of the stroke that field stays unset.
-v1::CommandedTouch CommandMessage(const CommandedTouch& touch);
+v1::CommandedTouch CommandMessage(const touch::CommandedTouch& touch);
 
 // As a physical source journals a touch: without its session time, since when it is made does not make it another
 // touch.
-std::string CommandBytes(const CommandedTouch& touch);
+std::string CommandBytes(const touch::CommandedTouch& touch);
 
 // Whether two commands have the same path: target, approach, lateral, standoff, speed and stroke within 1e-9 (SI),
 // whatever their session times and covariates.
@@ -34,4 +34,4 @@ bool SamePath(const v1::CommandedTouch& a, const v1::CommandedTouch& b);
 // the covariates were written. Bytes that are no command are the same only as bytes.
 bool SameCommand(const std::string& a, const std::string& b);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

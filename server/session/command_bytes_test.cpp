@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 v1::CommandedTouch Command() {
-  CommandedTouch touch;
+  touch::CommandedTouch touch;
   touch.target_m = {0.01, -0.02, 0.03};
   touch.session_time_s = 7;
   touch.covariates = {{"cov_humidity", 40}, {"cov_temperature", 21}};
@@ -14,7 +14,7 @@ v1::CommandedTouch Command() {
 }
 
 TEST(CommandBytes, AJournalsCommandHasNoSessionTimeAndNoLimitThatIsNone) {
-  CommandedTouch touch;
+  touch::CommandedTouch touch;
   touch.session_time_s = 7;
   const auto command = ParseCommandBytes(CommandBytes(touch));
   ASSERT_TRUE(command.has_value());
@@ -58,4 +58,4 @@ TEST(CommandBytes, WhatIsNoCommandIsTheSameOnlyAsBytes) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

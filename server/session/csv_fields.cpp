@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/session/measurement_columns.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 bool IsText(absl::string_view text) {
   for (size_t i = 0; i < text.size();) {
@@ -78,4 +78,4 @@ absl::StatusOr<size_t> CsvFields::CutQuoted(absl::string_view line, size_t start
   return comma;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

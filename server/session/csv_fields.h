@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::session {
 
 // Cuts a line at its commas. A field in quotes may hold commas and doubled quotes, but no line end.
 class CsvFields {
@@ -29,4 +29,4 @@ class CsvFields {
 // Valid UTF-8 without control characters: names go into messages and reports.
 bool IsText(absl::string_view text);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -11,7 +11,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr uint64_t kMaxValues = uint64_t{1} << 31;  // of a dataset that is read
@@ -200,4 +200,4 @@ absl::StatusOr<std::vector<std::string>> Hdf5ColumnsReader::Bytes(const std::str
   return strings;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

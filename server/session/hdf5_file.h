@@ -11,7 +11,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-namespace touchstone {
+namespace touchstone::session {
 
 // An HDF5 handle with the function that closes it.
 class Hdf5Handle {
@@ -85,4 +85,4 @@ class Hdf5ColumnsReader {
   Hdf5Handle file_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -7,7 +7,7 @@
 #include "server/session/journal_file.h"
 #include "server/session/journal_rows.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr size_t kMaxNameBytes = 200;  // of sessions and ids
@@ -197,4 +197,4 @@ absl::StatusOr<std::unique_ptr<Journal>> Journal::Open(const std::string& path, 
   return std::unique_ptr<Journal>(new JournalFile(std::move(opened)));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

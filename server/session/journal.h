@@ -17,7 +17,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::session {
 
 enum class TouchStage {
   kIntent = 1,     // written down; nothing has moved
@@ -133,4 +133,4 @@ class Journal {
   virtual absl::StatusOr<std::string> Fact(const std::string& key) const = 0;  // "" if it is not there
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::session

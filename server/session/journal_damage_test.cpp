@@ -19,7 +19,7 @@
 #include "server/base/test_folder.h"
 #include "server/session/journal.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::HasSubstr;
@@ -291,4 +291,4 @@ TEST_F(JournalDamage, AFullDiskRefusesTheStepAndKeepsTheRest) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

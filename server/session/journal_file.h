@@ -16,7 +16,7 @@
 #include "server/session/journal_open.h"
 #include "server/session/sqlite_file.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // "begun", "executing", "done", "failed".
 const char* StageInWords(TouchStage stage);
@@ -130,4 +130,4 @@ class JournalFile : public Journal {
   mutable std::mutex mutex_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::session

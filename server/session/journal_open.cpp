@@ -13,7 +13,7 @@
 #include "server/base/status.h"
 #include "server/session/journal_schema.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 bool IsThere(const std::string& path) {
@@ -145,4 +145,4 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   return opened;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

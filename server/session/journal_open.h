@@ -9,7 +9,7 @@
 #include "server/session/journal.h"
 #include "server/session/sqlite_file.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // Held while a journal is open for writing: FILE.lock, locked with flock, which ends with the process. The
 // file stays.
@@ -30,4 +30,4 @@ struct OpenedJournal {
 
 absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::Mode mode);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -5,7 +5,7 @@
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 void BindPose(const std::array<double, 6>& pose, SqliteStatement* statement) {
@@ -264,4 +264,4 @@ absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id)
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -8,7 +8,7 @@
 #include "server/session/journal.h"
 #include "server/session/sqlite_file.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // What is inserted is new: the caller has checked.
 absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& session);
@@ -29,4 +29,4 @@ absl::StatusOr<std::vector<int64_t>> ImageIds(SqliteFile* file, int64_t session_
 // A session with its counts and objects.
 absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

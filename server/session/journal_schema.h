@@ -1,7 +1,7 @@
 // How a journal stands in SQLite: journal.md says it for people. Internal to session/.
 #pragma once
 
-namespace touchstone {
+namespace touchstone::session {
 
 inline constexpr int kJournalApplicationId =
     0x54736A31;                            // "Tsj1": distinguishes a journal from other SQLite files
@@ -77,4 +77,4 @@ CREATE TABLE image(
 CREATE TABLE fact(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 )sql";
 
-}  // namespace touchstone
+}  // namespace touchstone::session

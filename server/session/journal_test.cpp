@@ -14,7 +14,7 @@
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::ElementsAre;
@@ -366,4 +366,4 @@ TEST_F(JournalTest, ThreadsShareAJournal) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -6,7 +6,7 @@
 #include "server/session/journal_file.h"
 #include "server/session/journal_rows.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 const char* StageInWords(TouchStage stage) {
   switch (stage) {
@@ -189,4 +189,4 @@ absl::StatusOr<uint64_t> JournalFile::NextNumber(int64_t session_id) const {
   return static_cast<uint64_t>(row.Integer(0));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -13,7 +13,7 @@
 #include "server/session/csv_fields.h"
 #include "server/session/session_measurements.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 absl::Status WrongValue(const MeasurementSet& set, int row, absl::string_view what, double value) {
@@ -28,7 +28,7 @@ absl::Status CheckSizes(const MeasurementSet& set) {
   bool fits = rows > 0 && set.touch.size() == rows && set.line.size() == rows &&
               set.session_time_s.size() == rows && set.target_m.size() == poses &&
               set.approach.size() == poses && set.lateral.size() == poses && set.standoff_m.size() == poses &&
-              set.speed_m_s.size() == poses && set.fingers >= 0 && set.fingers <= kMaxFingers &&
+              set.speed_m_s.size() == poses && set.fingers >= 0 && set.fingers <= model::kMaxFingers &&
               set.time_s.size() == rows * set.fingers;
   for (const std::vector<int>* column : {&set.round, &set.face})
     fits = fits && (column->empty() || column->size() == rows);
@@ -106,4 +106,4 @@ absl::Status CheckMeasurementSet(MeasurementSet* set) {
   return CheckTouchNumbers(*set);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

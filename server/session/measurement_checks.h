@@ -5,11 +5,11 @@
 
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 inline constexpr size_t kMaxObjectNameBytes = 256;
 
 // A touch number that stands twice would make "touch 17" ambiguous, and hints at a file pasted twice.
 absl::Status CheckTouchNumbers(const MeasurementSet& set);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -14,7 +14,7 @@
 #include "server/model/model.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr size_t kMaxShown = 48;
@@ -47,7 +47,7 @@ int FingerOfColumn(const std::string& name) {
   int finger = -1;
   const bool plain = digits.find_first_not_of("0123456789") == std::string::npos &&
                      (digits.size() == 1 || digits[0] != '0') && absl::SimpleAtoi(digits, &finger);
-  return plain && finger < kMaxFingers ? finger : -1;
+  return plain && finger < model::kMaxFingers ? finger : -1;
 }
 
 // The column that a name stands for; its index is set later where it is a covariate.
@@ -95,7 +95,7 @@ absl::Status CheckFingers(const std::map<int, std::string>& times, const std::st
   const int fingers = letters ? 3 : times.empty() ? 0 : times.rbegin()->first + 1;
   for (int finger = 0; finger < fingers; ++finger) {
     const auto found = times.find(finger);
-    const std::string expected = absl::StrCat("t_", FingerName(finger, letters ? 3 : 0), "_us");
+    const std::string expected = absl::StrCat("t_", model::FingerName(finger, letters ? 3 : 0), "_us");
     if (found == times.end())
       return absl::InvalidArgumentError(absl::StrCat(
           place, "time columns must be t_l_us,t_m_us,t_r_us or t_0_us,t_1_us,... without a gap; finger ",
@@ -201,4 +201,4 @@ absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const
   return columns;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

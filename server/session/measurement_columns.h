@@ -8,7 +8,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::session {
 
 // What a field of a row is read into.
 enum class ColumnKind {
@@ -49,4 +49,4 @@ absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const
 // A field for a message: its start if it is long, bytes that are no text escaped.
 std::string Shown(absl::string_view field);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -12,11 +12,11 @@
 #include "server/model/parameter_values.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 std::string Millimetres(double metres) {
-  return FileNumber(Unit::kMillimetre, metres);
+  return model::FileNumber(Unit::kMillimetre, metres);
 }
 
 // In quotes where a reader would take it apart.
@@ -48,7 +48,7 @@ v1::Vector3 VectorOf(const Eigen::Vector3d& v) {
 }  // namespace
 
 std::string TimeColumnName(int finger, int fingers) {
-  return absl::StrCat("t_", FingerName(finger, fingers), "_us");
+  return absl::StrCat("t_", model::FingerName(finger, fingers), "_us");
 }
 
 std::string MeasurementHeader(int fingers, const MeasurementColumns& columns) {
@@ -65,13 +65,13 @@ std::string MeasurementHeader(int fingers, const MeasurementColumns& columns) {
 std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns& columns) {
   const v1::CommandedTouch& c = touch.commanded;
   std::string row = absl::StrCat(touch.touch, ",", Name(touch.object), ",",
-                                 FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
+                                 model::FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
                                  Millimetres(c.standoff_m()), ",", Millimetres(c.target_m().x()), ",",
                                  Millimetres(c.target_m().y()), ",", Millimetres(c.target_m().z()));
   AppendVector(c.approach(), &row);
   AppendVector(c.lateral(), &row);
   for (const double time_s : touch.time_s)
-    absl::StrAppend(&row, ",", std::isnan(time_s) ? "" : FileNumber(Unit::kMicrosecond, time_s));
+    absl::StrAppend(&row, ",", std::isnan(time_s) ? "" : model::FileNumber(Unit::kMicrosecond, time_s));
   if (columns.session_time) absl::StrAppend(&row, ",", ShortestNumber(c.session_time_s()));
   if (columns.round) absl::StrAppend(&row, ",", touch.round.value_or(0));
   if (columns.face) absl::StrAppend(&row, ",", touch.face.value_or(0));
@@ -131,4 +131,4 @@ absl::StatusOr<std::vector<MeasuredTouch>> ParseMeasurements(const std::string& 
   return touches;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -11,7 +11,7 @@
 
 #include "touchstone/v1/types.pb.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // One row; SI inside, as on the wire.
 struct MeasuredTouch {
@@ -52,4 +52,4 @@ std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches);
 absl::StatusOr<std::vector<MeasuredTouch>> ParseMeasurements(const std::string& text,
                                                              const std::string& origin);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

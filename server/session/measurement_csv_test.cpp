@@ -8,7 +8,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::HasSubstr;
@@ -114,4 +114,4 @@ TEST(MeasurementCsv, ErrorsNameFileLineAndColumn) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -19,7 +19,7 @@
 #include "server/session/measurement_checks.h"
 #include "server/session/measurement_columns.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -291,4 +291,4 @@ absl::StatusOr<MeasurementSet> ReadMeasurementSet(const std::string& path) {
   return ParseMeasurementSet(text, path);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

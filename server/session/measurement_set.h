@@ -13,7 +13,7 @@
 
 #include "server/model/finger_name.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 struct MeasurementSet {
   std::string origin;      // what messages call it: the path
@@ -45,4 +45,4 @@ struct MeasurementSet {
 absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin);
 absl::StatusOr<MeasurementSet> ReadMeasurementSet(const std::string& path);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

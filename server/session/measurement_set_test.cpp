@@ -13,7 +13,7 @@
 #include "server/base/text.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::ElementsAre;
@@ -284,4 +284,4 @@ TEST(MeasurementSet, PublicSetsAreRead) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

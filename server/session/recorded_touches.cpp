@@ -9,7 +9,7 @@
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 // Of the grid that similar targets are looked up in; well above the tolerance.
@@ -129,4 +129,4 @@ size_t RecordedTouches::Repeats(const std::string& object, const v1::CommandedTo
   return rows == nullptr ? 0 : rows->size();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -13,7 +13,7 @@
 #include "server/session/journal.h"
 #include "touchstone/v1/types.pb.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // Unchanged after it was made; any thread may read.
 class RecordedTouches {
@@ -64,4 +64,4 @@ class RecordedTouches {
   std::unordered_map<std::string, std::vector<Recorded>> by_cell_;  // object and cell of the target
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -8,7 +8,7 @@
 #include "server/base/test_folder.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::ElementsAre;
@@ -126,4 +126,4 @@ TEST_F(RecordedTouchesTest, SessionsOfOneEndEffectorAreServedTogether) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

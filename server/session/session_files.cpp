@@ -11,7 +11,7 @@
 #include "server/session/command_bytes.h"
 #include "server/session/session_measurements.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -66,4 +66,4 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
   return added;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

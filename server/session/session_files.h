@@ -10,7 +10,7 @@
 
 #include "server/session/journal.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // The measurement file (format: proto/README.md); whole or absent. FAILED_PRECONDITION if no touch is done.
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path);
@@ -34,4 +34,4 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
 // empty.
 absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& options, Journal* journal);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -15,7 +15,7 @@
 #include "server/session/command_bytes.h"
 #include "server/session/session_measurements.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 using ::testing::HasSubstr;
@@ -141,7 +141,7 @@ TEST_F(SessionFiles, WhatARigMeasuredIsTheSetThatItsFileIsReadAs) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::vector<JournalTouch> touches(200);
   for (size_t k = 0; k < touches.size(); ++k) {
-    CommandedTouch commanded;  // numbers that no decimal of few digits is
+    touch::CommandedTouch commanded;  // numbers that no decimal of few digits is
     commanded.target_m = {0.1 * uniform(random), 0.1 * uniform(random), 0.1 * uniform(random)};
     commanded.approach = Eigen::Vector3d(uniform(random), uniform(random), uniform(random)).normalized();
     commanded.lateral = commanded.approach.unitOrthogonal();
@@ -300,4 +300,4 @@ TEST_F(SessionFiles, ASessionWithoutAResultIsNotExported) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::session

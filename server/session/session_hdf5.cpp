@@ -9,7 +9,7 @@
 #include "server/session/hdf5_file.h"
 #include "server/session/session_files.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr char kFormat[] = "touchstone: session/1";
@@ -247,4 +247,4 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
   return added;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -10,7 +10,7 @@
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::session {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -104,4 +104,4 @@ absl::StatusOr<MeasurementSet> SessionMeasurementSet(const Journal& journal, con
   return MakeMeasurementSet(touches, origin);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

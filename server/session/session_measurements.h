@@ -10,7 +10,7 @@
 #include "server/session/measurement_csv.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::session {
 
 // The touches that are done, in the order of their approaches, times since each approach began. `touch` is
 // the client's id where every id is a number of its own, else the number in the session; session_time_s is
@@ -32,4 +32,4 @@ absl::StatusOr<MeasurementSet> SessionMeasurementSet(const Journal& journal, con
 // origin, the line that the row would have in a file, and the value.
 absl::Status CheckMeasurementSet(MeasurementSet* set);
 
-}  // namespace touchstone
+}  // namespace touchstone::session

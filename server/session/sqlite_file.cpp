@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-namespace touchstone {
+namespace touchstone::session {
 
 SqliteStatement::SqliteStatement(SqliteStatement&& other) noexcept
     : file_(other.file_), statement_(other.statement_), result_(other.result_), bound_(other.bound_) {
@@ -159,4 +159,4 @@ absl::Status SqliteFile::Error(int result) const {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::session

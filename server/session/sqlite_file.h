@@ -13,7 +13,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::session {
 
 class SqliteFile;
 
@@ -94,4 +94,4 @@ class SqliteFile {
   std::map<const char*, sqlite3_stmt*> prepared_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::session

@@ -9,32 +9,34 @@
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr char kBuiltIn[] = "built-in supershape";
 
-absl::StatusOr<ServedObject> Serve(const std::string& name, TriangleMesh mesh, const std::string& origin) {
+absl::StatusOr<ServedObject> Serve(const std::string& name, geometry::TriangleMesh mesh,
+                                   const std::string& origin) {
   ServedObject object;
-  object.closed = InspectMesh(mesh).closed();
+  object.closed = geometry::InspectMesh(mesh).closed();
   object.origin = origin;
-  TOUCHSTONE_ASSIGN_OR_RETURN(object.surface, Surface::Create(name, std::move(mesh)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(object.surface, geometry::Surface::Create(name, std::move(mesh)));
   return object;
 }
 
 absl::StatusOr<ServedObject> MakeBuiltIn(const std::string& name, int triangles) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const SupershapeParameters parameters, NamedSupershape(name));
-  TOUCHSTONE_ASSIGN_OR_RETURN(TriangleMesh mesh, MakeSupershape(parameters, triangles));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::SupershapeParameters parameters,
+                              geometry::NamedSupershape(name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(geometry::TriangleMesh mesh, geometry::MakeSupershape(parameters, triangles));
   return Serve(name, std::move(mesh), kBuiltIn);
 }
 
 absl::StatusOr<ServedObject> ReadObject(const MeshSpec& spec) {
-  MeshImport import;
+  geometry::MeshImport import;
   import.unit = spec.unit;
   import.up = spec.up;
   import.scale = spec.scale;
   if (spec.fit_mm > 0) import.fit_mm = spec.fit_mm;
-  auto mesh = ReadMeshFile(spec.path, import);
+  auto mesh = geometry::ReadMeshFile(spec.path, import);
   if (!mesh.ok()) return mesh.status();
   auto object = Serve(spec.name, *std::move(mesh), std::filesystem::path(spec.path).filename().string());
   if (!object.ok())
@@ -46,7 +48,7 @@ absl::StatusOr<ServedObject> ReadObject(const MeshSpec& spec) {
 
 absl::StatusOr<ObjectStore> ObjectStore::Load(const std::vector<MeshSpec>& meshes, int supershape_triangles,
                                               ThreadPool* pool) {
-  const std::vector<std::string> shapes = SupershapeNames();
+  const std::vector<std::string> shapes = geometry::SupershapeNames();
   const int count = static_cast<int>(shapes.size() + meshes.size());
   std::vector<absl::StatusOr<ServedObject>> loaded(count, absl::UnknownError("not loaded"));
   pool->ParallelFor(count, 1, [&](int begin, int end) {
@@ -81,4 +83,4 @@ absl::StatusOr<const ServedObject*> ObjectStore::Find(const std::string& name,
       absl::StrCat(field, ": no object is named '", name, "'", DidYouMean(name, names)));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

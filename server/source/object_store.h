@@ -11,7 +11,7 @@
 #include "server/base/thread_pool.h"
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 // A mesh file to serve under a name, with what the file does not say.
 struct MeshSpec {
@@ -24,7 +24,7 @@ struct MeshSpec {
 };
 
 struct ServedObject {
-  std::shared_ptr<const Surface> surface;
+  std::shared_ptr<const geometry::Surface> surface;
   bool closed = false;
   std::string origin;  // "built-in supershape", or the file's name
 };
@@ -44,4 +44,4 @@ class ObjectStore {
   std::map<std::string, ServedObject> objects_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

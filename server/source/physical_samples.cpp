@@ -10,16 +10,16 @@
 #include "server/session/command_bytes.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // A touch as a batch of one, for the table of columns: what a rig does not measure is NaN.
-TouchBatch BatchOf(const TouchCommand& command, const JournalTouch& touch, uint64_t index) {
-  TouchBatch batch;
+effects::TouchBatch BatchOf(const TouchCommand& command, const session::JournalTouch& touch, uint64_t index) {
+  effects::TouchBatch batch;
   batch.Reset(1, static_cast<int>(touch.result.fingers.size()));
-  SetTouch(command.touch, index, 0, &batch);
+  touch::SetTouch(command.touch, index, 0, &batch);
   for (int finger = 0; finger < batch.fingers(); ++finger)
     batch.reported_time_s[finger] = touch.result.fingers[finger].contact_time_s;
   std::fill(batch.contact_m.begin(), batch.contact_m.end(), Eigen::Vector3d::Constant(kNan));
@@ -27,9 +27,9 @@ TouchBatch BatchOf(const TouchCommand& command, const JournalTouch& touch, uint6
   return batch;
 }
 
-bool EveryFingerHit(const JournalTouch& touch) {
+bool EveryFingerHit(const session::JournalTouch& touch) {
   return std::none_of(touch.result.fingers.begin(), touch.result.fingers.end(),
-                      [](const JournalFinger& finger) { return std::isnan(finger.contact_time_s); });
+                      [](const session::JournalFinger& finger) { return std::isnan(finger.contact_time_s); });
 }
 
 }  // namespace
@@ -38,14 +38,14 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSamples::Create(const Samp
                                                                       RigDevice* device, Rectifier rectify) {
   std::unique_ptr<PhysicalSamples> samples(new PhysicalSamples);
   samples->request_ = request;
-  DatasetSpecification& specification = samples->request_.specification;
-  DatasetPart& part = samples->request_.part;
-  if (specification.plan.kind == Plan::Kind::kSphere)
+  dataset::DatasetSpecification& specification = samples->request_.specification;
+  dataset::DatasetPart& part = samples->request_.part;
+  if (specification.plan.kind == touch::Plan::Kind::kSphere)
     return absl::InvalidArgumentError(
         "plan.sphere makes no sense at this source: an arm cannot come from everywhere; faces and list would "
         "be right");
   TOUCHSTONE_ASSIGN_OR_RETURN(samples->request_.session, SessionName(request.session));
-  TOUCHSTONE_RETURN_IF_ERROR(ValidateDataset(&specification, ImageOrigin::kPhotographed));
+  TOUCHSTONE_RETURN_IF_ERROR(dataset::ValidateDataset(&specification, dataset::ImageOrigin::kPhotographed));
   if (part.stop_index > specification.samples)
     return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
                                               specification.samples, " samples"));
@@ -64,48 +64,48 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSamples::Create(const Samp
   for (const auto& object : specification.objects) header.mesh_hashes.push_back(object->hash());
   header.fingers = device->fingers();
   header.spacing_m = device->spacing_m();
-  header.columns = ColumnsOf(specification.columns, specification.image, header.fingers);
+  header.columns = dataset::ColumnsOf(specification.columns, specification.image, header.fingers);
   for (const auto& object : specification.objects)
     samples->generators_.push_back(
-        MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+        touch::MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
   samples->device_ = device;
   samples->rectify_ = std::move(rectify);
   samples->next_index_ = part.start_index;
   return samples;
 }
 
-absl::StatusOr<std::optional<DatasetBatch>> PhysicalSamples::Next(const MotionGuard& guard) {
-  const DatasetPart& part = request_.part;
-  if (next_index_ >= part.stop_index) return std::optional<DatasetBatch>();
-  DatasetBatch batch;
+absl::StatusOr<std::optional<dataset::DatasetBatch>> PhysicalSamples::Next(const MotionGuard& guard) {
+  const dataset::DatasetPart& part = request_.part;
+  if (next_index_ >= part.stop_index) return std::optional<dataset::DatasetBatch>();
+  dataset::DatasetBatch batch;
   batch.start_index = next_index_;
   batch.rows = static_cast<uint32_t>(std::min<uint64_t>(part.batch_size, part.stop_index - next_index_));
-  const BatchColumns columns(header_.columns, request_.objects.size(), absl::MakeSpan(&batch, 1));
+  const dataset::BatchColumns columns(header_.columns, request_.objects.size(), absl::MakeSpan(&batch, 1));
   for (uint32_t row = 0; row < batch.rows; ++row) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     TOUCHSTONE_RETURN_IF_ERROR(MakeSample(row, guard, columns, &batch));
   }
   next_index_ += uint64_t{part.batch_size} * part.batch_stride;
-  return std::optional<DatasetBatch>(std::move(batch));
+  return std::optional<dataset::DatasetBatch>(std::move(batch));
 }
 
-absl::StatusOr<std::pair<TouchCommand, JournalTouch>> PhysicalSamples::MakeTouch(
+absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> PhysicalSamples::MakeTouch(
     uint64_t index, const MotionGuard& guard) const {
-  const DatasetSpecification& specification = request_.specification;
+  const dataset::DatasetSpecification& specification = request_.specification;
   const size_t which = index % request_.objects.size();
-  const PoseGenerator& generator = *generators_[which];
-  const uint64_t number = PlanNumber(index, request_.objects.size(), generator.Count() != 0);
+  const touch::PoseGenerator& generator = *generators_[which];
+  const uint64_t number = dataset::PlanNumber(index, request_.objects.size(), generator.Count() != 0);
   TouchCommand command;
   command.session = request_.session;
   command.object = request_.objects[which];
   command.bounds = specification.objects[which]->bounds();
-  if (specification.plan.kind == Plan::Kind::kFaces)
+  if (specification.plan.kind == touch::Plan::Kind::kFaces)
     command.repeat = number / (6 * specification.plan.faces.samples_per_face);
   for (uint32_t attempt = 0; attempt < specification.max_draws; ++attempt) {
     command.id = absl::StrCat("dataset-", request_.key, "-", index, "-", attempt);
-    command.touch = TouchOfPlan(specification.plan, generator, number, attempt);
-    command.bytes = CommandBytes(command.touch);
-    TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, device_->Touch(command, guard));
+    command.touch = touch::TouchOfPlan(specification.plan, generator, number, attempt);
+    command.bytes = session::CommandBytes(command.touch);
+    TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalTouch touch, device_->Touch(command, guard));
     if (generator.Accepts(EveryFingerHit(touch))) return std::pair(command, std::move(touch));
   }
   return absl::FailedPreconditionError(
@@ -113,21 +113,23 @@ absl::StatusOr<std::pair<TouchCommand, JournalTouch>> PhysicalSamples::MakeTouch
                    " draws had all fingers hit; raise max_draws or change the plan"));
 }
 
-absl::Status PhysicalSamples::MakeSample(uint32_t row, const MotionGuard& guard, const BatchColumns& columns,
-                                         DatasetBatch* batch) const {
+absl::Status PhysicalSamples::MakeSample(uint32_t row, const MotionGuard& guard,
+                                         const dataset::BatchColumns& columns,
+                                         dataset::DatasetBatch* batch) const {
   const uint64_t index = batch->start_index + row;
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto made, MakeTouch(index, guard));
   const auto& [command, touch] = made;
   const uint8_t accepted = 1;
-  const TouchPose pose = command.touch;
+  const touch::TouchPose pose = command.touch;
   columns.PutTouches({BatchOf(command, touch, index), {&row, 1}, {&accepted, 1}, {&pose, 1}});
-  const DatasetSpecification& specification = request_.specification;
+  const dataset::DatasetSpecification& specification = request_.specification;
   if (!specification.columns.image) return absl::OkStatus();
-  const Camera camera = CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
+  const image::Camera camera =
+      image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
   const ViewCommand view{request_.session, command.object, command.bounds, ObjectFromCamera(camera)};
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
                               TakePhotograph(device_, rectify_, view, specification.image, guard));
   return columns.AppendPicture(picture, specification.image, batch);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -8,7 +8,7 @@
 
 #include "server/source/physical_source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 class PhysicalSamples final : public SampleStream {
  public:
@@ -17,23 +17,23 @@ class PhysicalSamples final : public SampleStream {
                                                               Rectifier rectify);
 
   const SampleHeader& header() const override { return header_; }
-  absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) override;
+  absl::StatusOr<std::optional<dataset::DatasetBatch>> Next(const MotionGuard& guard) override;
 
  private:
   PhysicalSamples() = default;
   // The touch of a sample: drawn again, within bounds, while a finger misses.
-  absl::StatusOr<std::pair<TouchCommand, JournalTouch>> MakeTouch(uint64_t index,
-                                                                  const MotionGuard& guard) const;
+  absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> MakeTouch(uint64_t index,
+                                                                           const MotionGuard& guard) const;
   // Fills the row of sample start_index + row.
-  absl::Status MakeSample(uint32_t row, const MotionGuard& guard, const BatchColumns& columns,
-                          DatasetBatch* batch) const;
+  absl::Status MakeSample(uint32_t row, const MotionGuard& guard, const dataset::BatchColumns& columns,
+                          dataset::DatasetBatch* batch) const;
 
   SampleRequest request_;
   RigDevice* device_ = nullptr;
   Rectifier rectify_;
   SampleHeader header_;
-  std::vector<std::unique_ptr<PoseGenerator>> generators_;  // one per object
+  std::vector<std::unique_ptr<touch::PoseGenerator>> generators_;  // one per object
   uint64_t next_index_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -10,7 +10,7 @@
 #include "server/session/command_bytes.h"
 #include "server/source/physical_samples.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr double kUsualTouchDurationS = 8;  // until a rig has measured its own
@@ -22,30 +22,31 @@ std::string NewTouchId() {
 
 }  // namespace
 
-absl::Status CheckPhotograph(const DatasetImage& wanted) {
+absl::Status CheckPhotograph(const dataset::DatasetImage& wanted) {
   if (wanted.options.depth || wanted.options.mask)
     return absl::InvalidArgumentError(
         "image.depth, image.mask: this source's camera sees colours only; ask for none");
-  if (wanted.options.shading_style != ShadingStyle::kShaded)
+  if (wanted.options.shading_style != image::ShadingStyle::kShaded)
     return absl::InvalidArgumentError(
         "image.shading_style: this source's camera shows what it sees; leave it unspecified");
   return absl::OkStatus();
 }
 
-absl::StatusOr<Image> TakePhotograph(RigDevice* device, const Rectifier& rectify, const ViewCommand& command,
-                                     const DatasetImage& wanted, const MotionGuard& guard) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Frame frame, device->Photograph(command, guard));
-  const ImageOptions& options = wanted.options;
-  Image picture;
+absl::StatusOr<image::Image> TakePhotograph(RigDevice* device, const Rectifier& rectify,
+                                            const ViewCommand& command, const dataset::DatasetImage& wanted,
+                                            const MotionGuard& guard) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const image::Frame frame, device->Photograph(command, guard));
+  const image::ImageOptions& options = wanted.options;
+  image::Image picture;
   picture.width = options.width;
   picture.height = options.height;
-  picture.channels = options.format == PixelFormat::kRgb ? 3 : 1;
+  picture.channels = options.format == image::PixelFormat::kRgb ? 3 : 1;
   picture.pixels = rectify(frame, device->IntrinsicsOf(frame), options.width, options.height,
-                           wanted.vertical_fov_rad, options.format == PixelFormat::kGrey);
+                           wanted.vertical_fov_rad, options.format == image::PixelFormat::kGrey);
   return picture;
 }
 
-Eigen::Isometry3d ObjectFromCamera(const Camera& camera) {
+Eigen::Isometry3d ObjectFromCamera(const image::Camera& camera) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   const Eigen::Vector3d ahead = (camera.at_m - camera.eye_m).normalized();
   const Eigen::Vector3d right = ahead.cross(camera.up).normalized();
@@ -58,7 +59,7 @@ SourceInfo PhysicalSource::Describe() const {
   const SourceStatus status = device_->Status();
   SourceInfo info;
   info.kind = SourceKind::kPhysical;
-  info.plans = {Plan::Kind::kFaces, Plan::Kind::kList};
+  info.plans = {touch::Plan::Kind::kFaces, touch::Plan::Kind::kList};
   info.makes_images = device_->has_camera();
   info.max_fingers = device_->fingers();
   info.moves = device_->moves();
@@ -82,10 +83,10 @@ absl::StatusOr<TouchResults> PhysicalSource::MakeTouches(const TouchRequest& req
     command.object = request.object;
     command.bounds = object.surface->bounds();
     command.touch = request.touches[k];
-    command.bytes = CommandBytes(command.touch);
+    command.bytes = session::CommandBytes(command.touch);
     command.repeat = repeats[command.bytes]++;
-    TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, device_->Touch(command, guard));
-    for (const JournalFinger& finger : touch.result.fingers)
+    TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalTouch touch, device_->Touch(command, guard));
+    for (const session::JournalFinger& finger : touch.result.fingers)
       results.contact_time_s.push_back(finger.contact_time_s);
     results.journalled.push_back(std::move(touch));
   }
@@ -95,9 +96,9 @@ absl::StatusOr<TouchResults> PhysicalSource::MakeTouches(const TouchRequest& req
 absl::Status PhysicalSource::MakePictures(const CaptureRequest& request, const ServedObject& object,
                                           const MotionGuard& guard, const TakePicture& take) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckPhotograph(request.image));
-  for (const Camera& camera : request.cameras) {
+  for (const image::Camera& camera : request.cameras) {
     const ViewCommand command{"default", request.object, object.surface->bounds(), ObjectFromCamera(camera)};
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
                                 TakePhotograph(device_.get(), rectify_, command, request.image, guard));
     TOUCHSTONE_RETURN_IF_ERROR(take(picture));
   }
@@ -108,4 +109,4 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSource::MakeStream(const S
   return PhysicalSamples::Create(request, device_.get(), rectify_);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

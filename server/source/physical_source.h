@@ -7,13 +7,13 @@
 #include "server/source/rig_device.h"
 #include "server/source/source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 // Scales a photograph to width x height pixels of a vertical field of view (radians), without distortion, as a
 // virtual source renders it: rgb or grey.
 using Rectifier =
-    std::function<std::vector<uint8_t>(const Frame& frame, const Intrinsics& intrinsics, int width,
-                                       int height, double vertical_fov_rad, bool grey)>;
+    std::function<std::vector<uint8_t>(const image::Frame& frame, const image::Intrinsics& intrinsics,
+                                       int width, int height, double vertical_fov_rad, bool grey)>;
 
 class PhysicalSource final : public Source {
  public:
@@ -41,13 +41,14 @@ class PhysicalSource final : public Source {
 };
 
 // The photograph from there, as an image specification asks for it.
-absl::StatusOr<Image> TakePhotograph(RigDevice* device, const Rectifier& rectify, const ViewCommand& command,
-                                     const DatasetImage& wanted, const MotionGuard& guard);
+absl::StatusOr<image::Image> TakePhotograph(RigDevice* device, const Rectifier& rectify,
+                                            const ViewCommand& command, const dataset::DatasetImage& wanted,
+                                            const MotionGuard& guard);
 
 // INVALID_ARGUMENT for what a camera does not have: depth, mask, another shading style.
-absl::Status CheckPhotograph(const DatasetImage& wanted);
+absl::Status CheckPhotograph(const dataset::DatasetImage& wanted);
 
 // Camera of the protocol (eye, at, up) as object_from_camera: z looks ahead, y down.
-Eigen::Isometry3d ObjectFromCamera(const Camera& camera);
+Eigen::Isometry3d ObjectFromCamera(const image::Camera& camera);
 
-}  // namespace touchstone
+}  // namespace touchstone::source

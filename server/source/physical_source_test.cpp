@@ -9,7 +9,7 @@
 #include "server/session/command_bytes.h"
 #include "server/source/test_source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 using testing::HasSubstr;
@@ -17,14 +17,15 @@ using testing::HasSubstr;
 // Journals nothing, and misses with a finger as often as it is told.
 class FakeDevice final : public RigDevice {
  public:
-  absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override {
+  absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command,
+                                              const MotionGuard& guard) override {
     if (const absl::Status status = guard(); !status.ok()) return status;
     commands.push_back(command);
-    JournalTouch touch;
+    session::JournalTouch touch;
     touch.id = command.id;
     touch.object = command.object;
     touch.command = command.bytes;
-    touch.stage = TouchStage::kDone;
+    touch.stage = session::TouchStage::kDone;
     for (int finger = 0; finger < 3; ++finger) touch.result.fingers.push_back({1.0 + 0.1 * finger, {}, 0});
     if (misses > 0) {
       --misses;
@@ -32,16 +33,16 @@ class FakeDevice final : public RigDevice {
     }
     return touch;
   }
-  absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard&) override {
+  absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard&) override {
     views.push_back(command);
-    Frame frame;
+    image::Frame frame;
     frame.width = frame.height = 2;
     frame.rgb.assign(12, 7);
     return frame;
   }
   bool has_camera() const override { return camera; }
-  Intrinsics IntrinsicsOf(const Frame& frame) const override {
-    return PinholeIntrinsics(frame.width, frame.height, 0.8);
+  image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override {
+    return image::PinholeIntrinsics(frame.width, frame.height, 0.8);
   }
   int fingers() const override { return 3; }
   double spacing_m() const override { return 0.03; }
@@ -60,7 +61,8 @@ class PhysicalSourceTest : public testing::Test {
   PhysicalSourceTest() {
     auto device = std::make_unique<FakeDevice>();
     device_ = device.get();
-    const Rectifier grey_picture = [](const Frame&, const Intrinsics&, int width, int height, double, bool) {
+    const Rectifier grey_picture = [](const image::Frame&, const image::Intrinsics&, int width, int height,
+                                      double, bool) {
       return std::vector<uint8_t>(static_cast<size_t>(width) * height, 9);
     };
     source_ =
@@ -70,10 +72,10 @@ class PhysicalSourceTest : public testing::Test {
   static SampleRequest Faces(const std::vector<std::string>& columns) {
     SampleRequest request;
     request.objects = {"lat00", "lat10"};
-    request.specification.plan.kind = Plan::Kind::kFaces;
+    request.specification.plan.kind = touch::Plan::Kind::kFaces;
     request.specification.plan.faces.samples_per_face = 1;
     request.specification.plan.faces.rounds = 2;
-    request.specification.columns = *ColumnChoice::FromNames(columns);
+    request.specification.columns = *dataset::ColumnChoice::FromNames(columns);
     request.key = "0123456789abcdef";
     return request;
   }
@@ -123,7 +125,7 @@ TEST_F(PhysicalSourceTest, ASampleIsDrawnAgainUntilEveryFingerHits) {
 
 TEST_F(PhysicalSourceTest, AListsTouchStandsWithItsMiss) {
   SampleRequest request = Faces({"contact_time"});
-  request.specification.plan.kind = Plan::Kind::kList;
+  request.specification.plan.kind = touch::Plan::Kind::kList;
   request.specification.plan.list = {FromAbove()};
   device_->misses = 1;
   const auto batch = (*source_->Stream(request))->Next(NoObjection);
@@ -147,7 +149,7 @@ TEST_F(PhysicalSourceTest, GivesUpAfterMaxDraws) {
 
 TEST_F(PhysicalSourceTest, RefusesWhatARigCannotGive) {
   SampleRequest sphere = Faces({});
-  sphere.specification.plan.kind = Plan::Kind::kSphere;
+  sphere.specification.plan.kind = touch::Plan::Kind::kSphere;
   sphere.specification.samples = 3;
   EXPECT_THAT(std::string(source_->Stream(sphere).status().message()), HasSubstr("plan.sphere"));
   CaptureRequest depth;
@@ -169,7 +171,7 @@ TEST_F(PhysicalSourceTest, PhotographsEverySampleFromItsTouch) {
   ASSERT_TRUE(batch.ok() && batch->has_value()) << batch.status();
   EXPECT_EQ((*batch)->data[0], std::string(12, 9));
   ASSERT_EQ(device_->views.size(), 1u);
-  const CommandedTouch& touch = device_->commands[0].touch;
+  const touch::CommandedTouch& touch = device_->commands[0].touch;
   EXPECT_LT((device_->views[0].object_from_camera.translation() -
              (touch.target_m - touch.approach * touch.standoff_m))
                 .norm(),
@@ -177,4 +179,4 @@ TEST_F(PhysicalSourceTest, PhotographsEverySampleFromItsTouch) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::source

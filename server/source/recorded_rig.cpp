@@ -6,7 +6,7 @@
 #include "server/image/encode.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr double kVerticalFovRad = 0.7853981633974483;  // 45 deg: a journal does not say what the lens was
@@ -15,21 +15,26 @@ constexpr double kVerticalFovRad = 0.7853981633974483;  // 45 deg: a journal doe
 
 absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Open(const std::string& path) {
   std::unique_ptr<RecordedRig> source(new RecordedRig);
-  TOUCHSTONE_ASSIGN_OR_RETURN(source->journal_, Journal::Open(path, Journal::Mode::kReadOnly));
-  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, RecordedTouches::Read(*source->journal_));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<JournalSession> sessions, source->journal_->Sessions());
-  for (const JournalSession& session : sessions)
-    TOUCHSTONE_RETURN_IF_ERROR(source->journal_->ForEachImage(session.name, [&](const JournalImage& image) {
-      source->images_[image.id] = image;
-      return true;
-    }));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->journal_,
+                              session::Journal::Open(path, session::Journal::Mode::kReadOnly));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, session::RecordedTouches::Read(*source->journal_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions,
+                              source->journal_->Sessions());
+  for (const session::JournalSession& session : sessions)
+    TOUCHSTONE_RETURN_IF_ERROR(
+        source->journal_->ForEachImage(session.name, [&](const session::JournalImage& image) {
+          source->images_[image.id] = image;
+          return true;
+        }));
   return source;
 }
 
-absl::StatusOr<JournalTouch> RecordedRig::Touch(const TouchCommand& command, const MotionGuard& guard) {
+absl::StatusOr<session::JournalTouch> RecordedRig::Touch(const TouchCommand& command,
+                                                         const MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(guard());
-  const JournalTouch* touch = touches_->FindId(command.id);
-  if (touch == nullptr || touch->object != command.object || !SameCommand(touch->command, command.bytes))
+  const session::JournalTouch* touch = touches_->FindId(command.id);
+  if (touch == nullptr || touch->object != command.object ||
+      !session::SameCommand(touch->command, command.bytes))
     touch = touches_->Find(command.object, command.bytes, command.repeat);
   if (touch == nullptr)
     return absl::NotFoundError(
@@ -37,21 +42,21 @@ absl::StatusOr<JournalTouch> RecordedRig::Touch(const TouchCommand& command, con
   return *touch;
 }
 
-absl::StatusOr<Frame> RecordedRig::Photograph(const ViewCommand& command, const MotionGuard& guard) {
+absl::StatusOr<image::Frame> RecordedRig::Photograph(const ViewCommand& command, const MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(guard());
   const auto found = images_.find(ViewId(command));
   if (found == images_.end())
     return absl::NotFoundError(absl::StrCat("this is a recorded session, and no picture of '", command.object,
                                             "' was taken from there"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(Image image, DecodePng(found->second.png));
-  Frame frame;
+  TOUCHSTONE_ASSIGN_OR_RETURN(image::Image image, image::DecodePng(found->second.png));
+  image::Frame frame;
   frame.width = image.width, frame.height = image.height;
   frame.rgb = std::move(image.pixels);
   return frame;
 }
 
-Intrinsics RecordedRig::IntrinsicsOf(const Frame& frame) const {
-  return PinholeIntrinsics(frame.width, frame.height, kVerticalFovRad);
+image::Intrinsics RecordedRig::IntrinsicsOf(const image::Frame& frame) const {
+  return image::PinholeIntrinsics(frame.width, frame.height, kVerticalFovRad);
 }
 
 SourceStatus RecordedRig::Status() const {
@@ -61,4 +66,4 @@ SourceStatus RecordedRig::Status() const {
   return status;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -10,7 +10,7 @@
 #include "server/session/recorded_touches.h"
 #include "server/source/rig_device.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 class RecordedRig : public RigDevice {
  public:
@@ -19,21 +19,21 @@ class RecordedRig : public RigDevice {
 
   // By its id; else by its command, the repeats of it in the order in which they were made and round again.
   // NOT_FOUND: nothing like it was recorded.
-  absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
-  absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) override;
+  absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
+  absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) override;
   bool has_camera() const override { return !images_.empty(); }
-  Intrinsics IntrinsicsOf(const Frame& frame) const override;
+  image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return touches_->fingers(); }
   double spacing_m() const override { return touches_->spacing_m(); }
   bool moves() const override { return false; }
   SourceStatus Status() const override;
   SourceState State() const override { return SourceState::kIdle; }
-  Journal& journal() { return *journal_; }
+  session::Journal& journal() { return *journal_; }
 
  private:
-  std::unique_ptr<Journal> journal_;
-  std::unique_ptr<RecordedTouches> touches_;
-  std::map<std::string, JournalImage> images_;  // by id
+  std::unique_ptr<session::Journal> journal_;
+  std::unique_ptr<session::RecordedTouches> touches_;
+  std::map<std::string, session::JournalImage> images_;  // by id
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -8,7 +8,7 @@
 #include "server/session/command_bytes.h"
 #include "server/source/test_source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 class RecordedRigTest : public testing::Test {
@@ -16,17 +16,17 @@ class RecordedRigTest : public testing::Test {
   RecordedRigTest() {
     std::string folder = testing::TempDir() + "recorded_rig_XXXXXX";
     folder_ = mkdtemp(folder.data());
-    auto journal = *Journal::Open(folder_ + "/rig.db", Journal::Mode::kCreateOrReadWrite);
-    JournalSession session;
+    auto journal = *session::Journal::Open(folder_ + "/rig.db", session::Journal::Mode::kCreateOrReadWrite);
+    session::JournalSession session;
     session.name = "monday";
     EXPECT_TRUE(journal->EnsureSession(session).ok());
-    std::vector<JournalTouch> touches;
+    std::vector<session::JournalTouch> touches;
     for (int k = 0; k < 3; ++k) {  // the same touch three times
-      JournalTouch touch;
+      session::JournalTouch touch;
       touch.id = "touch-" + std::to_string(k);
       touch.object = "lat00";
-      touch.command = CommandBytes(FromAbove());
-      touch.stage = TouchStage::kDone;
+      touch.command = session::CommandBytes(FromAbove());
+      touch.stage = session::TouchStage::kDone;
       for (int finger = 0; finger < 3; ++finger) touch.result.fingers.push_back({1.0 + k, {}, 0});
       touches.push_back(touch);
     }
@@ -39,12 +39,13 @@ class RecordedRigTest : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
 
-  static TouchCommand Command(const std::string& id, const CommandedTouch& touch, uint64_t repeat = 0) {
+  static TouchCommand Command(const std::string& id, const touch::CommandedTouch& touch,
+                              uint64_t repeat = 0) {
     TouchCommand command;
     command.id = id;
     command.object = "lat00";
     command.touch = touch;
-    command.bytes = CommandBytes(touch);
+    command.bytes = session::CommandBytes(touch);
     command.repeat = repeat;
     return command;
   }
@@ -74,4 +75,4 @@ TEST_F(RecordedRigTest, SaysWhatWasNotRecorded) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -4,7 +4,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr size_t kMaxIdBytes = 128;
@@ -48,7 +48,7 @@ absl::Status CheckTouchIds(const std::vector<std::string>& ids, size_t touches) 
   return absl::OkStatus();
 }
 
-absl::Status CheckViews(size_t views, const DatasetImage& image, const SourceLimits& limits) {
+absl::Status CheckViews(size_t views, const dataset::DatasetImage& image, const SourceLimits& limits) {
   if (views == 0) return absl::InvalidArgumentError("views is empty: give at least one view");
   if (views > static_cast<size_t>(limits.max_images_per_request))
     return absl::InvalidArgumentError(
@@ -68,4 +68,4 @@ absl::Status CheckBatchSize(uint32_t batch_size, const SourceLimits& limits) {
       absl::StrCat("batch_size = ", batch_size, ": at most ", limits.max_batch_size));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

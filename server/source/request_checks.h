@@ -10,7 +10,7 @@
 
 #include "server/dataset/specification.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 // The most that one request may ask for.
 struct SourceLimits {
@@ -32,8 +32,8 @@ absl::Status CheckTouchCount(size_t touches, const SourceLimits& limits, size_t 
 absl::Status CheckTouchIds(const std::vector<std::string>& ids, size_t touches);
 
 // Views of one answer: how many, and how many bytes their pictures may have.
-absl::Status CheckViews(size_t views, const DatasetImage& image, const SourceLimits& limits);
+absl::Status CheckViews(size_t views, const dataset::DatasetImage& image, const SourceLimits& limits);
 
 absl::Status CheckBatchSize(uint32_t batch_size, const SourceLimits& limits);
 
-}  // namespace touchstone
+}  // namespace touchstone::source

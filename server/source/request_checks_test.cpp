@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 using testing::HasSubstr;
@@ -31,7 +31,7 @@ TEST(RequestChecks, IdsAreNoneOrOnePerTouchOf1To128Bytes) {
 
 TEST(RequestChecks, ViewsFitIntoOneAnswer) {
   SourceLimits limits;
-  DatasetImage image;
+  dataset::DatasetImage image;
   image.options.width = image.options.height = 1024;
   EXPECT_TRUE(CheckViews(64, image, limits).ok());  // 3 bytes per pixel: 192 MiB
   EXPECT_THAT(Message(CheckViews(65, image, limits)), HasSubstr("too much for one answer"));
@@ -57,4 +57,4 @@ TEST(RequestChecks, BatchesHaveAtMostTheLimit) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::source

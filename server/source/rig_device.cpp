@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::source {
 
 std::string ViewId(const ViewCommand& command) {
   std::string id = "view " + command.object;
@@ -15,4 +15,4 @@ std::string ViewId(const ViewCommand& command) {
   return id;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -15,13 +15,13 @@
 #include "server/source/source_state.h"
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 struct TouchCommand {
   std::string session, id;  // the touch is journalled under this id
   std::string object;
-  Bounds bounds;  // of the object, object frame
-  CommandedTouch touch;
+  geometry::Bounds bounds;  // of the object, object frame
+  touch::CommandedTouch touch;
   std::string bytes;    // the touch as the journal keeps it: command_bytes.h, without the session time
   uint64_t repeat = 0;  // which repeat of the same touch this is, from 0, as far as the caller knows
 };
@@ -29,7 +29,7 @@ struct TouchCommand {
 struct ViewCommand {
   std::string session;
   std::string object;
-  Bounds bounds;                                                         // of the object, object frame
+  geometry::Bounds bounds;                                               // of the object, object frame
   Eigen::Isometry3d object_from_camera = Eigen::Isometry3d::Identity();  // z looks ahead, y down
 };
 
@@ -53,11 +53,12 @@ class RigDevice {
   virtual ~RigDevice() = default;
   // The touch as it was made. One whose id is journalled already is answered from there; ALREADY_EXISTS if that
   // was another touch.
-  virtual absl::StatusOr<JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) = 0;
-  virtual absl::StatusOr<Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) = 0;
+  virtual absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command,
+                                                      const MotionGuard& guard) = 0;
+  virtual absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) = 0;
   virtual bool has_camera() const = 0;
   // Of the camera that took this picture.
-  virtual Intrinsics IntrinsicsOf(const Frame& frame) const = 0;
+  virtual image::Intrinsics IntrinsicsOf(const image::Frame& frame) const = 0;
   virtual int fingers() const = 0;
   virtual double spacing_m() const = 0;
   // True if it moves anything, so that a lease is needed.
@@ -66,4 +67,4 @@ class RigDevice {
   virtual SourceState State() const = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -6,15 +6,15 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
-absl::StatusOr<std::vector<CommandedTouch>> Source::ExpandPlan(const PlanRequest& request) const {
-  Bounds bounds;
-  if (request.plan.kind != Plan::Kind::kList) {
+absl::StatusOr<std::vector<touch::CommandedTouch>> Source::ExpandPlan(const PlanRequest& request) const {
+  geometry::Bounds bounds;
+  if (request.plan.kind != touch::Plan::Kind::kList) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, objects_.Find(request.object, "object"));
     bounds = object->surface->bounds();
   }
-  const auto generator = MakePoseGenerator(request.plan, bounds, request.seed);
+  const auto generator = touch::MakePoseGenerator(request.plan, bounds, request.seed);
   uint64_t count = request.count;
   if (generator->Count() != 0) {
     if (request.first_index > generator->Count())
@@ -27,9 +27,9 @@ absl::StatusOr<std::vector<CommandedTouch>> Source::ExpandPlan(const PlanRequest
   if (count > limit)
     return absl::InvalidArgumentError(absl::StrCat("count = ", count, ": at most ", limit,
                                                    " touches a request; ask in parts by first_index"));
-  std::vector<CommandedTouch> touches;
+  std::vector<touch::CommandedTouch> touches;
   for (uint64_t k = 0; k < count; ++k)
-    touches.push_back(TouchOfPlan(request.plan, *generator, request.first_index + k, 0));
+    touches.push_back(touch::TouchOfPlan(request.plan, *generator, request.first_index + k, 0));
   return touches;
 }
 
@@ -46,19 +46,19 @@ absl::StatusOr<CaptureResults> Source::Capture(const CaptureRequest& request, co
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, objects_.Find(request.object, "object"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckViews(request.cameras.size(), request.image, limits_));
   for (size_t k = 0; k < request.cameras.size(); ++k)
-    if (const absl::Status status = ValidateImageRequest(request.cameras[k], request.image.options);
+    if (const absl::Status status = image::ValidateImageRequest(request.cameras[k], request.image.options);
         !status.ok())
       return absl::Status(status.code(), absl::StrCat("views[", k, "]: ", status.message()));
-  ColumnChoice images_only;
+  dataset::ColumnChoice images_only;
   images_only.image = true;
   CaptureResults results;
-  results.columns = ColumnsOf(images_only, request.image, 0);  // the same columns as in a dataset
+  results.columns = dataset::ColumnsOf(images_only, request.image, 0);  // the same columns as in a dataset
   results.batch.data.resize(results.columns.size());
   results.batch.offsets.resize(results.columns.size());
-  const auto take = [&](const Image& picture) -> absl::Status {
+  const auto take = [&](const image::Image& picture) -> absl::Status {
     for (size_t k = 0; k < results.columns.size(); ++k)
-      TOUCHSTONE_RETURN_IF_ERROR(AppendPicture(picture, request.image, results.columns[k].name,
-                                               &results.batch.data[k], &results.batch.offsets[k]));
+      TOUCHSTONE_RETURN_IF_ERROR(dataset::AppendPicture(picture, request.image, results.columns[k].name,
+                                                        &results.batch.data[k], &results.batch.offsets[k]));
     ++results.batch.rows;
     return absl::OkStatus();
   };
@@ -78,4 +78,4 @@ absl::StatusOr<std::unique_ptr<SampleStream>> Source::Stream(const SampleRequest
   return MakeStream(resolved);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -25,15 +25,15 @@
 #include "server/touch/commanded_touch.h"
 #include "server/touch/plan.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 enum class SourceKind { kVirtual, kPhysical };  // the recording of a rig is a physical source too
 
 // What a source is.
 struct SourceInfo {
   SourceKind kind = SourceKind::kVirtual;
-  std::vector<Plan::Kind> plans;               // that make sense here
-  std::shared_ptr<const Model> default_model;  // null: it simulates nothing
+  std::vector<touch::Plan::Kind> plans;               // that make sense here
+  std::shared_ptr<const model::Model> default_model;  // null: it simulates nothing
   bool makes_images = false;
   std::string renderer;              // "egl" or "cpu"; empty: none
   std::string renderer_description;  // in words; also why there is none
@@ -45,7 +45,7 @@ struct SourceInfo {
 
 // The touches of a plan around an object, without touching it.
 struct PlanRequest {
-  Plan plan;           // valid
+  touch::Plan plan;    // valid
   std::string object;  // not needed by a list
   uint64_t seed = 0;
   uint64_t first_index = 0, count = 0;  // count 0: to the plan's end
@@ -53,8 +53,8 @@ struct PlanRequest {
 
 struct TouchRequest {
   std::string object;
-  std::vector<CommandedTouch> touches;  // made exact
-  std::shared_ptr<const Model> model;   // that simulates; null: the default
+  std::vector<touch::CommandedTouch> touches;  // made exact
+  std::shared_ptr<const model::Model> model;   // that simulates; null: the default
   uint64_t seed = 0;
   uint64_t first_index = 0;      // touch k draws the random numbers of index first_index + k
   std::string session;           // that a physical source journals in; empty: "default"
@@ -68,44 +68,44 @@ struct TouchResults {
   // Of a virtual source; empty at a physical one.
   std::vector<double> travel_m;
   std::vector<Eigen::Vector3d> contact_m, normal;
-  std::shared_ptr<const Model> model;  // that simulated
+  std::shared_ptr<const model::Model> model;  // that simulated
   // Of a physical source: how each was made. Empty at a virtual one.
   std::string session;
-  std::vector<JournalTouch> journalled;
+  std::vector<session::JournalTouch> journalled;
 
   size_t size() const { return fingers == 0 ? 0 : contact_time_s.size() / fingers; }
 };
 
 struct CaptureRequest {
   std::string object;
-  std::vector<Camera> cameras;  // one per photograph; each with the image's field of view
-  DatasetImage image;           // without its renderer
+  std::vector<image::Camera> cameras;  // one per photograph; each with the image's field of view
+  dataset::DatasetImage image;         // without its renderer
 };
 
 // One row per photograph.
 struct CaptureResults {
-  std::vector<ColumnInfo> columns;  // "image", and "depth_m", "mask" where asked for
-  DatasetBatch batch;
+  std::vector<dataset::ColumnInfo> columns;  // "image", and "depth_m", "mask" where asked for
+  dataset::DatasetBatch batch;
 };
 
 // A dataset, or a part of one.
 struct SampleRequest {
   std::vector<std::string> objects;  // names
   // What a dataset contains, but for its objects, the model's default and the renderer.
-  DatasetSpecification specification;
-  DatasetPart part;
+  dataset::DatasetSpecification specification;
+  dataset::DatasetPart part;
   std::string session;  // that a physical source journals in; empty: "default"
   std::string key;      // of what decides the touches: a physical source journals sample i under it and i
 };
 
 // What a stream of samples contains.
 struct SampleHeader {
-  uint64_t samples = 0;                // in the whole dataset
-  std::shared_ptr<const Model> model;  // that simulates; null: none
+  uint64_t samples = 0;                       // in the whole dataset
+  std::shared_ptr<const model::Model> model;  // that simulates; null: none
   std::vector<std::string> mesh_hashes;
   int fingers = 0;
   double spacing_m = 0;
-  std::vector<ColumnInfo> columns;
+  std::vector<dataset::ColumnInfo> columns;
   std::string renderer;  // "egl" or "cpu"; empty: none
 };
 
@@ -115,7 +115,7 @@ class SampleStream {
   virtual ~SampleStream() = default;
   virtual const SampleHeader& header() const = 0;
   // Nothing at the end. The guard is asked at least once per batch.
-  virtual absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) = 0;
+  virtual absl::StatusOr<std::optional<dataset::DatasetBatch>> Next(const MotionGuard& guard) = 0;
 };
 
 class Source {
@@ -127,7 +127,7 @@ class Source {
   const ObjectStore& objects() const { return objects_; }
   const SourceLimits& limits() const { return limits_; }
   virtual SourceInfo Describe() const = 0;
-  absl::StatusOr<std::vector<CommandedTouch>> ExpandPlan(const PlanRequest& request) const;
+  absl::StatusOr<std::vector<touch::CommandedTouch>> ExpandPlan(const PlanRequest& request) const;
 
   // Each checks its request against the limits and the objects before anything is computed or moved: INVALID_ARGUMENT
   // or NOT_FOUND names the field. Beside that, errors are those of the guard and of the source.
@@ -141,7 +141,7 @@ class Source {
   virtual absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                                    const MotionGuard& guard) = 0;
   // Takes the pictures one after the other; take(picture) appends one to the results.
-  using TakePicture = std::function<absl::Status(const Image& picture)>;
+  using TakePicture = std::function<absl::Status(const image::Image& picture)>;
   virtual absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
                                     const MotionGuard& guard, const TakePicture& take) = 0;
   // specification.objects are filled in.
@@ -152,4 +152,4 @@ class Source {
   const SourceLimits limits_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

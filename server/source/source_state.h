@@ -1,7 +1,7 @@
 // What a source is doing, or what keeps it from moving.
 #pragma once
 
-namespace touchstone {
+namespace touchstone::source {
 
 // The numbers are those of v1::SourceState.
 enum class SourceState : int {
@@ -19,4 +19,4 @@ enum class SourceState : int {
   kFault = 11,         // a violation or a fault of the controller's safety system
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

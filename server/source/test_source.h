@@ -5,7 +5,7 @@
 
 #include "server/source/source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 // The built-in supershapes, small.
 inline const ObjectStore& SmallObjects() {
@@ -23,8 +23,8 @@ inline absl::Status NoObjection() {
 }
 
 // Straight down onto the middle of the object, `x_m` beside it.
-inline CommandedTouch FromAbove(double x_m = 0) {
-  CommandedTouch touch;
+inline touch::CommandedTouch FromAbove(double x_m = 0) {
+  touch::CommandedTouch touch;
   touch.target_m.x() = x_m;
   touch.approach = {0, 0, -1};
   touch.lateral = {1, 0, 0};
@@ -32,4 +32,4 @@ inline CommandedTouch FromAbove(double x_m = 0) {
   return touch;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

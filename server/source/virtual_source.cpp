@@ -6,14 +6,15 @@
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 constexpr size_t kTouchBlock = 1024;
 
 // How many touches from `begin` on go through the simulation together. A model with history sees one touch after
 // the other; touches of different strokes never share a batch.
-size_t BlockSize(const std::vector<CommandedTouch>& touches, size_t begin, const TouchSimulator& simulator) {
+size_t BlockSize(const std::vector<touch::CommandedTouch>& touches, size_t begin,
+                 const touch::TouchSimulator& simulator) {
   size_t count = 1;
   while (!simulator.needs_previous_press() && count < kTouchBlock && begin + count < touches.size() &&
          touches[begin + count].stroke_m == touches[begin].stroke_m)
@@ -21,7 +22,7 @@ size_t BlockSize(const std::vector<CommandedTouch>& touches, size_t begin, const
   return count;
 }
 
-void AppendRows(const TouchBatch& batch, TouchResults* results) {
+void AppendRows(const effects::TouchBatch& batch, TouchResults* results) {
   for (int touch = 0; touch < batch.size(); ++touch)
     for (int finger = 0; finger < batch.fingers(); ++finger) {
       const int k = batch.At(finger, touch);
@@ -34,11 +35,11 @@ void AppendRows(const TouchBatch& batch, TouchResults* results) {
 
 class VirtualSamples final : public SampleStream {
  public:
-  VirtualSamples(SampleHeader header, std::unique_ptr<DatasetStream> stream)
+  VirtualSamples(SampleHeader header, std::unique_ptr<dataset::DatasetStream> stream)
       : header_(std::move(header)), stream_(std::move(stream)) {}
 
   const SampleHeader& header() const override { return header_; }
-  absl::StatusOr<std::optional<DatasetBatch>> Next(const MotionGuard& guard) override {
+  absl::StatusOr<std::optional<dataset::DatasetBatch>> Next(const MotionGuard& guard) override {
     absl::Status ended = guard();
     if (!ended.ok()) return ended;
     auto batch = stream_->Next([&] { return !(ended = guard()).ok(); });
@@ -48,43 +49,43 @@ class VirtualSamples final : public SampleStream {
 
  private:
   const SampleHeader header_;
-  const std::unique_ptr<DatasetStream> stream_;
+  const std::unique_ptr<dataset::DatasetStream> stream_;
 };
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<Renderer>> VirtualSource::RendererFor(RendererKind kind) const {
+absl::StatusOr<std::shared_ptr<image::Renderer>> VirtualSource::RendererFor(image::RendererKind kind) const {
   std::lock_guard<std::mutex> lock(renderer_mutex_);
-  if (kind == RendererKind::kAuto) kind = renderer_options_.kind;
-  std::shared_ptr<Renderer>& renderer = renderers_[kind];
+  if (kind == image::RendererKind::kAuto) kind = renderer_options_.kind;
+  std::shared_ptr<image::Renderer>& renderer = renderers_[kind];
   if (renderer != nullptr) return renderer;
-  RendererOptions options = renderer_options_;
+  image::RendererOptions options = renderer_options_;
   options.kind = kind;
-  TOUCHSTONE_ASSIGN_OR_RETURN(renderer, CreateRenderer(options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(renderer, image::CreateRenderer(options));
   return renderer;
 }
 
 SourceInfo VirtualSource::Describe() const {
   SourceInfo info;
   info.kind = SourceKind::kVirtual;
-  info.plans = {Plan::Kind::kSphere, Plan::Kind::kFaces, Plan::Kind::kList};
+  info.plans = {touch::Plan::Kind::kSphere, touch::Plan::Kind::kFaces, touch::Plan::Kind::kList};
   info.default_model = default_model_;
-  const auto renderer = RendererFor(RendererKind::kAuto);
+  const auto renderer = RendererFor(image::RendererKind::kAuto);
   info.makes_images = renderer.ok();
   if (renderer.ok()) info.renderer = (*renderer)->name();
   info.renderer_description =
       renderer.ok() ? (*renderer)->description() : absl::StrCat("none: ", renderer.status().message());
-  info.max_fingers = kMaxFingers;
+  info.max_fingers = model::kMaxFingers;
   return info;
 }
 
 absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& request,
                                                         const ServedObject& object,
                                                         const MotionGuard& guard) {
-  const std::shared_ptr<const Model> model = request.model != nullptr ? request.model : default_model_;
-  const TouchSimulator simulator(model);
-  TouchBatch batch;
-  TouchWorkspace workspace;
+  const std::shared_ptr<const model::Model> model = request.model != nullptr ? request.model : default_model_;
+  const touch::TouchSimulator simulator(model);
+  effects::TouchBatch batch;
+  touch::TouchWorkspace workspace;
   TouchResults results;
   results.fingers = model->fingers;
   results.model = model;
@@ -97,11 +98,11 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
     batch.seed = request.seed;
     batch.stroke_m = request.touches[begin].stroke_m;
     for (int k = 0; k < count; ++k) {
-      const CommandedTouch& touch = request.touches[begin + k];
-      SetTouch(touch, request.first_index + begin + k, k, &batch);
+      const touch::CommandedTouch& touch = request.touches[begin + k];
+      touch::SetTouch(touch, request.first_index + begin + k, k, &batch);
       if (!simulator.needed_covariates().empty())
-        TOUCHSTONE_RETURN_IF_ERROR(SetCovariates(simulator.needed_covariates(), touch,
-                                                 absl::StrCat("touches[", begin + k, "]"), k, &batch));
+        TOUCHSTONE_RETURN_IF_ERROR(touch::SetCovariates(simulator.needed_covariates(), touch,
+                                                        absl::StrCat("touches[", begin + k, "]"), k, &batch));
     }
     if (simulator.needs_previous_press()) batch.previous_press_m = press_m;  // one touch
     TOUCHSTONE_RETURN_IF_ERROR(simulator.Run(&batch, &workspace));
@@ -115,11 +116,11 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
 
 absl::Status VirtualSource::MakePictures(const CaptureRequest& request, const ServedObject& object,
                                          const MotionGuard& guard, const TakePicture& take) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<Renderer> renderer,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<image::Renderer> renderer,
                               RendererFor(request.image.renderer_kind));
-  for (const Camera& camera : request.cameras) {
+  for (const image::Camera& camera : request.cameras) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Image picture,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
                                 renderer->Render(object.surface, camera, request.image.options));
     TOUCHSTONE_RETURN_IF_ERROR(take(picture));
   }
@@ -127,24 +128,24 @@ absl::Status VirtualSource::MakePictures(const CaptureRequest& request, const Se
 }
 
 absl::StatusOr<std::unique_ptr<SampleStream>> VirtualSource::MakeStream(const SampleRequest& request) {
-  auto specification = std::make_shared<DatasetSpecification>(request.specification);
+  auto specification = std::make_shared<dataset::DatasetSpecification>(request.specification);
   if (specification->model == nullptr) specification->model = default_model_;
   if (specification->columns.image) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification->image.renderer,
                                 RendererFor(specification->image.renderer_kind));
   }
-  TOUCHSTONE_RETURN_IF_ERROR(ValidateDataset(specification.get()));
+  TOUCHSTONE_RETURN_IF_ERROR(dataset::ValidateDataset(specification.get()));
   SampleHeader header;
   header.samples = specification->samples;
   header.model = specification->model;
   for (const auto& object : specification->objects) header.mesh_hashes.push_back(object->hash());
   header.fingers = specification->model->fingers;
   header.spacing_m = specification->model->spacing_m;
-  header.columns = ColumnsOf(*specification);
+  header.columns = dataset::ColumnsOf(*specification);
   if (specification->columns.image) header.renderer = specification->image.renderer->name();
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<DatasetStream> stream,
-                              DatasetStream::Create(std::move(specification), request.part, pool_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<dataset::DatasetStream> stream,
+                              dataset::DatasetStream::Create(std::move(specification), request.part, pool_));
   return std::make_unique<VirtualSamples>(std::move(header), std::move(stream));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::source

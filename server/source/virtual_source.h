@@ -8,13 +8,14 @@
 #include "server/base/thread_pool.h"
 #include "server/source/source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 
 class VirtualSource final : public Source {
  public:
   // `objects` and `pool`, which datasets are computed with, must outlive the source.
   VirtualSource(const ObjectStore* objects, const SourceLimits& limits,
-                std::shared_ptr<const Model> default_model, const RendererOptions& renderer, ThreadPool* pool)
+                std::shared_ptr<const model::Model> default_model, const image::RendererOptions& renderer,
+                ThreadPool* pool)
       : Source(objects, limits),
         default_model_(std::move(default_model)),
         renderer_options_(renderer),
@@ -31,13 +32,13 @@ class VirtualSource final : public Source {
 
  private:
   // Made at the first use, so that a source is ready before a driver is.
-  absl::StatusOr<std::shared_ptr<Renderer>> RendererFor(RendererKind kind) const;
+  absl::StatusOr<std::shared_ptr<image::Renderer>> RendererFor(image::RendererKind kind) const;
 
-  const std::shared_ptr<const Model> default_model_;
-  const RendererOptions renderer_options_;
+  const std::shared_ptr<const model::Model> default_model_;
+  const image::RendererOptions renderer_options_;
   ThreadPool* const pool_;
   mutable std::mutex renderer_mutex_;
-  mutable std::map<RendererKind, std::shared_ptr<Renderer>> renderers_;
+  mutable std::map<image::RendererKind, std::shared_ptr<image::Renderer>> renderers_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -8,22 +8,23 @@
 #include "server/effects/all_effects.h"
 #include "server/source/test_source.h"
 
-namespace touchstone {
+namespace touchstone::source {
 namespace {
 
 using testing::HasSubstr;
 
-std::shared_ptr<const Model> ModelWith(const std::string& effects) {
-  auto model = ParseModel("touchstone: model/1\nname: test\nend_effector: {fingers: 3, spacing_mm: 10}\n" +
-                              (effects.empty() ? "" : "effects:\n" + effects),
-                          "test", Catalogue());
+std::shared_ptr<const model::Model> ModelWith(const std::string& effects) {
+  auto model =
+      model::ParseModel("touchstone: model/1\nname: test\nend_effector: {fingers: 3, spacing_mm: 10}\n" +
+                            (effects.empty() ? "" : "effects:\n" + effects),
+                        "test", effects::Catalogue());
   EXPECT_TRUE(model.ok()) << model.status();
-  return std::make_shared<const Model>(*std::move(model));
+  return std::make_shared<const model::Model>(*std::move(model));
 }
 
 class VirtualSourceTest : public testing::Test {
  protected:
-  VirtualSourceTest() : source_(&SmallObjects(), Limits(), ModelWith(""), RendererOptions(), &pool_) {}
+  VirtualSourceTest() : source_(&SmallObjects(), Limits(), ModelWith(""), image::RendererOptions(), &pool_) {}
   static SourceLimits Limits() {
     SourceLimits limits;
     limits.max_touches_per_request = 100;
@@ -49,7 +50,7 @@ TEST_F(VirtualSourceTest, TouchesGiveOneRowEachAndSayWhatSimulatedThem) {
   EXPECT_EQ(results->model->name, "test");
   EXPECT_TRUE(results->journalled.empty());
   for (size_t k = 0; k < 15; ++k)  // without effects: time = travel / speed
-    EXPECT_DOUBLE_EQ(results->contact_time_s[k], results->travel_m[k] / kDefaultSpeedMS);
+    EXPECT_DOUBLE_EQ(results->contact_time_s[k], results->travel_m[k] / touch::kDefaultSpeedMS);
 }
 
 TEST_F(VirtualSourceTest, ATouchDependsOnItsIndexAndNotOnItsPlaceInTheRequest) {
@@ -115,11 +116,11 @@ TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
   ASSERT_TRUE(touched.ok()) << touched.status();
   SampleRequest samples;
   samples.objects = {"lat00"};
-  samples.specification.plan.kind = Plan::Kind::kList;
+  samples.specification.plan.kind = touch::Plan::Kind::kList;
   samples.specification.plan.list = touches.touches;
   samples.specification.model = touches.model;
   samples.specification.seed = 3;
-  samples.specification.columns = *ColumnChoice::FromNames({"contact_time"});
+  samples.specification.columns = *dataset::ColumnChoice::FromNames({"contact_time"});
   auto stream = source_.Stream(samples);
   ASSERT_TRUE(stream.ok()) << stream.status();
   EXPECT_EQ((*stream)->header().samples, 7u);
@@ -136,7 +137,7 @@ TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
 
 TEST_F(VirtualSourceTest, ExpandsPlansInParts) {
   PlanRequest request;
-  request.plan.kind = Plan::Kind::kFaces;
+  request.plan.kind = touch::Plan::Kind::kFaces;
   request.plan.faces.samples_per_face = 2;
   request.plan.faces.rounds = 2;
   request.object = "lat00";
@@ -149,4 +150,4 @@ TEST_F(VirtualSourceTest, ExpandsPlansInParts) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::source

@@ -2,10 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
-namespace touchstone {
+namespace touchstone::touch {
 
 absl::Status SetCovariates(const std::vector<std::string>& names, const CommandedTouch& touch,
-                           const std::string& where, int row, TouchBatch* batch) {
+                           const std::string& where, int row, effects::TouchBatch* batch) {
   for (const std::string& name : names) {
     const auto value = touch.covariates.find(name);
     if (value == touch.covariates.end())
@@ -18,4 +18,4 @@ absl::Status SetCovariates(const std::vector<std::string>& names, const Commande
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -12,11 +12,11 @@
 #include "server/effects/touch_batch.h"
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
 // Fills row `row` of a batch that TouchSimulator::Prepare has sized. `index` decides the touch's random numbers.
 inline void SetTouch(const TouchPose& pose, double speed_m_s, double session_time_s, uint64_t index, int row,
-                     TouchBatch* batch) {
+                     effects::TouchBatch* batch) {
   batch->index[row] = index;
   batch->target_m[row] = pose.target_m;
   batch->approach[row] = pose.approach;
@@ -27,14 +27,14 @@ inline void SetTouch(const TouchPose& pose, double speed_m_s, double session_tim
 }
 
 // The stroke and the covariates are the batch's: see below.
-inline void SetTouch(const CommandedTouch& touch, uint64_t index, int row, TouchBatch* batch) {
+inline void SetTouch(const CommandedTouch& touch, uint64_t index, int row, effects::TouchBatch* batch) {
   SetTouch(touch, touch.speed_m_s, touch.session_time_s, index, row, batch);
 }
 
 // The named covariates of the touch in its row. INVALID_ARGUMENT names `where` ("touches[3]") and the covariate
 // that the touch lacks.
 absl::Status SetCovariates(const std::vector<std::string>& names, const CommandedTouch& touch,
-                           const std::string& where, int row, TouchBatch* batch);
+                           const std::string& where, int row, effects::TouchBatch* batch);
 
 // The descriptor: contact times relative to the first reporting finger's. Finger i's time is times_s[i * stride]
 // (seconds), NaN where it reported nothing, and so is its entry then. Calls put(finger, relative_s); returns
@@ -52,4 +52,4 @@ bool ForDescriptor(const double* times_s, size_t stride, int fingers, Put put) {
   return complete;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -9,7 +9,7 @@
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 std::string Text(const Eigen::Vector3d& v) {
@@ -68,4 +68,4 @@ absl::Status MakeExact(CommandedTouch* touch, const std::string& where) {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

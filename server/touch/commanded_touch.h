@@ -7,7 +7,7 @@
 #include <absl/status/status.h>
 #include <Eigen/Core>
 
-namespace touchstone {
+namespace touchstone::touch {
 
 // Where and how the end effector approaches. Object frame, metres.
 struct TouchPose {
@@ -31,4 +31,4 @@ struct CommandedTouch : TouchPose {
 // with `where` ("touches[3]") and name field, value and what would be right.
 absl::Status MakeExact(CommandedTouch* touch, const std::string& where);
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

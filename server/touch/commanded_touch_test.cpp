@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 using testing::AllOf;
@@ -41,4 +41,4 @@ TEST(CommandedTouch, ErrorsNameFieldValueAndWhatWouldBeRight) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::touch

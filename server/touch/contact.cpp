@@ -4,12 +4,12 @@
 
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
-void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace) {
-  const Surface& surface = *batch->surface;
+void FindContacts(bool curvature, effects::TouchBatch* batch, TouchWorkspace* workspace) {
+  const geometry::Surface& surface = *batch->surface;
   const double scale = batch->surface_scale;
-  Contacts& contacts = workspace->contacts;
+  geometry::Contacts& contacts = workspace->contacts;
   const double longest_m = batch->stroke_m / scale;
   if (batch->tip_radius_m > 0) {
     surface.SweepSpheres(workspace->origins_m, workspace->directions, batch->tip_radius_m / scale, longest_m,
@@ -22,7 +22,7 @@ void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace) 
   if (curvature) {
     for (size_t k = 0; k < count; ++k) {
       batch->curvature_per_m[k] =
-          contacts.triangle[k] == kNoTriangle
+          contacts.triangle[k] == geometry::kNoTriangle
               ? 0
               : surface.MeanCurvaturePerM(contacts.triangle[k], contacts.point_m[k]) / scale;
     }
@@ -53,4 +53,4 @@ void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace) 
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

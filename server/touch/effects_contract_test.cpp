@@ -10,24 +10,25 @@
 #include "server/touch/plan.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 constexpr int kTouches = 60;
 
 // Noise that some effects need to have something to act on.
-Model WithNoise() {
-  return *AddEffect(NominalModel(), "gaussian_noise", {"sigma_us=5000"}, Catalogue());
+model::Model WithNoise() {
+  return *model::AddEffect(model::NominalModel(), "gaussian_noise", {"sigma_us=5000"}, effects::Catalogue());
 }
 
-std::vector<double> ReportedTimes(const Model& model) {
-  static const auto surface = *Surface::Create("lat10", *MakeSupershape(*NamedSupershape("lat10"), 5000));
+std::vector<double> ReportedTimes(const model::Model& model) {
+  static const auto surface = *geometry::Surface::Create(
+      "lat10", *geometry::MakeSupershape(*geometry::NamedSupershape("lat10"), 5000));
   Plan plan;
   plan.kind = Plan::Kind::kFaces;
   plan.faces.samples_per_face = kTouches / 6;
   const auto generator = MakePoseGenerator(plan, surface->bounds(), 3);
-  const TouchSimulator simulator(std::make_shared<const Model>(model));
-  TouchBatch batch;
+  const TouchSimulator simulator(std::make_shared<const model::Model>(model));
+  effects::TouchBatch batch;
   TouchWorkspace workspace;
   simulator.Prepare(kTouches, &batch);
   batch.surface = surface;
@@ -49,14 +50,14 @@ bool Same(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 // `effect` on top of the noise, at its neutral values or at values of typical size.
-Model With(const Effect& effect, bool typical) {
-  Model model = effect.name == "gaussian_noise" ? NominalModel() : WithNoise();
-  EffectInstance instance;
-  instance.effect = Catalogue().Find(effect.name);
+model::Model With(const model::Effect& effect, bool typical) {
+  model::Model model = effect.name == "gaussian_noise" ? model::NominalModel() : WithNoise();
+  model::EffectInstance instance;
+  instance.effect = effects::Catalogue().Find(effect.name);
   instance.per_object = effect.always_per_object;
   instance.values = effect.NeutralValues(model.fingers);
   size_t at = 0;
-  for (const ParameterInfo& info : effect.parameters) {
+  for (const model::ParameterInfo& info : effect.parameters) {
     const int count = info.Count(model.fingers);
     for (int k = 0; typical && k < count; ++k)
       instance.values[at + k] = ToSi(info.unit, info.typical * (info.sum_zero ? k - 0.5 * (count - 1) : 1));
@@ -67,15 +68,15 @@ Model With(const Effect& effect, bool typical) {
 }
 
 TEST(EveryEffect, ChangesNothingAtItsNeutralValues) {
-  const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(NominalModel());
-  for (const auto& effect : Catalogue().All())
+  const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(model::NominalModel());
+  for (const auto& effect : effects::Catalogue().All())
     EXPECT_TRUE(Same(ReportedTimes(With(*effect, false)), effect->name == "gaussian_noise" ? ideal : noisy))
         << effect->name;
 }
 
 TEST(EveryEffect, ChangesReportedTimesAtTypicalValuesAndTheSameWayEveryTime) {
-  const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(NominalModel());
-  for (const auto& effect : Catalogue().All()) {
+  const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(model::NominalModel());
+  for (const auto& effect : effects::Catalogue().All()) {
     if (effect->parameters.empty()) continue;  // the entry that describes formulas
     const std::vector<double> once = ReportedTimes(With(*effect, true));
     EXPECT_FALSE(Same(once, effect->name == "gaussian_noise" ? ideal : noisy)) << effect->name;
@@ -86,8 +87,9 @@ TEST(EveryEffect, ChangesReportedTimesAtTypicalValuesAndTheSameWayEveryTime) {
 // The order of noise effects in the file is not physics.
 TEST(NoiseEffects, GiveTheSameTimesInWhateverOrderTheyStand) {
   const auto model = [](const std::vector<std::pair<const char*, const char*>>& effects) {
-    Model model = NominalModel();
-    for (const auto& [name, value] : effects) model = *AddEffect(model, name, {value}, Catalogue());
+    model::Model model = model::NominalModel();
+    for (const auto& [name, value] : effects)
+      model = *model::AddEffect(model, name, {value}, effects::Catalogue());
     return model;
   };
   const auto a = model({{"gaussian_noise", "sigma_us=5000"},
@@ -100,4 +102,4 @@ TEST(NoiseEffects, GiveTheSameTimesInWhateverOrderTheyStand) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -8,9 +8,9 @@
 
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
-void FindFirstFingers(TouchBatch* batch) {
+void FindFirstFingers(effects::TouchBatch* batch) {
   // Ties go to the lower finger. Comparisons with NaN are false, so a finger without contact is never first.
   for (int touch = 0; touch < batch->size(); ++touch) {
     int first = -1;
@@ -23,7 +23,7 @@ void FindFirstFingers(TouchBatch* batch) {
   }
 }
 
-void TravelToTime(TouchBatch* batch) {
+void TravelToTime(effects::TouchBatch* batch) {
   const double acceleration = batch->acceleration_m_s2;
   if (!(acceleration > 0)) {
     const double factor = batch->speed_factor;
@@ -102,4 +102,4 @@ void TravelToTime(TouchBatch* batch) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -9,7 +9,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 // A word of random bits to 0 .. bound - 1.
@@ -30,7 +30,7 @@ struct AngleTable {
 
 class SphereGenerator : public PoseGenerator {
  public:
-  SphereGenerator(const SpherePlan& plan, const Bounds& bounds, uint64_t seed)
+  SphereGenerator(const SpherePlan& plan, const geometry::Bounds& bounds, uint64_t seed)
       : seed_(seed),
         centre_m_(bounds.Centre()),
         radius_m_(plan.radius_ratio * 0.5 * bounds.DiagonalM()),
@@ -74,7 +74,7 @@ class SphereGenerator : public PoseGenerator {
 
 class FacesGenerator : public PoseGenerator {
  public:
-  FacesGenerator(const FacesPlan& plan, const Bounds& bounds, uint64_t seed)
+  FacesGenerator(const FacesPlan& plan, const geometry::Bounds& bounds, uint64_t seed)
       : plan_(plan), bounds_(bounds), seed_(seed) {}
 
   void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
@@ -116,7 +116,7 @@ class FacesGenerator : public PoseGenerator {
 
  private:
   const FacesPlan plan_;
-  const Bounds bounds_;
+  const geometry::Bounds bounds_;
   const uint64_t seed_;
 };
 
@@ -168,7 +168,8 @@ absl::Status ValidatePlan(Plan* plan) {
   return CheckBetween(faces.standoff_m, 1e-6, 10, "faces.standoff_m");
 }
 
-std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const Bounds& bounds, uint64_t seed) {
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
+                                                 uint64_t seed) {
   switch (plan.kind) {
     case Plan::Kind::kFaces:
       return std::make_unique<FacesGenerator>(plan.faces, bounds, seed);
@@ -190,4 +191,4 @@ CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uin
   return touch;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

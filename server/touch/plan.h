@@ -11,7 +11,7 @@
 #include "server/geometry/mesh.h"
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
 // The seed's generator: theta and phi are uniform multiples of the step angle, the start lies on a sphere
 // round the bounding box, the target is its centre. theta turns about z from +x; phi rises from the xy plane.
@@ -61,10 +61,11 @@ class PoseGenerator {
 };
 
 // `bounds` of the object that is touched; `plan` must be valid and outlive the generator.
-std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const Bounds& bounds, uint64_t seed);
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
+                                                 uint64_t seed);
 
 // Touch `number` of the plan with everything that is commanded.
 CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number,
                            uint32_t attempt);
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

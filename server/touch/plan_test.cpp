@@ -9,11 +9,11 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
-Bounds Box() {
-  Bounds bounds;
+geometry::Bounds Box() {
+  geometry::Bounds bounds;
   bounds.min_m = {-0.1, -0.05, -0.02};
   bounds.max_m = {0.2, 0.05, 0.06};
   return bounds;
@@ -112,4 +112,4 @@ TEST(Plan, RefusesWhatMakesNoSenseByName) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -1,9 +1,9 @@
 // Pose: commanded touch -> the real lines of the finger tips, in the frame of the nominal mesh.
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
-void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace) {
+void PoseLines(const effects::TouchBatch& batch, TouchWorkspace* workspace) {
   const int size = batch.size();
   workspace->origins_m.resize(static_cast<size_t>(size) * batch.fingers());
   workspace->directions.resize(workspace->origins_m.size());
@@ -30,4 +30,4 @@ void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

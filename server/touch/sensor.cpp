@@ -6,7 +6,7 @@
 #include "server/base/units.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 // Student's t by Bailey's polar form: sqrt(nu (u^(-2/nu) - 1)) cos(2 pi v) for uniform u in (0, 1] and v.
@@ -18,7 +18,7 @@ double StudentT(RandomStream* random, double degrees_of_freedom) {
          std::cos(2 * kPi * v);
 }
 
-void AddNoise(TouchBatch* batch, TouchWorkspace* workspace) {
+void AddNoise(effects::TouchBatch* batch, TouchWorkspace* workspace) {
   const int size = batch->size(), fingers = batch->fingers();
   workspace->normals.resize(static_cast<size_t>(size) * fingers);
   double* deviates = workspace->normals.data();  // [touch][finger]
@@ -44,7 +44,7 @@ void AddNoise(TouchBatch* batch, TouchWorkspace* workspace) {
 
 }  // namespace
 
-void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace) {
+void ReportTimes(effects::TouchBatch* batch, TouchWorkspace* workspace) {
   if (batch->any_noise) AddNoise(batch, workspace);
   if (batch->clock_factor != 1)
     for (double& time_s : batch->reported_time_s) time_s *= batch->clock_factor;
@@ -70,4 +70,4 @@ void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

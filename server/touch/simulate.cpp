@@ -9,18 +9,18 @@
 #include "server/base/status.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
-absl::Status FormulaStatus(const TouchBatch& batch) {
+absl::Status FormulaStatus(const effects::TouchBatch& batch) {
   return batch.formula_error.empty() ? absl::OkStatus() : absl::InvalidArgumentError(batch.formula_error);
 }
 
 }  // namespace
 
-TouchSimulator::TouchSimulator(std::shared_ptr<const Model> model) : model_(std::move(model)) {
-  for (const EffectInstance& instance : model_->effects) {
-    const EffectNeeds& needs = instance.effect->needs;
+TouchSimulator::TouchSimulator(std::shared_ptr<const model::Model> model) : model_(std::move(model)) {
+  for (const model::EffectInstance& instance : model_->effects) {
+    const model::EffectNeeds& needs = instance.effect->needs;
     needs_previous_press_ |= needs.previous_press;
     needs_curvature_ |= needs.curvature;
     for (const std::string& name : needs.covariates)
@@ -29,19 +29,19 @@ TouchSimulator::TouchSimulator(std::shared_ptr<const Model> model) : model_(std:
   }
 }
 
-void TouchSimulator::Prepare(int size, TouchBatch* batch) const {
+void TouchSimulator::Prepare(int size, effects::TouchBatch* batch) const {
   batch->Reset(size, model_->fingers);
   batch->spacing_m = model_->spacing_m;
 }
 
-void TouchSimulator::ApplyStage(Stage stage, bool before_cast, TouchBatch* batch) const {
-  for (const EffectInstance& instance : model_->effects) {
+void TouchSimulator::ApplyStage(model::Stage stage, bool before_cast, effects::TouchBatch* batch) const {
+  for (const model::EffectInstance& instance : model_->effects) {
     if (instance.effect->stage != stage || instance.effect->before_cast != before_cast) continue;
     instance.effect->apply(instance.ValuesFor(batch->surface->name()), *batch);
   }
 }
 
-absl::Status TouchSimulator::RunToMotion(TouchBatch* batch, TouchWorkspace* workspace) const {
+absl::Status TouchSimulator::RunToMotion(effects::TouchBatch* batch, TouchWorkspace* workspace) const {
   TOUCHSTONE_CHECK(batch->surface != nullptr);
   for (const std::string& name : needed_covariates_) {
     const auto found = batch->covariates.find(name);
@@ -50,32 +50,32 @@ absl::Status TouchSimulator::RunToMotion(TouchBatch* batch, TouchWorkspace* work
           "the model's formula uses ", name, ", which the touches do not carry: give covariates['", name,
           "'] with every touch (a column ", name, " in the plan), or use another model"));
   }
-  ApplyStage(Stage::kPose, false, batch);
-  ApplyStage(Stage::kContact, true, batch);
+  ApplyStage(model::Stage::kPose, false, batch);
+  ApplyStage(model::Stage::kContact, true, batch);
   PoseLines(*batch, workspace);
   FindContacts(needs_curvature_, batch, workspace);
-  ApplyStage(Stage::kContact, false, batch);
+  ApplyStage(model::Stage::kContact, false, batch);
   FindFirstFingers(batch);
-  ApplyStage(Stage::kMotion, false, batch);
+  ApplyStage(model::Stage::kMotion, false, batch);
   TravelToTime(batch);
   return FormulaStatus(*batch);
 }
 
-absl::Status TouchSimulator::RunSensor(TouchBatch* batch, TouchWorkspace* workspace) const {
+absl::Status TouchSimulator::RunSensor(effects::TouchBatch* batch, TouchWorkspace* workspace) const {
   batch->reported_time_s = batch->contact_time_s;
-  ApplyStage(Stage::kSensor, false, batch);
+  ApplyStage(model::Stage::kSensor, false, batch);
   ReportTimes(batch, workspace);
   return FormulaStatus(*batch);
 }
 
-absl::Status TouchSimulator::Run(TouchBatch* batch, TouchWorkspace* workspace) const {
+absl::Status TouchSimulator::Run(effects::TouchBatch* batch, TouchWorkspace* workspace) const {
   TOUCHSTONE_RETURN_IF_ERROR(RunToMotion(batch, workspace));
   return RunSensor(batch, workspace);
 }
 
-bool Descriptor(const TouchBatch& batch, int touch, double* descriptor_s) {
+bool Descriptor(const effects::TouchBatch& batch, int touch, double* descriptor_s) {
   return ForDescriptor(batch.reported_time_s.data() + touch, batch.size(), batch.fingers(),
                        [&](int finger, double relative_s) { descriptor_s[finger] = relative_s; });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -13,21 +13,21 @@
 #include "server/geometry/surface.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 
 // Work space of one thread; keeps its memory between batches.
 struct TouchWorkspace {
   std::vector<Eigen::Vector3d> origins_m;
   std::vector<Eigen::Vector3d> directions;
-  Contacts contacts;
+  geometry::Contacts contacts;
   std::vector<double> normals;
 };
 
 class TouchSimulator {
  public:
-  explicit TouchSimulator(std::shared_ptr<const Model> model);
+  explicit TouchSimulator(std::shared_ptr<const model::Model> model);
 
-  const Model& model() const { return *model_; }
+  const model::Model& model() const { return *model_; }
 
   // What any effect of the model needs.
   bool needs_previous_press() const { return needs_previous_press_; }
@@ -35,35 +35,36 @@ class TouchSimulator {
 
   // Sets the batch's size and what the model decides (fingers, spacing). The caller then fills the given
   // fields.
-  void Prepare(int size, TouchBatch* batch) const;
+  void Prepare(int size, effects::TouchBatch* batch) const;
 
   // Stages pose, contact and motion. Fails if a formula gives no finite number or a covariate is missing.
-  absl::Status RunToMotion(TouchBatch* batch, TouchWorkspace* workspace) const;
+  absl::Status RunToMotion(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
   // Stage sensor; previous_press_m must be filled before where it is needed.
-  absl::Status RunSensor(TouchBatch* batch, TouchWorkspace* workspace) const;
+  absl::Status RunSensor(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
   // Both.
-  absl::Status Run(TouchBatch* batch, TouchWorkspace* workspace) const;
+  absl::Status Run(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
  private:
-  void ApplyStage(Stage stage, bool before_cast, TouchBatch* batch) const;
+  void ApplyStage(model::Stage stage, bool before_cast, effects::TouchBatch* batch) const;
 
-  std::shared_ptr<const Model> model_;
+  std::shared_ptr<const model::Model> model_;
   bool needs_previous_press_ = false;
   bool needs_curvature_ = false;
   std::vector<std::string> needed_covariates_;
 };
 
 // The stages without their effects, one file each.
-void PoseLines(const TouchBatch& batch, TouchWorkspace* workspace);  // pose.cpp: lines in the mesh frame
-void FindContacts(bool curvature, TouchBatch* batch, TouchWorkspace* workspace);  // contact.cpp
-void FindFirstFingers(TouchBatch* batch);                                         // motion.cpp
-void TravelToTime(TouchBatch* batch);                                             // motion.cpp
-void ReportTimes(TouchBatch* batch, TouchWorkspace* workspace);                   // sensor.cpp
+void PoseLines(const effects::TouchBatch& batch,
+               TouchWorkspace* workspace);  // pose.cpp: lines in the mesh frame
+void FindContacts(bool curvature, effects::TouchBatch* batch, TouchWorkspace* workspace);  // contact.cpp
+void FindFirstFingers(effects::TouchBatch* batch);                                         // motion.cpp
+void TravelToTime(effects::TouchBatch* batch);                                             // motion.cpp
+void ReportTimes(effects::TouchBatch* batch, TouchWorkspace* workspace);                   // sensor.cpp
 
 // Contact times relative to the first reporting finger's (the descriptor), seconds; descriptor[finger].
 // Returns false if a finger reported nothing (NaN there).
-bool Descriptor(const TouchBatch& batch, int touch, double* descriptor_s);
+bool Descriptor(const effects::TouchBatch& batch, int touch, double* descriptor_s);
 
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -9,29 +9,29 @@
 #include "server/effects/all_effects.h"
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::touch {
 namespace {
 
 // The plane z = 0, two triangles of 2 m, seen from above.
-std::shared_ptr<const Surface> Plane() {
-  TriangleMesh mesh;
+std::shared_ptr<const geometry::Surface> Plane() {
+  geometry::TriangleMesh mesh;
   mesh.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-  return *Surface::Create("plane", mesh);
+  return *geometry::Surface::Create("plane", mesh);
 }
 
-std::shared_ptr<const Model> ModelWith(const std::string& effects, int fingers = 3) {
+std::shared_ptr<const model::Model> ModelWith(const std::string& effects, int fingers = 3) {
   std::string yaml = "touchstone: model/1\nname: test\nend_effector: {fingers: " + std::to_string(fingers) +
                      ", spacing_mm: 30}\n";
   if (!effects.empty()) yaml += "effects:\n" + effects;
-  auto model = ParseModel(yaml, "test", Catalogue());
+  auto model = model::ParseModel(yaml, "test", effects::Catalogue());
   EXPECT_TRUE(model.ok()) << model.status();
-  return std::make_shared<const Model>(*std::move(model));
+  return std::make_shared<const model::Model>(*std::move(model));
 }
 
 // One touch from 60 mm above the plane, tilted by `tilt_rad` about y so that finger l (at -x) leads or lags.
 struct Simulated {
-  TouchBatch batch;
+  effects::TouchBatch batch;
   TouchWorkspace workspace;
 };
 void Touch(const std::string& effects, double tilt_rad, Simulated* out, int fingers = 3, int count = 1) {
@@ -188,7 +188,7 @@ TEST(Simulation, ASampleDoesNotHangOnItsCompany) {
 
 TEST(Simulation, AFingerBesideTheObjectReportsNothingAndTheOthersDo) {
   const TouchSimulator simulator(ModelWith(""));
-  TouchBatch batch;
+  effects::TouchBatch batch;
   TouchWorkspace workspace;
   simulator.Prepare(1, &batch);
   batch.surface = Plane();
@@ -209,7 +209,7 @@ TEST(Simulation, AFormulaWithoutItsCovariateIsAnErrorThatNamesIt) {
       ModelWith("  - formula: {name: warm, adds: travel_mm, expression: \"k * cov_temperature\", parameters: "
                 "{k: {value: "
                 "1, unit: mm, min: -1, max: 1}}}\n"));
-  TouchBatch batch;
+  effects::TouchBatch batch;
   TouchWorkspace workspace;
   simulator.Prepare(1, &batch);
   batch.surface = Plane();
@@ -218,4 +218,4 @@ TEST(Simulation, AFormulaWithoutItsCovariateIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::touch

@@ -7,7 +7,7 @@
 namespace touchstone::bench {
 
 // Smallest travel along the segment origin .. origin + length_m * direction; length_m if nothing is met.
-inline float BruteForceTravel(const TriangleMesh& mesh, const Eigen::Vector3d& origin_m,
+inline float BruteForceTravel(const geometry::TriangleMesh& mesh, const Eigen::Vector3d& origin_m,
                               const Eigen::Vector3d& direction, float length_m) {
   const Eigen::Vector3f p = origin_m.cast<float>();
   const Eigen::Vector3f qp = -direction.cast<float>() * length_m;

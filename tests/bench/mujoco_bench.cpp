@@ -14,7 +14,7 @@ int main() {
   const auto specification = Touches(Lat20(), "");
   const std::string folder = std::string(P_tmpdir) + "/touchstone_mujoco_bench";
   const std::string mesh_path = folder + ".obj", model_path = folder + ".xml";
-  if (!touchstone::WriteMeshFile(mesh_path, specification->objects[0]->mesh()).ok()) return 1;
+  if (!touchstone::geometry::WriteMeshFile(mesh_path, specification->objects[0]->mesh()).ok()) return 1;
   std::ofstream(model_path) << "<mujoco><asset><mesh name=\"m\" file=\"" << mesh_path
                             << "\" scale=\"0.001 0.001 0.001\"/></asset><worldbody><geom type=\"mesh\" "
                                "mesh=\"m\"/></worldbody></mujoco>";

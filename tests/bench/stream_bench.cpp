@@ -34,7 +34,7 @@ v1::StreamDatasetRequest Request(uint64_t samples, bool images, v1::ImageEncodin
   v1::DatasetSpec* spec = request.mutable_spec();
   spec->add_objects("lat20");
   spec->mutable_plan()->mutable_sphere();
-  spec->mutable_model()->set_yaml(FormatModel(*ModelWith(kNoise)));
+  spec->mutable_model()->set_yaml(model::FormatModel(*ModelWith(kNoise)));
   spec->set_samples(samples);
   spec->set_seed(1);
   if (images) {
@@ -45,17 +45,17 @@ v1::StreamDatasetRequest Request(uint64_t samples, bool images, v1::ImageEncodin
 }
 
 // Samples per second of a stream inside the process, without gRPC.
-double InProcess(int threads, uint64_t samples, bool images, ImageEncoding encoding) {
+double InProcess(int threads, uint64_t samples, bool images, dataset::ImageEncoding encoding) {
   auto specification = Touches(Lat20(), kNoise);
   specification->samples = samples;
   if (images) {
-    specification->columns = *ColumnChoice::FromNames({"image"});
+    specification->columns = *dataset::ColumnChoice::FromNames({"image"});
     specification->image.encoding = encoding;
-    specification->image.renderer = *CreateRenderer({});
+    specification->image.renderer = *image::CreateRenderer({});
   }
   ThreadPool pool(threads);
   const auto begin = Clock::now();
-  auto stream = *DatasetStream::Create(specification, {}, &pool);
+  auto stream = *dataset::DatasetStream::Create(specification, {}, &pool);
   uint64_t rows = 0;
   while (auto batch = *stream->Next({})) rows += batch->rows;
   return rows / Seconds(begin);
@@ -93,15 +93,15 @@ Streamed OverLoopback(int port, int streams, uint64_t samples, bool images, v1::
 }
 
 nlohmann::json Run(uint64_t touches, uint64_t images) {
-  ServerOptions options;
+  service::ServerOptions options;
   options.listen = "127.0.0.1:0";
   options.supershape_triangles = kTriangles;
   options.threads = 2;
-  const auto server = *Server::Start(options);
+  const auto server = *service::Server::Start(options);
   OverLoopback(server->port(), 1, 1'000'000, false, v1::IMAGE_ENCODING_RAW);  // warm
   nlohmann::json result;
-  result["in_process_1_thread"] = InProcess(1, touches, false, ImageEncoding::kRaw);
-  result["in_process_2_threads"] = InProcess(2, touches, false, ImageEncoding::kRaw);
+  result["in_process_1_thread"] = InProcess(1, touches, false, dataset::ImageEncoding::kRaw);
+  result["in_process_2_threads"] = InProcess(2, touches, false, dataset::ImageEncoding::kRaw);
   result["first_batch_s"] =
       OverLoopback(server->port(), 1, 4096, false, v1::IMAGE_ENCODING_RAW).first_batch_s;
   result["one_stream"] =
@@ -113,7 +113,7 @@ nlohmann::json Run(uint64_t touches, uint64_t images) {
   result["growth_over_10M_touches_bytes"] =
       static_cast<int64_t>(ResidentBytes()) - static_cast<int64_t>(before);
   result["resident_bytes"] = ResidentBytes();
-  result["images_in_process"] = InProcess(2, images, true, ImageEncoding::kRaw);
+  result["images_in_process"] = InProcess(2, images, true, dataset::ImageEncoding::kRaw);
   result["images_raw_streamed"] =
       OverLoopback(server->port(), 1, images, true, v1::IMAGE_ENCODING_RAW).samples_per_s;
   result["images_png_streamed"] =

@@ -16,13 +16,13 @@ void MakeChunks(benchmark::State& state, const std::string& effects, uint64_t tr
                 double step_angle_deg = 1) {
   const auto specification = Touches(Lat20(triangles), effects);
   specification->plan.sphere.step_angle_rad = step_angle_deg * kPi / 180;
-  const BatchMaker maker(specification);
-  TouchSampler::Workspace workspace;
+  const dataset::BatchMaker maker(specification);
+  dataset::TouchSampler::Workspace workspace;
   const std::atomic<bool> cancelled{false};
   uint64_t index = 0;
   const auto make_chunk = [&](uint32_t count) {
-    std::vector<DatasetBatch> chunk(count);
-    for (DatasetBatch& batch : chunk) {
+    std::vector<dataset::DatasetBatch> chunk(count);
+    for (dataset::DatasetBatch& batch : chunk) {
       batch.start_index = index;
       batch.rows = kBatch;
       index += kBatch;
@@ -85,13 +85,13 @@ BENCHMARK(TouchesTipRadius)->Name("touches/tip_radius")->Unit(benchmark::kMillis
 // The plain loop: three rtcIntersect1 per touch, samples in their order, distances only.
 void Intersect1(benchmark::State& state) {
   const auto specification = Touches(Lat20(state.range(0)), "");
-  const std::vector<TouchPose> poses = AcceptedPoses(*specification, 1 << 16);
+  const std::vector<touch::TouchPose> poses = AcceptedPoses(*specification, 1 << 16);
   const auto scene = static_cast<RTCScene>(specification->objects[0]->embree_scene());
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   float sum = 0;
   for (auto _ : state) {
-    for (const TouchPose& pose : poses) {
+    for (const touch::TouchPose& pose : poses) {
       for (int finger = -1; finger <= 1; ++finger) {
         const Eigen::Vector3f origin =
             (pose.target_m - pose.approach * pose.standoff_m + pose.lateral * (0.03 * finger)).cast<float>();
@@ -121,11 +121,11 @@ BENCHMARK(Intersect1)
 // The baseline: Ericson's segment against every triangle, single precision.
 void BruteForce(benchmark::State& state) {
   const auto specification = Touches(Lat20(), "");
-  const std::vector<TouchPose> poses = AcceptedPoses(*specification, 64);
-  const TriangleMesh& mesh = specification->objects[0]->mesh();
+  const std::vector<touch::TouchPose> poses = AcceptedPoses(*specification, 64);
+  const geometry::TriangleMesh& mesh = specification->objects[0]->mesh();
   float sum = 0;
   for (auto _ : state)
-    for (const TouchPose& pose : poses)
+    for (const touch::TouchPose& pose : poses)
       for (int finger = -1; finger <= 1; ++finger)
         sum += BruteForceTravel(
             mesh, pose.target_m - pose.approach * pose.standoff_m + pose.lateral * (0.03 * finger),
@@ -137,10 +137,11 @@ BENCHMARK(BruteForce)->Name("baseline/brute_force")->Unit(benchmark::kMillisecon
 
 // Building what a touch needs of a mesh (all cores), and what it holds.
 void BuildSurface(benchmark::State& state) {
-  const TriangleMesh mesh = *MakeSupershape(*NamedSupershape("lat20"), state.range(0));
+  const geometry::TriangleMesh mesh =
+      *geometry::MakeSupershape(*geometry::NamedSupershape("lat20"), state.range(0));
   double bytes_per_triangle = 0;
   for (auto _ : state) {
-    const auto surface = *Surface::Create("lat20", mesh);
+    const auto surface = *geometry::Surface::Create("lat20", mesh);
     bytes_per_triangle = static_cast<double>(surface->MemoryBytes()) / surface->mesh().triangles.size();
   }
   state.counters["bytes_per_triangle"] = bytes_per_triangle;

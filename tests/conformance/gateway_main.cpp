@@ -15,12 +15,12 @@
 
 namespace {
 
-std::unique_ptr<touchstone::GatewayServer> StartGateway(std::vector<const char*> flags) {
+std::unique_ptr<touchstone::service::GatewayServer> StartGateway(std::vector<const char*> flags) {
   flags.insert(flags.begin(),
                {"touchstone-gateway", "--listen", "127.0.0.1:0", "--supershape-triangles", "2000"});
-  auto parsed = touchstone::ParseGatewayFlags(static_cast<int>(flags.size()), flags.data());
+  auto parsed = touchstone::service::ParseGatewayFlags(static_cast<int>(flags.size()), flags.data());
   if (parsed.ok()) {
-    auto gateway = touchstone::GatewayServer::Start(parsed->options);
+    auto gateway = touchstone::service::GatewayServer::Start(parsed->options);
     if (gateway.ok()) return *std::move(gateway);
     std::fprintf(stderr, "%s\n", std::string(gateway.status().message()).c_str());
   } else {
@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path folder = argv[2];
   std::unique_ptr<touchstone::rig::Emulator> emulator;
-  std::unique_ptr<touchstone::GatewayServer> gateway;
+  std::unique_ptr<touchstone::service::GatewayServer> gateway;
   if (mode == "--record") {
     // A busy machine, or one under sanitizers, must not pass for a broken rig: those have tests of their own.
     std::filesystem::remove_all(folder);

@@ -13,11 +13,11 @@ int main(int argc, char** argv) {
     touchstone::SetConformanceTarget(argv[2]);
     return RUN_ALL_TESTS();
   }
-  touchstone::ServerOptions options;
+  touchstone::service::ServerOptions options;
   options.listen = "127.0.0.1:0";
   options.supershape_triangles = 2000;
   options.lease_window_s = 2;
-  auto server = touchstone::Server::Start(options);
+  auto server = touchstone::service::Server::Start(options);
   if (!server.ok()) {
     std::fprintf(stderr, "%s\n", std::string(server.status().message()).c_str());
     return 1;

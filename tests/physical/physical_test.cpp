@@ -93,9 +93,9 @@ void PhysicalTest::StartGateway(std::vector<std::string> flags) {
   flags.insert(flags.begin() + 1, Patience().begin(), Patience().end());
   std::vector<const char*> argv;
   for (const std::string& flag : flags) argv.push_back(flag.c_str());
-  auto parsed = ParseGatewayFlags(static_cast<int>(argv.size()), argv.data());
+  auto parsed = service::ParseGatewayFlags(static_cast<int>(argv.size()), argv.data());
   ASSERT_TRUE(parsed.ok()) << parsed.status();
-  auto gateway = GatewayServer::Start(parsed->options);
+  auto gateway = service::GatewayServer::Start(parsed->options);
   ASSERT_TRUE(gateway.ok()) << gateway.status();
   gateway_ = *std::move(gateway);
   Connect(gateway_->port());
@@ -242,12 +242,13 @@ v1::RigState PhysicalTest::RigState() {
   return state;
 }
 
-std::vector<JournalTouch> PhysicalTest::Journalled() const {
-  std::vector<JournalTouch> touches;
-  const auto journal = Journal::Open((folder_ / "rig" / "rig.db").string(), Journal::Mode::kReadOnly);
+std::vector<session::JournalTouch> PhysicalTest::Journalled() const {
+  std::vector<session::JournalTouch> touches;
+  const auto journal =
+      session::Journal::Open((folder_ / "rig" / "rig.db").string(), session::Journal::Mode::kReadOnly);
   EXPECT_TRUE(journal.ok()) << journal.status();
   if (!journal.ok()) return touches;
-  const absl::Status read = (*journal)->ForEachTouch("test", [&](const JournalTouch& touch) {
+  const absl::Status read = (*journal)->ForEachTouch("test", [&](const session::JournalTouch& touch) {
     touches.push_back(touch);
     return true;
   });
@@ -259,11 +260,11 @@ void PhysicalTest::ExpectEveryResultIsItsOwnTouch() {
   StopGateway();
   const std::vector<rig::TouchTruth> truths = emulator_->Touches();
   std::vector<bool> taken(truths.size(), false);
-  for (const JournalTouch& touch : Journalled()) {
-    EXPECT_TRUE(touch.stage == TouchStage::kDone || touch.stage == TouchStage::kFailed)
+  for (const session::JournalTouch& touch : Journalled()) {
+    EXPECT_TRUE(touch.stage == session::TouchStage::kDone || touch.stage == session::TouchStage::kFailed)
         << touch.id << " was neither done nor given up";
-    if (touch.stage != TouchStage::kDone) continue;
-    const auto command = ParseCommandBytes(touch.command);
+    if (touch.stage != session::TouchStage::kDone) continue;
+    const auto command = session::ParseCommandBytes(touch.command);
     ASSERT_TRUE(command.has_value());
     bool found = false;
     for (size_t k = 0; k < truths.size() && !found; ++k) {

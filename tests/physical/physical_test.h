@@ -79,14 +79,14 @@ class PhysicalTest : public testing::Test {
   std::shared_ptr<v1::Control::Stub> control() { return control_; }
 
   // The journalled touches of session "test", oldest first. The gateway must be stopped.
-  std::vector<JournalTouch> Journalled() const;
+  std::vector<session::JournalTouch> Journalled() const;
   // Every journalled result is of a touch that the emulator saw, at the pose that was commanded, and no two
   // are of the same one: nothing lost, doubled or at a wrong pose.
   void ExpectEveryResultIsItsOwnTouch();
 
   std::filesystem::path folder_;
   std::unique_ptr<rig::Emulator> emulator_;
-  std::unique_ptr<GatewayServer> gateway_;
+  std::unique_ptr<service::GatewayServer> gateway_;
   std::shared_ptr<grpc::Channel> channel_;
   std::shared_ptr<v1::Source::Stub> source_;
   std::shared_ptr<v1::Control::Stub> control_;

@@ -95,7 +95,7 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   EXPECT_FALSE(emulator_->controller().Moving());
   const auto before = Journalled();
   ASSERT_EQ(before.size(), 2u);
-  EXPECT_EQ(before[1].stage, TouchStage::kExecuting)
+  EXPECT_EQ(before[1].stage, session::TouchStage::kExecuting)
       << "an interrupted touch is unknown until it is reconciled";
 
   // A trip is a protective stop: a person looks, and unlocks it at the pendant.

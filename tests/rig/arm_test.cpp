@@ -21,7 +21,7 @@ constexpr double kPatienceS = 60;  // host time; the machine may be busy
 // A heartbeat as the gateway gives it while something moves.
 class Heart {
  public:
-  explicit Heart(Arm* arm)
+  explicit Heart(gateway::arm::Arm* arm)
       : thread_([this, arm] {
           while (beating_) {
             arm->SendHeartbeat();
@@ -46,7 +46,7 @@ class EmulatedArm : public testing::Test {
     options_.model = model;
     options_.powered = true;
     controller_ = rig::Controller::Start(options_, &clock_, &faults_, nullptr);
-    UrArmOptions arm;
+    gateway::arm::UrArmOptions arm;
     arm.model = model;
     arm.address = "127.0.0.1";
     arm.dashboard_port = controller_->ports().dashboard;
@@ -61,14 +61,14 @@ class EmulatedArm : public testing::Test {
     arm.program_start_s = 10;
     arm.connect_wait_s = kPatienceS;
     arm_options_ = arm;
-    arm_ = ConnectUrArm(arm, &changes_).value();
+    arm_ = gateway::arm::ConnectUrArm(arm, &changes_).value();
   }
 
   template <typename Done>
   bool Wait(Done done) {
-    const double until_s = HostNowS() + kPatienceS;
+    const double until_s = gateway::timing::HostNowS() + kPatienceS;
     while (!done()) {
-      if (HostNowS() > until_s) return false;
+      if (gateway::timing::HostNowS() > until_s) return false;
       changes_.WaitForChange(changes_.count(), 0.01);
     }
     return true;
@@ -79,16 +79,16 @@ class EmulatedArm : public testing::Test {
       return state.ok() && state->program_id == program_id;
     });
   }
-  bool WaitForPhase(uint32_t program_id, MotionPhase phase) {
+  bool WaitForPhase(uint32_t program_id, gateway::arm::MotionPhase phase) {
     return Wait([&] {
       const auto state = arm_->State();
       return state.ok() && state->program_id == program_id && state->phase == phase;
     });
   }
   // A few steps straight down from above where the arm is.
-  ArmTouch SomeTouch(uint32_t program_id, double speed_m_s = 0.02) {
+  gateway::arm::ArmTouch SomeTouch(uint32_t program_id, double speed_m_s = 0.02) {
     Wait([&] { return arm_->State().ok(); });
-    ArmTouch touch;
+    gateway::arm::ArmTouch touch;
     touch.program_id = program_id;
     Eigen::Isometry3d pose = arm_->State()->base_from_tip;
     pose.translation().z() += 0.03;
@@ -110,10 +110,10 @@ class EmulatedArm : public testing::Test {
   rig::SimClock clock_;
   rig::Faults faults_;
   rig::ControllerOptions options_;
-  UrArmOptions arm_options_;
+  gateway::arm::UrArmOptions arm_options_;
   std::unique_ptr<rig::Controller> controller_;
-  ChangeNotifier changes_;
-  std::unique_ptr<UrArm> arm_;
+  gateway::timing::ChangeNotifier changes_;
+  std::unique_ptr<gateway::arm::UrArm> arm_;
 };
 
 TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
@@ -121,26 +121,26 @@ TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
   ASSERT_TRUE(state.ok()) << state.status();
   const Eigen::Isometry3d truth = controller_->BaseFromFlange() * arm_options_.script.flange_from_tip;
   EXPECT_LT((state->base_from_tip.translation() - truth.translation()).norm(), 2e-4);
-  EXPECT_EQ(state->robot_mode, RobotMode::kRunning);
+  EXPECT_EQ(state->robot_mode, gateway::arm::RobotMode::kRunning);
   EXPECT_TRUE(arm_->Ready().ok()) << arm_->Ready();
   EXPECT_FALSE(arm_->Version().empty());
 }
 
 TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
   Heart heart(arm_.get());
-  const ArmTouch touch = SomeTouch(7);
+  const gateway::arm::ArmTouch touch = SomeTouch(7);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
-  ASSERT_TRUE(WaitForPhase(7, MotionPhase::kReady));
+  ASSERT_TRUE(WaitForPhase(7, gateway::arm::MotionPhase::kReady));
   EXPECT_LT((controller_->BaseFromTip().translation() - touch.transit.back().translation()).norm(), 1e-4);
   ASSERT_TRUE(arm_->BeginApproach(7).ok());
-  ASSERT_TRUE(WaitForPhase(7, MotionPhase::kDone));
+  ASSERT_TRUE(WaitForPhase(7, gateway::arm::MotionPhase::kDone));
   EXPECT_LT((controller_->BaseFromTip().translation() - touch.transit.back().translation()).norm(), 1e-4);
 
   // The history shows the approach: at its speed, down to its end.
   const double now_s = arm_->State()->controller_time_s;
   double lowest_m = 1, fastest_m_s = 0;
-  for (const ArmState& state : arm_->History(now_s - 30, now_s)) {
-    if (state.phase != MotionPhase::kApproach) continue;
+  for (const gateway::arm::ArmState& state : arm_->History(now_s - 30, now_s)) {
+    if (state.phase != gateway::arm::MotionPhase::kApproach) continue;
     lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
     fastest_m_s = std::max(fastest_m_s, state.tip_velocity_m_s.norm());
   }
@@ -150,49 +150,49 @@ TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
 
 TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
   Heart heart(arm_.get());
-  const ArmTouch touch = SomeTouch(8, 0.002);
+  const gateway::arm::ArmTouch touch = SomeTouch(8, 0.002);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
-  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kReady));
+  ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(8).ok());
-  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kApproach));
+  ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kApproach));
   ASSERT_TRUE(arm_->EndApproach(8).ok());
-  ASSERT_TRUE(WaitForPhase(8, MotionPhase::kDone));
+  ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kDone));
   const double now_s = arm_->State()->controller_time_s;
   double lowest_m = 1;
-  for (const ArmState& state : arm_->History(now_s - 30, now_s))
-    if (state.phase == MotionPhase::kApproach)
+  for (const gateway::arm::ArmState& state : arm_->History(now_s - 30, now_s))
+    if (state.phase == gateway::arm::MotionPhase::kApproach)
       lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
   EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01) << "it would have taken 40 s to the end";
 }
 
 TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
   Heart heart(arm_.get());
-  const ArmTouch touch = SomeTouch(9);
-  Joints joints = options_.joints_rad;
+  const gateway::arm::ArmTouch touch = SomeTouch(9);
+  gateway::arm::Joints joints = options_.joints_rad;
   joints[0] += 0.2;
   ASSERT_TRUE(arm_->MoveThrough(9, touch.transit, {joints}).ok());
-  ASSERT_TRUE(WaitForPhase(9, MotionPhase::kDone));
-  EXPECT_LT(Farthest(arm_->State()->joints_rad, joints), 1e-3);
+  ASSERT_TRUE(WaitForPhase(9, gateway::arm::MotionPhase::kDone));
+  EXPECT_LT(gateway::arm::Farthest(arm_->State()->joints_rad, joints), 1e-3);
 }
 
 TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
   Heart heart(arm_.get());
-  const ArmTouch touch = SomeTouch(10, 0.002);
+  const gateway::arm::ArmTouch touch = SomeTouch(10, 0.002);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
-  ASSERT_TRUE(WaitForPhase(10, MotionPhase::kReady));
+  ASSERT_TRUE(WaitForPhase(10, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(10).ok());
-  ASSERT_TRUE(WaitForPhase(10, MotionPhase::kApproach));
+  ASSERT_TRUE(WaitForPhase(10, gateway::arm::MotionPhase::kApproach));
   ASSERT_TRUE(arm_->Stop().ok());
   ExpectAtRestSoon();
-  EXPECT_EQ(arm_->State()->phase, MotionPhase::kApproach) << "it tells how far it came";
+  EXPECT_EQ(arm_->State()->phase, gateway::arm::MotionPhase::kApproach) << "it tells how far it came";
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(11)).ok());
-  EXPECT_TRUE(WaitForPhase(11, MotionPhase::kReady));
+  EXPECT_TRUE(WaitForPhase(11, gateway::arm::MotionPhase::kReady));
 }
 
 TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
   Heart heart(arm_.get());
   for (uint32_t id = 20; id < 30; ++id) {
-    const ArmTouch touch = SomeTouch(id);
+    const gateway::arm::ArmTouch touch = SomeTouch(id);
     ASSERT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
     std::thread starter([&] { arm_->StartTouch(touch).IgnoreError(); });
     if (id % 2 == 0)
@@ -222,9 +222,9 @@ TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
 TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {
   Heart heart(arm_.get());
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(13, 0.001)).ok());
-  ASSERT_TRUE(WaitForPhase(13, MotionPhase::kReady));
+  ASSERT_TRUE(WaitForPhase(13, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(13).ok());
-  ASSERT_TRUE(WaitForPhase(13, MotionPhase::kApproach));
+  ASSERT_TRUE(WaitForPhase(13, gateway::arm::MotionPhase::kApproach));
   heart.Stop();
   EXPECT_TRUE(Wait([&] { return controller_->Count("watchdog_stops") > 0; }));
   ExpectAtRestSoon();
@@ -234,14 +234,15 @@ TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
   Heart heart(arm_.get());
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(14)).ok());
   faults_.Set("protective_stop", 1);
-  ASSERT_TRUE(
-      Wait([&] { return arm_->State().ok() && arm_->State()->safety_mode == SafetyMode::kProtectiveStop; }));
+  ASSERT_TRUE(Wait([&] {
+    return arm_->State().ok() && arm_->State()->safety_mode == gateway::arm::SafetyMode::kProtectiveStop;
+  }));
   EXPECT_EQ(arm_->Ready().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(arm_->Ready().message()), HasSubstr("PROTECTIVE_STOP"));
   EXPECT_EQ(arm_->StartTouch(SomeTouch(15)).code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(arm_->PowerOn([] { return absl::OkStatus(); }).code(), absl::StatusCode::kFailedPrecondition);
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  EXPECT_EQ(arm_->State()->safety_mode, SafetyMode::kProtectiveStop);
+  EXPECT_EQ(arm_->State()->safety_mode, gateway::arm::SafetyMode::kProtectiveStop);
 }
 
 TEST_F(EmulatedArm, FrozenControllerIsToldAsSuchAndComesBack) {
@@ -264,12 +265,12 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
   }));
   Heart heart(arm_.get());
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(16)).ok());
-  EXPECT_TRUE(WaitForPhase(16, MotionPhase::kReady));
+  EXPECT_TRUE(WaitForPhase(16, gateway::arm::MotionPhase::kReady));
 }
 
 TEST_F(EmulatedArm, ClockOfTheControllerIsToldInHostTime) {
   ASSERT_TRUE(Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 50; }));
-  const ArmState state = *arm_->State();
+  const gateway::arm::ArmState state = *arm_->State();
   const double told_s = arm_->ControllerClock().RemoteOf(state.host_time_s);
   EXPECT_NEAR(told_s, state.controller_time_s, 1.0) << "not later than a busy machine delivers it";
 }
@@ -280,7 +281,7 @@ TEST(UrArm, PowersOnAndReleasesTheBrakes) {
   rig::ControllerOptions options;
   options.model = "ur3";
   const auto controller = rig::Controller::Start(options, &clock, &faults, nullptr);
-  UrArmOptions arm_options;
+  gateway::arm::UrArmOptions arm_options;
   arm_options.model = "ur3";
   arm_options.address = "127.0.0.1";
   arm_options.dashboard_port = controller->ports().dashboard;
@@ -289,8 +290,8 @@ TEST(UrArm, PowersOnAndReleasesTheBrakes) {
   arm_options.rtde_port = controller->ports().rtde;
   arm_options.script.time_scale = 20;
   arm_options.connect_wait_s = kPatienceS;
-  ChangeNotifier changes;
-  const auto arm = ConnectUrArm(arm_options, &changes).value();
+  gateway::timing::ChangeNotifier changes;
+  const auto arm = gateway::arm::ConnectUrArm(arm_options, &changes).value();
   EXPECT_EQ(arm->Ready().code(), absl::StatusCode::kFailedPrecondition) << arm->Ready();
   EXPECT_THAT(std::string(arm->Ready().message()), HasSubstr("POWER_OFF"));
   const absl::Status powered = arm->PowerOn([] { return absl::OkStatus(); });
@@ -300,7 +301,7 @@ TEST(UrArm, PowersOnAndReleasesTheBrakes) {
 
 // Without a program that compiles nothing starts, and the error says what the controller said.
 TEST_F(EmulatedArm, ProgramThatDoesNotCompileIsToldAsSuch) {
-  ArmTouch touch = SomeTouch(17);
+  gateway::arm::ArmTouch touch = SomeTouch(17);
   touch.end.translation().x() = std::numeric_limits<double>::quiet_NaN();  // "nan" is no number of URScript
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
   ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));

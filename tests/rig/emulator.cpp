@@ -26,12 +26,12 @@ namespace {
 constexpr double kBaud = 115200, kBitsAByte = 10;
 
 // A mesh for the camera; its triangles are the oracle's.
-std::shared_ptr<const Surface> SurfaceOf(const hidden::Solid& solid) {
-  TriangleMesh mesh;
+std::shared_ptr<const geometry::Surface> SurfaceOf(const hidden::Solid& solid) {
+  geometry::TriangleMesh mesh;
   for (const Eigen::Vector3d& vertex : solid.triangles().vertices_mm)
     mesh.vertices_m.push_back((vertex * 1e-3).cast<float>());
   mesh.triangles = solid.triangles().corners;
-  auto surface = Surface::Create(solid.name(), std::move(mesh));
+  auto surface = geometry::Surface::Create(solid.name(), std::move(mesh));
   if (!surface.ok()) throw std::runtime_error(std::string(surface.status().message()));
   return *surface;
 }
@@ -109,7 +109,7 @@ class TheEmulator : public Emulator {
   std::atomic<bool> quit_{false};
   Faults faults_;
   std::unique_ptr<Log> log_;
-  std::map<std::string, std::shared_ptr<const Surface>> surfaces_;
+  std::map<std::string, std::shared_ptr<const geometry::Surface>> surfaces_;
   // In this order each needs only those before it; the threads of the later ones end first.
   std::unique_ptr<SimClock> clock_;
   std::unique_ptr<Device> device_;

@@ -22,7 +22,8 @@ std::string Quoted(const std::string& text) {
 }
 
 std::string PoseText(const Eigen::Isometry3d& pose) {
-  const Eigen::Vector3d mm = pose.translation() * 1e3, deg = RotationVectorOf(pose.linear()) * (180 / M_PI);
+  const Eigen::Vector3d mm = pose.translation() * 1e3,
+                        deg = geometry::RotationVectorOf(pose.linear()) * (180 / M_PI);
   return absl::StrFormat("{translation_mm: [%.9g, %.9g, %.9g], rotation_deg: [%.9g, %.9g, %.9g]}", mm.x(),
                          mm.y(), mm.z(), deg.x(), deg.y(), deg.z());
 }

@@ -8,7 +8,7 @@
 #include "server/diagnosis/inference/parameterization.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 namespace {
 
 constexpr double kStep = 0.02;                // of a free parameter's scale, for derivatives
@@ -25,21 +25,21 @@ Vector Centred(const std::vector<double>& time_s, int k, int fingers, double sig
 
 // Derivatives of every touch by all free parameters, [touch] fingers x parameters; those that are not finite
 // are 0.
-absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observations,
-                                                  const Parameterization& free,
+absl::StatusOr<std::vector<Matrix>> DerivativesOf(const touches::Observations& observations,
+                                                  const inference::Parameterization& free,
                                                   const std::vector<double>& at_start_s, double sigma_s,
                                                   ThreadPool* pool) {
   const int fingers = observations.fingers;
   std::vector<Matrix> columns(observations.size(), Matrix::Zero(fingers, free.size()));
   const Vector start = free.Start();
   for (int c = 0; c < free.size(); ++c) {
-    const FreeParameter& coordinate = free.parameters()[c];
+    const inference::FreeParameter& coordinate = free.parameters()[c];
     double step = kStep * coordinate.scale;
     if (start[c] + step > coordinate.upper) step = -step;
     Vector point = start;
     point[c] += step;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction moved,
-                                Predict(observations, free.At(point), false, false, pool));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction moved,
+                                touches::Predict(observations, free.At(point), false, false, pool));
     for (int k = 0; k < observations.size(); ++k) {
       const Vector change =
           Centred(moved.time_s, k, fingers, sigma_s) - Centred(at_start_s, k, fingers, sigma_s);
@@ -52,13 +52,15 @@ absl::StatusOr<std::vector<Matrix>> DerivativesOf(const Observations& observatio
 
 }  // namespace
 
-absl::StatusOr<LinearisedPrediction> Linearise(const Model& model, const Observations& present, double weight,
-                                               const Observations& candidates, double sigma_s,
+absl::StatusOr<LinearisedPrediction> Linearise(const model::Model& model,
+                                               const touches::Observations& present, double weight,
+                                               const touches::Observations& candidates, double sigma_s,
                                                ThreadPool* pool) {
-  Parameterization free(model, present.objects);
+  inference::Parameterization free(model, present.objects);
   for (size_t e = 0; e < model.effects.size(); ++e) free.Free(static_cast<int>(e), true);
   LinearisedPrediction result;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction now, Predict(present, model, false, false, pool));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction now,
+                              touches::Predict(present, model, false, false, pool));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Matrix> known,
                               DerivativesOf(present, free, now.time_s, sigma_s, pool));
   Matrix information = Matrix::Identity(free.size(), free.size());  // the priors'
@@ -66,7 +68,8 @@ absl::StatusOr<LinearisedPrediction> Linearise(const Model& model, const Observa
     if (present.used[k]) information += weight * known[k].transpose() * known[k];
   result.covariance = information.llt().solve(Matrix::Identity(free.size(), free.size()));
 
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction next, Predict(candidates, model, false, false, pool));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction next,
+                              touches::Predict(candidates, model, false, false, pool));
   TOUCHSTONE_ASSIGN_OR_RETURN(result.derivative, DerivativesOf(candidates, free, next.time_s, sigma_s, pool));
   for (int k = 0; k < candidates.size(); ++k)
     result.predicted.push_back(Centred(next.time_s, k, candidates.fingers, sigma_s));
@@ -113,4 +116,4 @@ void SequentialRefit::Add(int k) {
   covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

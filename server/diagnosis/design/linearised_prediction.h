@@ -10,7 +10,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 
 // Times are less their mean over the fingers, in standard deviations of the noise. Free parameters are
 // counted in their scales, so that each has a prior of width 1.
@@ -22,8 +22,9 @@ struct LinearisedPrediction {
 
 // Every value of every effect is free. weight: how many touches of the present data one of `present` stands
 // for.
-absl::StatusOr<LinearisedPrediction> Linearise(const Model& model, const Observations& present, double weight,
-                                               const Observations& candidates, double sigma_s,
+absl::StatusOr<LinearisedPrediction> Linearise(const model::Model& model,
+                                               const touches::Observations& present, double weight,
+                                               const touches::Observations& candidates, double sigma_s,
                                                ThreadPool* pool);
 
 // One model that is fitted again and again to what another one would measure: recursive least squares, exact
@@ -55,4 +56,4 @@ class SequentialRefit {
   double separation_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

@@ -9,7 +9,7 @@
 #include "server/diagnosis/design/linearised_prediction.h"
 #include "server/diagnosis/design/touch_candidates.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 namespace {
 
 constexpr int kMaxData = 3000;          // touches that stand for the present data
@@ -26,7 +26,7 @@ struct ModelPair {
 };
 
 // The observations, or runs of them spread over the session.
-Observations PresentData(const Observations& observations) {
+touches::Observations PresentData(const touches::Observations& observations) {
   std::vector<int> keep;
   const int runs = (observations.size() + kRunLength - 1) / kRunLength;
   const int run_step = std::max(1, (observations.size() + kMaxData - 1) / kMaxData);
@@ -36,8 +36,8 @@ Observations PresentData(const Observations& observations) {
   return PartOf(observations, keep);
 }
 
-ProposedTouch TouchOf(const Observations& candidates, int k) {
-  const MeasurementSet& set = *candidates.set;
+ProposedTouch TouchOf(const touches::Observations& candidates, int k) {
+  const session::MeasurementSet& set = *candidates.set;
   const int row = candidates.row[k];
   ProposedTouch proposed;
   proposed.object = candidates.objects[candidates.object[k]];
@@ -52,15 +52,16 @@ ProposedTouch TouchOf(const Observations& candidates, int k) {
   return proposed;
 }
 
-bool Drifts(const Model& model) {
-  return std::any_of(model.effects.begin(), model.effects.end(),
-                     [](const EffectInstance& instance) { return instance.effect->needs.session_time; });
+bool Drifts(const model::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const model::EffectInstance& instance) {
+    return instance.effect->needs.session_time;
+  });
 }
 
 // Chooses touches one after the other, spread over the objects.
 class TouchChooser {
  public:
-  TouchChooser(const Observations& candidates, const std::vector<CompetingModel>& models,
+  TouchChooser(const touches::Observations& candidates, const std::vector<CompetingModel>& models,
                const std::vector<LinearisedPrediction>& predictions, int max_touches);
   std::vector<ProposedTouch> Choose();
 
@@ -70,7 +71,7 @@ class TouchChooser {
   int Best() const;  // -1: no candidate is worth anything
   ProposedTouch Propose(int k) const;
 
-  const Observations& candidates_;
+  const touches::Observations& candidates_;
   const std::vector<CompetingModel>& models_;
   const std::vector<LinearisedPrediction>& predictions_;
   const int max_touches_;
@@ -79,7 +80,7 @@ class TouchChooser {
   std::vector<int> of_object_;    // chosen touches
 };
 
-TouchChooser::TouchChooser(const Observations& candidates, const std::vector<CompetingModel>& models,
+TouchChooser::TouchChooser(const touches::Observations& candidates, const std::vector<CompetingModel>& models,
                            const std::vector<LinearisedPrediction>& predictions, int max_touches)
     : candidates_(candidates),
       models_(models),
@@ -148,7 +149,7 @@ std::vector<ProposedTouch> TouchChooser::Choose() {
 
 }  // namespace
 
-absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const Observations& observations,
+absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const touches::Observations& observations,
                                                           const std::vector<CompetingModel>& models,
                                                           double sigma_s, int max_touches, uint64_t seed,
                                                           ThreadPool* pool) {
@@ -159,11 +160,11 @@ absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const Observations& ob
   CandidateChoice choice;
   choice.seed = seed;
   for (const CompetingModel& competing : models) choice.different_times |= Drifts(*competing.model);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Observations candidates,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Observations candidates,
                               MakeCandidates(observations, *models[0].model, choice, pool));
   if (candidates.size() == 0) return std::vector<ProposedTouch>();
 
-  const Observations present = PresentData(observations);
+  const touches::Observations present = PresentData(observations);
   const double weight = double(observations.size()) / present.size();
   std::vector<LinearisedPrediction> predictions;
   for (const CompetingModel& competing : models) {
@@ -174,4 +175,4 @@ absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const Observations& ob
   return TouchChooser(candidates, models, predictions, max_touches).Choose();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

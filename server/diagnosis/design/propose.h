@@ -12,17 +12,17 @@
 #include "server/model/model.h"
 #include "server/touch/commanded_touch.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 
 // A fitted model that explains the present data, and what people call it ("tip_radius").
 struct CompetingModel {
   std::string name;
-  std::shared_ptr<const Model> model;
+  std::shared_ptr<const model::Model> model;
 };
 
 struct ProposedTouch {
   std::string object;
-  CommandedTouch touch;           // no stroke limit
+  touch::CommandedTouch touch;    // no stroke limit
   bool has_session_time = false;  // whether touch.session_time_s matters: the set has one, or a model drifts
   std::string purpose;            // "tells tip_radius from oblique_slip", "learns the values of tip_radius"
   // In standard deviations of the noise: the expected difference between the two models of the purpose; for
@@ -41,9 +41,9 @@ struct ProposedTouch {
 // With one model: where its values would be learnt best (D-optimal). Empty if no touch would discriminate:
 // then only another kind of measurement does. What a touch leaves to the next one (return_hysteresis) is not
 // planned. sigma_s: noise of one finger's time. Deterministic for a seed, whatever the pool.
-absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const Observations& observations,
+absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const touches::Observations& observations,
                                                           const std::vector<CompetingModel>& models,
                                                           double sigma_s, int max_touches, uint64_t seed,
                                                           ThreadPool* pool);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

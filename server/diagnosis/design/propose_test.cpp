@@ -11,21 +11,21 @@
 #include "server/diagnosis/touches/prediction.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 namespace {
 
 using Effects = std::vector<std::pair<std::string, std::vector<std::string>>>;
 
 constexpr double kSigmaS = 0.002;
 
-std::shared_ptr<const Model> ModelWith(const Effects& effects) {
-  return std::make_shared<const Model>(WithEffects(NominalModel(), effects));
+std::shared_ptr<const model::Model> ModelWith(const Effects& effects) {
+  return std::make_shared<const model::Model>(touches::WithEffects(model::NominalModel(), effects));
 }
 
-Observations Present() {
-  HiddenRig rig;
+touches::Observations Present() {
+  touches::HiddenRig rig;
   rig.hidden = {};
-  auto observations = MakeObservations(MakeTestInput(rig));
+  auto observations = touches::MakeObservations(touches::MakeTestInput(rig));
   EXPECT_TRUE(observations.ok()) << observations.status();
   return *std::move(observations);
 }
@@ -71,9 +71,9 @@ TEST(ProposeTouches, TellMoreThanTouchesAtRandom) {
   for (const ProposedTouch& touch : proposed) designed += touch.separation_sigmas * touch.separation_sigmas;
 
   // The mean square difference of the two at touches of the set, even without a refit that makes it smaller.
-  const Observations present = Present();
-  const auto a = Predict(present, *ModelWith(radius), false, false, nullptr);
-  const auto b = Predict(present, *ModelWith(allowed), false, false, nullptr);
+  const touches::Observations present = Present();
+  const auto a = touches::Predict(present, *ModelWith(radius), false, false, nullptr);
+  const auto b = touches::Predict(present, *ModelWith(allowed), false, false, nullptr);
   double random = 0;
   int count = 0;
   for (int k = 0; k < present.size(); ++k) {
@@ -119,11 +119,11 @@ TEST(ProposeTouches, TheSameSeedProposesTheSame) {
 }
 
 TEST(TouchCandidates, EndOnSmoothSurfacesAndKeepUnitVectors) {
-  const Observations present = Present();
-  const auto candidates = MakeCandidates(present, NominalModel(), {}, nullptr);
+  const touches::Observations present = Present();
+  const auto candidates = MakeCandidates(present, model::NominalModel(), {}, nullptr);
   ASSERT_TRUE(candidates.ok()) << candidates.status();
   EXPECT_GT(candidates->size(), 150);
-  const auto here = Predict(*candidates, NominalModel(), true, false, nullptr);
+  const auto here = touches::Predict(*candidates, model::NominalModel(), true, false, nullptr);
   std::set<double> speeds;
   for (int k = 0; k < candidates->size(); ++k) {
     const int row = candidates->row[k];
@@ -135,4 +135,4 @@ TEST(TouchCandidates, EndOnSmoothSurfacesAndKeepUnitVectors) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

@@ -10,7 +10,7 @@
 #include "server/diagnosis/touches/prediction.h"
 #include "server/touch/plan.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 namespace {
 
 constexpr double kSpread = 0.8;
@@ -24,15 +24,16 @@ double Median(std::vector<double> values) {
 }
 
 // The same objects without touches.
-Observations Blank(const Observations& like) {
-  Observations blank;
+touches::Observations Blank(const touches::Observations& like) {
+  touches::Observations blank;
   blank.fingers = like.fingers;
   blank.objects = like.objects;
   blank.surfaces = like.surfaces;
   return blank;
 }
 
-void Append(const TouchPose& pose, int object, double speed_m_s, double session_time_s, MeasurementSet* set) {
+void Append(const touch::TouchPose& pose, int object, double speed_m_s, double session_time_s,
+            session::MeasurementSet* set) {
   set->touch.push_back(set->touch.size());
   set->object.push_back(object);
   set->target_m.push_back(pose.target_m);
@@ -44,7 +45,7 @@ void Append(const TouchPose& pose, int object, double speed_m_s, double session_
   set->line.push_back(0);
 }
 
-void Number(const std::shared_ptr<const MeasurementSet>& set, Observations* observations) {
+void Number(const std::shared_ptr<const session::MeasurementSet>& set, touches::Observations* observations) {
   const int count = set->size();
   observations->set = set;
   observations->row.resize(count);
@@ -59,7 +60,7 @@ void Number(const std::shared_ptr<const MeasurementSet>& set, Observations* obse
 
 // Whether no finger of touch k meets an edge when the touch moves aside by kNearEdgeM: normal and travel
 // change smoothly.
-bool AwayFromEdges(const Prediction& here, const Prediction& beside, int k) {
+bool AwayFromEdges(const touches::Prediction& here, const touches::Prediction& beside, int k) {
   for (int i = 0; i < here.fingers; ++i) {
     const size_t at = size_t(k) * here.fingers + i;
     if (std::isnan(beside.time_s[at])) return false;
@@ -73,21 +74,21 @@ bool AwayFromEdges(const Prediction& here, const Prediction& beside, int k) {
 }
 
 // Poses of all faces of all objects, each at every speed.
-std::shared_ptr<const MeasurementSet> DrawSet(const Observations& observations,
-                                              const CandidateChoice& choice) {
-  const MeasurementSet& old = *observations.set;
+std::shared_ptr<const session::MeasurementSet> DrawSet(const touches::Observations& observations,
+                                                       const CandidateChoice& choice) {
+  const session::MeasurementSet& old = *observations.set;
   const double speed_m_s = Median(old.speed_m_s), standoff_m = Median(old.standoff_m);
   const double last_s = *std::max_element(old.session_time_s.begin(), old.session_time_s.end());
   const int objects = static_cast<int>(observations.objects.size());
   const int speeds = static_cast<int>(std::size(kSpeedFactors));
-  auto set = std::make_shared<MeasurementSet>();
+  auto set = std::make_shared<session::MeasurementSet>();
   set->origin = "candidates";
   set->fingers = observations.fingers;
   set->has_poses = true;
   set->has_session_time = old.has_session_time || choice.different_times;
   set->objects = observations.objects;
-  Plan plan;
-  plan.kind = Plan::Kind::kFaces;
+  touch::Plan plan;
+  plan.kind = touch::Plan::Kind::kFaces;
   plan.faces.max_tilt_rad = choice.max_tilt_rad;
   plan.faces.spread = kSpread;
   plan.faces.standoff_m = standoff_m;
@@ -95,10 +96,10 @@ std::shared_ptr<const MeasurementSet> DrawSet(const Observations& observations,
   plan.faces.samples_per_face = std::clamp(choice.max_candidates / (6 * speeds * objects), 4, 60);
   for (int o = 0; o < objects; ++o) {
     const auto generator =
-        MakePoseGenerator(plan, observations.surfaces[o]->bounds(), choice.seed * 1000 + o);
+        touch::MakePoseGenerator(plan, observations.surfaces[o]->bounds(), choice.seed * 1000 + o);
     std::vector<uint64_t> numbers(6 * plan.faces.samples_per_face);
     std::iota(numbers.begin(), numbers.end(), 0);
-    std::vector<TouchPose> poses(numbers.size());
+    std::vector<touch::TouchPose> poses(numbers.size());
     generator->Draw(numbers, 0, poses.data());
     for (size_t n = 0; n < poses.size(); ++n) {
       // Cold at the beginning of a new session, or long warm: where drifts differ most.
@@ -113,23 +114,24 @@ std::shared_ptr<const MeasurementSet> DrawSet(const Observations& observations,
 }
 
 // Which candidates every finger completes away from edges; `here` is the prediction for them.
-absl::StatusOr<std::vector<char>> CompletedAwayFromEdges(const Observations& candidates,
-                                                         const Prediction& here, const Model& model,
-                                                         ThreadPool* pool) {
+absl::StatusOr<std::vector<char>> CompletedAwayFromEdges(const touches::Observations& candidates,
+                                                         const touches::Prediction& here,
+                                                         const model::Model& model, ThreadPool* pool) {
   std::vector<char> good(candidates.size(), 1);
   for (int k = 0; k < candidates.size(); ++k)
     for (int i = 0; i < candidates.fingers; ++i)
       good[k] &= !std::isnan(here.time_s[size_t(k) * candidates.fingers + i]);
   for (const int direction : {0, 1, 2, 3}) {
-    auto moved = std::make_shared<MeasurementSet>(*candidates.set);
+    auto moved = std::make_shared<session::MeasurementSet>(*candidates.set);
     for (int k = 0; k < moved->size(); ++k) {
       const Eigen::Vector3d side =
           direction < 2 ? moved->lateral[k] : moved->approach[k].cross(moved->lateral[k]).eval();
       moved->target_m[k] += (direction % 2 ? -kNearEdgeM : kNearEdgeM) * side;
     }
-    Observations beside = Blank(candidates);
+    touches::Observations beside = Blank(candidates);
     Number(moved, &beside);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction there, Predict(beside, model, true, false, pool));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction there,
+                                touches::Predict(beside, model, true, false, pool));
     for (int k = 0; k < candidates.size(); ++k) good[k] = good[k] && AwayFromEdges(here, there, k);
   }
   return good;
@@ -137,8 +139,8 @@ absl::StatusOr<std::vector<char>> CompletedAwayFromEdges(const Observations& can
 
 }  // namespace
 
-Observations PartOf(const Observations& observations, const std::vector<int>& keep) {
-  Observations part = Blank(observations);
+touches::Observations PartOf(const touches::Observations& observations, const std::vector<int>& keep) {
+  touches::Observations part = Blank(observations);
   part.set = observations.set;
   std::vector<int> number(observations.size(), -1), pose(observations.poses, -1);
   for (size_t n = 0; n < keep.size(); ++n) {
@@ -157,11 +159,13 @@ Observations PartOf(const Observations& observations, const std::vector<int>& ke
   return part;
 }
 
-absl::StatusOr<Observations> MakeCandidates(const Observations& observations, const Model& model,
-                                            const CandidateChoice& choice, ThreadPool* pool) {
-  Observations candidates = Blank(observations);
+absl::StatusOr<touches::Observations> MakeCandidates(const touches::Observations& observations,
+                                                     const model::Model& model, const CandidateChoice& choice,
+                                                     ThreadPool* pool) {
+  touches::Observations candidates = Blank(observations);
   Number(DrawSet(observations, choice), &candidates);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction here, Predict(candidates, model, true, false, pool));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction here,
+                              touches::Predict(candidates, model, true, false, pool));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<char> good,
                               CompletedAwayFromEdges(candidates, here, model, pool));
   std::vector<int> keep;
@@ -170,4 +174,4 @@ absl::StatusOr<Observations> MakeCandidates(const Observations& observations, co
   return PartOf(candidates, keep);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

@@ -6,7 +6,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::design {
 
 struct CandidateChoice {
   int max_candidates = 1500;     // about, all objects and speeds together
@@ -17,10 +17,11 @@ struct CandidateChoice {
 
 // Observations of touches that every finger of `model` completes, none within 1 mm of a sharp edge; their
 // times are unknown (0). Speeds: half, once and twice the median of `observations`.
-absl::StatusOr<Observations> MakeCandidates(const Observations& observations, const Model& model,
-                                            const CandidateChoice& choice, ThreadPool* pool);
+absl::StatusOr<touches::Observations> MakeCandidates(const touches::Observations& observations,
+                                                     const model::Model& model, const CandidateChoice& choice,
+                                                     ThreadPool* pool);
 
 // The touches `keep` of `observations`, in that order. A previous touch that is not kept becomes none.
-Observations PartOf(const Observations& observations, const std::vector<int>& keep);
+touches::Observations PartOf(const touches::Observations& observations, const std::vector<int>& keep);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::design

@@ -7,7 +7,7 @@
 #include "server/base/random.h"
 #include "server/diagnosis/distributions/two_samples.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr int kMaxRepeats = 60;
@@ -98,8 +98,9 @@ int CountRepeats(const std::vector<double>& time_s, int fingers, bool* in_rounds
   return *in_rounds ? rounds : CountNeighbours(time_s, fingers, typical_s);
 }
 
-PoseFreeObject AssumePlan(const MeasurementSet& set, int object, std::shared_ptr<const Surface> surface,
-                          double speed_m_s, int max_touches) {
+PoseFreeObject AssumePlan(const session::MeasurementSet& set, int object,
+                          std::shared_ptr<const geometry::Surface> surface, double speed_m_s,
+                          int max_touches) {
   PoseFreeObject result;
   result.surface = std::move(surface);
   std::vector<int> rows;
@@ -112,7 +113,7 @@ PoseFreeObject AssumePlan(const MeasurementSet& set, int object, std::shared_ptr
   result.repeats = CountRepeats(time_s, set.fingers, &result.in_rounds);
   const int count = static_cast<int>(rows.size());
   const int poses = (count + result.repeats - 1) / result.repeats;
-  result.plan.kind = Plan::Kind::kFaces;
+  result.plan.kind = touch::Plan::Kind::kFaces;
   result.plan.speed_m_s = speed_m_s;
   result.plan.touch_interval_s = kTouchIntervalS;
   result.plan.faces.samples_per_face = (poses + 5) / 6;
@@ -133,7 +134,8 @@ PoseFreeObject AssumePlan(const MeasurementSet& set, int object, std::shared_ptr
   return result;
 }
 
-RoundScatter ScatterAmongRounds(const MeasurementSet& set, const std::vector<PoseFreeObject>& objects) {
+RoundScatter ScatterAmongRounds(const session::MeasurementSet& set,
+                                const std::vector<PoseFreeObject>& objects) {
   double squares = 0;
   RoundScatter scatter;
   for (const PoseFreeObject& object : objects) {
@@ -161,11 +163,11 @@ RoundScatter ScatterAmongRounds(const MeasurementSet& set, const std::vector<Pos
   return scatter;
 }
 
-Plan WithPoses(const Plan& plan, const AssumedPoses& poses) {
-  Plan changed = plan;
+touch::Plan WithPoses(const touch::Plan& plan, const AssumedPoses& poses) {
+  touch::Plan changed = plan;
   changed.faces.max_tilt_rad = poses.max_tilt_rad;
   changed.faces.spread = poses.spread;
   return changed;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

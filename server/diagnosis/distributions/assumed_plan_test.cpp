@@ -6,7 +6,7 @@
 #include "server/diagnosis/distributions/pose_free_rank.h"
 #include "server/diagnosis/distributions/pose_free_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 TEST(SequentialP, IsExactWhetherOneStopsOrNot) {
@@ -37,4 +37,4 @@ TEST(CountRepeats, SeesRoundsRepeatsInAnyOrderAndNone) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

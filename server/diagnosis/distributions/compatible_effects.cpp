@@ -8,7 +8,7 @@
 #include "server/diagnosis/distributions/effect_variation.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr double kCompatibleP = 0.1;
@@ -37,7 +37,7 @@ struct Trial {
 };
 
 // Evaluates a trial; it replaces `best` if its misfit is smaller.
-absl::Status Attempt(const Model& model, Trial trial, ReferenceSize size, const MisfitOfModel& misfit,
+absl::Status Attempt(const model::Model& model, Trial trial, ReferenceSize size, const MisfitOfModel& misfit,
                      Trial* best) {
   const auto varied = Varied(model, trial.direction, trial.amounts);
   if (!varied) return absl::OkStatus();
@@ -47,9 +47,9 @@ absl::Status Attempt(const Model& model, Trial trial, ReferenceSize size, const 
 }
 
 // The best of a few strengths along one direction with each of `poses`, against quick references.
-absl::Status Screen(const Model& model, const EffectDirection& direction,
+absl::Status Screen(const model::Model& model, const EffectDirection& direction,
                     const std::vector<AssumedPoses>& poses, const MisfitOfModel& misfit, Trial* best) {
-  const ParameterInfo& info = direction.effect->parameters[direction.parameter];
+  const model::ParameterInfo& info = direction.effect->parameters[direction.parameter];
   const double typical =
       ToSi(info.unit, info.typical != 0 ? std::abs(info.typical) : 0.05 * (info.upper - info.lower));
   for (const AssumedPoses& supposed : poses)
@@ -82,13 +82,13 @@ Trial Moved(const Trial& trial, size_t what, double step) {
 // Coordinate descent over the strength, the poses' tilt and spread (poses that were fitted without the effect
 // imitate a part of it) and the other fingers or axes. Stops where the sets are clearly compatible.
 // `promising`: poses that suit another effect.
-absl::Status Refine(const Model& model, double step, const AssumedPoses& promising,
+absl::Status Refine(const model::Model& model, double step, const AssumedPoses& promising,
                     const MisfitOfModel& misfit, Trial* best) {
   if (best->misfit.p_value > kClearlyCompatibleP) return absl::OkStatus();
   Trial trial = *best;
   trial.poses = promising;
   TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
-  const ParameterInfo& info = trial.direction.effect->parameters[trial.direction.parameter];
+  const model::ParameterInfo& info = trial.direction.effect->parameters[trial.direction.parameter];
   const size_t free = trial.amounts.size() - (info.sum_zero ? 1 : 0);
   for (size_t what = 0; what < 2 + free; ++what) {
     if (step < kFineStep && (what == 1 || what == 2)) continue;
@@ -111,7 +111,8 @@ using Progress = std::function<bool(double done)>;
 
 class CompatibleEffectSearch {
  public:
-  CompatibleEffectSearch(const Model& model, MisfitOfModel misfit, ThreadPool* pool, const Progress& progress)
+  CompatibleEffectSearch(const model::Model& model, MisfitOfModel misfit, ThreadPool* pool,
+                         const Progress& progress)
       : model_(model), misfit_(std::move(misfit)), pool_(pool), progress_(progress) {}
 
   // Leaves the best directions of the best effects.
@@ -130,7 +131,7 @@ class CompatibleEffectSearch {
   // Trials that are far behind do not catch up.
   void DropHopeless();
 
-  const Model& model_;
+  const model::Model& model_;
   MisfitOfModel misfit_;
   ThreadPool* const pool_;
   const Progress& progress_;
@@ -233,10 +234,11 @@ std::vector<CompatibleEffect> CompatibleEffectSearch::Compatible() {
 }  // namespace
 
 absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
-    const Model& model, bool noise_is_known, const std::vector<std::shared_ptr<const Effect>>& also,
-    const std::vector<AssumedPoses>& poses, MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
+    const model::Model& model, bool noise_is_known,
+    const std::vector<std::shared_ptr<const model::Effect>>& also, const std::vector<AssumedPoses>& poses,
+    MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
     const std::function<bool(double done)>& progress) {
-  std::vector<std::shared_ptr<const Effect>> effects = Catalogue().All();
+  std::vector<std::shared_ptr<const model::Effect>> effects = effects::Catalogue().All();
   effects.insert(effects.end(), also.begin(), also.end());
   std::vector<EffectDirection> directions;
   for (const auto& effect : effects) {
@@ -251,4 +253,4 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
   return search.Compatible();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

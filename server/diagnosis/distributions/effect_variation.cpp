@@ -9,32 +9,32 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
-std::shared_ptr<const Model> Varied(const Model& model, const EffectDirection& direction,
-                                    const std::vector<double>& amounts) {
-  auto varied = std::make_shared<Model>(model);
-  EffectInstance* instance = nullptr;
-  for (EffectInstance& candidate : varied->effects)
+std::shared_ptr<const model::Model> Varied(const model::Model& model, const EffectDirection& direction,
+                                           const std::vector<double>& amounts) {
+  auto varied = std::make_shared<model::Model>(model);
+  model::EffectInstance* instance = nullptr;
+  for (model::EffectInstance& candidate : varied->effects)
     if (candidate.effect->name == direction.effect->name && !direction.effect->formula) instance = &candidate;
   if (!instance) {
-    EffectInstance added;
+    model::EffectInstance added;
     added.effect = direction.effect;
     added.per_object = direction.effect->always_per_object;
     added.values = direction.effect->NeutralValues(model.fingers);
     // The other parameters of the effect (the length of a bump) at their typical size.
     int offset = 0;
     for (size_t p = 0; p < direction.effect->parameters.size(); ++p) {
-      const ParameterInfo& info = direction.effect->parameters[p];
-      if (info.arity == Arity::kScalar && static_cast<int>(p) != direction.parameter && info.typical != 0 &&
-          info.neutral != 0)
+      const model::ParameterInfo& info = direction.effect->parameters[p];
+      if (info.arity == model::Arity::kScalar && static_cast<int>(p) != direction.parameter &&
+          info.typical != 0 && info.neutral != 0)
         added.values[offset] = ToSi(info.unit, info.typical);
       offset += info.Count(model.fingers);
     }
     varied->effects.push_back(std::move(added));
     instance = &varied->effects.back();
   }
-  const ParameterInfo& info = direction.effect->parameters[direction.parameter];
+  const model::ParameterInfo& info = direction.effect->parameters[direction.parameter];
   const int count = info.Count(model.fingers);
   const auto vary = [&](std::vector<double>* values) {
     if (static_cast<int>(values->size()) < direction.offset + count) return false;
@@ -59,9 +59,9 @@ std::shared_ptr<const Model> Varied(const Model& model, const EffectDirection& d
   return varied;
 }
 
-std::string VariationInWords(const Model& model, const EffectDirection& direction,
+std::string VariationInWords(const model::Model& model, const EffectDirection& direction,
                              const std::vector<double>& amounts) {
-  const ParameterInfo& info = direction.effect->parameters[direction.parameter];
+  const model::ParameterInfo& info = direction.effect->parameters[direction.parameter];
   double mean = 0;
   if (info.sum_zero)
     for (const double amount : amounts) mean += amount / amounts.size();
@@ -70,23 +70,24 @@ std::string VariationInWords(const Model& model, const EffectDirection& directio
     values.push_back(absl::StrFormat("%.3g", FromSi(info.unit, amount - mean)));
   const auto model_has =
       std::any_of(model.effects.begin(), model.effects.end(),
-                  [&](const EffectInstance& e) { return e.effect->name == direction.effect->name; });
+                  [&](const model::EffectInstance& e) { return e.effect->name == direction.effect->name; });
   return absl::StrCat(info.name, model_has && info.neutral == 0 ? " changed by " : " = ",
                       values.size() == 1 ? values[0] : absl::StrCat("[", absl::StrJoin(values, ", "), "]"));
 }
 
-bool VisibleWithoutPoses(const Effect& effect, bool noise_is_known) {
-  const bool noise = effect.role == EffectRole::kNoiseLevel || effect.role == EffectRole::kNoiseGrowth ||
-                     effect.role == EffectRole::kNoiseTails;
-  if (effect.role == EffectRole::kDropout || (noise && noise_is_known)) return false;
+bool VisibleWithoutPoses(const model::Effect& effect, bool noise_is_known) {
+  const bool noise = effect.role == model::EffectRole::kNoiseLevel ||
+                     effect.role == model::EffectRole::kNoiseGrowth ||
+                     effect.role == model::EffectRole::kNoiseTails;
+  if (effect.role == model::EffectRole::kDropout || (noise && noise_is_known)) return false;
   return effect.name != "formula" && !effect.parameters.empty() && effect.needs.covariates.empty();
 }
 
-std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const Effect>& effect, int fingers) {
+std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const model::Effect>& effect, int fingers) {
   std::vector<EffectDirection> directions;
   int offset = 0;
   for (size_t p = 0; p < effect->parameters.size(); ++p) {
-    const ParameterInfo& info = effect->parameters[p];
+    const model::ParameterInfo& info = effect->parameters[p];
     const int count = info.Count(fingers);
     // Others (the length of bumps) describe the shape of the effect, not its strength.
     if (p == 0 || info.neutral == 0)
@@ -97,4 +98,4 @@ std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const Effect>& e
   return directions;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -7,28 +7,30 @@
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr uint32_t kMaxAttempts = 64;
 
-void Fill(const std::vector<CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k, int t,
-          TouchBatch* batch) {
-  SetTouch(touches[k], numbers[k], t, batch);
+void Fill(const std::vector<touch::CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k,
+          int t, effects::TouchBatch* batch) {
+  touch::SetTouch(touches[k], numbers[k], t, batch);
 }
 
 }  // namespace
 
-absl::StatusOr<PlannedTouches> DrawPlannedTouches(std::shared_ptr<const Model> model,
-                                                  std::shared_ptr<const Surface> surface, const Plan& plan,
+absl::StatusOr<PlannedTouches> DrawPlannedTouches(std::shared_ptr<const model::Model> model,
+                                                  std::shared_ptr<const geometry::Surface> surface,
+                                                  const touch::Plan& plan,
                                                   const std::vector<uint64_t>& numbers, uint64_t seed) {
-  const TouchSimulator simulator(model);
-  const auto generator = MakePoseGenerator(plan, surface->bounds(), seed);
+  const touch::TouchSimulator simulator(model);
+  const auto generator = touch::MakePoseGenerator(plan, surface->bounds(), seed);
   const uint64_t poses_per_round = 6ull * plan.faces.samples_per_face;
   PlannedTouches drawn;
   drawn.numbers = numbers;
   drawn.seed = seed;
-  for (const uint64_t number : numbers) drawn.touches.push_back(TouchOfPlan(plan, *generator, number, 0));
+  for (const uint64_t number : numbers)
+    drawn.touches.push_back(touch::TouchOfPlan(plan, *generator, number, 0));
 
   // The first touch of every pose decides whether the pose misses and is drawn again, in all of its rounds; a
   // finger that only failed to report does not count.
@@ -36,8 +38,8 @@ absl::StatusOr<PlannedTouches> DrawPlannedTouches(std::shared_ptr<const Model> m
   std::vector<size_t> slots;
   for (size_t k = 0; k < numbers.size(); ++k)
     if (attempt.emplace(numbers[k] % poses_per_round, 0).second) slots.push_back(k);
-  TouchBatch batch;
-  TouchWorkspace workspace;
+  effects::TouchBatch batch;
+  touch::TouchWorkspace workspace;
   batch.surface = surface;
   batch.seed = seed;
   for (uint32_t n = 0; n < kMaxAttempts && !slots.empty(); ++n) {
@@ -52,26 +54,27 @@ absl::StatusOr<PlannedTouches> DrawPlannedTouches(std::shared_ptr<const Model> m
         hit &= !std::isnan(batch.travel_m[batch.At(i, static_cast<int>(t))]);
       if (hit) continue;
       const uint64_t number = numbers[slots[t]];
-      drawn.touches[slots[t]] = TouchOfPlan(plan, *generator, number, ++attempt[number % poses_per_round]);
+      drawn.touches[slots[t]] =
+          touch::TouchOfPlan(plan, *generator, number, ++attempt[number % poses_per_round]);
       missed.push_back(slots[t]);
     }
     slots.swap(missed);
   }
   for (size_t k = 0; k < numbers.size(); ++k) {
     const uint32_t draws = attempt[numbers[k] % poses_per_round];
-    if (draws > 0) drawn.touches[k] = TouchOfPlan(plan, *generator, numbers[k], draws);
+    if (draws > 0) drawn.touches[k] = touch::TouchOfPlan(plan, *generator, numbers[k], draws);
   }
   return drawn;
 }
 
-absl::StatusOr<std::vector<double>> SimulatePlannedTouches(std::shared_ptr<const Model> model,
-                                                           std::shared_ptr<const Surface> surface,
+absl::StatusOr<std::vector<double>> SimulatePlannedTouches(std::shared_ptr<const model::Model> model,
+                                                           std::shared_ptr<const geometry::Surface> surface,
                                                            const PlannedTouches& drawn) {
-  const TouchSimulator simulator(model);
+  const touch::TouchSimulator simulator(model);
   const size_t count = drawn.touches.size();
   const int fingers = model->fingers;
-  TouchBatch batch;
-  TouchWorkspace workspace;
+  effects::TouchBatch batch;
+  touch::TouchWorkspace workspace;
   batch.surface = std::move(surface);
   batch.seed = drawn.seed;
   // All together in the order of the session, so that a press reaches the next touch.
@@ -91,12 +94,13 @@ absl::StatusOr<std::vector<double>> SimulatePlannedTouches(std::shared_ptr<const
   return time_s;
 }
 
-absl::StatusOr<std::vector<double>> SimulatePlan(std::shared_ptr<const Model> model,
-                                                 std::shared_ptr<const Surface> surface, const Plan& plan,
+absl::StatusOr<std::vector<double>> SimulatePlan(std::shared_ptr<const model::Model> model,
+                                                 std::shared_ptr<const geometry::Surface> surface,
+                                                 const touch::Plan& plan,
                                                  const std::vector<uint64_t>& numbers, uint64_t seed) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const PlannedTouches drawn,
                               DrawPlannedTouches(model, surface, plan, numbers, seed));
   return SimulatePlannedTouches(std::move(model), std::move(surface), drawn);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr double kSuspicious = 0.1;  // below it the poses are fitted
@@ -21,7 +21,7 @@ constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5, kBef
 absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const PoseFreeExperiment& experiment,
                                                                 const PoseFreeRank& rank) {
   const auto misfit_under = [&](PoseFreeNull null) -> MisfitOfModel {
-    return [&experiment, null = std::move(null)](const std::shared_ptr<const Model>& model,
+    return [&experiment, null = std::move(null)](const std::shared_ptr<const model::Model>& model,
                                                  const AssumedPoses& poses,
                                                  ReferenceSize size) -> absl::StatusOr<PoseFreeMisfit> {
       TOUCHSTONE_ASSIGN_OR_RETURN(const PoseFreeSamples reference,
@@ -30,7 +30,7 @@ absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const PoseFreeEx
       return PoseFreeMisfit{null.Misfit(distances), null.P(distances)};
     };
   };
-  const auto renew = [&](const std::shared_ptr<const Model>& model,
+  const auto renew = [&](const std::shared_ptr<const model::Model>& model,
                          const AssumedPoses& poses) -> absl::StatusOr<MisfitOfModel> {
     TOUCHSTONE_ASSIGN_OR_RETURN(const PoseFreeRank own, PoseFreeRank::Make(experiment, model, poses, true,
                                                                            kBeforeRenewal, kBeforeRenewal));
@@ -55,9 +55,9 @@ PoseFreeComparison Prepare(const PoseFreeExperiment& experiment) {
   comparison.noise_change = experiment.noise_is_new    ? NoiseChange::kNewEffect
                             : experiment.noise_changed ? NoiseChange::kNewValue
                                                        : NoiseChange::kNone;
-  comparison.model_has_noise =
-      std::any_of(experiment.model->effects.begin(), experiment.model->effects.end(),
-                  [](const EffectInstance& e) { return e.effect->role == EffectRole::kNoiseLevel; });
+  comparison.model_has_noise = std::any_of(
+      experiment.model->effects.begin(), experiment.model->effects.end(),
+      [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
   comparison.size_ratio = experiment.size_ratio;
   return comparison;
 }
@@ -104,4 +104,4 @@ absl::StatusOr<PoseFreeComparison> ComparePoseFree(const DiagnosisInput& input,
   return comparison;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -16,7 +16,7 @@
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/residuals/histogram_bins.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // What the rounds of a set say about the model's noise.
 enum class NoiseChange { kNone, kNewValue, kNewEffect };
@@ -26,7 +26,7 @@ struct PoseFreeComparison {
   bool noise_is_known = false;      // from rounds that are enough to tell
   std::optional<RoundNoise> noise;  // set where it is known and not zero
   // The model that the set was compared with: the given one, with the noise of the rounds if that differs.
-  std::shared_ptr<const Model> model;
+  std::shared_ptr<const model::Model> model;
   NoiseChange noise_change = NoiseChange::kNone;
   bool model_has_noise = false;  // gaussian_noise
   double size_ratio = 1;         // of measured to simulated times where it is absurd (a wrong unit); else 1
@@ -37,7 +37,7 @@ struct PoseFreeComparison {
   double energy_distance_s = 0;  // between measured and simulated touches
   double energy_p_value = 1;
   std::vector<StatisticComparison> statistics;
-  std::vector<ComparedHistogram> histograms;
+  std::vector<residuals::ComparedHistogram> histograms;
   std::string plan;           // by which the simulated touches were made, in words
   int simulated_touches = 0;  // that the set is compared with
 
@@ -59,4 +59,4 @@ struct PoseFreeComparison {
 absl::StatusOr<PoseFreeComparison> ComparePoseFree(const DiagnosisInput& input,
                                                    const DiagnosisContext& context, bool diagnose);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

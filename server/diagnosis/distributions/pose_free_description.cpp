@@ -8,7 +8,7 @@
 #include "server/base/normal.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr size_t kMaxExamples = 5;
@@ -39,17 +39,17 @@ std::vector<double> Curvatures(const PoseFreeSample& sample) {
   return {};
 }
 
-ComparedHistogram HistogramOf(HistogramQuantity quantity, const std::string& object,
-                              const std::vector<double>& measured, const std::vector<double>& simulated,
-                              double p_value) {
-  ComparedHistogram histogram;
+residuals::ComparedHistogram HistogramOf(residuals::HistogramQuantity quantity, const std::string& object,
+                                         const std::vector<double>& measured,
+                                         const std::vector<double>& simulated, double p_value) {
+  residuals::ComparedHistogram histogram;
   histogram.quantity = quantity;
   histogram.object = object;
   std::vector<double> pooled = measured;
   pooled.insert(pooled.end(), simulated.begin(), simulated.end());
-  histogram.edges = HistogramEdges(std::move(pooled));
-  histogram.measured = HistogramDensity(measured, histogram.edges);
-  histogram.simulated = HistogramDensity(simulated, histogram.edges);
+  histogram.edges = residuals::HistogramEdges(std::move(pooled));
+  histogram.measured = residuals::HistogramDensity(measured, histogram.edges);
+  histogram.simulated = residuals::HistogramDensity(simulated, histogram.edges);
   histogram.improved = histogram.simulated;
   histogram.p_simulated = histogram.p_improved = p_value;
   return histogram;
@@ -57,14 +57,16 @@ ComparedHistogram HistogramOf(HistogramQuantity quantity, const std::string& obj
 
 // Histograms of one quantity; `measure` is its place among the distances.
 void AppendHistograms(const PoseFreeExperiment& experiment, const PoseFreeRank& rank,
-                      HistogramQuantity quantity, int measure, std::vector<ComparedHistogram>* histograms) {
+                      residuals::HistogramQuantity quantity, int measure,
+                      std::vector<residuals::ComparedHistogram>* histograms) {
   const auto values = [&](const PoseFreeSample& sample) {
-    return quantity == HistogramQuantity::kCurvature ? Curvatures(sample)
-                                                     : DescriptorsUs(sample, experiment.set.fingers);
+    return quantity == residuals::HistogramQuantity::kCurvature
+               ? Curvatures(sample)
+               : DescriptorsUs(sample, experiment.set.fingers);
   };
   const size_t objects = experiment.objects.size();
   std::vector<double> all_measured, all_simulated;
-  std::vector<ComparedHistogram> by_object;
+  std::vector<residuals::ComparedHistogram> by_object;
   for (size_t o = 0; o < objects; ++o) {
     const std::vector<double> measured = values(experiment.measured[o]),
                               simulated = values(rank.reference()[o]);
@@ -84,7 +86,7 @@ void AppendHistograms(const PoseFreeExperiment& experiment, const PoseFreeRank& 
 }  // namespace
 
 PoseFreeRows CountRows(const PoseFreeExperiment& experiment) {
-  const MeasurementSet& set = experiment.set;
+  const session::MeasurementSet& set = experiment.set;
   PoseFreeRows rows;
   rows.rounds = experiment.objects[0].in_rounds ? experiment.objects[0].repeats : 0;
   rows.thinned = set.size();
@@ -139,20 +141,21 @@ std::vector<StatisticComparison> CompareStatistics(const PoseFreeExperiment& exp
   return comparisons;
 }
 
-std::vector<ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperiment& experiment,
-                                                         const PoseFreeRank& rank) {
+std::vector<residuals::ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperiment& experiment,
+                                                                    const PoseFreeRank& rank) {
   // The distances are those of the energy, the spread and, with three fingers, the curvature.
   constexpr int kEnergyMeasure = 0, kCurvatureMeasure = 2;
-  std::vector<ComparedHistogram> histograms;
-  AppendHistograms(experiment, rank, HistogramQuantity::kDescriptor, kEnergyMeasure, &histograms);
+  std::vector<residuals::ComparedHistogram> histograms;
+  AppendHistograms(experiment, rank, residuals::HistogramQuantity::kDescriptor, kEnergyMeasure, &histograms);
   if (experiment.set.fingers == 3)
-    AppendHistograms(experiment, rank, HistogramQuantity::kCurvature, kCurvatureMeasure, &histograms);
+    AppendHistograms(experiment, rank, residuals::HistogramQuantity::kCurvature, kCurvatureMeasure,
+                     &histograms);
   return histograms;
 }
 
 std::string PlanInWords(const PoseFreeExperiment& experiment, const AssumedPoses& poses, bool fitted) {
   const PoseFreeObject& first = experiment.objects[0];
-  const FacesPlan faces = WithPoses(first.plan, poses).faces;
+  const touch::FacesPlan faces = WithPoses(first.plan, poses).faces;
   return absl::StrCat("faces of the bounding box, ", faces.samples_per_face, " poses per face, ",
                       first.repeats, first.repeats == 1 ? " touch" : " touches", " per pose, tilt up to ",
                       std::round(10 * faces.max_tilt_rad / kRadiansPerDegree) / 10, " deg, spread over ",
@@ -161,4 +164,4 @@ std::string PlanInWords(const PoseFreeExperiment& experiment, const AssumedPoses
                       FromSi(Unit::kMillimetrePerSecond, experiment.speed_m_s), " mm/s");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -10,7 +10,7 @@
 #include "server/diagnosis/distributions/pose_free_rank.h"
 #include "server/diagnosis/residuals/histogram_bins.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // Every row of the set is compared, incomplete or thinned out.
 struct PoseFreeRows {
@@ -43,9 +43,9 @@ std::vector<StatisticComparison> CompareStatistics(const PoseFreeExperiment& exp
                                                    const PoseFreeRank& rank);
 // Descriptors and, with three fingers, curvatures: over all objects and object by object. The simulated
 // sample is the reference; the improved one is the same.
-std::vector<ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperiment& experiment,
-                                                         const PoseFreeRank& rank);
+std::vector<residuals::ComparedHistogram> ComparePoseFreeHistograms(const PoseFreeExperiment& experiment,
+                                                                    const PoseFreeRank& rank);
 // "faces of the bounding box, 8 poses per face, ..."; `fitted`: the poses are those that fit best.
 std::string PlanInWords(const PoseFreeExperiment& experiment, const AssumedPoses& poses, bool fitted);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 PoseFreeSample MakePoseFreeSample(const std::vector<double>& time_s, int fingers, double speed_m_s,
                                   double spacing_m) {
@@ -90,4 +90,4 @@ double PoseFreeNull::P(const std::vector<double>& distances) const {
   return (1.0 + (largest_.end() - at)) / (1.0 + largest_.size());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/distributions/two_samples.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // The touches of one object, on one side of the comparison.
 struct PoseFreeSample {
@@ -48,4 +48,4 @@ class PoseFreeNull {
   std::vector<double> largest_;              // standardised distance of every set, sorted
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

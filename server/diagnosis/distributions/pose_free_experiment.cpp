@@ -10,7 +10,7 @@
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr int kMaxMeasuredTouches = 1500;  // all objects together
@@ -79,8 +79,8 @@ absl::Status PoseFreeExperiment::CompareSizes() {
 void PoseFreeExperiment::EstimateNoise() {
   scatter = ScatterAmongRounds(set, objects);
   if (!noise_is_known() || scatter.sigma_s == 0) return;
-  auto noisy = std::make_shared<Model>(*input.model);
-  for (EffectInstance& instance : noisy->effects) {
+  auto noisy = std::make_shared<model::Model>(*input.model);
+  for (model::EffectInstance& instance : noisy->effects) {
     if (instance.effect->name != "gaussian_noise") continue;
     const double sigma_s = instance.ValuesFor(set.objects[0])[0];
     const double std_error_s = scatter.sigma_s / std::sqrt(2 * scatter.degrees_of_freedom);
@@ -92,8 +92,8 @@ void PoseFreeExperiment::EstimateNoise() {
     model = noisy;
     return;
   }
-  EffectInstance noise;
-  noise.effect = Catalogue().Find("gaussian_noise");
+  model::EffectInstance noise;
+  noise.effect = effects::Catalogue().Find("gaussian_noise");
   noise.values = {scatter.sigma_s};
   noisy->effects.push_back(std::move(noise));
   noise_changed = noise_is_new = true;
@@ -106,9 +106,9 @@ std::vector<double> PoseFreeExperiment::MeasuredTimes(int object) const {
     for (int i = 0; i < set.fingers; ++i) time_s.push_back(set.TimeS(row, i));
   return time_s;
 }
-absl::StatusOr<std::vector<double>> PoseFreeExperiment::TimesOfSet(const std::shared_ptr<const Model>& of,
-                                                                   int object, const AssumedPoses& poses,
-                                                                   uint64_t number) const {
+absl::StatusOr<std::vector<double>> PoseFreeExperiment::TimesOfSet(
+    const std::shared_ptr<const model::Model>& of, int object, const AssumedPoses& poses,
+    uint64_t number) const {
   const PoseFreeObject& like = objects[object];
   // Every object of every set has poses of its own.
   const uint64_t seed = RandomBlock(input.seed, RandomDomain::kDiagnosis, number, object, 7)[0];
@@ -128,7 +128,7 @@ absl::StatusOr<std::shared_ptr<const PlannedTouches>> PoseFreeExperiment::Touche
   const bool quick = size == ReferenceSize::kQuick;
   const int max_touches = quick ? kMaxQuickPerObject : kMaxReferencePerObject,
             all_touches = quick ? kQuickTouches : kReferenceTouches;
-  Plan plan = WithPoses(objects[object].plan, poses);
+  touch::Plan plan = WithPoses(objects[object].plan, poses);
   plan.faces.rounds = 1;
   plan.faces.samples_per_face =
       std::clamp(all_touches / 6 / static_cast<int>(set.objects.size()), 10, max_touches / 6);
@@ -142,9 +142,8 @@ absl::StatusOr<std::shared_ptr<const PlannedTouches>> PoseFreeExperiment::Touche
   return touches_.emplace(key, shared).first->second;
 }
 
-absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeReference(const std::shared_ptr<const Model>& of,
-                                                                  const AssumedPoses& poses,
-                                                                  ReferenceSize size) const {
+absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeReference(
+    const std::shared_ptr<const model::Model>& of, const AssumedPoses& poses, ReferenceSize size) const {
   PoseFreeSamples samples;
   for (size_t o = 0; o < objects.size(); ++o) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches, TouchesOfReference(static_cast<int>(o), poses, size));
@@ -155,7 +154,7 @@ absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeReference(const std::sha
   return samples;
 }
 
-absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeSet(const std::shared_ptr<const Model>& of,
+absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeSet(const std::shared_ptr<const model::Model>& of,
                                                             const AssumedPoses& poses,
                                                             uint64_t number) const {
   PoseFreeSamples samples;
@@ -171,4 +170,4 @@ absl::StatusOr<PoseFreeSamples> PoseFreeExperiment::MakeSet(const std::shared_pt
   return samples;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -13,7 +13,7 @@
 #include "server/diagnosis/distributions/pose_free_distances.h"
 #include "server/diagnosis/input.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // One sample per object, in the order of the set's objects.
 using PoseFreeSamples = std::vector<PoseFreeSample>;
@@ -31,9 +31,9 @@ class PoseFreeExperiment {
 
   // Pure functions of their arguments; callable from several threads. A set is like the measured one: as many
   // touches and rounds of each object, the same fingers missing.
-  absl::StatusOr<PoseFreeSamples> MakeReference(const std::shared_ptr<const Model>& model,
+  absl::StatusOr<PoseFreeSamples> MakeReference(const std::shared_ptr<const model::Model>& model,
                                                 const AssumedPoses& poses, ReferenceSize size) const;
-  absl::StatusOr<PoseFreeSamples> MakeSet(const std::shared_ptr<const Model>& model,
+  absl::StatusOr<PoseFreeSamples> MakeSet(const std::shared_ptr<const model::Model>& model,
                                           const AssumedPoses& poses, uint64_t number) const;
 
   // False: cancelled.
@@ -45,14 +45,14 @@ class PoseFreeExperiment {
 
   const DiagnosisInput& input;
   const DiagnosisContext& context;
-  const MeasurementSet& set;
-  double speed_m_s = kDefaultSpeedMS;  // median of the set's, where it has speeds
+  const session::MeasurementSet& set;
+  double speed_m_s = touch::kDefaultSpeedMS;  // median of the set's, where it has speeds
   std::vector<PoseFreeObject> objects;
-  double size_ratio = 1;               // of measured to simulated times, where it is absurd; else 1
-  RoundScatter scatter;                // of one finger's time among rounds
-  std::shared_ptr<const Model> model;  // the given one, with the noise that the rounds show
-  bool noise_changed = false;          // `model` has another noise than the given one ...
-  bool noise_is_new = false;           // ... which had none
+  double size_ratio = 1;                      // of measured to simulated times, where it is absurd; else 1
+  RoundScatter scatter;                       // of one finger's time among rounds
+  std::shared_ptr<const model::Model> model;  // the given one, with the noise that the rounds show
+  bool noise_changed = false;                 // `model` has another noise than the given one ...
+  bool noise_is_new = false;                  // ... which had none
   PoseFreeSamples measured;
 
  private:
@@ -65,7 +65,7 @@ class PoseFreeExperiment {
   absl::Status CompareSizes();
   void EstimateNoise();
   std::vector<double> MeasuredTimes(int object) const;
-  absl::StatusOr<std::vector<double>> TimesOfSet(const std::shared_ptr<const Model>& of, int object,
+  absl::StatusOr<std::vector<double>> TimesOfSet(const std::shared_ptr<const model::Model>& of, int object,
                                                  const AssumedPoses& poses, uint64_t number) const;
   absl::StatusOr<std::shared_ptr<const PlannedTouches>> TouchesOfReference(int object,
                                                                            const AssumedPoses& poses,
@@ -77,4 +77,4 @@ class PoseFreeExperiment {
       touches_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

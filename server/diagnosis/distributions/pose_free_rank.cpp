@@ -6,7 +6,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 constexpr int kEnough = 10;     // sets at least as far off: no more are needed to know that p is not small
@@ -34,7 +34,7 @@ PoseFreeNull PoseFreeRank::Null(size_t object) const {
 }
 
 absl::StatusOr<PoseFreeRank> PoseFreeRank::Make(const PoseFreeExperiment& experiment,
-                                                const std::shared_ptr<const Model>& model,
+                                                const std::shared_ptr<const model::Model>& model,
                                                 const AssumedPoses& poses, bool coarse, double from,
                                                 double to) {
   PoseFreeRank rank;
@@ -115,4 +115,4 @@ absl::StatusOr<AssumedPoses> FitPoses(const PoseFreeExperiment& experiment, cons
   return best;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

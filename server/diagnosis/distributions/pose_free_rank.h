@@ -4,7 +4,7 @@
 
 #include "server/diagnosis/distributions/pose_free_experiment.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // p of `measured` among the values of simulated sets, in the order in which they were made: if the k-th that
 // is at least as large stands at place m, k / m; with fewer than k of them, (1 + number as large) / (1 +
@@ -17,7 +17,7 @@ class PoseFreeRank {
   // `coarse`: sets are made only until it is clear whether p is above 0.1. `from` and `to`: the part of the
   // progress that this takes. Returns CANCELLED if the progress callback says so.
   static absl::StatusOr<PoseFreeRank> Make(const PoseFreeExperiment& experiment,
-                                           const std::shared_ptr<const Model>& model,
+                                           const std::shared_ptr<const model::Model>& model,
                                            const AssumedPoses& poses, bool coarse, double from, double to);
 
   // p of all distance measures together.
@@ -41,4 +41,4 @@ class PoseFreeRank {
 absl::StatusOr<AssumedPoses> FitPoses(const PoseFreeExperiment& experiment, const PoseFreeRank& rank,
                                       double from, double to);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

@@ -5,7 +5,7 @@
 
 #include "server/diagnosis/distributions/pose_free_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 std::vector<std::string> NamesOf(const std::vector<CompatibleEffect>& effects) {
@@ -92,12 +92,12 @@ TEST(PoseFree, MissingNoiseIsNamedWithItsSizeFromTheRounds) {
   EXPECT_EQ(comparison->noise_change, NoiseChange::kNewEffect);
   ASSERT_TRUE(comparison->noise.has_value());
   EXPECT_NEAR(comparison->noise->sigma_s, 0.005, 4 * comparison->noise->std_error_s);
-  EXPECT_THAT(FormatModel(*comparison->model), testing::HasSubstr("gaussian_noise"));
+  EXPECT_THAT(model::FormatModel(*comparison->model), testing::HasSubstr("gaussian_noise"));
 }
 
 TEST(PoseFree, TimesInTheWrongUnitHaveAnAbsurdSize) {
   DiagnosisInput input = MakePoseFreeInput(WedgeModel(kWedgeNoise), 4, 2, 6);
-  auto set = std::make_shared<MeasurementSet>(*input.set);
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
   for (double& time_s : set->time_s) time_s *= 1000;
   input.set = set;
   const auto comparison = ComparePoseFree(input, {}, false);
@@ -107,7 +107,7 @@ TEST(PoseFree, TimesInTheWrongUnitHaveAnAbsurdSize) {
 
 TEST(PoseFree, RowsWithAMissingFingerAreCounted) {
   DiagnosisInput input = MakePoseFreeInput(WedgeModel(kWedgeNoise), 4, 3, 7);
-  auto set = std::make_shared<MeasurementSet>(*input.set);
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
   for (const int row : {3, 9, 40}) set->time_s[row * 3 + 1] = NAN;
   input.set = set;
   const auto comparison = ComparePoseFree(input, {}, false);
@@ -125,7 +125,7 @@ TEST(PoseFree, AnObjectWithoutAMeshAndAWrongNumberOfFingersAreErrors) {
   EXPECT_THAT(std::string(ComparePoseFree(input, {}, false).status().message()),
               testing::HasSubstr("object 'wedge0' has no mesh"));
   input = MakePoseFreeInput(WedgeModel(kWedgeNoise), 4, 2, 8);
-  auto model = std::make_shared<Model>(*input.model);
+  auto model = std::make_shared<model::Model>(*input.model);
   model->fingers = 4;
   input.model = model;
   EXPECT_THAT(std::string(ComparePoseFree(input, {}, false).status().message()),
@@ -175,4 +175,4 @@ TEST(PoseFree, IsCancelledAtEveryStageAndGivesTheSameOnAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

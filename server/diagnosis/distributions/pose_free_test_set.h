@@ -12,11 +12,11 @@
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // A wedge of 120 x 100 x 80 mm: six faces, none of them like another.
-inline std::shared_ptr<const Surface> WedgeSurface() {
-  TriangleMesh mesh;
+inline std::shared_ptr<const geometry::Surface> WedgeSurface() {
+  geometry::TriangleMesh mesh;
   mesh.vertices_m = {{-0.06f, -0.05f, -0.04f}, {0.06f, -0.05f, -0.04f}, {0.06f, 0.05f, -0.04f},
                      {-0.06f, 0.05f, -0.04f},  {-0.05f, -0.04f, 0.03f}, {0.05f, -0.05f, 0.04f},
                      {0.055f, 0.045f, 0.02f},  {-0.06f, 0.05f, 0.04f}};
@@ -25,32 +25,33 @@ inline std::shared_ptr<const Surface> WedgeSurface() {
     mesh.triangles.push_back({q[0], q[1], q[2]});
     mesh.triangles.push_back({q[0], q[2], q[3]});
   }
-  return *Surface::Create("wedge", mesh);
+  return *geometry::Surface::Create("wedge", mesh);
 }
 
-inline std::shared_ptr<const Model> WedgeModel(const std::string& effects) {
-  auto model = ParseModel("touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n" +
-                              (effects.empty() ? effects : "effects:\n" + effects),
-                          "test", Catalogue());
+inline std::shared_ptr<const model::Model> WedgeModel(const std::string& effects) {
+  auto model =
+      model::ParseModel("touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n" +
+                            (effects.empty() ? effects : "effects:\n" + effects),
+                        "test", effects::Catalogue());
   EXPECT_TRUE(model.ok()) << model.status();
-  return std::make_shared<const Model>(*std::move(model));
+  return std::make_shared<const model::Model>(*std::move(model));
 }
 
 inline constexpr char kWedgeNoise[] = "  - gaussian_noise: {sigma_us: 5000}\n";
 
 // A set without poses that `model` made: `poses` x `rounds` on each object, in rounds.
-inline DiagnosisInput MakePoseFreeInput(const std::shared_ptr<const Model>& model, int poses_a_face,
+inline DiagnosisInput MakePoseFreeInput(const std::shared_ptr<const model::Model>& model, int poses_a_face,
                                         int rounds, uint64_t seed, const std::string& nominal = kWedgeNoise,
                                         int objects = 1, const AssumedPoses& poses = {}) {
-  auto set = std::make_shared<MeasurementSet>();
+  auto set = std::make_shared<session::MeasurementSet>();
   set->origin = "test.csv";
   set->fingers = 3;
   DiagnosisInput input;
   for (int o = 0; o < objects; ++o) {
     set->objects.push_back("wedge" + std::to_string(o));
     input.surfaces[set->objects[o]] = WedgeSurface();
-    Plan plan;
-    plan.kind = Plan::Kind::kFaces;
+    touch::Plan plan;
+    plan.kind = touch::Plan::Kind::kFaces;
     plan.faces.samples_per_face = poses_a_face;
     plan.faces.rounds = rounds;
     plan.touch_interval_s = 10;
@@ -69,4 +70,4 @@ inline DiagnosisInput MakePoseFreeInput(const std::shared_ptr<const Model>& mode
   return input;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

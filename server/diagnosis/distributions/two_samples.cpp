@@ -8,7 +8,7 @@
 #include "server/base/units.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 bool Complete(const double* times, int fingers) {
@@ -87,11 +87,13 @@ std::vector<TouchStatistic> TouchStatistics(const std::vector<double>& time_s, i
   const bool three = fingers == 3;
   if (three) list.push_back({kCurvatureStatistic, "1/m", {}});
   list.push_back(
-      {absl::StrCat(FingerName(fingers - 1, fingers), " after ", FingerName(0, fingers)), "us", {}});
+      {absl::StrCat(model::FingerName(fingers - 1, fingers), " after ", model::FingerName(0, fingers)),
+       "us",
+       {}});
   if (fingers > 2) list.push_back({"second after first", "us", {}});
   const size_t fractions = list.size();
   for (int i = 0; i < fingers; ++i)
-    list.push_back({absl::StrCat("finger ", FingerName(i, fingers), " first"), "", {}});
+    list.push_back({absl::StrCat("finger ", model::FingerName(i, fingers), " first"), "", {}});
 
   std::vector<double> sorted(fingers);
   for (size_t at = 0; at + fingers <= time_s.size(); at += fingers) {
@@ -110,4 +112,4 @@ std::vector<TouchStatistic> TouchStatistics(const std::vector<double>& time_s, i
   return list;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

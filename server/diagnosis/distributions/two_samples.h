@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 
 // Touches as points: only differences between a touch's times are known, so n times become n - 1 numbers,
 // their orthonormal contrasts (Helmert's). Euclidean distances between points are those between the times
@@ -46,4 +46,4 @@ struct TouchStatistic {
 std::vector<TouchStatistic> TouchStatistics(const std::vector<double>& time_s, int fingers, double speed_m_s,
                                             double spacing_m);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

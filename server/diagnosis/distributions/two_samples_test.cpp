@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::diagnosis::distributions {
 namespace {
 
 TEST(EnergyDistance, IsZeroForEqualSamplesAndTheClosedFormForTwoPoints) {
@@ -28,4 +28,4 @@ TEST(KolmogorovDistance, IsTheLargestGapWithTiesOnBothSides) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::distributions

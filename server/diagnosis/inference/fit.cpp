@@ -7,7 +7,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr double kStep = 0.02;  // of a parameter's scale, for derivatives
@@ -185,4 +185,4 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization star
   return fit;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -14,7 +14,7 @@
 #include "server/diagnosis/inference/observation_model.h"
 #include "server/diagnosis/inference/parameterization.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // What is fitted to: shared by all fits of a diagnosis.
 struct Experiment {
@@ -47,4 +47,4 @@ inline constexpr int kMaxIterations = 10;
 absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start,
                              int max_iterations = kMaxIterations);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -8,7 +8,7 @@
 #include "server/diagnosis/inference/linear_test_model.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr double kSigma = 0.005;   // of the rows
@@ -26,8 +26,8 @@ class FitTest : public ::testing::Test {
     experiment.likelihood = likelihood.get();
   }
   Parameterization Free(const std::vector<std::string>& effects, bool per_object = false) const {
-    Parameterization model(NominalModel(), rows.groups());
-    for (const std::string& effect : effects) model.Add(Catalogue().Find(effect), per_object);
+    Parameterization model(model::NominalModel(), rows.groups());
+    for (const std::string& effect : effects) model.Add(effects::Catalogue().Find(effect), per_object);
     return model;
   }
   LinearTestModel rows;
@@ -134,4 +134,4 @@ TEST_F(FitTest, HeldOutErrorSeesThatGroupsDisagree) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

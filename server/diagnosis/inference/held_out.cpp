@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr int kFolds = 5;  // of blocks
@@ -51,4 +51,4 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
   return std::sqrt(sum / n);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

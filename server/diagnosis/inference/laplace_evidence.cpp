@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr double kVisible = 10;  // squared scale over standard error from where a direction counts as visible
@@ -171,4 +171,4 @@ LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
   return best;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

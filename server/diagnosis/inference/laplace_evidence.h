@@ -9,7 +9,7 @@
 #include "server/diagnosis/inference/likelihood.h"
 #include "server/diagnosis/inference/parameterization.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // What the data say of one model with free parameters. Logs in nats, comparable between models of one set of rows.
 struct LaplaceEvidence {
@@ -36,4 +36,4 @@ std::vector<Eigen::MatrixXd> Grams(const Likelihood& likelihood, const Likelihoo
 // What the prior says of values: Cauchy round what changes nothing, ten times as wide as rigs usually show.
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 // Correlation lengths over the longest side of the object, and bump sizes (as rows) over sigma.
@@ -228,4 +228,4 @@ Eigen::VectorXd Likelihood::FieldMean(const Columns& r, int s) const {
   return mean;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -17,7 +17,7 @@
 #include "server/base/thread_pool.h"
 #include "server/diagnosis/inference/smooth_error.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // One hypothesis about the smooth error.
 struct SurfaceErrorHypothesis {
@@ -79,4 +79,4 @@ class Likelihood {
   std::vector<SurfaceErrorHypothesis> hypotheses_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

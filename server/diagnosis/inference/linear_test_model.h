@@ -8,7 +8,7 @@
 #include "server/base/random.h"
 #include "server/diagnosis/inference/observation_model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // predicted[r] = sum over the model's effects of column[r] * (v + bend * v^2), v the effect's first value, SI.
 class LinearTestModel : public ObservationModel {
@@ -31,9 +31,9 @@ class LinearTestModel : public ObservationModel {
     return first;
   }
 
-  absl::StatusOr<std::vector<double>> Predict(const Model& model) const override {
+  absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
     std::vector<double> predicted(rows(), 0.0);
-    for (const EffectInstance& instance : model.effects) {
+    for (const model::EffectInstance& instance : model.effects) {
       const auto column = columns.find(instance.effect->name);
       if (column == columns.end()) continue;
       for (int r = 0; r < rows(); ++r) {
@@ -68,4 +68,4 @@ class LinearTestModel : public ObservationModel {
   std::vector<std::string> names_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

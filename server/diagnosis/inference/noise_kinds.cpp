@@ -6,7 +6,7 @@
 
 #include "server/diagnosis/inference/noise_likelihood.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr int kMaxGroups = 1500;            // that a shape is judged on
@@ -297,4 +297,4 @@ NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof) {
   return found;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

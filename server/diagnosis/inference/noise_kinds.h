@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/inference/noise_likelihood.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // Readings of one sensor that should have been alike.
 struct RepeatedReading {
@@ -42,4 +42,4 @@ struct NoiseFindings {
 // `effective_dof`: degrees of freedom that the fit and the smooth error have used up. Large sets are thinned.
 NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -6,7 +6,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr int kNodes = 20;     // per reading, of the integral over the common shift
@@ -137,4 +137,4 @@ double OutlierProbability(const ReadingGroup& group, const NoiseModel& model) {
   return 1 - std::min(1.0, std::exp(clean - NoiseLogLikelihood({group}, model)));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // Readings that share an unknown shift: the fingers of one touch that report.
 struct ReadingGroup {
@@ -33,4 +33,4 @@ double ProfileSigma(const std::vector<ReadingGroup>& groups, NoiseModel* model);
 // Probability that a reading of the group is an outlier, under a mixture.
 double OutlierProbability(const ReadingGroup& group, const NoiseModel& model);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -10,7 +10,7 @@
 
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // Rows are differences that noise leaves independent, of equal variance. Rows of one group (an object) follow
 // each other; a group's smooth error and its own values concern its rows only. Methods are const and may be
@@ -28,7 +28,7 @@ class ObservationModel {
 
   // What the deterministic part of a model expects, one number per reading; NaN where it expects none. Only the
   // methods below read it.
-  virtual absl::StatusOr<std::vector<double>> Predict(const Model& model) const = 0;
+  virtual absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const = 0;
   // Measured minus predicted, as rows.
   virtual Eigen::VectorXd Residual(const std::vector<double>& predicted) const = 0;
   // `moved` minus `predicted`, as rows, for a derivative: readings that jump between the two (another face is
@@ -37,4 +37,4 @@ class ObservationModel {
                                  const std::vector<double>& moved) const = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // One entry of a parameter, in the unit of files.
 struct ParameterEstimate {
@@ -19,4 +19,4 @@ struct ParameterEstimate {
   std::optional<double> before;  // of an effect that the model has: the value there
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

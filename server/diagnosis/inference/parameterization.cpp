@@ -8,12 +8,12 @@
 #include "server/model/finger_name.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
 // Directions in which the entries of one parameter may move: the unit vectors, or, where the entries sum to
 // zero, an orthonormal basis of that plane (Helmert's).
-std::vector<std::vector<double>> Directions(const ParameterInfo& parameter, int count) {
+std::vector<std::vector<double>> Directions(const model::ParameterInfo& parameter, int count) {
   std::vector<std::vector<double>> directions;
   if (!parameter.sum_zero) {
     for (int j = 0; j < count; ++j) {
@@ -33,19 +33,19 @@ std::vector<std::vector<double>> Directions(const ParameterInfo& parameter, int 
 
 }  // namespace
 
-std::string NameOf(const Effect& effect) {
+std::string NameOf(const model::Effect& effect) {
   return effect.formula ? "formula " + effect.formula->name : effect.name;
 }
 
-std::string EntryName(const ParameterInfo& parameter, int entry, int fingers) {
-  if (parameter.arity == Arity::kVector3) return std::string(1, "xyz"[entry]);
-  if (parameter.arity == Arity::kPerFinger) return FingerName(entry, fingers);
+std::string EntryName(const model::ParameterInfo& parameter, int entry, int fingers) {
+  if (parameter.arity == model::Arity::kVector3) return std::string(1, "xyz"[entry]);
+  if (parameter.arity == model::Arity::kPerFinger) return model::FingerName(entry, fingers);
   return "";
 }
 
-Parameterization::Parameterization(Model base, std::vector<std::string> objects)
+Parameterization::Parameterization(model::Model base, std::vector<std::string> objects)
     : base_(std::move(base)), objects_(std::move(objects)) {
-  for (EffectInstance& instance : base_.effects)
+  for (model::EffectInstance& instance : base_.effects)
     if (instance.per_object)
       for (const std::string& object : objects_) instance.object_values.emplace(object, instance.values);
 }
@@ -57,13 +57,13 @@ bool Parameterization::IsFree(int effect) const {
 
 void Parameterization::Free(int index, bool refit) {
   if (IsFree(index)) return;
-  const EffectInstance& instance = base_.effects[index];
-  const Effect& effect = *instance.effect;
+  const model::EffectInstance& instance = base_.effects[index];
+  const model::Effect& effect = *instance.effect;
   const int fingers = base_.fingers;
   for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p) {
-    const ParameterInfo& parameter = effect.parameters[p];
+    const model::ParameterInfo& parameter = effect.parameters[p];
     const double si = SiFactor(parameter.unit);
-    const int count = parameter.Count(fingers), offset = ValueOffset(effect, p, fingers);
+    const int count = parameter.Count(fingers), offset = model::ValueOffset(effect, p, fingers);
     for (const std::vector<double>& direction : Directions(parameter, count)) {
       FreeParameter c;
       c.effect = index;
@@ -102,8 +102,8 @@ void Parameterization::Free(int index, bool refit) {
   }
 }
 
-void Parameterization::Add(std::shared_ptr<const Effect> effect, bool per_object) {
-  EffectInstance instance;
+void Parameterization::Add(std::shared_ptr<const model::Effect> effect, bool per_object) {
+  model::EffectInstance instance;
   instance.values = effect->NeutralValues(base_.fingers);
   instance.per_object = per_object || effect->always_per_object;
   instance.effect = std::move(effect);
@@ -129,7 +129,7 @@ Eigen::VectorXd Parameterization::Start() const {
   Eigen::VectorXd point(size());
   for (int i = 0; i < size(); ++i) {
     const FreeParameter& c = parameters_[i];
-    const EffectInstance& instance = base_.effects[c.effect];
+    const model::EffectInstance& instance = base_.effects[c.effect];
     const std::vector<double>& values =
         c.object.empty() ? instance.values : instance.object_values.at(c.object);
     double sum = 0;  // the weights of one parameter's coordinates are orthonormal
@@ -145,11 +145,11 @@ Eigen::VectorXd Parameterization::Clip(Eigen::VectorXd point) const {
   return point;
 }
 
-Model Parameterization::At(const Eigen::VectorXd& point) const {
-  Model model = base_;
+model::Model Parameterization::At(const Eigen::VectorXd& point) const {
+  model::Model model = base_;
   // Free values are the sum of their coordinates.
   const auto values_of = [&](const FreeParameter& c) -> std::vector<double>& {
-    EffectInstance& instance = model.effects[c.effect];
+    model::EffectInstance& instance = model.effects[c.effect];
     return c.object.empty() ? instance.values : instance.object_values.at(c.object);
   };
   for (const FreeParameter& c : parameters_)
@@ -162,9 +162,9 @@ Model Parameterization::At(const Eigen::VectorXd& point) const {
     for (size_t j = 0; j < c.weights.size(); ++j) values[j] += c.weights[j] * value;
   }
   for (const FreeParameter& c : parameters_) {
-    const Effect& effect = *model.effects[c.effect].effect;
-    const ParameterInfo& parameter = effect.parameters[c.parameter];
-    const int offset = ValueOffset(effect, c.parameter, model.fingers);
+    const model::Effect& effect = *model.effects[c.effect].effect;
+    const model::ParameterInfo& parameter = effect.parameters[c.parameter];
+    const int offset = model::ValueOffset(effect, c.parameter, model.fingers);
     const double si = SiFactor(parameter.unit);
     for (int j = 0; j < parameter.Count(model.fingers); ++j) {
       double& value = values_of(c)[offset + j];
@@ -181,16 +181,16 @@ void Parameterization::MoveTo(const Eigen::VectorXd& point) {
 std::vector<ParameterEstimate> Parameterization::Describe(int index, const Eigen::VectorXd& point,
                                                           const Eigen::MatrixXd& covariance) const {
   std::vector<ParameterEstimate> described;
-  const Model model = At(point);
-  const EffectInstance& instance = model.effects[index];
-  const Effect& effect = *instance.effect;
+  const model::Model model = At(point);
+  const model::EffectInstance& instance = model.effects[index];
+  const model::Effect& effect = *instance.effect;
   std::vector<std::string> objects = {""};
   if (instance.per_object) objects = objects_;
   for (const std::string& object : objects) {
     const std::vector<double>& values = object.empty() ? instance.values : instance.object_values.at(object);
     for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p) {
-      const ParameterInfo& parameter = effect.parameters[p];
-      const int offset = ValueOffset(effect, p, model.fingers);
+      const model::ParameterInfo& parameter = effect.parameters[p];
+      const int offset = model::ValueOffset(effect, p, model.fingers);
       for (int j = 0; j < parameter.Count(model.fingers); ++j) {
         // The entry's variance through the coordinates that move it.
         Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size());
@@ -218,4 +218,4 @@ std::vector<ParameterEstimate> Parameterization::Describe(int index, const Eigen
   return described;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

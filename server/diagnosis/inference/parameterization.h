@@ -10,7 +10,7 @@
 #include "server/diagnosis/inference/parameter_estimate.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // One direction in which values may move.
 struct FreeParameter {
@@ -29,17 +29,17 @@ class Parameterization {
  public:
   Parameterization() = default;
   // Nothing is free yet; values of per-object effects are spelled out for `objects`.
-  Parameterization(Model base, std::vector<std::string> objects);
+  Parameterization(model::Model base, std::vector<std::string> objects);
 
   // Sets every value of effect `index` free. Values that start where a sum of zero binds them stay bound.
   // `refit`: the model had the effect; the prior is around its values.
   void Free(int index, bool refit);
   // Appends an effect at values that change nothing (or, for formulas, at those given) and sets it free.
-  void Add(std::shared_ptr<const Effect> effect, bool per_object);
+  void Add(std::shared_ptr<const model::Effect> effect, bool per_object);
   // Takes effect `index` out, with its free parameters.
   Parameterization Without(int index) const;
 
-  const Model& base() const { return base_; }
+  const model::Model& base() const { return base_; }
   const std::vector<FreeParameter>& parameters() const { return parameters_; }
   int size() const { return static_cast<int>(parameters_.size()); }
   bool IsFree(int effect) const;
@@ -47,7 +47,7 @@ class Parameterization {
   // The point where the base stands.
   Eigen::VectorXd Start() const;
   // The model at a point; values are clipped to their bounds.
-  Model At(const Eigen::VectorXd& point) const;
+  model::Model At(const Eigen::VectorXd& point) const;
   // The same as a new base: fits continue from there.
   void MoveTo(const Eigen::VectorXd& point);
   Eigen::VectorXd Clip(Eigen::VectorXd point) const;
@@ -57,16 +57,16 @@ class Parameterization {
                                           const Eigen::MatrixXd& covariance) const;
 
  private:
-  Model base_;
+  model::Model base_;
   std::vector<std::string> objects_;
   std::vector<FreeParameter> parameters_;
   int shapes_ = 0;
 };
 
 // "tip_radius", or "formula lead_screw".
-std::string NameOf(const Effect& effect);
+std::string NameOf(const model::Effect& effect);
 
 // "l", "x", or empty: which entry of a parameter.
-std::string EntryName(const ParameterInfo& parameter, int entry, int fingers);
+std::string EntryName(const model::ParameterInfo& parameter, int entry, int fingers);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -4,49 +4,49 @@
 
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 namespace {
 
-Model With(const std::string& effect, const std::vector<std::string>& values) {
-  return *AddEffect(NominalModel(), effect, values, Catalogue());
+model::Model With(const std::string& effect, const std::vector<std::string>& values) {
+  return *model::AddEffect(model::NominalModel(), effect, values, effects::Catalogue());
 }
 
 TEST(Parameterization, StandsWhereItsBaseStands) {
   Parameterization model(With("finger_length", {"offset_mm=0.3,-0.1,-0.2"}), {"lat00"});
   model.Free(0, true);
   EXPECT_EQ(model.size(), 2);  // three values that sum to zero
-  const Model again = model.At(model.Start());
+  const model::Model again = model.At(model.Start());
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(again.effects[0].values[i], model.base().effects[0].values[i], 1e-12);
 }
 
 TEST(Parameterization, KeepsTheSumOfZeroWhereverItMoves) {
-  Parameterization model(NominalModel(), {});
-  model.Add(Catalogue().Find("channel_latency"), false);
-  const Model moved = model.At(Eigen::Vector2d(0.001, -0.004));
+  Parameterization model(model::NominalModel(), {});
+  model.Add(effects::Catalogue().Find("channel_latency"), false);
+  const model::Model moved = model.At(Eigen::Vector2d(0.001, -0.004));
   EXPECT_NEAR(moved.effects[0].values[0] + moved.effects[0].values[1] + moved.effects[0].values[2], 0, 1e-15);
 }
 
 TEST(Parameterization, GivesEveryObjectItsOwnValues) {
-  Parameterization model(NominalModel(), {"a", "b"});
-  model.Add(Catalogue().Find("object_scale"), true);
+  Parameterization model(model::NominalModel(), {"a", "b"});
+  model.Add(effects::Catalogue().Find("object_scale"), true);
   ASSERT_EQ(model.size(), 2);
-  const Model moved = model.At(Eigen::Vector2d(0.01, -0.02));
+  const model::Model moved = model.At(Eigen::Vector2d(0.01, -0.02));
   EXPECT_NEAR(moved.effects[0].ValuesFor("a")[0], 0.01, 1e-15);
   EXPECT_NEAR(moved.effects[0].ValuesFor("b")[0], -0.02, 1e-15);
 }
 
 TEST(Parameterization, HoldsValuesWithinTheirBounds) {
-  Parameterization model(NominalModel(), {});
-  model.Add(Catalogue().Find("tip_radius"), false);
+  Parameterization model(model::NominalModel(), {});
+  model.Add(effects::Catalogue().Find("tip_radius"), false);
   Eigen::VectorXd below(1);
   below << -1;
   EXPECT_EQ(model.At(below).effects[0].values[0], 0);
 }
 
 TEST(Parameterization, TurnsTheRampsInfinityIntoZero) {
-  Parameterization model(NominalModel(), {});
-  model.Add(Catalogue().Find("acceleration_ramp"), false);
+  Parameterization model(model::NominalModel(), {});
+  model.Add(effects::Catalogue().Find("acceleration_ramp"), false);
   EXPECT_NEAR(model.Start()[0], 0, 1e-2);
   Eigen::VectorXd point(1);
   point << 50;  // s^2 / m
@@ -54,8 +54,8 @@ TEST(Parameterization, TurnsTheRampsInfinityIntoZero) {
 }
 
 TEST(Parameterization, TellsValuesWithErrorsInTheUnitsOfFiles) {
-  Parameterization model(NominalModel(), {});
-  model.Add(Catalogue().Find("tip_radius"), false);
+  Parameterization model(model::NominalModel(), {});
+  model.Add(effects::Catalogue().Find("tip_radius"), false);
   Eigen::VectorXd point(1);
   point << 1.5e-3;
   const auto values = model.Describe(0, point, Eigen::MatrixXd::Constant(1, 1, 1e-10));
@@ -67,13 +67,13 @@ TEST(Parameterization, TellsValuesWithErrorsInTheUnitsOfFiles) {
 }
 
 TEST(Parameterization, WithoutAnEffectKeepsTheOthersParameters) {
-  Parameterization model(NominalModel(), {});
-  model.Add(Catalogue().Find("tool_tilt"), false);
-  model.Add(Catalogue().Find("tip_radius"), false);
+  Parameterization model(model::NominalModel(), {});
+  model.Add(effects::Catalogue().Find("tool_tilt"), false);
+  model.Add(effects::Catalogue().Find("tip_radius"), false);
   const Parameterization rest = model.Without(0);
   ASSERT_EQ(rest.size(), 1);
   EXPECT_EQ(rest.base().effects[rest.parameters()[0].effect].effect->name, "tip_radius");
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

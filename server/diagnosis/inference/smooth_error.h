@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace touchstone {
+namespace touchstone::diagnosis::inference {
 
 // A bump of height h at `position_m` adds h * row_per_m[j] to row first_row + j.
 struct SmoothErrorSite {
@@ -21,4 +21,4 @@ struct SmoothErrorGeometry {
   double mean_row_per_m = 0;  // mean size of a reading's response: scale of amplitudes
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::inference

@@ -1,6 +1,6 @@
 #include "server/diagnosis/report/design_messages.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 void WriteVector(const Eigen::Vector3d& vector, v1::Vector3* message) {
@@ -11,7 +11,7 @@ void WriteVector(const Eigen::Vector3d& vector, v1::Vector3* message) {
 
 }  // namespace
 
-void WriteProposedTouch(const ProposedTouch& proposed, v1::Report* report) {
+void WriteProposedTouch(const design::ProposedTouch& proposed, v1::Report* report) {
   v1::ProposedTouch* message = report->add_next_touches();
   message->set_object(proposed.object);
   message->set_purpose(proposed.purpose);
@@ -26,4 +26,4 @@ void WriteProposedTouch(const ProposedTouch& proposed, v1::Report* report) {
   for (const auto& [name, value] : proposed.touch.covariates) (*touch->mutable_covariates())[name] = value;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -4,9 +4,9 @@
 #include "server/diagnosis/design/propose.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 
 // Appends to next_touches.
-void WriteProposedTouch(const ProposedTouch& proposed, v1::Report* report);
+void WriteProposedTouch(const design::ProposedTouch& proposed, v1::Report* report);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

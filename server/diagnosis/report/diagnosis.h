@@ -12,36 +12,36 @@
 #include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/touches/data_summary.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 
 // What was compared as distributions, and how it came out.
 struct PoseFreeDiagnosis {
   DiagnosisInput input;
-  PoseFreeComparison comparison;
+  distributions::PoseFreeComparison comparison;
 };
 
 struct Diagnosis {
-  Verdict verdict = Verdict::kNone;
+  selection::Verdict verdict = selection::Verdict::kNone;
   std::string model_name, model_hash;  // of the initial model
-  DataSummary data;
+  touches::DataSummary data;
 
   // How wrong; none of them if no touch could be used.
-  std::optional<NoiseFloor> noise_floor;
-  std::optional<Quality> initial;  // the model as it was given
-  std::optional<Quality> final;    // after all steps and refits
-  double reducible_share = 0;      // of the mean square error that is not noise, 0 to 1
+  std::optional<selection::NoiseFloor> noise_floor;
+  std::optional<selection::Quality> initial;  // the model as it was given
+  std::optional<selection::Quality> final;    // after all steps and refits
+  double reducible_share = 0;                 // of the mean square error that is not noise, 0 to 1
 
   // Where.
-  ResidualSummary residuals;
+  residuals::ResidualSummary residuals;
 
   // Why, and what to do.
-  std::vector<RefittedEffect> refitted;
-  std::vector<LadderStep> steps;
-  std::vector<ConfoundedEffects> confounded;
-  std::vector<RankedCandidate> candidates;
-  std::optional<UnexplainedRest> unexplained;
+  std::vector<selection::RefittedEffect> refitted;
+  std::vector<selection::LadderStep> steps;
+  std::vector<selection::ConfoundedEffects> confounded;
+  std::vector<selection::RankedCandidate> candidates;
+  std::optional<selection::UnexplainedRest> unexplained;
   std::string improved_model_yaml, improved_model_hash;  // empty if nothing changed
-  std::vector<ProposedTouch> next_touches;
+  std::vector<design::ProposedTouch> next_touches;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this
@@ -50,4 +50,4 @@ struct Diagnosis {
   std::optional<PoseFreeDiagnosis> pose_free;  // of a set without poses, instead of all the rest
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

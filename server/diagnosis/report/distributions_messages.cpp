@@ -9,18 +9,19 @@
 #include "server/diagnosis/report/residuals_messages.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr char kNoiseEffect[] = "gaussian_noise";
 
-std::string PInWords(const PoseFreeComparison& comparison) {
+std::string PInWords(const distributions::PoseFreeComparison& comparison) {
   return absl::StrCat("(p = ", absl::StrFormat("%.2g", comparison.p_value), ")");
 }
 
-void WriteRows(const MeasurementSet& set, const PoseFreeRows& rows, v1::Report* report) {
+void WriteRows(const session::MeasurementSet& set, const distributions::PoseFreeRows& rows,
+               v1::Report* report) {
   report->set_touches(rows.compared);
-  for (int i = 0; i < set.fingers; ++i) report->add_fingers(FingerName(i, set.fingers));
+  for (int i = 0; i < set.fingers; ++i) report->add_fingers(model::FingerName(i, set.fingers));
   v1::DataSummary* data = report->mutable_data();
   data->set_rows(set.size());
   data->set_origin(set.origin);
@@ -40,7 +41,7 @@ void WriteRows(const MeasurementSet& set, const PoseFreeRows& rows, v1::Report* 
   }
 }
 
-void WriteNoiseFloor(const RoundNoise& noise, v1::Report* report) {
+void WriteNoiseFloor(const distributions::RoundNoise& noise, v1::Report* report) {
   report->set_noise_floor_us(noise.sigma_s * kMicrosecondsPerSecond);
   v1::NoiseFloor* floor = report->mutable_noise_floor();
   floor->set_sigma_us(noise.sigma_s * kMicrosecondsPerSecond);
@@ -50,14 +51,14 @@ void WriteNoiseFloor(const RoundNoise& noise, v1::Report* report) {
   floor->set_from_repeats(true);
 }
 
-void WriteTest(const PoseFreeComparison& comparison, v1::Report* report) {
+void WriteTest(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
   report->mutable_initial()->set_lack_of_fit_p(comparison.p_value);
   v1::DistributionComparison* distributions = report->mutable_distributions();
   distributions->set_energy_distance(comparison.energy_distance_s * kMicrosecondsPerSecond);
   distributions->set_p(comparison.energy_p_value);
   distributions->set_plan(comparison.plan);
   distributions->set_simulated_touches(comparison.simulated_touches);
-  for (const StatisticComparison& statistic : comparison.statistics) {
+  for (const distributions::StatisticComparison& statistic : comparison.statistics) {
     v1::StatisticTest* test = distributions->add_statistics();
     test->set_name(statistic.name);
     test->set_unit(statistic.unit);
@@ -65,12 +66,13 @@ void WriteTest(const PoseFreeComparison& comparison, v1::Report* report) {
     test->set_simulated(statistic.simulated);
     test->set_p(statistic.p_value);
   }
-  for (const CompatibleEffect& effect : comparison.compatible_effects)
+  for (const distributions::CompatibleEffect& effect : comparison.compatible_effects)
     distributions->add_compatible_effects(effect.effect);
-  for (const ComparedHistogram& histogram : comparison.histograms) WriteHistogram(histogram, report);
+  for (const residuals::ComparedHistogram& histogram : comparison.histograms)
+    WriteHistogram(histogram, report);
 }
 
-void WriteWarnings(const PoseFreeComparison& comparison, v1::Report* report) {
+void WriteWarnings(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
   report->add_warnings(
       "no poses: times are compared as distributions, which is about two orders weaker than touch by touch; "
       "where on the object the model fails, and which effect is missing, cannot be known");
@@ -87,7 +89,7 @@ void WriteWarnings(const PoseFreeComparison& comparison, v1::Report* report) {
                                       " times the simulated ones: is their unit us, and the mesh's mm?"));
 }
 
-void WriteNoiseParameter(const RoundNoise& noise, v1::ParameterValue* value) {
+void WriteNoiseParameter(const distributions::RoundNoise& noise, v1::ParameterValue* value) {
   value->set_name("sigma_us");
   value->set_unit("us");
   value->set_value(noise.sigma_s * kMicrosecondsPerSecond);
@@ -98,13 +100,13 @@ void WriteNoiseParameter(const RoundNoise& noise, v1::ParameterValue* value) {
 
 // The noise that the rounds show is known for certain, whatever else is wrong: a step or a refit. Returns the
 // sentence about it.
-std::string WriteNoiseChange(const PoseFreeComparison& comparison, v1::Report* report) {
-  if (comparison.noise_change == NoiseChange::kNone) return "";
-  report->set_improved_model_yaml(FormatModel(*comparison.model));
+std::string WriteNoiseChange(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
+  if (comparison.noise_change == distributions::NoiseChange::kNone) return "";
+  report->set_improved_model_yaml(model::FormatModel(*comparison.model));
   report->set_improved_model_hash(comparison.model->Hash());
-  const bool is_new = comparison.noise_change == NoiseChange::kNewEffect;
+  const bool is_new = comparison.noise_change == distributions::NoiseChange::kNewEffect;
   if (is_new) {
-    const auto effect = Catalogue().Find(kNoiseEffect);
+    const auto effect = effects::Catalogue().Find(kNoiseEffect);
     v1::Step* step = report->add_steps();
     step->set_effect(kNoiseEffect);
     step->set_probability(1);
@@ -124,9 +126,9 @@ std::string WriteNoiseChange(const PoseFreeComparison& comparison, v1::Report* r
       is_new ? " per finger; the model has no noise. " : " per finger, not as the model says. ");
 }
 
-std::string CompatibleEffectsInWords(const std::vector<CompatibleEffect>& compatible) {
+std::string CompatibleEffectsInWords(const std::vector<distributions::CompatibleEffect>& compatible) {
   std::vector<std::string> words;
-  for (const CompatibleEffect& effect : compatible)
+  for (const distributions::CompatibleEffect& effect : compatible)
     words.push_back(absl::StrCat(effect.effect, " (", effect.values, ")"));
   if (words.empty())
     return "No single effect of the catalogue would make them alike: there may be several, or another "
@@ -138,16 +140,17 @@ std::string CompatibleEffectsInWords(const std::vector<CompatibleEffect>& compat
                       "; which of them it is, if it is one, times alone cannot tell. ");
 }
 
-void WriteDiagnosis(const PoseFreeComparison& comparison, v1::Report* report) {
+void WriteDiagnosis(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
   const std::string noise_words = WriteNoiseChange(comparison, report);
   report->mutable_final()->set_lack_of_fit_p(comparison.p_value);
   if (comparison.compatible) {
-    report->set_verdict(comparison.noise_change == NoiseChange::kNewEffect ? v1::Report::MISSING_EFFECTS
-                                                                           : v1::Report::ADEQUATE);
+    report->set_verdict(comparison.noise_change == distributions::NoiseChange::kNewEffect
+                            ? v1::Report::MISSING_EFFECTS
+                            : v1::Report::ADEQUATE);
     report->set_summary(absl::StrCat(
         noise_words, "As distributions, the measured times and those of the model ",
-        comparison.noise_change == NoiseChange::kNone ? "" : "with that noise ", "do not differ ",
-        PInWords(comparison), ". That says little: without poses only large errors show."));
+        comparison.noise_change == distributions::NoiseChange::kNone ? "" : "with that noise ",
+        "do not differ ", PInWords(comparison), ". That says little: without poses only large errors show."));
     return;
   }
   report->set_verdict(v1::Report::UNEXPLAINED);
@@ -159,7 +162,7 @@ void WriteDiagnosis(const PoseFreeComparison& comparison, v1::Report* report) {
 
 }  // namespace
 
-v1::Report PoseFreeReport(const DiagnosisInput& input, const PoseFreeComparison& comparison) {
+v1::Report PoseFreeReport(const DiagnosisInput& input, const distributions::PoseFreeComparison& comparison) {
   v1::Report report;
   report.set_model_name(input.model->name);
   report.set_model_hash(input.model->Hash());
@@ -177,4 +180,4 @@ v1::Report PoseFreeReport(const DiagnosisInput& input, const PoseFreeComparison&
   return report;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

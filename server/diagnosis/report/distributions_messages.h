@@ -4,9 +4,9 @@
 #include "server/diagnosis/distributions/pose_free.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 
 // The whole report but version and duration. `input` is what was compared.
-v1::Report PoseFreeReport(const DiagnosisInput& input, const PoseFreeComparison& comparison);
+v1::Report PoseFreeReport(const DiagnosisInput& input, const distributions::PoseFreeComparison& comparison);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -5,23 +5,23 @@
 
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
 
-std::shared_ptr<const Model> NoisyModel() {
-  auto model = ParseModel(
+std::shared_ptr<const model::Model> NoisyModel() {
+  auto model = model::ParseModel(
       "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
       "effects:\n  - gaussian_noise: {sigma_us: 5000}\n",
-      "test", Catalogue());
+      "test", effects::Catalogue());
   EXPECT_TRUE(model.ok()) << model.status();
-  return std::make_shared<const Model>(*std::move(model));
+  return std::make_shared<const model::Model>(*std::move(model));
 }
 
 DiagnosisInput Input() {
-  auto set = std::make_shared<MeasurementSet>();
+  auto set = std::make_shared<session::MeasurementSet>();
   set->origin = "test.csv";
   set->fingers = 3;
   set->objects = {"wedge"};
@@ -33,11 +33,11 @@ DiagnosisInput Input() {
 }
 
 // A model that the rounds show to be right.
-PoseFreeComparison Adequate() {
-  PoseFreeComparison comparison;
+distributions::PoseFreeComparison Adequate() {
+  distributions::PoseFreeComparison comparison;
   comparison.rows.compared = 72;
   comparison.noise_is_known = true;
-  comparison.noise = RoundNoise{0.005, 0.0001, 0.0048, 0.0052, 96};
+  comparison.noise = distributions::RoundNoise{0.005, 0.0001, 0.0048, 0.0052, 96};
   comparison.model = NoisyModel();
   comparison.model_has_noise = true;
   comparison.p_value = 0.4;
@@ -58,7 +58,7 @@ TEST(PoseFreeReport, SaysWhatCannotBeKnown) {
 }
 
 TEST(PoseFreeReport, NamesCompatibleEffectsAndNoCulprit) {
-  PoseFreeComparison comparison = Adequate();
+  distributions::PoseFreeComparison comparison = Adequate();
   comparison.compatible = false;
   comparison.compatible_effects = {{"finger_length", "offset_mm = [1, -0.5, -0.5]", 0.6},
                                    {"channel_latency", "latency_us = [5e+04, 0, 0]", 0.4}};
@@ -71,8 +71,8 @@ TEST(PoseFreeReport, NamesCompatibleEffectsAndNoCulprit) {
 }
 
 TEST(PoseFreeReport, MakesNewNoiseAStepAndChangedNoiseARefit) {
-  PoseFreeComparison comparison = Adequate();
-  comparison.noise_change = NoiseChange::kNewEffect;
+  distributions::PoseFreeComparison comparison = Adequate();
+  comparison.noise_change = distributions::NoiseChange::kNewEffect;
   v1::Report report = PoseFreeReport(Input(), comparison);
   EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
   ASSERT_EQ(report.steps_size(), 1);
@@ -80,7 +80,7 @@ TEST(PoseFreeReport, MakesNewNoiseAStepAndChangedNoiseARefit) {
   EXPECT_DOUBLE_EQ(report.steps(0).parameters(0).value(), 5000);
   EXPECT_THAT(report.improved_model_yaml(), HasSubstr("gaussian_noise"));
 
-  comparison.noise_change = NoiseChange::kNewValue;
+  comparison.noise_change = distributions::NoiseChange::kNewValue;
   report = PoseFreeReport(Input(), comparison);
   EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE);
   ASSERT_EQ(report.refitted_size(), 1);
@@ -88,13 +88,13 @@ TEST(PoseFreeReport, MakesNewNoiseAStepAndChangedNoiseARefit) {
 }
 
 TEST(PoseFreeReport, AsksForTheUnitOfTimesOfAnAbsurdSize) {
-  PoseFreeComparison comparison = Adequate();
+  distributions::PoseFreeComparison comparison = Adequate();
   comparison.size_ratio = 1000;
   EXPECT_THAT(PoseFreeReport(Input(), comparison).warnings(), Contains(HasSubstr("is their unit us")));
 }
 
 TEST(PoseFreeReport, WithoutADiagnosisHasNoVerdict) {
-  PoseFreeComparison comparison = Adequate();
+  distributions::PoseFreeComparison comparison = Adequate();
   comparison.diagnosed = false;
   const v1::Report report = PoseFreeReport(Input(), comparison);
   EXPECT_EQ(report.verdict(), v1::Report::VERDICT_UNSPECIFIED);
@@ -103,4 +103,4 @@ TEST(PoseFreeReport, WithoutADiagnosisHasNoVerdict) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -3,32 +3,32 @@
 #include "server/base/units.h"
 #include "server/session/measurement_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 double Us(double time_s) {
   return time_s * kMicrosecondsPerSecond;
 }
 
-const char* NameOf(ErrorGroupKind kind) {
+const char* NameOf(residuals::ErrorGroupKind kind) {
   switch (kind) {
-    case ErrorGroupKind::kObject:
+    case residuals::ErrorGroupKind::kObject:
       return "object";
-    case ErrorGroupKind::kFace:
+    case residuals::ErrorGroupKind::kFace:
       return "face";
-    case ErrorGroupKind::kFinger:
+    case residuals::ErrorGroupKind::kFinger:
       return "finger";
-    case ErrorGroupKind::kRound:
+    case residuals::ErrorGroupKind::kRound:
       return "round";
-    case ErrorGroupKind::kTime:
+    case residuals::ErrorGroupKind::kTime:
       return "time";
-    case ErrorGroupKind::kSpeed:
+    case residuals::ErrorGroupKind::kSpeed:
       return "speed";
   }
   return "";
 }
 
-void WriteSlice(const ErrorSlice& slice, v1::Slice* message) {
+void WriteSlice(const residuals::ErrorSlice& slice, v1::Slice* message) {
   message->set_slice(slice.conditions);
   message->set_touches(static_cast<uint32_t>(slice.touches));
   message->set_mean_residual_us(Us(slice.mean_residual_s));
@@ -37,7 +37,7 @@ void WriteSlice(const ErrorSlice& slice, v1::Slice* message) {
   message->set_words(slice.words);
 }
 
-void WriteGroup(const ErrorGroup& group, v1::GroupError* message) {
+void WriteGroup(const residuals::ErrorGroup& group, v1::GroupError* message) {
   message->set_kind(NameOf(group.kind));
   message->set_name(group.name);
   message->set_touches(static_cast<uint32_t>(group.touches));
@@ -46,20 +46,20 @@ void WriteGroup(const ErrorGroup& group, v1::GroupError* message) {
   message->set_share_of_excess_error(group.share_of_excess_error);
 }
 
-void WriteWorstTouch(const WorstTouch& touch, v1::TouchError* message) {
+void WriteWorstTouch(const residuals::WorstTouch& touch, v1::TouchError* message) {
   message->set_touch(touch.touch);
   message->set_object(touch.object);
   message->set_norm_us(Us(touch.norm_s));
   for (const double residual_s : touch.residual_s) message->add_residual_us(Us(residual_s));
 }
 
-void WriteCurve(const ResidualCurve& curve, int fingers, v1::CovariateCurve* message) {
+void WriteCurve(const residuals::ResidualCurve& curve, int fingers, v1::CovariateCurve* message) {
   message->set_covariate(curve.covariate);
   message->set_unit(curve.unit);
   message->set_p(curve.p_value);
-  for (const ResidualCurveBin& bin : curve.bins) {
+  for (const residuals::ResidualCurveBin& bin : curve.bins) {
     v1::CurveBin* bin_message = message->add_bins();
-    bin_message->set_finger(FingerName(bin.finger, fingers));
+    bin_message->set_finger(model::FingerName(bin.finger, fingers));
     bin_message->set_centre(bin.centre);
     bin_message->set_count(static_cast<uint32_t>(bin.touches));
     bin_message->set_mean_residual_us(Us(bin.mean_residual_s));
@@ -68,14 +68,14 @@ void WriteCurve(const ResidualCurve& curve, int fingers, v1::CovariateCurve* mes
   }
 }
 
-void WriteParity(const ParityPoint& point, v1::ParityPoint* message) {
+void WriteParity(const residuals::ParityPoint& point, v1::ParityPoint* message) {
   message->set_simulated_us(Us(point.simulated_s));
   message->set_measured_us(Us(point.measured_s));
   message->set_improved_us(Us(point.improved_s));
   message->set_finger(static_cast<uint32_t>(point.finger));
 }
 
-void WriteSurfacePoint(const SurfaceResidual& point, v1::SurfacePoint* message) {
+void WriteSurfacePoint(const residuals::SurfaceResidual& point, v1::SurfacePoint* message) {
   message->set_object(point.object);
   message->set_x_mm(point.contact_m.x() * kMillimetresPerMetre);
   message->set_y_mm(point.contact_m.y() * kMillimetresPerMetre);
@@ -85,7 +85,7 @@ void WriteSurfacePoint(const SurfaceResidual& point, v1::SurfacePoint* message) 
   message->set_finger(static_cast<uint32_t>(point.finger));
 }
 
-void WriteOutline(const DrawableObject& outline, v1::ObjectOutline* message) {
+void WriteOutline(const residuals::DrawableObject& outline, v1::ObjectOutline* message) {
   message->set_object(outline.object);
   // Vertices are stored, drawn and sent in single precision.
   for (const Eigen::Vector3f& vertex : outline.mesh.vertices_m)
@@ -97,10 +97,10 @@ void WriteOutline(const DrawableObject& outline, v1::ObjectOutline* message) {
 
 }  // namespace
 
-void WriteHistogram(const ComparedHistogram& histogram, v1::Report* report) {
+void WriteHistogram(const residuals::ComparedHistogram& histogram, v1::Report* report) {
   v1::Histogram* message = report->add_histograms();
-  message->set_quantity(histogram.quantity == HistogramQuantity::kDescriptor ? "descriptor_us"
-                                                                             : "curvature_per_m");
+  message->set_quantity(histogram.quantity == residuals::HistogramQuantity::kDescriptor ? "descriptor_us"
+                                                                                        : "curvature_per_m");
   message->set_object(histogram.object);
   *message->mutable_edges() = {histogram.edges.begin(), histogram.edges.end()};
   *message->mutable_measured() = {histogram.measured.begin(), histogram.measured.end()};
@@ -110,17 +110,21 @@ void WriteHistogram(const ComparedHistogram& histogram, v1::Report* report) {
   message->set_p_improved(histogram.p_improved);
 }
 
-void WriteResiduals(const ResidualSummary& residuals, int fingers, v1::Report* report) {
-  for (const ErrorSlice& slice : residuals.slices) WriteSlice(slice, report->add_where());
-  for (const ErrorGroup& group : residuals.grouped.groups) WriteGroup(group, report->add_groups());
+void WriteResiduals(const residuals::ResidualSummary& residuals, int fingers, v1::Report* report) {
+  for (const residuals::ErrorSlice& slice : residuals.slices) WriteSlice(slice, report->add_where());
+  for (const residuals::ErrorGroup& group : residuals.grouped.groups) WriteGroup(group, report->add_groups());
   for (const double bias_s : residuals.grouped.finger_bias_s) report->add_finger_bias_us(Us(bias_s));
-  for (const WorstTouch& touch : residuals.worst_touches) WriteWorstTouch(touch, report->add_worst_touches());
-  for (const ResidualCurve& curve : residuals.curves) WriteCurve(curve, fingers, report->add_curves());
-  for (const ComparedHistogram& histogram : residuals.histograms) WriteHistogram(histogram, report);
-  for (const ParityPoint& point : residuals.parity) WriteParity(point, report->add_parity());
-  for (const SurfaceResidual& point : residuals.surface_points)
+  for (const residuals::WorstTouch& touch : residuals.worst_touches)
+    WriteWorstTouch(touch, report->add_worst_touches());
+  for (const residuals::ResidualCurve& curve : residuals.curves)
+    WriteCurve(curve, fingers, report->add_curves());
+  for (const residuals::ComparedHistogram& histogram : residuals.histograms)
+    WriteHistogram(histogram, report);
+  for (const residuals::ParityPoint& point : residuals.parity) WriteParity(point, report->add_parity());
+  for (const residuals::SurfaceResidual& point : residuals.surface_points)
     WriteSurfacePoint(point, report->add_surface_points());
-  for (const DrawableObject& outline : residuals.outlines) WriteOutline(outline, report->add_outlines());
+  for (const residuals::DrawableObject& outline : residuals.outlines)
+    WriteOutline(outline, report->add_outlines());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -8,24 +8,24 @@
 
 #include "server/base/readable_time.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr int kFewTouches = 100;
 
 // "radius_mm 1.5 +- 0.005 mm"
-std::string Value(const ParameterEstimate& value) {
+std::string Value(const inference::ParameterEstimate& value) {
   std::string name = value.name;
   if (!value.entry.empty()) name += " " + value.entry;
   return absl::StrFormat("%s %.4g +- %.2g%s%s", name, value.value, value.std_error,
                          value.unit.empty() ? "" : " ", value.unit);
 }
 
-std::string Values(const std::vector<ParameterEstimate>& parameters) {
+std::string Values(const std::vector<inference::ParameterEstimate>& parameters) {
   constexpr int kMaxShown = 4;
   if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
   std::vector<std::string> texts;
-  for (const ParameterEstimate& value : parameters) texts.push_back(Value(value));
+  for (const inference::ParameterEstimate& value : parameters) texts.push_back(Value(value));
   return absl::StrJoin(texts, ", ");
 }
 
@@ -39,7 +39,7 @@ std::string HowWrong(const Diagnosis& diagnosis) {
       diagnosis.noise_floor->from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
 }
 
-std::string WhatRemains(const UnexplainedRest& rest) {
+std::string WhatRemains(const selection::UnexplainedRest& rest) {
   if (rest.formula.empty())
     return "A structure remains that neither an effect of the catalogue nor a simple formula explains.";
   return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
@@ -52,7 +52,7 @@ constexpr char kNoTouch[] = "No touch could be used: nothing can be said of the 
 
 }  // namespace
 
-std::vector<std::string> DataWarnings(const DataSummary& data) {
+std::vector<std::string> DataWarnings(const touches::DataSummary& data) {
   if (data.touches == 0) return {kNoTouch};
   std::vector<std::string> warnings;
   if (data.touches < kFewTouches)
@@ -77,10 +77,10 @@ std::vector<std::string> DataWarnings(const DataSummary& data) {
 std::string Summarize(const Diagnosis& diagnosis) {
   if (diagnosis.data.touches == 0) return kNoTouch;
   std::vector<std::string> sentences = {HowWrong(diagnosis)};
-  for (const RefittedEffect& refit : diagnosis.refitted)
+  for (const selection::RefittedEffect& refit : diagnosis.refitted)
     sentences.push_back(
         absl::StrCat("In the model ", refit.effect, " has another value: ", Values(refit.parameters), "."));
-  for (const LadderStep& step : diagnosis.steps) {
+  for (const selection::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
     sentences.push_back(absl::StrCat("Missing: ", name, " (", Values(step.parameters), ")."));
@@ -89,20 +89,20 @@ std::string Summarize(const Diagnosis& diagnosis) {
           absl::StrCat("These data cannot tell them apart. ", step.discriminating_measurement));
   }
   switch (diagnosis.verdict) {
-    case Verdict::kAdequate:
+    case selection::Verdict::kAdequate:
       sentences.push_back("Nothing is missing that these data could show.");
       break;
-    case Verdict::kUnexplained:
+    case selection::Verdict::kUnexplained:
       sentences.push_back(WhatRemains(*diagnosis.unexplained));
       break;
-    case Verdict::kMissingEffects:
-    case Verdict::kWrongValues:
+    case selection::Verdict::kMissingEffects:
+    case selection::Verdict::kWrongValues:
       sentences.push_back(absl::StrCat("Then ", TimeInWords(diagnosis.final->rmse_s), " is left."));
       break;
-    case Verdict::kNone:
+    case selection::Verdict::kNone:
       break;
   }
   return absl::StrJoin(sentences, " ");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -6,12 +6,12 @@
 
 #include "server/diagnosis/report/diagnosis.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 
 // What limits the diagnosis: few objects, no repeats, few touches.
-std::vector<std::string> DataWarnings(const DataSummary& data);
+std::vector<std::string> DataWarnings(const touches::DataSummary& data);
 
 // One paragraph: how wrong, why, what to do.
 std::string Summarize(const Diagnosis& diagnosis);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -6,50 +6,50 @@
 #include "server/diagnosis/report/residuals_messages.h"
 #include "server/model/finger_name.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 namespace {
 
 double Us(double time_s) {
   return time_s * kMicrosecondsPerSecond;
 }
 
-v1::Report::Verdict ToMessage(Verdict verdict) {
+v1::Report::Verdict ToMessage(selection::Verdict verdict) {
   switch (verdict) {
-    case Verdict::kNone:
+    case selection::Verdict::kNone:
       return v1::Report::VERDICT_UNSPECIFIED;
-    case Verdict::kAdequate:
+    case selection::Verdict::kAdequate:
       return v1::Report::ADEQUATE;
-    case Verdict::kWrongValues:
+    case selection::Verdict::kWrongValues:
       return v1::Report::WRONG_VALUES;
-    case Verdict::kMissingEffects:
+    case selection::Verdict::kMissingEffects:
       return v1::Report::MISSING_EFFECTS;
-    case Verdict::kUnexplained:
+    case selection::Verdict::kUnexplained:
       return v1::Report::UNEXPLAINED;
   }
   return v1::Report::VERDICT_UNSPECIFIED;
 }
 
-const char* ToMessage(EffectScope scope) {
-  return scope == EffectScope::kObject ? "object" : "rig";
+const char* ToMessage(selection::EffectScope scope) {
+  return scope == selection::EffectScope::kObject ? "object" : "rig";
 }
 
-const char* ToMessage(CandidateNote note) {
+const char* ToMessage(selection::CandidateNote note) {
   switch (note) {
-    case CandidateNote::kNone:
+    case selection::CandidateNote::kNone:
       return "";
-    case CandidateNote::kInvisible:
+    case selection::CandidateNote::kInvisible:
       return "this experiment cannot see it";
-    case CandidateNote::kNeutral:
+    case selection::CandidateNote::kNeutral:
       return "fits best where it changes nothing";
-    case CandidateNote::kLinearised:
+    case selection::CandidateNote::kLinearised:
       return "not among the eight most probable; its gain is a linearised prediction";
   }
   return "";
 }
 
 template <typename Message>
-void WriteParameters(const std::vector<ParameterEstimate>& parameters, Message* message) {
-  for (const ParameterEstimate& estimate : parameters) {
+void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters, Message* message) {
+  for (const inference::ParameterEstimate& estimate : parameters) {
     v1::ParameterValue* value = message->add_parameters();
     value->set_name(estimate.name);
     value->set_value(estimate.value);
@@ -63,13 +63,13 @@ void WriteParameters(const std::vector<ParameterEstimate>& parameters, Message* 
   }
 }
 
-void WriteQuality(const Quality& quality, v1::Quality* message) {
+void WriteQuality(const selection::Quality& quality, v1::Quality* message) {
   message->set_rmse_us(Us(quality.rmse_s));
   message->set_heldout_rmse_us(Us(quality.heldout_rmse_s));
   message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
-void WriteNoiseFloor(const NoiseFloor& floor, v1::NoiseFloor* message) {
+void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message) {
   message->set_sigma_us(Us(floor.sigma_s));
   message->set_lower_us(Us(floor.lower_s));
   message->set_upper_us(Us(floor.upper_s));
@@ -77,7 +77,7 @@ void WriteNoiseFloor(const NoiseFloor& floor, v1::NoiseFloor* message) {
   message->set_from_repeats(floor.from_repeats);
 }
 
-void WriteStep(const LadderStep& step, v1::Step* message) {
+void WriteStep(const selection::LadderStep& step, v1::Step* message) {
   message->set_effect(step.effect);
   for (const std::string& name : step.equivalent) message->add_equivalent(name);
   message->set_probability(step.probability);
@@ -93,7 +93,7 @@ void WriteStep(const LadderStep& step, v1::Step* message) {
   message->set_scope(ToMessage(step.scope));
 }
 
-void WriteCandidate(const RankedCandidate& candidate, v1::Candidate* message) {
+void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
   message->set_effect(candidate.effect);
   WriteParameters(candidate.parameters, message);
   message->set_probability(candidate.probability);
@@ -104,8 +104,8 @@ void WriteCandidate(const RankedCandidate& candidate, v1::Candidate* message) {
   message->set_scope(ToMessage(candidate.scope));
 }
 
-void WriteUnexplained(const UnexplainedRest& rest, v1::Unexplained* message) {
-  for (const CovariateTest& test : rest.covariates) {
+void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* message) {
+  for (const selection::CovariateTest& test : rest.covariates) {
     v1::CovariateTest* covariate = message->add_covariates();
     covariate->set_name(test.name);
     covariate->set_p(test.p);
@@ -121,9 +121,10 @@ void WriteUnexplained(const UnexplainedRest& rest, v1::Unexplained* message) {
   message->set_nearest_cosine(rest.nearest_cosine);
 }
 
-void WriteData(const DataSummary& data, v1::Report* report) {
+void WriteData(const touches::DataSummary& data, v1::Report* report) {
   report->set_touches(static_cast<uint32_t>(data.touches));
-  for (int finger = 0; finger < data.fingers; ++finger) report->add_fingers(FingerName(finger, data.fingers));
+  for (int finger = 0; finger < data.fingers; ++finger)
+    report->add_fingers(model::FingerName(finger, data.fingers));
   v1::DataSummary* message = report->mutable_data();
   message->set_origin(data.origin);
   message->set_rows(static_cast<uint32_t>(data.rows));
@@ -143,18 +144,18 @@ void WriteData(const DataSummary& data, v1::Report* report) {
 }
 
 void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
-  for (const RefittedEffect& refit : diagnosis.refitted) {
+  for (const selection::RefittedEffect& refit : diagnosis.refitted) {
     v1::Refit* message = report->add_refitted();
     message->set_effect(refit.effect);
     WriteParameters(refit.parameters, message);
   }
-  for (const LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
-  for (const ConfoundedEffects& confounded : diagnosis.confounded) {
+  for (const selection::LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
+  for (const selection::ConfoundedEffects& confounded : diagnosis.confounded) {
     v1::Ambiguity* message = report->add_ambiguities();
     for (const std::string& effect : confounded.effects) message->add_effects(effect);
     message->set_discriminating_measurement(confounded.discriminating_measurement);
   }
-  for (const RankedCandidate& candidate : diagnosis.candidates)
+  for (const selection::RankedCandidate& candidate : diagnosis.candidates)
     WriteCandidate(candidate, report->add_candidates());
   if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
   report->set_improved_model_yaml(diagnosis.improved_model_yaml);
@@ -179,11 +180,11 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   report.set_reducible_share(diagnosis.reducible_share);
   WriteResiduals(diagnosis.residuals, diagnosis.data.fingers, &report);
   WriteCauses(diagnosis, &report);
-  for (const ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);
+  for (const design::ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);
   report.set_summary(diagnosis.summary);
   for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -4,8 +4,8 @@
 #include "server/diagnosis/report/diagnosis.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::report {
 
 v1::Report ToReport(const Diagnosis& diagnosis);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::report

@@ -8,11 +8,11 @@
 #include "server/base/random.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 // Whether any two used touches differ in the covariate.
-bool Varies(const Observations& observations, const ResidualCovariate& covariate) {
+bool Varies(const touches::Observations& observations, const ResidualCovariate& covariate) {
   double min = INFINITY, max = -INFINITY;
   // Every touch of a small set; of a large one enough to see any difference that could matter.
   const int step = std::max(1, observations.size() / 20000);
@@ -40,9 +40,9 @@ std::vector<std::string> Numbers(const std::vector<int>& values, int* lowest) {
 
 }  // namespace
 
-std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observations,
-                                                      const Prediction& prediction) {
-  const MeasurementSet& set = *observations.set;
+std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observations& observations,
+                                                      const touches::Prediction& prediction) {
+  const session::MeasurementSet& set = *observations.set;
   const std::vector<int>& row = observations.row;
   const int fingers = observations.fingers;
   const size_t cells = static_cast<size_t>(observations.size()) * fingers;
@@ -104,7 +104,7 @@ std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observ
   add("object", "object", "", [&observations](int k, int) { return double(observations.object[k]); });
   list.back().labels = observations.objects;
   add("finger", "finger", "", [](int, int i) { return double(i); });
-  for (int i = 0; i < fingers; ++i) list.back().labels.push_back(FingerName(i, fingers));
+  for (int i = 0; i < fingers; ++i) list.back().labels.push_back(model::FingerName(i, fingers));
   for (const auto& [name, values] :
        {std::make_pair("face", &set.face), std::make_pair("round", &set.round)}) {
     if (values->empty()) continue;
@@ -121,15 +121,15 @@ std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observ
   return list;
 }
 
-int FingersCompared(const Observations& observations, const std::vector<double>& residuals, int k) {
+int FingersCompared(const touches::Observations& observations, const std::vector<double>& residuals, int k) {
   int count = 0;
   for (int i = 0; i < observations.fingers; ++i)
     count += !std::isnan(residuals[size_t(k) * observations.fingers + i]);
   return count;
 }
 
-std::vector<int> ThinnedTouches(const Observations& observations, const std::vector<double>& residuals,
-                                int limit) {
+std::vector<int> ThinnedTouches(const touches::Observations& observations,
+                                const std::vector<double>& residuals, int limit) {
   std::vector<int> touches;
   for (int k = 0; k < observations.size(); ++k)
     if (observations.used[k] && FingersCompared(observations, residuals, k) > 1) touches.push_back(k);
@@ -146,4 +146,4 @@ std::vector<int> ThinnedTouches(const Observations& observations, const std::vec
   return touches;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -8,7 +8,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 struct ResidualCovariate {
   std::string name;                 // as formulas and reports name it: "incidence_deg"
@@ -23,16 +23,16 @@ struct ResidualCovariate {
 
 // Every covariate that the set and the prediction have values for, without those that never vary. Both must
 // outlive the list.
-std::vector<ResidualCovariate> ListResidualCovariates(const Observations& observations,
-                                                      const Prediction& prediction);
+std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observations& observations,
+                                                      const touches::Prediction& prediction);
 
 // At most about `limit` of the touches that take part (used, with a residual), in order: whole poses, the
 // same ones at every call.
-std::vector<int> ThinnedTouches(const Observations& observations, const std::vector<double>& residuals,
-                                int limit);
+std::vector<int> ThinnedTouches(const touches::Observations& observations,
+                                const std::vector<double>& residuals, int limit);
 
 // The number of fingers of touch k that have a residual.
-int FingersCompared(const Observations& observations, const std::vector<double>& residuals, int k);
+int FingersCompared(const touches::Observations& observations, const std::vector<double>& residuals, int k);
 
 // What noise of sigma_s contributes on average to the square of one finger's residual (s^2), in a touch with
 // that many compared fingers: removing the touch's mean takes away one part in n.
@@ -40,4 +40,4 @@ inline double NoiseShare(double sigma_s, int fingers_compared) {
   return sigma_s * sigma_s * (1 - 1.0 / fingers_compared);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -6,7 +6,7 @@
 #include "server/diagnosis/residuals/covariates.h"
 #include "server/diagnosis/residuals/dependence.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kBins = 12;
@@ -82,7 +82,8 @@ std::vector<ResidualCurveBin> BinsOfFinger(const std::vector<ResidualCell>& cell
 
 }  // namespace
 
-std::vector<ResidualCurve> MakeResidualCurves(const Observations& observations, const Prediction& initial,
+std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& observations,
+                                              const touches::Prediction& initial,
                                               const std::vector<double>& before,
                                               const std::vector<double>& after, uint64_t seed) {
   const int fingers = observations.fingers;
@@ -125,4 +126,4 @@ std::vector<ResidualCurve> MakeResidualCurves(const Observations& observations, 
   return curves;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

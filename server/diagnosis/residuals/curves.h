@@ -9,7 +9,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 struct ResidualCurveBin {
   int finger = 0;              // 0 is the first
@@ -33,8 +33,9 @@ struct ResidualCurve {
 // A curve for every covariate but the finger. `before` and `after` are the residuals of the initial and the
 // improved model, [k * fingers + finger], seconds, NaN where a finger takes no part. `seed` is that of the
 // permutations. Reads at most 60,000 touches, the permutations at most 20,000 poses. Deterministic.
-std::vector<ResidualCurve> MakeResidualCurves(const Observations& observations, const Prediction& initial,
+std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& observations,
+                                              const touches::Prediction& initial,
                                               const std::vector<double>& before,
                                               const std::vector<double>& after, uint64_t seed);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

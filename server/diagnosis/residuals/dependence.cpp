@@ -7,7 +7,7 @@
 #include "server/base/random.h"
 #include "server/diagnosis/residuals/permutation.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kMaxPosesPermuted = 20000;
@@ -160,4 +160,4 @@ double DependenceP(const std::vector<ResidualCell>& cells, const std::vector<dou
   return PermutationP(observed, permuted);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

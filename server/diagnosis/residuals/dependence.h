@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // One finger of one touch, as the curves and the test of dependence see it.
 struct ResidualCell {
@@ -27,4 +27,4 @@ int BinOf(const std::vector<double>& ends, double value);
 double DependenceP(const std::vector<ResidualCell>& cells, const std::vector<double>& ends, int fingers,
                    uint64_t seed, int number);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -1,10 +1,11 @@
 #include "server/diagnosis/residuals/describe_residuals.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
-ResidualSummary DescribeResiduals(const Observations& observations, const Prediction& initial,
-                                  const Prediction& improved, const std::vector<double>& before,
-                                  const std::vector<double>& after, const ResidualScale& scale) {
+ResidualSummary DescribeResiduals(const touches::Observations& observations,
+                                  const touches::Prediction& initial, const touches::Prediction& improved,
+                                  const std::vector<double>& before, const std::vector<double>& after,
+                                  const ResidualScale& scale) {
   ResidualSummary summary;
   summary.slices = FindSlices(observations, initial, before, scale.sigma_s);
   summary.grouped = GroupErrors(observations, before, scale.sigma_s);
@@ -17,4 +18,4 @@ ResidualSummary DescribeResiduals(const Observations& observations, const Predic
   return summary;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

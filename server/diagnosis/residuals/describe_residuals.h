@@ -13,7 +13,7 @@
 #include "server/diagnosis/residuals/surface_points.h"
 #include "server/diagnosis/residuals/worst_touches.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // Each part is documented at its type. Fingers are numbered, 0 is the first.
 struct ResidualSummary {
@@ -29,8 +29,9 @@ struct ResidualSummary {
 
 // `before` and `after` are the residuals of the predictions `initial` and `improved`, which may be the same:
 // [k * fingers + finger], seconds, NaN where a finger takes no part. Deterministic.
-ResidualSummary DescribeResiduals(const Observations& observations, const Prediction& initial,
-                                  const Prediction& improved, const std::vector<double>& before,
-                                  const std::vector<double>& after, const ResidualScale& scale);
+ResidualSummary DescribeResiduals(const touches::Observations& observations,
+                                  const touches::Prediction& initial, const touches::Prediction& improved,
+                                  const std::vector<double>& before, const std::vector<double>& after,
+                                  const ResidualScale& scale);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

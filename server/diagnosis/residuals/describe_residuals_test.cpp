@@ -5,27 +5,27 @@
 
 #include "server/diagnosis/touches/made_up_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr double kSigmaS = 0.005;
 
 // Contacts come early by 1 ms per degree of incidence, on every finger.
-MadeUpSet EarlyOnSlopes() {
-  MadeUpSet set(5, 48, 4, kSigmaS, 1);
+touches::MadeUpSet EarlyOnSlopes() {
+  touches::MadeUpSet set(5, 48, 4, kSigmaS, 1);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
   set.Finish();
   return set;
 }
 
-ResidualSummary Describe(const MadeUpSet& set) {
+ResidualSummary Describe(const touches::MadeUpSet& set) {
   return DescribeResiduals(set.observations, set.prediction, set.prediction, set.residuals, set.residuals,
                            {kSigmaS, 0.03, 0});
 }
 
 TEST(ResidualPlots, AreThinnedAndParityDiffersByTheResidual) {
-  const MadeUpSet set = EarlyOnSlopes();
+  const touches::MadeUpSet set = EarlyOnSlopes();
   const ResidualSummary summary = Describe(set);
   EXPECT_EQ(summary.parity.size(), 2000u);
   double squares = 0;
@@ -38,8 +38,8 @@ TEST(ResidualPlots, AreThinnedAndParityDiffersByTheResidual) {
 }
 
 TEST(ResidualPlots, OutlinesAreCoarseCopies) {
-  MadeUpSet set(1, 4, 2, kSigmaS, 7);
-  TriangleMesh sphere;  // an octahedron divided five times: 8192 triangles, radius 50 mm
+  touches::MadeUpSet set(1, 4, 2, kSigmaS, 7);
+  geometry::TriangleMesh sphere;  // an octahedron divided five times: 8192 triangles, radius 50 mm
   sphere.vertices_m = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   sphere.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
   for (int level = 0; level < 5; ++level) {
@@ -59,10 +59,10 @@ TEST(ResidualPlots, OutlinesAreCoarseCopies) {
     sphere.triangles = finer;
   }
   for (Eigen::Vector3f& vertex : sphere.vertices_m) vertex *= 0.05f;
-  set.observations.surfaces[0] = *Surface::Create("ball", sphere);
+  set.observations.surfaces[0] = *geometry::Surface::Create("ball", sphere);
   const ResidualSummary summary = Describe(set);
   ASSERT_EQ(summary.outlines.size(), 1u);
-  const TriangleMesh& outline = summary.outlines[0].mesh;
+  const geometry::TriangleMesh& outline = summary.outlines[0].mesh;
   EXPECT_LE(outline.triangles.size(), 400u);
   EXPECT_GE(outline.triangles.size(), 150u);
   for (const Eigen::Vector3f& vertex : outline.vertices_m) EXPECT_NEAR(vertex.norm(), 0.048, 0.003);
@@ -71,7 +71,7 @@ TEST(ResidualPlots, OutlinesAreCoarseCopies) {
 }
 
 TEST(DescribeResiduals, SaysTheSameTwice) {
-  const MadeUpSet set = EarlyOnSlopes();
+  const touches::MadeUpSet set = EarlyOnSlopes();
   const ResidualSummary once = Describe(set), twice = Describe(set);
   ASSERT_EQ(once.slices.size(), twice.slices.size());
   ASSERT_EQ(once.curves.size(), twice.curves.size());
@@ -91,14 +91,14 @@ TEST(DescribeResiduals, SaysTheSameTwice) {
 }
 
 TEST(DescribeResiduals, ShowsAPartOfManyTouches) {
-  const MadeUpSet set(5, 1000, 12, kSigmaS, 8);
+  const touches::MadeUpSet set(5, 1000, 12, kSigmaS, 8);
   const ResidualSummary summary = Describe(set);
   EXPECT_EQ(summary.parity.size(), 2000u);
   EXPECT_LE(summary.surface_points.size(), 4000u);
 }
 
 TEST(DescribeResiduals, WithoutTimesGivesAnEmptySummary) {
-  MadeUpSet set(1, 2, 1, kSigmaS, 9);
+  touches::MadeUpSet set(1, 2, 1, kSigmaS, 9);
   for (double& time_s : set.observations.time_s) time_s = NAN;
   set.Finish();
   const ResidualSummary summary = Describe(set);
@@ -110,4 +110,4 @@ TEST(DescribeResiduals, WithoutTimesGivesAnEmptySummary) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -9,7 +9,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/covariates.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kTimeBins = 8;
@@ -41,7 +41,8 @@ std::string WholeNumber(double value) {
 
 class ErrorGrouper {
  public:
-  ErrorGrouper(const Observations& observations, const std::vector<double>& residuals, double sigma_s);
+  ErrorGrouper(const touches::Observations& observations, const std::vector<double>& residuals,
+               double sigma_s);
   GroupedErrors Group();
 
  private:
@@ -61,7 +62,7 @@ class ErrorGrouper {
     return values;
   }
 
-  const Observations& observations_;
+  const touches::Observations& observations_;
   const std::vector<double>& residuals_;
   const double sigma_s_;
   std::vector<int> touches_, compared_;  // the touches that count, and how many fingers of each
@@ -69,7 +70,7 @@ class ErrorGrouper {
   GroupedErrors result_;
 };
 
-ErrorGrouper::ErrorGrouper(const Observations& observations, const std::vector<double>& residuals,
+ErrorGrouper::ErrorGrouper(const touches::Observations& observations, const std::vector<double>& residuals,
                            double sigma_s)
     : observations_(observations), residuals_(residuals), sigma_s_(sigma_s) {
   for (int k = 0; k < observations.size(); ++k) {
@@ -127,7 +128,7 @@ void ErrorGrouper::ByNumber(ErrorGroupKind kind, const std::vector<double>& valu
 std::vector<GroupSums> ErrorGrouper::ByFinger() {
   std::vector<GroupSums> fingers(observations_.fingers);
   for (int i = 0; i < observations_.fingers; ++i) {
-    fingers[i].name = FingerName(i, observations_.fingers);
+    fingers[i].name = model::FingerName(i, observations_.fingers);
     for (size_t n = 0; n < touches_.size(); ++n)
       if (!std::isnan(residuals_[size_t(touches_[n]) * observations_.fingers + i])) Add(n, i, &fingers[i]);
     all_excess_ += fingers[i].excess;
@@ -154,7 +155,7 @@ void ErrorGrouper::ByTime() {
 }
 
 GroupedErrors ErrorGrouper::Group() {
-  const MeasurementSet& set = *observations_.set;
+  const session::MeasurementSet& set = *observations_.set;
   const std::vector<GroupSums> fingers = ByFinger();
 
   std::vector<GroupSums> objects(observations_.objects.size());
@@ -177,9 +178,9 @@ GroupedErrors ErrorGrouper::Group() {
 
 }  // namespace
 
-GroupedErrors GroupErrors(const Observations& observations, const std::vector<double>& residuals,
+GroupedErrors GroupErrors(const touches::Observations& observations, const std::vector<double>& residuals,
                           double sigma_s) {
   return ErrorGrouper(observations, residuals, sigma_s).Group();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

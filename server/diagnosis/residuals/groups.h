@@ -6,7 +6,7 @@
 
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // What the touches of a group have in common. kFinger groups hold one finger of every touch, kTime groups
 // equal parts of the session.
@@ -28,7 +28,7 @@ struct GroupedErrors {
 
 // residuals: [k * fingers + finger], seconds, NaN where a finger takes no part; sigma_s: noise of one
 // finger's time. Touches that are left out, or in which fewer than two fingers are compared, count nowhere.
-GroupedErrors GroupErrors(const Observations& observations, const std::vector<double>& residuals,
+GroupedErrors GroupErrors(const touches::Observations& observations, const std::vector<double>& residuals,
                           double sigma_s);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 std::vector<double> HistogramEdges(std::vector<double> pooled) {
   if (pooled.empty()) return {};
@@ -43,4 +43,4 @@ std::vector<double> HistogramDensity(const std::vector<double>& values, const st
   return density;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

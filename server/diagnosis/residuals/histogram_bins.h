@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 inline constexpr int kMaxHistogramBins = 60;
 
@@ -30,4 +30,4 @@ std::vector<double> HistogramEdges(std::vector<double> pooled);
 // Density of `values` over the bins, 1 / unit: the share of *all* values in a bin, over its width.
 std::vector<double> HistogramDensity(const std::vector<double>& values, const std::vector<double>& edges);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

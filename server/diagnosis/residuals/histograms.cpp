@@ -8,7 +8,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/permutation.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr size_t kMaxPlotted = 200000;  // values of each sample whose quantiles set the edges
@@ -20,7 +20,7 @@ struct ComparedSample {
 };
 
 // Times of touch k as the model would report them: with noise that depends on the touch's number alone.
-void AddNoise(const Prediction& prediction, int k, const ResidualScale& scale, uint64_t touch,
+void AddNoise(const touches::Prediction& prediction, int k, const ResidualScale& scale, uint64_t touch,
               std::vector<double>* time_s) {
   RandomStream random(scale.seed, RandomDomain::kDiagnosis, touch, 4);
   for (int i = 0; i < prediction.fingers; ++i)
@@ -42,9 +42,10 @@ struct ComparedQuantities {
   ComparedSample descriptor, curvature;
 };
 
-ComparedQuantities CollectQuantities(const Observations& observations, const Prediction& initial,
-                                     const Prediction& improved, const ResidualScale& scale) {
-  const MeasurementSet& set = *observations.set;
+ComparedQuantities CollectQuantities(const touches::Observations& observations,
+                                     const touches::Prediction& initial, const touches::Prediction& improved,
+                                     const ResidualScale& scale) {
+  const session::MeasurementSet& set = *observations.set;
   const int fingers = observations.fingers;
   ComparedQuantities all;
   ComparedSample& descriptor = all.descriptor;
@@ -122,8 +123,10 @@ ComparedHistogram MakeHistogram(HistogramQuantity quantity, const std::string& o
 
 }  // namespace
 
-std::vector<ComparedHistogram> MakeHistograms(const Observations& observations, const Prediction& initial,
-                                              const Prediction& improved, const ResidualScale& scale) {
+std::vector<ComparedHistogram> MakeHistograms(const touches::Observations& observations,
+                                              const touches::Prediction& initial,
+                                              const touches::Prediction& improved,
+                                              const ResidualScale& scale) {
   std::vector<ComparedHistogram> histograms;
   if (observations.fingers < 2) return histograms;
   const ComparedQuantities all = CollectQuantities(observations, initial, improved, scale);
@@ -145,4 +148,4 @@ std::vector<ComparedHistogram> MakeHistograms(const Observations& observations, 
   return histograms;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -8,11 +8,13 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // Times of both models get noise of scale.sigma_s, the same for both. The p of each histogram are those of
 // PosePermutationP. Empty with fewer than two fingers; curvature only with three. Deterministic.
-std::vector<ComparedHistogram> MakeHistograms(const Observations& observations, const Prediction& initial,
-                                              const Prediction& improved, const ResidualScale& scale);
+std::vector<ComparedHistogram> MakeHistograms(const touches::Observations& observations,
+                                              const touches::Prediction& initial,
+                                              const touches::Prediction& improved,
+                                              const ResidualScale& scale);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -3,20 +3,21 @@
 #include <algorithm>
 #include <set>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kOutlineTriangles = 400;
 
 // One vertex for each occupied cell of a grid with `cells` cells along the longest side of the box.
-TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells) {
+geometry::TriangleMesh Clustered(const geometry::TriangleMesh& mesh, const geometry::Bounds& bounds,
+                                 int cells) {
   const double size_m = (bounds.max_m - bounds.min_m).maxCoeff() / cells * (1 + 1e-9);
   constexpr uint32_t kNone = 0xFFFFFFFFu;
   std::vector<uint32_t> cluster_of_cell(static_cast<size_t>(cells) * cells * cells, kNone);
   std::vector<uint32_t> cluster(mesh.vertices_m.size(), kNone);
   std::vector<Eigen::Vector3d> sum;
   std::vector<double> count;
-  TriangleMesh coarse;
+  geometry::TriangleMesh coarse;
   std::set<std::array<uint32_t, 3>> seen;
   for (const auto& triangle : mesh.triangles) {
     std::array<uint32_t, 3> corners;
@@ -49,21 +50,21 @@ TriangleMesh Clustered(const TriangleMesh& mesh, const Bounds& bounds, int cells
 
 }  // namespace
 
-TriangleMesh Decimated(const TriangleMesh& mesh, int max_triangles) {
+geometry::TriangleMesh Decimated(const geometry::TriangleMesh& mesh, int max_triangles) {
   if (static_cast<int>(mesh.triangles.size()) <= max_triangles) return mesh;
-  const Bounds bounds = ComputeBounds(mesh);
+  const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
   // From the coarsest grid upwards, since coarse ones are cheap. A closed surface has about 12 cells^2
   // triangles.
-  TriangleMesh best;
+  geometry::TriangleMesh best;
   for (int cells = 2; cells <= 64; ++cells) {
-    TriangleMesh coarse = Clustered(mesh, bounds, cells);
+    geometry::TriangleMesh coarse = Clustered(mesh, bounds, cells);
     if (static_cast<int>(coarse.triangles.size()) > max_triangles) break;
     best = std::move(coarse);
   }
   return best;
 }
 
-std::vector<DrawableObject> MakeOutlines(const Observations& observations) {
+std::vector<DrawableObject> MakeOutlines(const touches::Observations& observations) {
   std::vector<DrawableObject> outlines;
   for (size_t o = 0; o < observations.objects.size(); ++o)
     if (observations.surfaces[o])
@@ -72,4 +73,4 @@ std::vector<DrawableObject> MakeOutlines(const Observations& observations) {
   return outlines;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr size_t kMaxPoints = 2000;
 
 }  // namespace
 
-std::vector<ParityPoint> MakeParity(const Observations& observations, const Prediction& initial,
-                                    const std::vector<double>& before, const std::vector<double>& after) {
+std::vector<ParityPoint> MakeParity(const touches::Observations& observations,
+                                    const touches::Prediction& initial, const std::vector<double>& before,
+                                    const std::vector<double>& after) {
   const int fingers = observations.fingers;
   std::vector<size_t> cells;
   for (int k = 0; k < observations.size(); ++k)
@@ -38,4 +39,4 @@ std::vector<ParityPoint> MakeParity(const Observations& observations, const Pred
   return points;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -6,7 +6,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // One finger of one touch. Times are less the mean over the touch's compared fingers: only differences
 // between fingers are measured.
@@ -19,7 +19,8 @@ struct ParityPoint {
 
 // At most 2,000 points, evenly spread over the session. `before` and `after` are the residuals of the initial
 // and the improved model, [k * fingers + finger], seconds, NaN where a finger takes no part.
-std::vector<ParityPoint> MakeParity(const Observations& observations, const Prediction& initial,
-                                    const std::vector<double>& before, const std::vector<double>& after);
+std::vector<ParityPoint> MakeParity(const touches::Observations& observations,
+                                    const touches::Prediction& initial, const std::vector<double>& before,
+                                    const std::vector<double>& after);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -5,7 +5,7 @@
 
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr size_t kMaxPosesTested = 20000;
@@ -92,4 +92,4 @@ double PosePermutationP(const std::vector<double>& a, const std::vector<double>&
   return PermutationP(observed, permuted);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // Probability of at least `observed`, from `permuted` values. Exact, (1 + number at least as large) / (1 +
 // number), as long as some are as large. Beyond all of them the tail is that of a scaled chi-square with
@@ -24,4 +24,4 @@ double ChiSquareTail(double x, double degrees_of_freedom);
 double PosePermutationP(const std::vector<double>& a, const std::vector<double>& b,
                         const std::vector<int>& pose, uint64_t seed, uint64_t number);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 struct ResidualScale {
   double sigma_s = 0;        // noise of one finger's time
@@ -11,4 +11,4 @@ struct ResidualScale {
   uint64_t seed = 0;         // of permutations and of the noise that is added to simulated times
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

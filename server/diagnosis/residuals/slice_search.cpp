@@ -8,7 +8,7 @@
 
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kThresholds = 14;  // about so many per continuous covariate
@@ -275,4 +275,4 @@ SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& 
   return *best;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

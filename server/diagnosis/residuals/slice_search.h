@@ -9,7 +9,7 @@
 
 #include "server/diagnosis/residuals/covariates.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // Cuts of one covariate at numbers that are easy to read.
 class SliceBins {
@@ -75,4 +75,4 @@ std::vector<SliceCandidate> SearchSlices(const std::vector<SliceBins>& bins, con
 SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& cells,
                           const std::vector<int>& live, const SliceCandidate& slice);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -11,7 +11,7 @@
 #include "server/base/readable_time.h"
 #include "server/diagnosis/residuals/slice_search.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kMaxSlices = 6;
@@ -41,7 +41,7 @@ struct SliceEvidence {
 
 class SliceFinder {
  public:
-  SliceFinder(const Observations& observations, const Prediction& prediction,
+  SliceFinder(const touches::Observations& observations, const touches::Prediction& prediction,
               const std::vector<double>& residuals, double sigma_s)
       : observations_(observations),
         residuals_(residuals),
@@ -68,7 +68,7 @@ class SliceFinder {
   double TotalExcess() const;                 // s^2
   double MinZ(double total_excess_s2) const;  // that a slice must reach on the other half
 
-  const Observations& observations_;
+  const touches::Observations& observations_;
   const std::vector<double>& residuals_;
   const double sigma_s_;
   const std::vector<ResidualCovariate> covariates_;
@@ -236,9 +236,10 @@ std::vector<ErrorSlice> SliceFinder::Find() {
 
 }  // namespace
 
-std::vector<ErrorSlice> FindSlices(const Observations& observations, const Prediction& prediction,
+std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
+                                   const touches::Prediction& prediction,
                                    const std::vector<double>& residuals, double sigma_s) {
   return SliceFinder(observations, prediction, residuals, sigma_s).Find();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -7,7 +7,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // A part of the data in which the model is wrong, described by one or two conditions. It consists of single
 // fingers of touches; a residual is measured minus simulated time, less its mean over the touch's fingers.
@@ -27,7 +27,8 @@ struct ErrorSlice {
 // residuals: [k * fingers + finger], seconds, NaN where a finger takes no part. Thresholds are found on half
 // of the poses and kept only if the other half agrees; the numbers are then computed from all touches. Empty
 // if nothing stands out. The search reads at most 30,000 touches (whole poses, spread over the set).
-std::vector<ErrorSlice> FindSlices(const Observations& observations, const Prediction& prediction,
+std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
+                                   const touches::Prediction& prediction,
                                    const std::vector<double>& residuals, double sigma_s);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kMaxPoints = 4000;
@@ -15,7 +15,7 @@ struct Spot {
   double count = 0, before = 0, after = 0, after_count = 0;
 };
 
-std::vector<Spot> CollectSpots(const Observations& observations, const Prediction& improved,
+std::vector<Spot> CollectSpots(const touches::Observations& observations, const touches::Prediction& improved,
                                const std::vector<double>& before, const std::vector<double>& after) {
   const int fingers = observations.fingers;
   std::vector<Spot> spots(static_cast<size_t>(observations.poses) * fingers);
@@ -35,8 +35,8 @@ std::vector<Spot> CollectSpots(const Observations& observations, const Predictio
 
 }  // namespace
 
-std::vector<SurfaceResidual> MakeSurfaceResiduals(const Observations& observations,
-                                                  const Prediction& improved,
+std::vector<SurfaceResidual> MakeSurfaceResiduals(const touches::Observations& observations,
+                                                  const touches::Prediction& improved,
                                                   const std::vector<double>& before,
                                                   const std::vector<double>& after) {
   std::vector<SurfaceResidual> points;
@@ -64,4 +64,4 @@ std::vector<SurfaceResidual> MakeSurfaceResiduals(const Observations& observatio
   return points;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -9,7 +9,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 // The residual of one finger at one pose, averaged over the repeats of the pose.
 struct SurfaceResidual {
@@ -24,9 +24,9 @@ struct SurfaceResidual {
 // Object by object, at most 4,000 points in all and 1,500 per object, evenly spread over the poses. `before`
 // and `after` are the residuals of the initial and the improved model, [k * fingers + finger], seconds, NaN
 // where a finger takes no part. Empty if the prediction has no contacts.
-std::vector<SurfaceResidual> MakeSurfaceResiduals(const Observations& observations,
-                                                  const Prediction& improved,
+std::vector<SurfaceResidual> MakeSurfaceResiduals(const touches::Observations& observations,
+                                                  const touches::Prediction& improved,
                                                   const std::vector<double>& before,
                                                   const std::vector<double>& after);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

@@ -5,14 +5,14 @@
 
 #include "server/diagnosis/residuals/covariates.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr size_t kMaxWorstTouches = 10;
 
 }  // namespace
 
-std::vector<WorstTouch> FindWorstTouches(const Observations& observations,
+std::vector<WorstTouch> FindWorstTouches(const touches::Observations& observations,
                                          const std::vector<double>& residuals) {
   const int fingers = observations.fingers;
   std::vector<int> touches;
@@ -39,4 +39,4 @@ std::vector<WorstTouch> FindWorstTouches(const Observations& observations,
   return worst;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

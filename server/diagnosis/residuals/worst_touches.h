@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::residuals {
 
 struct WorstTouch {
   uint64_t touch = 0;  // its number in the measurement file
@@ -17,7 +17,7 @@ struct WorstTouch {
 };
 
 // At most ten of the touches that count, largest norm first. residuals: [k * fingers + finger], seconds.
-std::vector<WorstTouch> FindWorstTouches(const Observations& observations,
+std::vector<WorstTouch> FindWorstTouches(const touches::Observations& observations,
                                          const std::vector<double>& residuals);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::residuals

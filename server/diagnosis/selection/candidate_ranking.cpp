@@ -6,16 +6,16 @@
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/ladder.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kMaxFitted = 8;         // candidates that are fitted in full
 constexpr double kMaxExponent = 600;  // of a candidate's odds
 
 // Whether every value of the effect ended at its neutral, usually a bound.
-bool ChangesNothing(const Fit& fit, int index) {
+bool ChangesNothing(const inference::Fit& fit, int index) {
   for (int i = 0; i < fit.model.size(); ++i) {
-    const FreeParameter& c = fit.model.parameters()[i];
+    const inference::FreeParameter& c = fit.model.parameters()[i];
     if (c.effect == index && std::abs(fit.point[i] - c.neutral) > 1e-9 * c.scale) return false;
   }
   return true;
@@ -25,8 +25,8 @@ double Odds(const RankedCandidate& candidate) {
   return std::exp(std::min(candidate.gain_nats, kMaxExponent));
 }
 
-void DescribeFit(const Experiment& experiment, const Fit& fit, double initial_log_evidence,
-                 RankedCandidate* candidate) {
+void DescribeFit(const inference::Experiment& experiment, const inference::Fit& fit,
+                 double initial_log_evidence, RankedCandidate* candidate) {
   candidate->gain_nats = fit.log_evidence - initial_log_evidence;
   const int index = static_cast<int>(fit.model.base().effects.size()) - 1;
   if (ChangesNothing(fit, index)) {
@@ -37,7 +37,7 @@ void DescribeFit(const Experiment& experiment, const Fit& fit, double initial_lo
   candidate->parameters = fit.model.Describe(index, fit.point, fit.covariance);
   const Eigen::VectorXd r = fit.columns.values.col(0);
   candidate->rmse_s = std::sqrt(r.squaredNorm() / std::max<double>(1, static_cast<double>(r.size())));
-  candidate->heldout_rmse_s = HeldOutRmse(experiment, fit);
+  candidate->heldout_rmse_s = inference::HeldOutRmse(experiment, fit);
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ void DescribeFit(const Experiment& experiment, const Fit& fit, double initial_lo
 absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,
                                                             const SelectionResult& selection) {
   const StepwiseSearch& search = *selection.search;
-  const Fit& initial = selection.initial_model;
+  const inference::Fit& initial = selection.initial_model;
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions,
                               search.Score(initial, selection.initial_effects));
   std::stable_sort(extensions.begin(), extensions.end(),
@@ -66,7 +66,7 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
     candidate.gain_nats = extension.log_evidence - initial.log_evidence;
     if (fitted < kMaxFitted) {
       ++fitted;
-      TOUCHSTONE_ASSIGN_OR_RETURN(const Fit fit, search.FitExtension(extension));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit fit, search.FitExtension(extension));
       DescribeFit(workspace.experiment, fit, initial.log_evidence, &candidate);
     } else {
       candidate.note = CandidateNote::kLinearised;
@@ -82,4 +82,4 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
   return candidates;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

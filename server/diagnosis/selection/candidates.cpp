@@ -8,22 +8,22 @@
 #include "server/diagnosis/inference/parameterization.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 // A ramp that ends before the first contact leaves no trace. These end a little before and after the usual travel;
 // the free parameter is 1 / acceleration.
-std::vector<double> RampStarts(const Observations& o) {
+std::vector<double> RampStarts(const touches::Observations& o) {
   const double speed_m_s = o.set->speed_m_s[o.row[0]], travel_m = o.set->standoff_m[o.row[0]];
   std::vector<double> starts;
   for (const double share : {0.7, 1.3}) starts.push_back(2 * share * travel_m / (speed_m_s * speed_m_s));
   return starts;
 }
 
-Candidate MakeCandidate(std::shared_ptr<const Effect> effect, bool per_object, bool of_user,
-                        const Observations& searched) {
+Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user,
+                        const touches::Observations& searched) {
   Candidate candidate{std::move(effect), per_object, of_user, {}};
-  const std::vector<ParameterInfo>& parameters = candidate.effect->parameters;
+  const std::vector<model::ParameterInfo>& parameters = candidate.effect->parameters;
   if (!parameters.empty() && parameters.back().reciprocal && searched.size() > 0)
     candidate.further_starts = RampStarts(searched);
   return candidate;
@@ -31,22 +31,23 @@ Candidate MakeCandidate(std::shared_ptr<const Effect> effect, bool per_object, b
 
 // What effect `one` declares about telling it from `other`; empty: nothing.
 std::string DeclaredBy(const std::string& one, const std::string& other) {
-  const auto effect = Catalogue().Find(one);
+  const auto effect = effects::Catalogue().Find(one);
   if (effect == nullptr) return "";
-  for (const ConfoundedEffect& confounded : effect->confounded_with)
+  for (const model::ConfoundedEffect& confounded : effect->confounded_with)
     if (confounded.effect == other) return confounded.discriminating_measurement;
   return "";
 }
 
 }  // namespace
 
-std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const Observations& searched) {
+std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches::Observations& searched) {
   std::vector<Candidate> candidates;
   const auto has = [&](const std::string& name) {
-    return std::any_of(input.model->effects.begin(), input.model->effects.end(),
-                       [&](const EffectInstance& instance) { return NameOf(*instance.effect) == name; });
+    return std::any_of(
+        input.model->effects.begin(), input.model->effects.end(),
+        [&](const model::EffectInstance& instance) { return inference::NameOf(*instance.effect) == name; });
   };
-  for (const auto& effect : Catalogue().All()) {
+  for (const auto& effect : effects::Catalogue().All()) {
     const bool describes_only = effect->parameters.empty();  // the entry for formulas
     if (describes_only || effect->random() || has(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;
@@ -55,7 +56,7 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const Observa
       candidates.push_back(MakeCandidate(effect, true, false, searched));
   }
   for (const auto& effect : input.also)
-    if (!has(NameOf(*effect)) && !effect->random())
+    if (!has(inference::NameOf(*effect)) && !effect->random())
       candidates.push_back(MakeCandidate(effect, false, true, searched));
   return candidates;
 }
@@ -72,4 +73,4 @@ std::string DiscriminatingMeasurement(const std::vector<std::string>& effects) {
       absl::StrJoin(effects, " and "), " on the rig; `touchstone propose` looks for touches that do.");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -8,10 +8,10 @@
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 struct Candidate {
-  std::shared_ptr<const Effect> effect;
+  std::shared_ptr<const model::Effect> effect;
   bool per_object = false;
   bool of_user = false;  // from `also`
   // Values of the effect's last free parameter from where a fit starts as well: where the response is not linear.
@@ -20,10 +20,10 @@ struct Candidate {
 
 // Every effect of the catalogue that changes expectations and that the model does not have yet, some also object by
 // object, and the user's own. `searched`: the touches of the search.
-std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const Observations& searched);
+std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches::Observations& searched);
 
 // The measurement or intervention that tells two or more effects apart, for people. Effects declare it
 // (Effect::confounded_with); of several pairs the one of the effects that are named first counts.
 std::string DiscriminatingMeasurement(const std::vector<std::string>& effects);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -12,7 +12,7 @@
 #include "server/diagnosis/selection/term_scores.h"
 #include "server/effects/formula.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 // The size of a term that rigs show: scale of the prior.
@@ -20,8 +20,8 @@ constexpr double kTypicalTravelM = 0.2e-3;
 constexpr int kPeriods = 40;
 constexpr double kMinPeriodMm = 1.5, kMaxPeriodMm = 40;
 
-ParameterInfo Bounded(const std::string& name, Unit unit, double bound) {
-  ParameterInfo parameter;
+model::ParameterInfo Bounded(const std::string& name, Unit unit, double bound) {
+  model::ParameterInfo parameter;
   parameter.name = name;
   parameter.unit = unit;
   parameter.lower = -bound;
@@ -38,7 +38,7 @@ double BoundFor(double value) {
 // Terms with their columns: of time in s for a value of 1 in the units of files.
 class TermTable {
  public:
-  TermTable(const TouchObservationModel& touches, const Prediction& details)
+  TermTable(const touches::TouchObservationModel& touches, const touches::Prediction& details)
       : touches_(touches), o_(touches.observations()), d_(details), values_(o_.time_s.size()) {}
 
   // The rows of a value that is multiplied by k = 1 mm (of travel) or 1 us.
@@ -67,9 +67,9 @@ class TermTable {
   }
 
  private:
-  const TouchObservationModel& touches_;
-  const Observations& o_;
-  const Prediction& d_;
+  const touches::TouchObservationModel& touches_;
+  const touches::Observations& o_;
+  const touches::Prediction& d_;
   std::vector<double> values_;
   std::vector<Eigen::VectorXd> columns_;
   std::vector<double> scales_;
@@ -84,9 +84,10 @@ Unit UnitOfFactor(const FormulaTerm& term) {
 }
 
 // A factor of the fingers times a covariate or a function of one.
-std::vector<FormulaTerm> ScoreProducts(const TermScorer& scorer, const TouchObservationModel& touches,
-                                       const Prediction& d) {
-  const Observations& o = touches.observations();
+std::vector<FormulaTerm> ScoreProducts(const TermScorer& scorer,
+                                       const touches::TouchObservationModel& touches,
+                                       const touches::Prediction& d) {
+  const touches::Observations& o = touches.observations();
   const std::vector<TermFactor> factors = ListTermFactors(o, d);
   const bool several_speeds = std::any_of(factors.begin(), factors.end(),
                                           [](const TermFactor& f) { return f.covariate == "speed_mm_s"; });
@@ -122,8 +123,8 @@ std::vector<FormulaTerm> ScoreProducts(const TermScorer& scorer, const TouchObse
 }
 
 // Periodic in the travel: a lead screw, a gear.
-std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const TouchObservationModel& touches,
-                                      const Prediction& d) {
+std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const touches::TouchObservationModel& touches,
+                                      const touches::Prediction& d) {
   const int fingers = touches.observations().fingers;
   TermTable table(touches, d);
   std::vector<FormulaTerm> terms;
@@ -159,8 +160,9 @@ std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const TouchObser
 
 }  // namespace
 
-std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const TouchObservationModel& touches,
-                                    const Fit& fit, const Prediction& details) {
+std::vector<FormulaTerm> ScoreTerms(const inference::Experiment& experiment,
+                                    const touches::TouchObservationModel& touches, const inference::Fit& fit,
+                                    const touches::Prediction& details) {
   const TermScorer scorer(experiment, fit);
   std::vector<FormulaTerm> terms = ScoreProducts(scorer, touches, details);
   const std::vector<FormulaTerm> periodic = ScorePeriods(scorer, touches, details);
@@ -170,23 +172,23 @@ std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const TouchObs
   return terms;
 }
 
-absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,
-                                                             const FormulaTerm& term) {
-  FormulaSpec spec;
+absl::StatusOr<std::shared_ptr<const model::Effect>> MakeTermEffect(const std::string& name,
+                                                                    const FormulaTerm& term) {
+  model::FormulaSpec spec;
   spec.name = name;
   spec.adds_time = term.adds_time;
-  spec.stage = term.adds_time ? Stage::kSensor : Stage::kMotion;
+  spec.stage = term.adds_time ? model::Stage::kSensor : model::Stage::kMotion;
   spec.expression = term.expression;
   spec.parameters = term.parameters;
   spec.values = term.values;
-  return MakeFormulaEffect(spec);
+  return effects::MakeFormulaEffect(spec);
 }
 
 FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b) {
   FormulaTerm sum = a;
   std::string second = absl::StrCat(" ", b.expression, " ");
   for (size_t p = 0; p < b.parameters.size(); ++p) {
-    ParameterInfo parameter = b.parameters[p];
+    model::ParameterInfo parameter = b.parameters[p];
     const std::string renamed = parameter.name + "2";
     // Names stand between blanks or next to operators; no variable ends in them alone.
     second = absl::StrReplaceAll(second,
@@ -203,4 +205,4 @@ FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b) {
   return sum;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -10,28 +10,29 @@
 #include "server/diagnosis/inference/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 struct FormulaTerm {
   std::string covariate;   // "approach_z"
   std::string expression;  // with its parameters: "k * (finger == 0) * approach_z"
   bool adds_time = false;
-  std::vector<ParameterInfo> parameters;  // in the units of files
-  std::vector<double> values;             // where a fit starts
-  double gain_nats = 0;                   // log evidence over the fit without it, less its complexity penalty
-  double log_ratio = 0;                   // of the likelihoods
+  std::vector<model::ParameterInfo> parameters;  // in the units of files
+  std::vector<double> values;                    // where a fit starts
+  double gain_nats = 0;  // log evidence over the fit without it, less its complexity penalty
+  double log_ratio = 0;  // of the likelihoods
   int degrees_of_freedom = 1;
 };
 
 // Every term's gain over `fit`, best first. `details` are of the fit's model, with curvature.
-std::vector<FormulaTerm> ScoreTerms(const Experiment& experiment, const TouchObservationModel& touches,
-                                    const Fit& fit, const Prediction& details);
+std::vector<FormulaTerm> ScoreTerms(const inference::Experiment& experiment,
+                                    const touches::TouchObservationModel& touches, const inference::Fit& fit,
+                                    const touches::Prediction& details);
 
 // The term as an effect of this name.
-absl::StatusOr<std::shared_ptr<const Effect>> MakeTermEffect(const std::string& name,
-                                                             const FormulaTerm& term);
+absl::StatusOr<std::shared_ptr<const model::Effect>> MakeTermEffect(const std::string& name,
+                                                                    const FormulaTerm& term);
 
 // Two terms in one expression: parameters of the second are renamed where they clash.
 FormulaTerm Sum(const FormulaTerm& a, const FormulaTerm& b);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -6,23 +6,24 @@
 #include "server/diagnosis/selection/workspace.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 using ::testing::HasSubstr;
 
 // The best term for a rig with this formula hidden.
 FormulaTerm BestTerm(const std::string& expression, const std::string& k) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 6;
   rig.hidden = {{"formula",
                  {"name=odd", "adds=travel_mm", "expression=" + expression, "k=" + k, "k_unit=1", "k_min=-9",
                   "k_max=9"}}};
-  const auto workspace = MakeWorkspace(MakeTestInput(rig), {});
+  const auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
   EXPECT_TRUE(workspace.ok()) << workspace.status();
   EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
-  const auto fit = FitModel((*workspace)->experiment,
-                            Parameterization(*(*workspace)->input.model, (*workspace)->searched->objects));
+  const auto fit = inference::FitModel(
+      (*workspace)->experiment,
+      inference::Parameterization(*(*workspace)->input.model, (*workspace)->searched->objects));
   EXPECT_TRUE(fit.ok());
   const auto details = (*workspace)->searched_predictor->Run(fit->model.base(), true, true);
   return ScoreTerms((*workspace)->experiment, *(*workspace)->rows, *fit, *details)[0];
@@ -61,4 +62,4 @@ TEST(FormulaTerms, AreEffectsThatAModelCanHold) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

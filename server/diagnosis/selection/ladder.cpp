@@ -8,7 +8,7 @@
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kSurfaceNats = 5;        // evidence that makes a surface error a step by itself
@@ -19,31 +19,32 @@ constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest mus
 constexpr double kLengthError = 0.4;        // relative, of a surface error's length: the grid's spacing
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
-absl::StatusOr<Fit> FitAll(const Workspace& workspace, const Fit& fit) {
+absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
   if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
-  const Observations& o = *workspace.observations;
-  const Contrasts contrasts(o, workspace.nominal.time_s);
-  const Likelihood likelihood(FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0,
-                              nullptr);
-  const TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
-  Experiment all = workspace.experiment;
+  const touches::Observations& o = *workspace.observations;
+  const touches::Contrasts contrasts(o, workspace.nominal.time_s);
+  const inference::Likelihood likelihood(
+      touches::FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0, nullptr);
+  const touches::TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
+  inference::Experiment all = workspace.experiment;
   all.observations = &rows;
   all.likelihood = &likelihood;
   all.pool = nullptr;  // the predictor has the threads
-  TOUCHSTONE_ASSIGN_OR_RETURN(Fit whole, FitModel(all, fit.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit whole, inference::FitModel(all, fit.model));
   whole.columns = fit.columns;  // held-out errors come from the search's touches
   return whole;
 }
 
 // The model with only those of its further effects that are in `kept`.
-Parameterization Only(const Parameterization& model, int initial_effects, const std::vector<int>& kept) {
-  Parameterization part = model;
+inference::Parameterization Only(const inference::Parameterization& model, int initial_effects,
+                                 const std::vector<int>& kept) {
+  inference::Parameterization part = model;
   for (int index = static_cast<int>(model.base().effects.size()) - 1; index >= initial_effects; --index)
     if (std::find(kept.begin(), kept.end(), index) == kept.end()) part = part.Without(index);
   return part;
 }
 
-void AddTexts(const Effect& effect, LadderStep* step) {
+void AddTexts(const model::Effect& effect, LadderStep* step) {
   step->meaning = effect.meaning;
   step->check_on_rig = effect.check_on_rig;
   step->remedy = effect.remedy;
@@ -81,33 +82,34 @@ class LadderBuilder {
 
   // The improved model: everything but the formula; its residuals, and the noise floor.
   absl::Status Improve() {
-    const Observations& o = *workspace_.observations;
+    const touches::Observations& o = *workspace_.observations;
     TOUCHSTONE_ASSIGN_OR_RETURN(fit_, FitAll(workspace_, selection_.fit));
-    Model whole = fit_.model.base();
+    model::Model whole = fit_.model.base();
     RoundValues(fit_, &whole);
     ladder_.improved = whole;
     if (has_formula()) ladder_.improved.effects.erase(ladder_.improved.effects.begin() + selection_.formula);
     ladder_.changed = !selection_.steps.empty();
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
-    ladder_.residuals = Residuals(o, ladder_.prediction);
+    ladder_.residuals = touches::Residuals(o, ladder_.prediction);
     std::vector<double> best = ladder_.residuals;
     if (has_formula()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction with, workspace_.predictor->Run(whole, false, false));
-      best = Residuals(o, with);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
+                                  workspace_.predictor->Run(whole, false, false));
+      best = touches::Residuals(o, with);
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
     return absl::OkStatus();
   }
 
   void DescribeRefits() {
-    const Model& before = *workspace_.input.model;
-    const Parameterization initial(before, workspace_.observations->objects);
+    const model::Model& before = *workspace_.input.model;
+    const inference::Parameterization initial(before, workspace_.observations->objects);
     for (int index = 0; index < static_cast<int>(before.effects.size()); ++index) {
       if (!fit_.model.IsFree(index)) continue;
-      const std::vector<ParameterEstimate> old =
+      const std::vector<inference::ParameterEstimate> old =
           initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
       RefittedEffect refit;
-      refit.effect = NameOf(*before.effects[index].effect);
+      refit.effect = inference::NameOf(*before.effects[index].effect);
       refit.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
       for (size_t j = 0; j < refit.parameters.size() && j < old.size(); ++j)
         refit.parameters[j].before = old[j].value;
@@ -122,10 +124,10 @@ class LadderBuilder {
     std::vector<int> kept, open;
     for (const SelectedStep& step : selection_.steps) open.push_back(step.effect);
     while (!open.empty()) {
-      absl::StatusOr<Fit> next = absl::NotFoundError("");
+      absl::StatusOr<inference::Fit> next = absl::NotFoundError("");
       size_t chosen = 0;
       for (size_t j = 0; j < open.size(); ++j) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(Fit trial, FitWith(kept, open[j], open.size() == 1));
+        TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit trial, FitWith(kept, open[j], open.size() == 1));
         if (next.ok() && trial.log_evidence <= next->log_evidence) continue;
         next = std::move(trial);
         chosen = j;
@@ -138,18 +140,19 @@ class LadderBuilder {
   }
 
   // The fit with the steps kept so far and one more; the last one is the whole fit.
-  absl::StatusOr<Fit> FitWith(std::vector<int> kept, int further, bool last) const {
+  absl::StatusOr<inference::Fit> FitWith(std::vector<int> kept, int further, bool last) const {
     if (last && !has_formula()) return selection_.fit;
     kept.push_back(further);
-    return FitModel(workspace_.experiment, Only(selection_.fit.model, selection_.initial_effects, kept));
+    return inference::FitModel(workspace_.experiment,
+                               Only(selection_.fit.model, selection_.initial_effects, kept));
   }
 
-  absl::Status DescribeStep(int index, const Fit& with_it) {
+  absl::Status DescribeStep(int index, const inference::Fit& with_it) {
     const SelectedStep& from = *std::find_if(selection_.steps.begin(), selection_.steps.end(),
                                              [&](const SelectedStep& s) { return s.effect == index; });
-    const EffectInstance& instance = fit_.model.base().effects[index];
+    const model::EffectInstance& instance = fit_.model.base().effects[index];
     LadderStep step;
-    step.effect = NameOf(*instance.effect);
+    step.effect = inference::NameOf(*instance.effect);
     step.scope = instance.per_object ? EffectScope::kObject : EffectScope::kRig;
     AddTexts(*instance.effect, &step);
     step.probability = from.probability;
@@ -164,18 +167,18 @@ class LadderBuilder {
       step.discriminating_measurement = DiscriminatingMeasurement(equivalent);
       ladder_.confounded.push_back({equivalent, step.discriminating_measurement});
     }
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction prediction,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.predictor->Run(with_it.model.base(), false, false));
-    step.quality = QualityOf(workspace_, with_it, Residuals(*workspace_.observations, prediction));
+    step.quality = QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction));
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
   }
 
   // Bumps of the surface may be the last step.
   bool SurfaceErrorIsAStep() const {
-    const std::vector<EffectInstance>& effects = workspace_.input.model->effects;
-    const bool had = std::any_of(effects.begin(), effects.end(), [](const EffectInstance& e) {
-      return e.effect->role == EffectRole::kSmoothError;
+    const std::vector<model::EffectInstance>& effects = workspace_.input.model->effects;
+    const bool had = std::any_of(effects.begin(), effects.end(), [](const model::EffectInstance& e) {
+      return e.effect->role == model::EffectRole::kSmoothError;
     });
     const double gain_nats = selection_.surface_error.gain_nats;
     const bool misfit = ladder_.final.lack_of_fit_p < kMisfitP;
@@ -185,7 +188,7 @@ class LadderBuilder {
 
   void AddSurfaceError() {
     const SurfaceErrorFinding& found = selection_.surface_error;
-    const auto effect = FindByRole(EffectRole::kSmoothError);
+    const auto effect = effects::FindByRole(model::EffectRole::kSmoothError);
     LadderStep step;
     step.effect = effect->name;
     step.scope = EffectScope::kObject;
@@ -195,8 +198,8 @@ class LadderBuilder {
     step.discriminating_measurement = DiscriminatingMeasurement({effect->name});
     const double rms_mm = found.rms_m * kMillimetresPerMetre,
                  length_mm = found.length_m * kMillimetresPerMetre;
-    const auto add = [&](const ParameterInfo& parameter, double value, double relative_error) {
-      ParameterEstimate estimate;
+    const auto add = [&](const model::ParameterInfo& parameter, double value, double relative_error) {
+      inference::ParameterEstimate estimate;
       estimate.name = parameter.name;
       estimate.unit = std::string(UnitSymbol(parameter.unit));
       estimate.value = value;
@@ -210,7 +213,7 @@ class LadderBuilder {
     step.quality = QualityWithoutSurface(workspace_, selection_.fit);
     if (!has_formula()) ladder_.final = step.quality;
     ladder_.steps.push_back(std::move(step));
-    EffectInstance instance;
+    model::EffectInstance instance;
     instance.effect = effect;
     instance.per_object = true;
     // Two per cent of the values stand for their error.
@@ -228,7 +231,7 @@ class LadderBuilder {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
-  Fit fit_;  // on all touches
+  inference::Fit fit_;  // on all touches
   Ladder ladder_;
 };
 
@@ -238,4 +241,4 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
   return LadderBuilder(workspace, selection).Build();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

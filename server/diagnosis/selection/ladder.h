@@ -9,7 +9,7 @@
 #include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/selection/selection.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 struct Ladder {
   Verdict verdict = Verdict::kNone;
@@ -21,11 +21,11 @@ struct Ladder {
   std::vector<RankedCandidate> candidates;  // best first
   std::optional<UnexplainedRest> unexplained;
 
-  Model improved;                 // the initial model with steps and refits, without a formula
-  bool changed = false;           // improved differs from the initial model
-  bool values_wrong = false;      // an effect of the initial model, other than noise, has other values
-  std::vector<double> residuals;  // of the improved model, all touches, s
-  Prediction prediction;          // of the improved model, with details
+  model::Model improved;           // the initial model with steps and refits, without a formula
+  bool changed = false;            // improved differs from the initial model
+  bool values_wrong = false;       // an effect of the initial model, other than noise, has other values
+  std::vector<double> residuals;   // of the improved model, all touches, s
+  touches::Prediction prediction;  // of the improved model, with details
 };
 
 absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionResult& selection);
@@ -34,7 +34,7 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
 
 // The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
 // noise floor and final errors, which noise does not change.
-void AddNoiseSteps(const NoiseFindings& noise, Ladder* ladder);
+void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder);
 
 // Every effect of the catalogue as the only step.
 absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,
@@ -50,6 +50,6 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
 double RoundedTo(double value, double std_error);
 
 // Sets the fitted values of a model, rounded so.
-void RoundValues(const Fit& fit, Model* model);
+void RoundValues(const inference::Fit& fit, model::Model* model);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

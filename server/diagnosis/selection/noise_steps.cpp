@@ -7,7 +7,7 @@
 #include "server/diagnosis/selection/ladder.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kSignificant = 3.3;   // standard errors, for a refit
@@ -22,12 +22,12 @@ class NoiseStepWriter {
   explicit NoiseStepWriter(Ladder* ladder) : ladder_(*ladder) {}
 
   // The effect of this role, which has one parameter.
-  void Write(EffectRole role, const NoiseEstimate& found) {
-    EffectInstance* present = nullptr;
-    for (EffectInstance& instance : ladder_.improved.effects)
+  void Write(model::EffectRole role, const inference::NoiseEstimate& found) {
+    model::EffectInstance* present = nullptr;
+    for (model::EffectInstance& instance : ladder_.improved.effects)
       if (instance.effect->role == role) present = &instance;
-    const auto effect = FindByRole(role);
-    const ParameterEstimate estimate = Estimate(effect->parameters[0], found);
+    const auto effect = effects::FindByRole(role);
+    const inference::ParameterEstimate estimate = Estimate(effect->parameters[0], found);
     if (present != nullptr)
       Refit(estimate, present);
     else
@@ -35,8 +35,9 @@ class NoiseStepWriter {
   }
 
  private:
-  static ParameterEstimate Estimate(const ParameterInfo& parameter, const NoiseEstimate& found) {
-    ParameterEstimate estimate;
+  static inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter,
+                                               const inference::NoiseEstimate& found) {
+    inference::ParameterEstimate estimate;
     estimate.name = parameter.name;
     estimate.unit = std::string(UnitSymbol(parameter.unit));
     estimate.value = FromSi(parameter.unit, std::clamp(found.value, ToSi(parameter.unit, parameter.lower),
@@ -47,7 +48,7 @@ class NoiseStepWriter {
     return estimate;
   }
 
-  void Refit(ParameterEstimate estimate, EffectInstance* present) {
+  void Refit(inference::ParameterEstimate estimate, model::EffectInstance* present) {
     const Unit unit = present->effect->parameters[0].unit;
     const double before = FromSi(unit, present->values[0]), change = std::abs(estimate.value - before);
     if (change < kSignificant * estimate.std_error || change < kRelevant * estimate.value) return;
@@ -58,7 +59,8 @@ class NoiseStepWriter {
     ladder_.changed = true;
   }
 
-  void Add(const std::shared_ptr<const Effect>& effect, const ParameterEstimate& estimate, double gain_nats) {
+  void Add(const std::shared_ptr<const model::Effect>& effect, const inference::ParameterEstimate& estimate,
+           double gain_nats) {
     LadderStep step;
     step.effect = effect->name;
     step.meaning = effect->meaning;
@@ -69,7 +71,7 @@ class NoiseStepWriter {
     step.parameters = {estimate};
     step.quality = ladder_.final;  // noise changes no expectation: the errors stay
     ladder_.steps.push_back(std::move(step));
-    EffectInstance instance;
+    model::EffectInstance instance;
     instance.effect = effect;
     instance.values = effect->NeutralValues(ladder_.improved.fingers);
     instance.values[0] = ToSi(effect->parameters[0].unit, RoundedTo(estimate.value, estimate.std_error));
@@ -82,25 +84,25 @@ class NoiseStepWriter {
 
 }  // namespace
 
-void AddNoiseSteps(const NoiseFindings& noise, Ladder* ladder) {
+void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder) {
   NoiseStepWriter writer(ladder);
-  const bool has_sigma =
-      std::any_of(ladder->improved.effects.begin(), ladder->improved.effects.end(),
-                  [](const EffectInstance& e) { return e.effect->role == EffectRole::kNoiseLevel; });
-  NoiseEstimate sigma = noise.sigma_s;
+  const bool has_sigma = std::any_of(
+      ladder->improved.effects.begin(), ladder->improved.effects.end(),
+      [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
+  inference::NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = kCertainNats;
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
   if (scatter && (has_sigma || ladder->noise_floor.sigma_s * kMicrosecondsPerSecond > kMinFloorUs))
-    writer.Write(EffectRole::kNoiseLevel, sigma);
-  const std::pair<EffectRole, const NoiseEstimate*> kinds[] = {
-      {EffectRole::kNoiseGrowth, &noise.slope},
-      {EffectRole::kNoiseTails, &noise.degrees_of_freedom},
-      {EffectRole::kQuantisation, &noise.poll_interval_s},
-      {EffectRole::kDropout, &noise.missed_probability},
+    writer.Write(model::EffectRole::kNoiseLevel, sigma);
+  const std::pair<model::EffectRole, const inference::NoiseEstimate*> kinds[] = {
+      {model::EffectRole::kNoiseGrowth, &noise.slope},
+      {model::EffectRole::kNoiseTails, &noise.degrees_of_freedom},
+      {model::EffectRole::kQuantisation, &noise.poll_interval_s},
+      {model::EffectRole::kDropout, &noise.missed_probability},
   };
   for (const auto& [role, found] : kinds)
     if (found->gain_nats > 0) writer.Write(role, *found);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

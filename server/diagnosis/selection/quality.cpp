@@ -8,20 +8,20 @@
 
 #include "server/diagnosis/inference/held_out.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kMinDegreesOfFreedom = 8;
 
 // Held-out error over error, on the touches of the search.
-double HeldOutRatio(const Workspace& workspace, const Fit& fit) {
+double HeldOutRatio(const Workspace& workspace, const inference::Fit& fit) {
   const double rmse = std::sqrt(fit.columns.values.col(0).squaredNorm() /
                                 std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  return rmse > 0 ? HeldOutRmse(workspace.experiment, fit) / rmse : 1;
+  return rmse > 0 ? inference::HeldOutRmse(workspace.experiment, fit) / rmse : 1;
 }
 
 // Without repeats: how much better a smooth remainder explains the residuals than none.
-double SmoothRemainderP(const Workspace& workspace, const Fit& fit) {
+double SmoothRemainderP(const Workspace& workspace, const inference::Fit& fit) {
   const double gain = std::max(SurfaceErrorNats(workspace, fit), 0.0);
   return 0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) +
          (gain > 0 ? 0 : 0.5);
@@ -29,12 +29,12 @@ double SmoothRemainderP(const Workspace& workspace, const Fit& fit) {
 
 }  // namespace
 
-bool HasRepeats(const SumOfSquares& error) {
+bool HasRepeats(const touches::SumOfSquares& error) {
   return error.degrees_of_freedom >= kMinDegreesOfFreedom;
 }
 
-double LackOfFitP(const Observations& o, const std::vector<double>& residuals, double parameters) {
-  const SumOfSquares pure = PureErrorOf(o, residuals), total = TotalSquares(o, residuals);
+double LackOfFitP(const touches::Observations& o, const std::vector<double>& residuals, double parameters) {
+  const touches::SumOfSquares pure = PureErrorOf(o, residuals), total = touches::TotalSquares(o, residuals);
   const double dof = total.degrees_of_freedom - pure.degrees_of_freedom - parameters;
   if (!HasRepeats(pure) || dof < 1 || !(pure.sum_of_squares > 0)) return 1;
   const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / dof /
@@ -42,34 +42,36 @@ double LackOfFitP(const Observations& o, const std::vector<double>& residuals, d
   return boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof, pure.degrees_of_freedom), f));
 }
 
-Quality QualityOf(const Workspace& workspace, const Fit& fit, const std::vector<double>& residuals) {
+Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
+                  const std::vector<double>& residuals) {
   Quality quality;
-  const Observations& o = *workspace.observations;
-  quality.rmse_s = Rmse(o, residuals);
+  const touches::Observations& o = *workspace.observations;
+  quality.rmse_s = touches::Rmse(o, residuals);
   quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
   quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
                                                                 : SmoothRemainderP(workspace, fit);
   return quality;
 }
 
-Quality QualityWithoutSurface(const Workspace& workspace, const Fit& fit) {
+Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit) {
   Quality quality;
   const std::vector<double> left = ResidualsWithoutSurface(workspace, fit);
   const double effective_dof =
       workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof + fit.model.size();
-  const SumOfSquares total = TotalSquares(*workspace.searched, left);
+  const touches::SumOfSquares total = touches::TotalSquares(*workspace.searched, left);
   quality.rmse_s = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
   quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
   quality.lack_of_fit_p = LackOfFitP(*workspace.searched, left, effective_dof);
   return quality;
 }
 
-NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best, double fitted_parameters) {
+NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vector<double>& best,
+                        double fitted_parameters) {
   NoiseFloor floor;
-  SumOfSquares error = PureErrorOf(o, best);
+  touches::SumOfSquares error = PureErrorOf(o, best);
   floor.from_repeats = HasRepeats(error);
   if (!floor.from_repeats) {
-    error = TotalSquares(o, best);
+    error = touches::TotalSquares(o, best);
     error.degrees_of_freedom = std::max(error.degrees_of_freedom - fitted_parameters, 1.0);
   }
   floor.degrees_of_freedom = error.degrees_of_freedom;
@@ -86,4 +88,4 @@ NoiseFloor NoiseFloorOf(const Observations& o, const std::vector<double>& best, 
   return floor;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -4,24 +4,26 @@
 #include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/selection/selection.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 // F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without repeats or
 // without degrees of freedom.
-double LackOfFitP(const Observations& observations, const std::vector<double>& residuals, double parameters);
+double LackOfFitP(const touches::Observations& observations, const std::vector<double>& residuals,
+                  double parameters);
 
 // Repeats enough for an F test.
-bool HasRepeats(const SumOfSquares& error);
+bool HasRepeats(const touches::SumOfSquares& error);
 
 // Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
 // comes from the touches of the search.
-Quality QualityOf(const Workspace& workspace, const Fit& fit, const std::vector<double>& residuals);
+Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
+                  const std::vector<double>& residuals);
 
 // The same for what the fit's surface error leaves, on the touches of the search.
-Quality QualityWithoutSurface(const Workspace& workspace, const Fit& fit);
+Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit);
 
 // The floor below which no model can go, from the repeats, else from `best`, residuals of the best model.
-NoiseFloor NoiseFloorOf(const Observations& observations, const std::vector<double>& best,
+NoiseFloor NoiseFloorOf(const touches::Observations& observations, const std::vector<double>& best,
                         double fitted_parameters);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

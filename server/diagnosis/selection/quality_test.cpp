@@ -6,37 +6,37 @@
 
 #include "server/diagnosis/touches/made_up_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 TEST(Rmse, EqualsSigmaWhereTheModelIsPerfect) {
-  const MadeUpSet set(5, 48, 4, 0.005, 1);
-  EXPECT_NEAR(Rmse(set.observations, set.residuals), 0.005, 0.0002);
+  const touches::MadeUpSet set(5, 48, 4, 0.005, 1);
+  EXPECT_NEAR(touches::Rmse(set.observations, set.residuals), 0.005, 0.0002);
 }
 
 TEST(PureError, IsTheScatterOfRepeatsWhateverTheMisfit) {
-  MadeUpSet set(5, 48, 4, 0.005, 2);
+  touches::MadeUpSet set(5, 48, 4, 0.005, 2);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
   set.Finish();
-  const SumOfSquares error = PureErrorOf(set.observations, set.residuals);
+  const touches::SumOfSquares error = PureErrorOf(set.observations, set.residuals);
   EXPECT_EQ(error.degrees_of_freedom, 5 * 48 * (4 - 1) * 2);
   EXPECT_NEAR(std::sqrt(error.sum_of_squares / error.degrees_of_freedom), 0.005, 0.0003);
-  EXPECT_GT(Rmse(set.observations, set.residuals), 0.015);
+  EXPECT_GT(touches::Rmse(set.observations, set.residuals), 0.015);
 }
 
 TEST(LackOfFit, IsUniformWhereNothingIsMissing) {
   int below_tenth = 0;
   constexpr int kSets = 200;
   for (int seed = 0; seed < kSets; ++seed) {
-    const MadeUpSet set(3, 10, 3, 0.005, 100 + seed);
+    const touches::MadeUpSet set(3, 10, 3, 0.005, 100 + seed);
     below_tenth += LackOfFitP(set.observations, set.residuals, 0) < 0.1;
   }
   EXPECT_NEAR(below_tenth, 0.1 * kSets, 4 * std::sqrt(0.09 * kSets));
 }
 
 TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
-  MadeUpSet set(5, 48, 4, 0.005, 3);
+  touches::MadeUpSet set(5, 48, 4, 0.005, 3);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.005 * std::sin(set.observations.pose[k]);
   set.Finish();
@@ -44,7 +44,7 @@ TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
 }
 
 TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
-  const MadeUpSet set(5, 48, 1, 0.005, 4);
+  const touches::MadeUpSet set(5, 48, 1, 0.005, 4);
   const NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
   EXPECT_FALSE(floor.from_repeats);
   EXPECT_NEAR(floor.sigma_s, 5000e-6, 400e-6);
@@ -53,4 +53,4 @@ TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

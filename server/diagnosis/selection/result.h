@@ -8,7 +8,7 @@
 
 #include "server/diagnosis/inference/parameter_estimate.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 enum class Verdict {
   kNone,            // a comparison gives none
@@ -38,7 +38,7 @@ struct NoiseFloor {
 // New values of an effect that the model has.
 struct RefittedEffect {
   std::string effect;  // "formula NAME" for a formula
-  std::vector<ParameterEstimate> parameters;
+  std::vector<inference::ParameterEstimate> parameters;
 };
 
 // An effect to add, after all earlier ones.
@@ -49,7 +49,7 @@ struct LadderStep {
   std::string discriminating_measurement;  // that would tell; empty if nothing is confounded
   double probability = 0;                  // with its equivalents, among all that could take its place
   double gain_nats = 0;                    // of log evidence, over the fit without it
-  std::vector<ParameterEstimate> parameters;
+  std::vector<inference::ParameterEstimate> parameters;
   Quality quality;  // with this step, all earlier ones and refits, everything fitted anew
   std::string meaning, check_on_rig, remedy;  // for people, from the catalogue
 };
@@ -68,8 +68,8 @@ struct RankedCandidate {
   CandidateNote note = CandidateNote::kNone;
   double probability = 0;  // of being the one effect that is missing
   double gain_nats = 0;
-  std::vector<ParameterEstimate> parameters;  // empty unless it was fitted
-  double rmse_s = 0, heldout_rmse_s = 0;      // 0 unless it was fitted
+  std::vector<inference::ParameterEstimate> parameters;  // empty unless it was fitted
+  double rmse_s = 0, heldout_rmse_s = 0;                 // 0 unless it was fitted
 
   bool explains() const { return note != CandidateNote::kInvisible && note != CandidateNote::kNeutral; }
 };
@@ -91,11 +91,11 @@ struct UnexplainedRest {
   std::vector<CovariateTest> covariates;  // that it depends on, largest gain first
   std::string formula;                    // a suggestion; empty: none
   std::string formula_yaml;               // the whole effect for a model file
-  std::vector<ParameterEstimate> parameters;
+  std::vector<inference::ParameterEstimate> parameters;
   double rmse_s = 0, heldout_rmse_s = 0;  // with the formula
   double heldout_gain = 0;                // share of the held-out excess error that it removes, 0 to 1
   std::string nearest_effect;             // of the catalogue, and the cosine between the two
   double nearest_cosine = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

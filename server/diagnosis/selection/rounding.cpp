@@ -4,15 +4,15 @@
 #include "server/diagnosis/selection/ladder.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 // Sets the entry of `parameter` that the estimate is of. `values`: of its whole effect.
-void SetRounded(const ParameterEstimate& estimate, const ParameterInfo& parameter, int offset, int fingers,
-                std::vector<double>* values) {
+void SetRounded(const inference::ParameterEstimate& estimate, const model::ParameterInfo& parameter,
+                int offset, int fingers, std::vector<double>* values) {
   const int last = parameter.Count(fingers) - 1;
   for (int j = 0; j <= last; ++j) {
-    if (EntryName(parameter, j, fingers) != estimate.entry) continue;
+    if (inference::EntryName(parameter, j, fingers) != estimate.entry) continue;
     const double rounded = RoundedTo(estimate.value, estimate.std_error);
     if (rounded >= parameter.lower && rounded <= parameter.upper)
       (*values)[offset + j] = ToSi(parameter.unit, rounded);
@@ -33,20 +33,21 @@ double RoundedTo(double value, double std_error) {
   return digit >= 1 ? std::round(value / digit) * digit : std::round(value / digit) / std::round(1 / digit);
 }
 
-void RoundValues(const Fit& fit, Model* model) {
+void RoundValues(const inference::Fit& fit, model::Model* model) {
   for (int index = 0; index < static_cast<int>(model->effects.size()); ++index) {
     if (!fit.model.IsFree(index)) continue;
-    EffectInstance& instance = model->effects[index];
-    const Effect& effect = *instance.effect;
-    for (const ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
+    model::EffectInstance& instance = model->effects[index];
+    const model::Effect& effect = *instance.effect;
+    for (const inference::ParameterEstimate& estimate :
+         fit.model.Describe(index, fit.point, fit.covariance)) {
       std::vector<double>& values =
           estimate.object.empty() ? instance.values : instance.object_values.at(estimate.object);
       for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p)
         if (effect.parameters[p].name == estimate.name)
-          SetRounded(estimate, effect.parameters[p], ValueOffset(effect, p, model->fingers), model->fingers,
-                     &values);
+          SetRounded(estimate, effect.parameters[p], model::ValueOffset(effect, p, model->fingers),
+                     model->fingers, &values);
     }
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -9,7 +9,7 @@
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kTermsFitted = 3;
@@ -30,9 +30,9 @@ struct WithTerm {
 };
 
 // The index of the formula of this name among the effects that were added; -1: there is none.
-int FindFormula(const Fit& fit, int initial_effects, const std::string& name) {
+int FindFormula(const inference::Fit& fit, int initial_effects, const std::string& name) {
   for (int index = initial_effects; index < static_cast<int>(fit.model.base().effects.size()); ++index) {
-    const Effect& effect = *fit.model.base().effects[index].effect;
+    const model::Effect& effect = *fit.model.base().effects[index].effect;
     if (effect.formula != nullptr && effect.formula->name == name) return index;
   }
   return -1;
@@ -40,9 +40,9 @@ int FindFormula(const Fit& fit, int initial_effects, const std::string& name) {
 
 absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const StepwiseSearch& search,
                                   const Explanation& without, const FormulaTerm* first) {
-  const Experiment& experiment = workspace.experiment;
+  const inference::Experiment& experiment = workspace.experiment;
   WithTerm best;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                               workspace.searched_predictor->Run(without.fit.model.base(), true, true));
   const std::vector<FormulaTerm> terms = ScoreTerms(experiment, *workspace.rows, without.fit, details);
   const double penalty_nats = search.rules().complexity_penalty_nats;
@@ -51,7 +51,7 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const StepwiseSear
   for (const FormulaTerm& candidate : terms) {
     if (fitted++ == kTermsFitted || candidate.gain_nats < 0.5 * penalty_nats) break;
     FormulaTerm term = candidate;
-    Parameterization base = without.fit.model;
+    inference::Parameterization base = without.fit.model;
     if (first != nullptr) {
       // The second term joins the first in one expression.
       term = Sum(*first, candidate);
@@ -61,12 +61,13 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const StepwiseSear
     }
     const auto effect = MakeTermEffect(FormulaName(term), term);
     if (!effect.ok()) return effect.status();
-    Parameterization start = base;
+    inference::Parameterization start = base;
     start.Add(*effect, false);
-    absl::StatusOr<Fit> fit = FitModel(experiment, std::move(start));
+    absl::StatusOr<inference::Fit> fit = inference::FitModel(experiment, std::move(start));
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit.status();
     if (!fit.ok() || fit->log_evidence <= best_evidence) continue;
-    const double gain = 1 - HeldOutRmse(experiment, *fit) / HeldOutRmse(experiment, without.fit);
+    const double gain =
+        1 - inference::HeldOutRmse(experiment, *fit) / inference::HeldOutRmse(experiment, without.fit);
     if (gain < search.rules().min_relative_cv_gain) continue;
     best_evidence = fit->log_evidence;
     best.found = true;
@@ -83,8 +84,8 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
   const StepwiseSearch& search = *result->search;
   const int initial_effects = static_cast<int>(workspace.input.model->effects.size());
   result->initial_effects = initial_effects;
-  Parameterization base(*workspace.input.model, workspace.searched->objects);
-  TOUCHSTONE_ASSIGN_OR_RETURN(result->initial_model, FitModel(workspace.experiment, base));
+  inference::Parameterization base(*workspace.input.model, workspace.searched->objects);
+  TOUCHSTONE_ASSIGN_OR_RETURN(result->initial_model, inference::FitModel(workspace.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(Explanation best, search.Run(base, initial_effects));
   result->formula = -1;
   FormulaTerm* first = nullptr;
@@ -94,7 +95,7 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
     // From scratch, with the formula's term as one effect among the others.
     const auto effect = MakeTermEffect(FormulaName(with.term), with.term);
     if (!effect.ok()) return effect.status();
-    Parameterization start = base;
+    inference::Parameterization start = base;
     start.Add(*effect, false);
     TOUCHSTONE_ASSIGN_OR_RETURN(Explanation again, search.Run(start, initial_effects));
     const int at = FindFormula(again.fit, initial_effects, FormulaName(with.term));
@@ -110,8 +111,9 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
   result->fit = best.fit;
   result->without_formula = best.fit;
   if (result->formula >= 0) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(result->without_formula,
-                                FitModel(workspace.experiment, best.fit.model.Without(result->formula)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        result->without_formula,
+        inference::FitModel(workspace.experiment, best.fit.model.Without(result->formula)));
   }
   return absl::OkStatus();
 }
@@ -124,11 +126,11 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
     if (index == result->formula) continue;
     SelectedStep step;
     step.effect = index;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, search.WithoutEffect(whole, index));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without, search.WithoutEffect(whole, index));
     step.gain_nats = result->fit.log_evidence - without.log_evidence;
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<CompetingFit> competing,
                                 search.CompetingFits(whole, index));
-    const std::string own = NameOf(*result->fit.model.base().effects[index].effect);
+    const std::string own = inference::NameOf(*result->fit.model.base().effects[index].effect);
     double all = std::exp(-std::min(step.gain_nats, 700.0)), equivalent_sum = 0;
     for (const CompetingFit& competitor : competing) {
       const double evidence = competitor.fit.log_evidence - result->fit.log_evidence;
@@ -152,12 +154,12 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
 
 }  // namespace
 
-std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const Fit& fit) {
-  const Contrasts& contrasts = *workspace.contrasts;
-  const Observations& o = *workspace.searched;
+std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const inference::Fit& fit) {
+  const touches::Contrasts& contrasts = *workspace.contrasts;
+  const touches::Observations& o = *workspace.searched;
   const Eigen::VectorXd left =
       fit.columns.values.col(0) -
-      workspace.likelihood->FieldMean(Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
+      workspace.likelihood->FieldMean(inference::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
   std::vector<double> residuals(o.time_s.size(), NAN);
   for (size_t t = 0; t < contrasts.touches().size(); ++t) {
     const Eigen::MatrixXd& h = contrasts.MatrixOf(static_cast<int>(t));
@@ -173,13 +175,13 @@ std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const Fi
   return residuals;
 }
 
-double SurfaceErrorNats(const Workspace& workspace, const Fit& fit) {
+double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit) {
   std::vector<int> members(fit.model.size() + 1);
   for (int i = 0; i <= fit.model.size(); ++i) members[i] = i;
   const std::vector<Eigen::MatrixXd> grams = {workspace.likelihood->Gram(fit.columns, 0)};
-  const double none =
-      ComputeLaplaceEvidence(*workspace.likelihood, grams, members, fit.model.parameters(), fit.point)
-          .log_evidence;
+  const double none = inference::ComputeLaplaceEvidence(*workspace.likelihood, grams, members,
+                                                        fit.model.parameters(), fit.point)
+                          .log_evidence;
   const double excess = fit.log_evidence - none;  // log of (none + some) / none
   return excess > 30 ? excess : std::log(std::max(std::expm1(excess), 1e-12));
 }
@@ -187,12 +189,12 @@ double SurfaceErrorNats(const Workspace& workspace, const Fit& fit) {
 namespace {
 
 // The noise of what the fit leaves, on all touches.
-absl::StatusOr<NoiseFindings> NoiseOf(const Workspace& workspace, const Fit& fit) {
-  const Observations& o = *workspace.observations;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+absl::StatusOr<inference::NoiseFindings> NoiseOf(const Workspace& workspace, const inference::Fit& fit) {
+  const touches::Observations& o = *workspace.observations;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                               workspace.predictor->Run(fit.model.base(), true, false));
   const std::vector<double> residuals =
-      workspace.thinned ? Residuals(o, details) : ResidualsWithoutSurface(workspace, fit);
+      workspace.thinned ? touches::Residuals(o, details) : ResidualsWithoutSurface(workspace, fit);
   std::vector<double> tangents(residuals.size());
   std::vector<char> expected(residuals.size());
   // A finger that would have had farther to go than any that reported is beyond the rig's stroke.
@@ -206,18 +208,19 @@ absl::StatusOr<NoiseFindings> NoiseOf(const Workspace& workspace, const Fit& fit
   }
   const double surface_dof =
       workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
-  return FindNoise(MakeNoiseSample(o, residuals, tangents, expected), fit.model.size() + surface_dof);
+  return inference::FindNoise(touches::MakeNoiseSample(o, residuals, tangents, expected),
+                              fit.model.size() + surface_dof);
 }
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
 // count less. Returns whether anything changed; `weights`: by row of the set.
-absl::StatusOr<bool> ReviseTouches(const Fit& fit, const NoiseFindings& noise, Workspace* workspace,
-                                   std::vector<double>* weights) {
-  Observations& o = *workspace->observations;
+absl::StatusOr<bool> ReviseTouches(const inference::Fit& fit, const inference::NoiseFindings& noise,
+                                   Workspace* workspace, std::vector<double>* weights) {
+  touches::Observations& o = *workspace->observations;
   TOUCHSTONE_ASSIGN_OR_RETURN(const int edges, LeaveOutEdges(*workspace->predictor, fit.model.base(), &o));
   const bool reweigh = weights->empty() && !noise.weights.empty();
   if (edges == 0 && noise.outliers.empty() && !reweigh) return false;
-  for (const int k : noise.outliers) LeaveOut(&o, k, kOutlierReason);
+  for (const int k : noise.outliers) touches::LeaveOut(&o, k, touches::kOutlierReason);
   weights->clear();
   if (noise.weights.empty()) return true;
   weights->assign(o.set->size(), 1.0);
@@ -250,15 +253,16 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
   if (result.formula >= 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        const Prediction details,
+        const touches::Prediction details,
         workspace->searched_predictor->Run(result.without_formula.model.base(), true, true));
     result.terms = ScoreTerms(workspace->experiment, *workspace->rows, result.without_formula, details);
   }
-  const SurfaceErrorHypothesis& hypothesis = workspace->likelihood->hypotheses()[result.fit.hypothesis];
+  const inference::SurfaceErrorHypothesis& hypothesis =
+      workspace->likelihood->hypotheses()[result.fit.hypothesis];
   result.surface_error = {SurfaceErrorNats(*workspace, result.fit),
                           hypothesis.amplitude_over_sigma * result.fit.sigma, hypothesis.length_m,
                           hypothesis.effective_dof};
   return result;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -13,7 +13,7 @@
 #include "server/diagnosis/selection/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 // Another way to explain what one step explains.
 struct CompetingEffect {
@@ -21,7 +21,7 @@ struct CompetingEffect {
   bool per_object = false;
   double relative_log_evidence = 0;  // nats, over the step's own
   bool equivalent = false;           // these data cannot tell it from the step
-  Model model;                       // the whole model with it
+  model::Model model;                // the whole model with it
 };
 
 struct SelectedStep {
@@ -40,15 +40,15 @@ struct SurfaceErrorFinding {
 
 struct SelectionResult {
   std::unique_ptr<StepwiseSearch> search;  // the experiment that it works on belongs to the workspace
-  Fit initial_model;                       // as it was given
-  Fit fit;                                 // everything: effects, refits, formula
-  Fit without_formula;                     // the same if there is no formula
+  inference::Fit initial_model;            // as it was given
+  inference::Fit fit;                      // everything: effects, refits, formula
+  inference::Fit without_formula;          // the same if there is no formula
   int initial_effects = 0;                 // effects below this index are the initial model's
   int formula = -1;                        // index of the formula's effect in fit.model
   FormulaTerm term;
   std::vector<FormulaTerm> terms;  // scored on what the named effects leave; empty if there is no formula
   std::vector<SelectedStep> steps;
-  NoiseFindings noise;
+  inference::NoiseFindings noise;
   SurfaceErrorFinding surface_error;
 };
 
@@ -56,9 +56,9 @@ struct SelectionResult {
 absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace);
 
 // Residuals [k * fingers + i], s, of a fit on the searched touches, without what its surface hypothesis explains.
-std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const Fit& fit);
+std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const inference::Fit& fit);
 
 // Log evidence of any surface error over none, nats.
-double SurfaceErrorNats(const Workspace& workspace, const Fit& fit);
+double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

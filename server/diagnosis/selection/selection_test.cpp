@@ -6,7 +6,7 @@
 
 #include "server/diagnosis/touches/simulated_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 struct Selected {
@@ -23,9 +23,9 @@ Selected SelectFor(const DiagnosisInput& input) {
 }
 
 TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
-  const Selected selected = SelectFor(MakeTestInput(rig));
+  const Selected selected = SelectFor(touches::MakeTestInput(rig));
   const SelectionResult& result = selected.result;
   ASSERT_EQ(result.steps.size(), 1u);
   EXPECT_EQ(result.fit.model.base().effects[result.steps[0].effect].effect->name, "tip_radius");
@@ -37,22 +37,22 @@ TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
 }
 
 TEST(SelectExplanation, NamesACompetingEffectThatTheseDataCannotTellFromTheStep) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
-  const Selected selected = SelectFor(MakeTestInput(rig));
+  const Selected selected = SelectFor(touches::MakeTestInput(rig));
   ASSERT_GE(selected.result.steps.size(), 1u);
   ASSERT_FALSE(selected.result.steps[0].competing.empty());
   EXPECT_TRUE(selected.result.steps[0].competing[0].equivalent);
 }
 
 TEST(SelectExplanation, LeavesOutliersOutWithTheirReason) {
-  DiagnosisInput input = MakeTestInput({});
-  auto set = std::make_shared<MeasurementSet>(*input.set);
+  DiagnosisInput input = touches::MakeTestInput({});
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
   for (const int row : {10, 60, 110}) set->time_s[static_cast<size_t>(row) * set->fingers] += 0.5;
   input.set = set;
   const Selected selected = SelectFor(input);
-  const Observations& o = *selected.workspace->observations;
-  EXPECT_EQ(o.unused.count(kOutlierReason), 1u);
+  const touches::Observations& o = *selected.workspace->observations;
+  EXPECT_EQ(o.unused.count(touches::kOutlierReason), 1u);
   for (int k = 0; k < o.size(); ++k) {
     if (o.row[k] != 10 && o.row[k] != 60 && o.row[k] != 110) continue;
     EXPECT_FALSE(o.used[k]) << o.row[k];
@@ -61,4 +61,4 @@ TEST(SelectExplanation, LeavesOutliersOutWithTheirReason) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

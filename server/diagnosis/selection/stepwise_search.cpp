@@ -10,7 +10,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kNearPrediction = 40;  // nats: candidates this far behind the best prediction are not fitted
@@ -25,7 +25,8 @@ double ChiSquaredTail(double x, int q) {
 
 }  // namespace
 
-bool StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensions) const {
+bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit& after,
+                             size_t extensions) const {
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1))
     return false;
@@ -33,26 +34,27 @@ bool StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensi
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
-  return HeldOutRmse(experiment_, after) <
-         (1 - rules_.min_relative_cv_gain) * HeldOutRmse(experiment_, before);
+  return inference::HeldOutRmse(experiment_, after) <
+         (1 - rules_.min_relative_cv_gain) * inference::HeldOutRmse(experiment_, before);
 }
 
 // What may extend the fit: effects of the model whose values are not free yet, and candidates that it lacks.
-std::vector<Extension> StepwiseSearch::ListExtensions(const Fit& fit, int initial_effects) const {
+std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit, int initial_effects) const {
   std::vector<Extension> extensions;
-  const Model& model = fit.model.base();
+  const model::Model& model = fit.model.base();
   for (int index = 0; index < initial_effects; ++index) {
     if (fit.model.IsFree(index) || model.effects[index].effect->random()) continue;
     Extension extension;
-    extension.name = NameOf(*model.effects[index].effect);
+    extension.name = inference::NameOf(*model.effects[index].effect);
     extension.start = fit.model;
     extension.start.Free(index, true);
     extensions.push_back(std::move(extension));
   }
   for (int c = 0; c < static_cast<int>(candidates_.size()); ++c) {
-    const std::string name = NameOf(*candidates_[c].effect);
-    const bool present = std::any_of(model.effects.begin(), model.effects.end(),
-                                     [&](const EffectInstance& e) { return NameOf(*e.effect) == name; });
+    const std::string name = inference::NameOf(*candidates_[c].effect);
+    const bool present =
+        std::any_of(model.effects.begin(), model.effects.end(),
+                    [&](const model::EffectInstance& e) { return inference::NameOf(*e.effect) == name; });
     if (present) continue;
     Extension extension;
     extension.candidate = c;
@@ -64,7 +66,8 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const Fit& fit, int initia
   return extensions;
 }
 
-absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int initial_effects) const {
+absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const inference::Fit& fit,
+                                                             int initial_effects) const {
   std::vector<Extension> extensions = ListExtensions(fit, initial_effects);
   // One wide matrix: the residual, the fit's own columns, and every extension's.
   const int own = fit.model.size();
@@ -73,7 +76,7 @@ absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int
   for (Extension& extension : extensions) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const Eigen::MatrixXd columns,
-        Derivatives(experiment_, extension.start, extension.start.Start(), fit.predicted, own));
+        inference::Derivatives(experiment_, extension.start, extension.start.Start(), fit.predicted, own));
     first_column.push_back(1 + own + static_cast<int>(wide.cols()));
     const int at = static_cast<int>(wide.cols());
     wide.conservativeResize(Eigen::NoChange, at + columns.cols());
@@ -82,8 +85,9 @@ absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int
       extension.visible |= columns.col(i).norm() * extension.start.parameters()[own + i].scale >
                            kVisible * std::sqrt(static_cast<double>(columns.rows()));
   }
-  const Likelihood& likelihood = *experiment_.likelihood;
-  const Likelihood::Columns all = Likelihood::Join(fit.columns, likelihood.Prepare(wide));
+  const inference::Likelihood& likelihood = *experiment_.likelihood;
+  const inference::Likelihood::Columns all =
+      inference::Likelihood::Join(fit.columns, likelihood.Prepare(wide));
   std::vector<Eigen::MatrixXd> grams(likelihood.hypotheses().size());
   const auto gram = [&](int begin, int end) {
     for (int s = begin; s < end; ++s) grams[s] = likelihood.Gram(all, s);
@@ -96,18 +100,20 @@ absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int
       std::vector<int> members;
       for (int i = 0; i <= own; ++i) members.push_back(i);
       for (int i = own; i < extension.start.size(); ++i) members.push_back(first_column[m] + i - own);
-      extension.log_evidence = ComputeLaplaceEvidence(likelihood, grams, members,
-                                                      extension.start.parameters(), extension.start.Start())
-                                   .log_evidence;
+      extension.log_evidence =
+          inference::ComputeLaplaceEvidence(likelihood, grams, members, extension.start.parameters(),
+                                            extension.start.Start())
+              .log_evidence;
     }
   };
   ParallelFor(experiment_.pool, static_cast<int>(extensions.size()), 1, evaluate);
   return extensions;
 }
 
-absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) const {
-  std::vector<Parameterization> starts = {extension.start};
-  const Effect* effect = extension.candidate >= 0 ? candidates_[extension.candidate].effect.get() : nullptr;
+absl::StatusOr<inference::Fit> StepwiseSearch::FitExtension(const Extension& extension) const {
+  std::vector<inference::Parameterization> starts = {extension.start};
+  const model::Effect* effect =
+      extension.candidate >= 0 ? candidates_[extension.candidate].effect.get() : nullptr;
   const int size = extension.start.size();
   if (effect != nullptr)
     for (const double value : candidates_[extension.candidate].further_starts) {
@@ -122,7 +128,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) con
       Eigen::VectorXd point = extension.start.Start();
       RandomStream random(k, RandomDomain::kDiagnosis, 77);
       for (int i = 0; i < size; ++i) {
-        const FreeParameter& c = extension.start.parameters()[i];
+        const inference::FreeParameter& c = extension.start.parameters()[i];
         if (c.effect == static_cast<int>(extension.start.base().effects.size()) - 1)
           point[i] = random.Uniform(c.lower, c.upper);
       }
@@ -130,9 +136,9 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) con
       starts.back().MoveTo(point);
     }
   }
-  absl::StatusOr<Fit> best = absl::InternalError("no fit");
-  for (Parameterization& start : starts) {
-    absl::StatusOr<Fit> fit = FitModel(experiment_, std::move(start));
+  absl::StatusOr<inference::Fit> best = absl::InternalError("no fit");
+  for (inference::Parameterization& start : starts) {
+    absl::StatusOr<inference::Fit> fit = inference::FitModel(experiment_, std::move(start));
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit;
     if (fit.ok() && (!best.ok() || fit->log_evidence > best->log_evidence)) best = std::move(fit);
     if (!best.ok() && !fit.ok()) best = fit.status();
@@ -145,7 +151,7 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
                               Score(explanation->fit, explanation->initial_effects));
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
-  absl::StatusOr<Fit> best = absl::NotFoundError("");
+  absl::StatusOr<inference::Fit> best = absl::NotFoundError("");
   int fitted = 0;
   for (const Extension& extension : extensions) {
     const bool unreached = !extension.visible && extension.start.parameters().back().reciprocal;
@@ -156,7 +162,7 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
     if (!near && !unreached && !user) continue;
     progress_(absl::StrCat("fitting ", extension.name));
     fitted += near;
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
     if (!best.ok() || fit.log_evidence > best->log_evidence) best = std::move(fit);
   }
   if (!best.ok() || !Accepts(explanation->fit, *best, extensions.size())) return false;
@@ -164,15 +170,16 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
   return true;
 }
 
-absl::StatusOr<Fit> StepwiseSearch::WithoutEffect(const Explanation& explanation, int index) const {
+absl::StatusOr<inference::Fit> StepwiseSearch::WithoutEffect(const Explanation& explanation,
+                                                             int index) const {
   // Other effects of the given model stay as free as they are.
-  return FitModel(experiment_, explanation.fit.model.Without(index));
+  return inference::FitModel(experiment_, explanation.fit.model.Without(index));
 }
 
 absl::StatusOr<bool> StepwiseSearch::RemoveStep(Explanation* explanation) const {
   for (int index = static_cast<int>(explanation->fit.model.base().effects.size()) - 1;
        index >= explanation->initial_effects; --index) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, WithoutEffect(*explanation, index));
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, WithoutEffect(*explanation, index));
     if (explanation->fit.log_evidence - fit.log_evidence >= rules_.enter_nats) continue;
     explanation->fit = std::move(fit);
     return true;
@@ -182,25 +189,26 @@ absl::StatusOr<bool> StepwiseSearch::RemoveStep(Explanation* explanation) const 
 
 absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Explanation& explanation,
                                                                         int index) const {
-  const Effect& own = *explanation.fit.model.base().effects[index].effect;
+  const model::Effect& own = *explanation.fit.model.base().effects[index].effect;
   // The other effects stay where they are: what takes this one's place finds them so.
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without,
-                              FitModel(experiment_, explanation.fit.model.Without(index), 0));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without,
+                              inference::FitModel(experiment_, explanation.fit.model.Without(index), 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions, Score(without, explanation.initial_effects));
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<CompetingFit> competing;
-  competing.push_back({NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
+  competing.push_back(
+      {inference::NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
   int fitted = 0;
   for (const Extension& extension : extensions) {
     if (extension.candidate < 0 || !extension.visible || fitted >= rules_.max_refits) continue;
-    if (extension.name == NameOf(own) &&
+    if (extension.name == inference::NameOf(own) &&
         candidates_[extension.candidate].per_object == explanation.fit.model.base().effects[index].per_object)
       continue;
     if (extension.log_evidence < explanation.fit.log_evidence - kNearPrediction) continue;
-    progress_(absl::StrCat("trying ", extension.name, " instead of ", NameOf(own)));
+    progress_(absl::StrCat("trying ", extension.name, " instead of ", inference::NameOf(own)));
     ++fitted;
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
     competing.push_back({extension.name, candidates_[extension.candidate].per_object, std::move(fit)});
   }
   std::sort(competing.begin() + 1, competing.end(), [](const CompetingFit& a, const CompetingFit& b) {
@@ -222,10 +230,11 @@ absl::StatusOr<bool> StepwiseSearch::SwapStep(Explanation* explanation) const {
   return false;
 }
 
-absl::StatusOr<Explanation> StepwiseSearch::Run(Parameterization start, int initial_effects) const {
+absl::StatusOr<Explanation> StepwiseSearch::Run(inference::Parameterization start,
+                                                int initial_effects) const {
   Explanation explanation;
   explanation.initial_effects = initial_effects;
-  TOUCHSTONE_ASSIGN_OR_RETURN(explanation.fit, FitModel(experiment_, std::move(start)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(explanation.fit, inference::FitModel(experiment_, std::move(start)));
   for (int step = 0; step < rules_.max_steps; ++step) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool added, AddStep(&explanation));
     if (!added) break;
@@ -240,4 +249,4 @@ absl::StatusOr<Explanation> StepwiseSearch::Run(Parameterization start, int init
   return explanation;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

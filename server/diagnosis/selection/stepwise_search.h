@@ -11,7 +11,7 @@
 #include "server/diagnosis/inference/fit.h"
 #include "server/diagnosis/selection/candidates.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 // Thresholds, chosen on the tuning seeds of tests/hidden_effects.
 struct SearchRules {
@@ -31,61 +31,61 @@ struct Extension {
   std::string name;         // of the effect
   bool visible = false;     // false: this experiment cannot see it
   double log_evidence = 0;  // linearised prediction, nats
-  Parameterization start;
+  inference::Parameterization start;
 };
 
 // One effect in the place of another, fitted.
 struct CompetingFit {
   std::string name;
   bool per_object = false;
-  Fit fit;
+  inference::Fit fit;
 };
 
 struct Explanation {
-  Fit fit;
+  inference::Fit fit;
   int initial_effects = 0;  // effects below this index are the initial model's
 };
 
 class StepwiseSearch {
  public:
   // `experiment` must outlive it. `progress` is told what is fitted.
-  StepwiseSearch(const Experiment& experiment, std::vector<Candidate> candidates, SearchRules rules,
-                 std::function<void(const std::string&)> progress)
+  StepwiseSearch(const inference::Experiment& experiment, std::vector<Candidate> candidates,
+                 SearchRules rules, std::function<void(const std::string&)> progress)
       : experiment_(experiment),
         candidates_(std::move(candidates)),
         rules_(rules),
         progress_(std::move(progress)) {}
 
   // From a start (the initial model, perhaps with a formula), the best explanation.
-  absl::StatusOr<Explanation> Run(Parameterization start, int initial_effects) const;
+  absl::StatusOr<Explanation> Run(inference::Parameterization start, int initial_effects) const;
 
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts.
-  absl::StatusOr<std::vector<Extension>> Score(const Fit& fit, int initial_effects) const;
+  absl::StatusOr<std::vector<Extension>> Score(const inference::Fit& fit, int initial_effects) const;
 
   // The fits in which other effects take the place of effect `index`, best first; the linearised prediction
   // chooses which are fitted. The first is the fit itself.
   absl::StatusOr<std::vector<CompetingFit>> CompetingFits(const Explanation& explanation, int index) const;
 
   // The fit with the effect taken out (one of the initial model: held at its values there).
-  absl::StatusOr<Fit> WithoutEffect(const Explanation& explanation, int index) const;
+  absl::StatusOr<inference::Fit> WithoutEffect(const Explanation& explanation, int index) const;
 
   // An extension fitted in full, from several starts where the response is not linear.
-  absl::StatusOr<Fit> FitExtension(const Extension& extension) const;
+  absl::StatusOr<inference::Fit> FitExtension(const Extension& extension) const;
 
   const SearchRules& rules() const { return rules_; }
   const std::vector<Candidate>& candidates() const { return candidates_; }
 
  private:
-  std::vector<Extension> ListExtensions(const Fit& fit, int initial_effects) const;
+  std::vector<Extension> ListExtensions(const inference::Fit& fit, int initial_effects) const;
   absl::StatusOr<bool> AddStep(Explanation* explanation) const;
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
-  bool Accepts(const Fit& before, const Fit& after, size_t extensions) const;
+  bool Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions) const;
 
-  const Experiment& experiment_;
+  const inference::Experiment& experiment_;
   std::vector<Candidate> candidates_;
   SearchRules rules_;
   std::function<void(const std::string&)> progress_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -8,7 +8,7 @@
 #include "server/diagnosis/inference/linear_test_model.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kSigma = 0.005;
@@ -20,26 +20,27 @@ class StepwiseSearchTest : public ::testing::Test {
   StepwiseSearchTest() : rows(4, 25, 2) {
     for (const char* effect : {"object_push", "oblique_slip", "gravity_sag"}) {
       rows.columns[effect] = rows.Random(rows.columns.size() + 1, kColumn);
-      candidates.push_back({Catalogue().Find(effect), false, false, {}});
+      candidates.push_back({effects::Catalogue().Find(effect), false, false, {}});
     }
     rows.measured = rows.Random(9, kSigma);
-    likelihood = std::make_unique<Likelihood>(rows.GroupRows(), nullptr, 0, nullptr);
+    likelihood = std::make_unique<inference::Likelihood>(rows.GroupRows(), nullptr, 0, nullptr);
     experiment.observations = &rows;
     experiment.likelihood = likelihood.get();
   }
   StepwiseSearch Search() const {
     return {experiment, candidates, SearchRules(), [](const std::string&) {}};
   }
-  Parameterization Nominal() const { return {NominalModel(), rows.groups()}; }
-  static std::vector<std::string> Names(const Fit& fit) {
+  inference::Parameterization Nominal() const { return {model::NominalModel(), rows.groups()}; }
+  static std::vector<std::string> Names(const inference::Fit& fit) {
     std::vector<std::string> names;
-    for (const EffectInstance& instance : fit.model.base().effects) names.push_back(instance.effect->name);
+    for (const model::EffectInstance& instance : fit.model.base().effects)
+      names.push_back(instance.effect->name);
     return names;
   }
-  LinearTestModel rows;
+  inference::LinearTestModel rows;
   std::vector<Candidate> candidates;
-  std::unique_ptr<Likelihood> likelihood;
-  Experiment experiment;
+  std::unique_ptr<inference::Likelihood> likelihood;
+  inference::Experiment experiment;
 };
 
 TEST_F(StepwiseSearchTest, AddsNothingToNoise) {
@@ -66,7 +67,7 @@ TEST_F(StepwiseSearchTest, RemovesAnEffectThatTwoOthersMakeSuperfluous) {
 TEST_F(StepwiseSearchTest, PredictsTheEvidenceOfALinearExtension) {
   rows.measured += kPushM * rows.columns["oblique_slip"];
   const StepwiseSearch search = Search();
-  const Fit nominal = *FitModel(experiment, Nominal());
+  const inference::Fit nominal = *inference::FitModel(experiment, Nominal());
   const std::vector<Extension> extensions = *search.Score(nominal, 0);
   ASSERT_EQ(extensions.size(), 3u);
   for (const Extension& extension : extensions) {
@@ -78,7 +79,7 @@ TEST_F(StepwiseSearchTest, PredictsTheEvidenceOfALinearExtension) {
 
 TEST_F(StepwiseSearchTest, SaysWhatTheRowsCannotSee) {
   rows.columns["gravity_sag"].setZero();
-  const std::vector<Extension> extensions = *Search().Score(*FitModel(experiment, Nominal()), 0);
+  const std::vector<Extension> extensions = *Search().Score(*inference::FitModel(experiment, Nominal()), 0);
   EXPECT_FALSE(extensions[2].visible);
   EXPECT_TRUE(extensions[0].visible);
 }
@@ -98,7 +99,8 @@ TEST_F(StepwiseSearchTest, AnEffectWithTheSameColumnCompetesWithEqualEvidence) {
 
 TEST_F(StepwiseSearchTest, SetsAValueOfTheInitialModelFreeWhereItIsWrong) {
   rows.measured += kPushM * rows.columns["object_push"];
-  const Model model = *AddEffect(NominalModel(), "object_push", {"shift_mm=0.4"}, Catalogue());
+  const model::Model model =
+      *model::AddEffect(model::NominalModel(), "object_push", {"shift_mm=0.4"}, effects::Catalogue());
   const Explanation explanation = *Search().Run({model, rows.groups()}, 1);
   EXPECT_EQ(Names(explanation.fit), std::vector<std::string>{"object_push"});
   ASSERT_TRUE(explanation.fit.model.IsFree(0));
@@ -106,4 +108,4 @@ TEST_F(StepwiseSearchTest, SetsAValueOfTheInitialModelFreeWhereItIsWrong) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

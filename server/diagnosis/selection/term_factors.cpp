@@ -8,7 +8,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 double ThreeDigits(double value) {
@@ -19,9 +19,9 @@ double ThreeDigits(double value) {
 
 }  // namespace
 
-std::vector<TermFactor> ListTermFactors(const Observations& o, const Prediction& d) {
+std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const touches::Prediction& d) {
   std::vector<TermFactor> factors;
-  const MeasurementSet& set = *o.set;
+  const session::MeasurementSet& set = *o.set;
   const auto at = [&o](int k, int i) { return static_cast<size_t>(k) * o.fingers + i; };
   const auto add = [&](const std::string& covariate, const std::string& expression, bool differs,
                        double penalty_nats, TermValue value) {
@@ -112,7 +112,7 @@ std::vector<TermFactor> ListTermFactors(const Observations& o, const Prediction&
   return factors;
 }
 
-std::vector<FingerFactor> ListFingerFactors(const Observations& o, const Prediction& d) {
+std::vector<FingerFactor> ListFingerFactors(const touches::Observations& o, const touches::Prediction& d) {
   std::vector<FingerFactor> factors;
   const double middle = 0.5 * (o.fingers - 1);
   factors.push_back({"", [](int, int) { return 1.0; }});
@@ -126,4 +126,4 @@ std::vector<FingerFactor> ListFingerFactors(const Observations& o, const Predict
   return factors;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -9,7 +9,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 using TermValue = std::function<double(int k, int finger)>;
 
@@ -31,7 +31,9 @@ struct FingerFactor {
 inline constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
 
 // Both must outlive the lists.
-std::vector<TermFactor> ListTermFactors(const Observations& observations, const Prediction& details);
-std::vector<FingerFactor> ListFingerFactors(const Observations& observations, const Prediction& details);
+std::vector<TermFactor> ListTermFactors(const touches::Observations& observations,
+                                        const touches::Prediction& details);
+std::vector<FingerFactor> ListFingerFactors(const touches::Observations& observations,
+                                            const touches::Prediction& details);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

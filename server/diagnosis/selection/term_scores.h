@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/inference/fit.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 // Gains of blocks of columns, one per block.
 struct TermScores {
@@ -19,7 +19,7 @@ struct TermScores {
 // `experiment` and `fit` must outlive it.
 class TermScorer {
  public:
-  TermScorer(const Experiment& experiment, const Fit& fit);
+  TermScorer(const inference::Experiment& experiment, const inference::Fit& fit);
 
   // Blocks of `width` (1 or 2) columns. `scales`: of each column's value, the width of its prior.
   TermScores Score(const Eigen::MatrixXd& columns, int width, const std::vector<double>& scales) const;
@@ -40,13 +40,13 @@ class TermScorer {
     Eigen::VectorXd step;
   };
 
-  Projection Project(const Likelihood::Columns& prepared, int width, int s) const;
+  Projection Project(const inference::Likelihood::Columns& prepared, int width, int s) const;
   BlockFit FitBlock(const Projection& projection, int b, int width, const std::vector<double>& scales,
                     int s) const;
 
-  const Likelihood& likelihood_;
-  const Fit& fit_;
+  const inference::Likelihood& likelihood_;
+  const inference::Fit& fit_;
   double base_log_ = 0;  // log likelihood of the fit without a term: scale of the sums
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -11,7 +11,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/selection/ladder.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr size_t kMaxCovariates = 6;
@@ -31,16 +31,16 @@ double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const E
 }
 
 // "formula: ..." as it stands in a model file.
-std::string FormulaYaml(const Fit& fit, int index) {
-  Model only = fit.model.base();
+std::string FormulaYaml(const inference::Fit& fit, int index) {
+  model::Model only = fit.model.base();
   only.effects = {only.effects[index]};
-  EffectInstance& instance = only.effects[0];
+  model::EffectInstance& instance = only.effects[0];
   size_t at_value = 0;  // a formula's parameters are numbers
-  for (const ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
-    const ParameterInfo& parameter = instance.effect->parameters[at_value];
+  for (const inference::ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
+    const model::ParameterInfo& parameter = instance.effect->parameters[at_value];
     instance.values[at_value++] = ToSi(parameter.unit, RoundedTo(estimate.value, estimate.std_error));
   }
-  const std::string text = FormatModel(only);
+  const std::string text = model::FormatModel(only);
   const size_t at = text.find("effects:");
   const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
   return line == std::string::npos ? text : text.substr(line + 1);
@@ -72,14 +72,14 @@ std::vector<CovariateTest> TestCovariates(const std::vector<FormulaTerm>& terms,
 // The formula, its values, and what it would do.
 absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& selection,
                              const Quality& final, double floor_s, UnexplainedRest* rest) {
-  const Fit& fit = selection.fit;
-  const EffectInstance& instance = fit.model.base().effects[selection.formula];
+  const inference::Fit& fit = selection.fit;
+  const model::EffectInstance& instance = fit.model.base().effects[selection.formula];
   rest->formula = instance.effect->formula->expression;
   rest->formula_yaml = FormulaYaml(fit, selection.formula);
   rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction with,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                               workspace.predictor->Run(fit.model.base(), false, false));
-  const Quality quality = QualityOf(workspace, fit, Residuals(*workspace.observations, with));
+  const Quality quality = QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with));
   rest->rmse_s = quality.rmse_s;
   rest->heldout_rmse_s = quality.heldout_rmse_s;
   const double before = std::pow(final.heldout_rmse_s, 2) - floor_s * floor_s;
@@ -91,8 +91,8 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
 // What of the catalogue looks most like the formula.
 absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult& selection,
                                UnexplainedRest* rest) {
-  const Fit& fit = selection.fit;
-  const Fit& without = selection.without_formula;
+  const inference::Fit& fit = selection.fit;
+  const inference::Fit& without = selection.without_formula;
   const int own = without.model.size();
   const Eigen::MatrixXd others = without.columns.values.rightCols(own);
   Eigen::VectorXd column;
@@ -104,9 +104,9 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
                               selection.search->Score(without, selection.initial_effects));
   for (const Extension& extension : extensions) {
     if (extension.candidate < 0 || !extension.visible) continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const Eigen::MatrixXd span,
-        Derivatives(workspace.experiment, extension.start, extension.start.Start(), without.predicted, own));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
+                                inference::Derivatives(workspace.experiment, extension.start,
+                                                       extension.start.Start(), without.predicted, own));
     if (span.cols() > kMaxSpan) continue;
     const double cosine = Cosine(others, column, span);
     if (cosine <= rest->nearest_cosine) continue;
@@ -123,7 +123,7 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                     double floor_s) {
   std::vector<FormulaTerm> terms = selection.terms;
   if (terms.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction details,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                                 workspace.searched_predictor->Run(selection.fit.model.base(), true, true));
     terms = ScoreTerms(workspace.experiment, *workspace.rows, selection.fit, details);
   }
@@ -136,4 +136,4 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
   return rest;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

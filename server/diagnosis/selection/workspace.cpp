@@ -9,7 +9,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kMaxMissed = 0.5;  // share of an object's touches
@@ -22,7 +22,7 @@ constexpr int kRepeatsSearched = 4;
 constexpr double kFloorM = 0.3e-6;  // what mesh files and CSV numbers are rounded to, about
 
 // A mesh that most touches miss is not the mesh that was touched.
-absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
+absl::Status CheckMeshes(const touches::Observations& o, const touches::Prediction& nominal,
                          std::vector<std::string>* warnings) {
   std::vector<int> touches(o.objects.size()), missed(o.objects.size());
   std::vector<double> off_m(o.objects.size());
@@ -33,14 +33,14 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
       misses |= !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMaxTravel * o.set->standoff_m[o.row[k]]);
     missed[o.object[k]] += misses;
-    const Bounds& bounds = o.surfaces[o.object[k]]->bounds();
+    const geometry::Bounds& bounds = o.surfaces[o.object[k]]->bounds();
     const Eigen::Vector3d& target = o.set->target_m[o.row[k]];
     const Eigen::Vector3d outside = (bounds.min_m - target).cwiseMax(target - bounds.max_m).cwiseMax(0.0);
     off_m[o.object[k]] = std::max(off_m[o.object[k]], outside.norm());
   }
   for (size_t object = 0; object < o.objects.size(); ++object) {
     if (touches[object] == 0 || missed[object] <= kWarnMissed * touches[object]) continue;
-    const Bounds& bounds = o.surfaces[object]->bounds();
+    const geometry::Bounds& bounds = o.surfaces[object]->bounds();
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * 1e3;
     const std::string text = absl::StrFormat(
         "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
@@ -59,7 +59,7 @@ absl::Status CheckMeshes(const Observations& o, const Prediction& nominal,
 }
 
 // Times a thousand times too long or too short: no effect does that, a wrong unit does.
-absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
+absl::Status CheckUnits(const touches::Observations& o, const touches::Prediction& nominal) {
   std::vector<double> measured, predicted;
   for (int k = 0; k < o.size(); ++k) {
     double min_s = INFINITY, max_s = -INFINITY, min_p = INFINITY, max_p = -INFINITY;
@@ -89,8 +89,8 @@ absl::Status CheckUnits(const Observations& o, const Prediction& nominal) {
 }
 
 // A part of the observations; `previous` stays within it.
-Observations Thin(const Observations& o, const std::vector<int>& kept) {
-  Observations part;
+touches::Observations Thin(const touches::Observations& o, const std::vector<int>& kept) {
+  touches::Observations part;
   part.set = o.set;
   part.fingers = o.fingers;
   part.objects = o.objects;
@@ -113,7 +113,8 @@ Observations Thin(const Observations& o, const std::vector<int>& kept) {
 
 }  // namespace
 
-absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* o) {
+absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const model::Model& model,
+                                  touches::Observations* o) {
   std::vector<std::vector<double>> travels;
   for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(kEdgeM, 0.0), std::pair(-kEdgeM, 0.0),
                              std::pair(0.0, kEdgeM), std::pair(0.0, -kEdgeM)}) {
@@ -132,13 +133,13 @@ absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model
       }
     }
     if (!edge) continue;
-    LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
+    touches::LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
     ++left_out;
   }
   return left_out;
 }
 
-SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& residuals) {
+touches::SumOfSquares PureErrorOf(const touches::Observations& o, const std::vector<double>& residuals) {
   // Groups of one pose and one set of reporting fingers: sums of residuals and of squares.
   struct Group {
     int touches = 0, members = 0;
@@ -161,7 +162,7 @@ SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& resid
     for (int i = 0; i < o.fingers; ++i)
       if (!std::isnan(r[i])) group.sum[i] += r[i], group.squares += r[i] * r[i];
   }
-  SumOfSquares error;
+  touches::SumOfSquares error;
   for (const auto& [key, group] : groups) {
     double mean_squares = 0;
     for (const double sum : group.sum) mean_squares += sum * sum / group.touches;
@@ -174,7 +175,7 @@ SumOfSquares PureErrorOf(const Observations& o, const std::vector<double>& resid
 namespace {
 
 // Up to four touches per pose, of poses spread evenly over the set. [k]
-std::vector<char> ChooseTouches(const Observations& o) {
+std::vector<char> ChooseTouches(const touches::Observations& o) {
   std::vector<int> usable(o.poses, 0);
   for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
   int total = 0;
@@ -198,7 +199,7 @@ std::vector<char> ChooseTouches(const Observations& o) {
 }
 
 // The touches that the search sees; of large sets a part, with the touch before each, which hysteresis feels.
-Observations SearchedOf(const Observations& o, bool thinned) {
+touches::Observations SearchedOf(const touches::Observations& o, bool thinned) {
   std::vector<int> kept;
   if (!thinned) {
     for (int k = 0; k < o.size(); ++k) kept.push_back(k);
@@ -210,7 +211,7 @@ Observations SearchedOf(const Observations& o, bool thinned) {
     if (chosen[k] && o.previous[k] >= 0) needed[o.previous[k]] = 1;
   for (int k = 0; k < o.size(); ++k)
     if (chosen[k] || needed[k]) kept.push_back(k);
-  Observations searched = Thin(o, kept);
+  touches::Observations searched = Thin(o, kept);
   for (size_t j = 0; j < kept.size(); ++j)
     if (!chosen[kept[j]]) searched.used[j] = 0;
   return searched;
@@ -219,14 +220,14 @@ Observations SearchedOf(const Observations& o, bool thinned) {
 }  // namespace
 
 absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row) {
-  const Observations& o = *workspace->observations;
+  const touches::Observations& o = *workspace->observations;
   workspace->thinned = o.size() > kMaxSearched;
-  workspace->searched = std::make_unique<Observations>(SearchedOf(o, workspace->thinned));
-  workspace->searched_predictor = std::make_unique<Predictor>(*workspace->searched, nullptr);
+  workspace->searched = std::make_unique<touches::Observations>(SearchedOf(o, workspace->thinned));
+  workspace->searched_predictor = std::make_unique<touches::Predictor>(*workspace->searched, nullptr);
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->searched_nominal,
                               workspace->searched_predictor->Run(*workspace->input.model, true, false));
-  const Observations& searched = *workspace->searched;
-  workspace->contrasts = std::make_unique<Contrasts>(searched, workspace->searched_nominal.time_s);
+  const touches::Observations& searched = *workspace->searched;
+  workspace->contrasts = std::make_unique<touches::Contrasts>(searched, workspace->searched_nominal.time_s);
   if (!weights_by_row.empty()) {
     std::vector<double> weights;
     for (const int k : workspace->contrasts->touches()) weights.push_back(weights_by_row[searched.row[k]]);
@@ -235,14 +236,14 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
   double slope = 0;  // s/m
   for (const int k : workspace->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
   slope /= std::max<size_t>(workspace->contrasts->touches().size(), 1);
-  const SmoothErrorGeometry geometry =
-      SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
-  workspace->likelihood = std::make_unique<Likelihood>(
-      FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())), &geometry,
-      kFloorM * slope, workspace->context.pool);
-  workspace->rows = std::make_unique<TouchObservationModel>(
+  const inference::SmoothErrorGeometry geometry =
+      touches::SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
+  workspace->likelihood = std::make_unique<inference::Likelihood>(
+      touches::FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())),
+      &geometry, kFloorM * slope, workspace->context.pool);
+  workspace->rows = std::make_unique<touches::TouchObservationModel>(
       searched, *workspace->searched_predictor, *workspace->contrasts, workspace->searched_nominal.time_s);
-  Experiment& experiment = workspace->experiment;
+  inference::Experiment& experiment = workspace->experiment;
   experiment.observations = workspace->rows.get();
   experiment.likelihood = workspace->likelihood.get();
   experiment.pool = workspace->context.pool;
@@ -256,10 +257,10 @@ absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& i
   workspace->context = context;
   if (context.progress && !context.progress("reading", 0))
     return absl::CancelledError("the diagnosis was cancelled");
-  TOUCHSTONE_ASSIGN_OR_RETURN(Observations observations, MakeObservations(input));
-  workspace->observations = std::make_unique<Observations>(std::move(observations));
-  Observations& o = *workspace->observations;
-  workspace->predictor = std::make_unique<Predictor>(o, context.pool);
+  TOUCHSTONE_ASSIGN_OR_RETURN(touches::Observations observations, touches::MakeObservations(input));
+  workspace->observations = std::make_unique<touches::Observations>(std::move(observations));
+  touches::Observations& o = *workspace->observations;
+  workspace->predictor = std::make_unique<touches::Predictor>(o, context.pool);
   if (context.progress && !context.progress("predicting", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->nominal, workspace->predictor->Run(*input.model, true, true));
@@ -269,10 +270,11 @@ absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& i
     int members = 0;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
       members += !std::isnan(o.time_s[e]) && !std::isnan(workspace->nominal.time_s[e]);
-    if (members < 2) LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
+    if (members < 2)
+      touches::LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
   }
   TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*workspace->predictor, *input.model, &o).status());
   return workspace;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

@@ -11,7 +11,7 @@
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 
 // The search works on at most so many touches: its likelihood costs the square of an object's touches.
 inline constexpr int kMaxSearched = 2400;
@@ -19,19 +19,19 @@ inline constexpr int kMaxSearched = 2400;
 struct Workspace {
   DiagnosisInput input;
   DiagnosisContext context;
-  std::unique_ptr<Observations> observations;  // every touch
-  std::unique_ptr<Predictor> predictor;
-  Prediction nominal;  // of the initial model, with details
+  std::unique_ptr<touches::Observations> observations;  // every touch
+  std::unique_ptr<touches::Predictor> predictor;
+  touches::Prediction nominal;  // of the initial model, with details
   std::vector<std::string> warnings;
 
   // What the search sees.
-  std::unique_ptr<Observations> searched;
-  std::unique_ptr<Predictor> searched_predictor;
-  Prediction searched_nominal;
-  std::unique_ptr<Contrasts> contrasts;
-  std::unique_ptr<TouchObservationModel> rows;
-  std::unique_ptr<Likelihood> likelihood;
-  Experiment experiment;
+  std::unique_ptr<touches::Observations> searched;
+  std::unique_ptr<touches::Predictor> searched_predictor;
+  touches::Prediction searched_nominal;
+  std::unique_ptr<touches::Contrasts> contrasts;
+  std::unique_ptr<touches::TouchObservationModel> rows;
+  std::unique_ptr<inference::Likelihood> likelihood;
+  inference::Experiment experiment;
   bool thinned = false;
 };
 
@@ -44,9 +44,11 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
 
 // Where a small move of the tool makes a finger meet another part of the object, the time says more about the
 // edge than about the rig, and a fit would chase it. Leaves such touches out; returns how many are new.
-absl::StatusOr<int> LeaveOutEdges(const Predictor& predictor, const Model& model, Observations* observations);
+absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const model::Model& model,
+                                  touches::Observations* observations);
 
 // Pure error of residuals [k * fingers + i] among repeats: touches of one pose with the same fingers.
-SumOfSquares PureErrorOf(const Observations& observations, const std::vector<double>& residuals);
+touches::SumOfSquares PureErrorOf(const touches::Observations& observations,
+                                  const std::vector<double>& residuals);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

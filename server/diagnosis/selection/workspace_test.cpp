@@ -7,11 +7,11 @@
 
 #include "server/diagnosis/touches/simulated_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::selection {
 namespace {
 
 TEST(Workspace, SearchesAllTouchesOfASmallSet) {
-  const auto workspace = MakeWorkspace(MakeTestInput({}), {});
+  const auto workspace = MakeWorkspace(touches::MakeTestInput({}), {});
   ASSERT_TRUE(workspace.ok()) << workspace.status();
   ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
   EXPECT_FALSE((*workspace)->thinned);
@@ -20,13 +20,13 @@ TEST(Workspace, SearchesAllTouchesOfASmallSet) {
 }
 
 TEST(Workspace, ThinsALargeSetToWholePosesOfEveryObject) {
-  HiddenRig rig;
+  touches::HiddenRig rig;
   rig.samples_per_face = 50;
   rig.rounds = 6;  // 5,400 touches
-  const auto workspace = MakeWorkspace(MakeTestInput(rig), {});
+  const auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
   ASSERT_TRUE(workspace.ok()) << workspace.status();
   ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
-  const Observations& searched = *(*workspace)->searched;
+  const touches::Observations& searched = *(*workspace)->searched;
   EXPECT_TRUE((*workspace)->thinned);
   const int used = static_cast<int>(std::count(searched.used.begin(), searched.used.end(), 1));
   EXPECT_LE(used, kMaxSearched);
@@ -39,7 +39,7 @@ TEST(Workspace, ThinsALargeSetToWholePosesOfEveryObject) {
 }
 
 TEST(Workspace, WeighsTheRowsOfATouchByTheRootOfItsWeight) {
-  const auto workspace = MakeWorkspace(MakeTestInput({}), {});
+  const auto workspace = MakeWorkspace(touches::MakeTestInput({}), {});
   ASSERT_TRUE(workspace.ok()) << workspace.status();
   ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
   const Eigen::VectorXd plain = (*workspace)->rows->Residual((*workspace)->searched_nominal.time_s);
@@ -54,17 +54,17 @@ TEST(Workspace, WeighsTheRowsOfATouchByTheRootOfItsWeight) {
 }
 
 TEST(Workspace, LeavesOutTouchesOfWhichTheModelMissesTooManyFingers) {
-  DiagnosisInput input = MakeTestInput({});
-  auto set = std::make_shared<MeasurementSet>(*input.set);
+  DiagnosisInput input = touches::MakeTestInput({});
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
   // One touch, far beside the object.
   set->target_m[0] += 0.5 * set->approach[0].cross(set->lateral[0]);
   input.set = set;
   const auto workspace = MakeWorkspace(input, {});
   ASSERT_TRUE(workspace.ok()) << workspace.status();
-  const Observations& o = *(*workspace)->observations;
+  const touches::Observations& o = *(*workspace)->observations;
   const int k = static_cast<int>(std::find(o.row.begin(), o.row.end(), 0) - o.row.begin());
   EXPECT_FALSE(o.used[k]);
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::selection

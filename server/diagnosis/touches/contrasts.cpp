@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 // Orthonormal rows that sum to zero over the fingers of the mask (Helmert's).
@@ -73,4 +73,4 @@ Eigen::VectorXd Contrasts::Apply(const std::vector<double>& per_finger) const {
   return result;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -9,7 +9,7 @@
 
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 class Contrasts {
  public:
@@ -45,4 +45,4 @@ class Contrasts {
   std::vector<Eigen::MatrixXd> matrices_;  // by mask
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -6,7 +6,7 @@
 
 #include "server/diagnosis/touches/made_up_test_set.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 TEST(Contrasts, AreBlindToAShiftOfAWholeTouch) {
@@ -48,4 +48,4 @@ TEST(Contrasts, StandSortedByObject) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -5,7 +5,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr size_t kMaxSpeeds = 20;
@@ -13,7 +13,7 @@ constexpr size_t kMaxSpeeds = 20;
 }  // namespace
 
 DataSummary SummarizeData(const Observations& o) {
-  const MeasurementSet& set = *o.set;
+  const session::MeasurementSet& set = *o.set;
   DataSummary data;
   data.origin = set.origin;
   data.fingers = o.fingers;
@@ -42,4 +42,4 @@ DataSummary SummarizeData(const Observations& o) {
   return data;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

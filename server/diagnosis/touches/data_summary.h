@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 struct DataSummary {
   std::string origin;  // what messages call the set: the path
@@ -27,4 +27,4 @@ struct DataSummary {
 
 DataSummary SummarizeData(const Observations& observations);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

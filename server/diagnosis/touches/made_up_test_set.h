@@ -9,7 +9,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 struct MadeUpSet {
   Observations observations;
@@ -18,7 +18,7 @@ struct MadeUpSet {
 
   // `objects` x `poses` x `rounds` touches, three fingers, incidence up to 30 deg, travel 40 to 90 mm.
   MadeUpSet(int objects, int poses, int rounds, double sigma_s, uint64_t seed) {
-    auto set = std::make_shared<MeasurementSet>();
+    auto set = std::make_shared<session::MeasurementSet>();
     set->fingers = observations.fingers = prediction.fingers = 3;
     set->has_poses = set->has_session_time = true;
     RandomStream random(seed, RandomDomain::kTest);
@@ -101,4 +101,4 @@ struct MadeUpSet {
   }
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -4,18 +4,18 @@
 #include <cmath>
 #include <map>
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr double kMaxTangent = 10;
 constexpr size_t kMaxDelays = 6000;
 
-std::vector<ReadingGroup> GroupsOf(const Observations& o, const std::vector<double>& residuals_s,
-                                   const std::vector<double>& tan_incidence) {
-  std::vector<ReadingGroup> groups;
+std::vector<inference::ReadingGroup> GroupsOf(const Observations& o, const std::vector<double>& residuals_s,
+                                              const std::vector<double>& tan_incidence) {
+  std::vector<inference::ReadingGroup> groups;
   for (int k = 0; k < o.size(); ++k) {
     if (!o.used[k]) continue;
-    ReadingGroup group;
+    inference::ReadingGroup group;
     group.index = k;
     for (int i = 0; i < o.fingers; ++i) {
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
@@ -47,26 +47,28 @@ std::vector<double> DelaysOf(const Observations& o) {
 }
 
 // Contacts of one finger at one pose.
-std::vector<RepeatedReading> RepeatedOf(const Observations& o, const std::vector<char>& expected) {
-  std::map<std::pair<int, int>, RepeatedReading> by_pose_and_finger;
+std::vector<inference::RepeatedReading> RepeatedOf(const Observations& o, const std::vector<char>& expected) {
+  std::map<std::pair<int, int>, inference::RepeatedReading> by_pose_and_finger;
   for (int k = 0; k < o.size(); ++k)
     for (int i = 0; i < o.fingers; ++i) {
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
       if (!expected[e]) continue;
-      RepeatedReading& reading = by_pose_and_finger[{o.pose[k], i}];
+      inference::RepeatedReading& reading = by_pose_and_finger[{o.pose[k], i}];
       reading.expected += 1;
       reading.silent += std::isnan(o.time_s[e]);
     }
-  std::vector<RepeatedReading> repeated;
+  std::vector<inference::RepeatedReading> repeated;
   for (const auto& [key, reading] : by_pose_and_finger) repeated.push_back(reading);
   return repeated;
 }
 
 }  // namespace
 
-NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
-                            const std::vector<double>& tan_incidence, const std::vector<char>& expected) {
-  NoiseSample sample;
+inference::NoiseSample MakeNoiseSample(const Observations& observations,
+                                       const std::vector<double>& residuals_s,
+                                       const std::vector<double>& tan_incidence,
+                                       const std::vector<char>& expected) {
+  inference::NoiseSample sample;
   sample.groups = GroupsOf(observations, residuals_s, tan_incidence);
   sample.delays_s = DelaysOf(observations);
   sample.repeated = RepeatedOf(observations, expected);
@@ -74,4 +76,4 @@ NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<
   return sample;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

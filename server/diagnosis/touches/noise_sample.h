@@ -6,12 +6,14 @@
 #include "server/diagnosis/inference/noise_kinds.h"
 #include "server/diagnosis/touches/observations.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 // residuals_s: what is left, less any surface error; tan_incidence: of every finger; both [k * fingers + i], NaN
 // where a finger takes no part. expected: whether the model expects the finger to report. Only touches that are
 // used count. Groups carry the touch as their index.
-NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
-                            const std::vector<double>& tan_incidence, const std::vector<char>& expected);
+inference::NoiseSample MakeNoiseSample(const Observations& observations,
+                                       const std::vector<double>& residuals_s,
+                                       const std::vector<double>& tan_incidence,
+                                       const std::vector<char>& expected);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -11,7 +11,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr size_t kMaxExamples = 5;
@@ -19,7 +19,7 @@ constexpr size_t kMaxExamples = 5;
 constexpr double kMaxBackward = 0.05;
 
 absl::Status CheckInput(const DiagnosisInput& input) {
-  const MeasurementSet& set = *input.set;
+  const session::MeasurementSet& set = *input.set;
   if (set.fingers == 0)
     return absl::InvalidArgumentError(absl::StrCat(
         set.origin,
@@ -44,7 +44,7 @@ absl::Status CheckInput(const DiagnosisInput& input) {
 }
 
 // The order of the session: the file's, unless its session times are clearly sorted otherwise.
-std::vector<int> SessionOrder(const MeasurementSet& set) {
+std::vector<int> SessionOrder(const session::MeasurementSet& set) {
   std::vector<int> rows(set.size());
   std::iota(rows.begin(), rows.end(), 0);
   if (!set.has_session_time) return rows;
@@ -59,7 +59,7 @@ std::vector<int> SessionOrder(const MeasurementSet& set) {
 void FindPoses(Observations* o) {
   using Key = std::array<double, 12>;
   absl::flat_hash_map<Key, int> poses;
-  const MeasurementSet& set = *o->set;
+  const session::MeasurementSet& set = *o->set;
   o->pose.resize(o->size());
   for (int k = 0; k < o->size(); ++k) {
     const int row = o->row[k];
@@ -78,7 +78,7 @@ void FindPoses(Observations* o) {
 
 absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInput(input));
-  const MeasurementSet& set = *input.set;
+  const session::MeasurementSet& set = *input.set;
   Observations o;
   o.set = input.set;
   o.fingers = set.fingers;
@@ -119,4 +119,4 @@ void LeaveOut(Observations* observations, int k, const std::string& reason) {
     unused.examples.push_back(observations->set->touch[observations->row[k]]);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

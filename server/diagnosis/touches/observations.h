@@ -10,7 +10,7 @@
 
 #include "server/diagnosis/input.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 // Touches that were left out for one reason.
 struct UnusedTouches {
@@ -21,12 +21,12 @@ struct UnusedTouches {
 // Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's
 // order).
 struct Observations {
-  std::shared_ptr<const MeasurementSet> set;
+  std::shared_ptr<const session::MeasurementSet> set;
   int fingers = 0;
-  std::vector<std::string> objects;                      // as in the set
-  std::vector<std::shared_ptr<const Surface>> surfaces;  // one an object
-  std::vector<int> row;                                  // touch -> row of the set
-  std::vector<int> object;                               // touch -> index into objects
+  std::vector<std::string> objects;                                // as in the set
+  std::vector<std::shared_ptr<const geometry::Surface>> surfaces;  // one an object
+  std::vector<int> row;                                            // touch -> row of the set
+  std::vector<int> object;                                         // touch -> index into objects
   std::vector<int> pose;  // touch -> group of equal commanded touches, numbered by first appearance
   int poses = 0;
   std::vector<double> time_s;  // [k * fingers + finger], NaN: not reported
@@ -47,4 +47,4 @@ inline constexpr char kOutlierReason[] =
 // Takes touch k out, with the reason in words for people ("a finger within 0.3 mm of an edge").
 void LeaveOut(Observations* observations, int k, const std::string& reason);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -9,7 +9,7 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 // Arrays [k * fingers + finger] unless told otherwise; SI, object frame.
 struct Prediction {
@@ -27,7 +27,7 @@ struct Prediction {
 
 // Deterministic part of the model (noise effects, polling, dropouts and surface_error left out) at every
 // touch. `details` false fills time_s only.
-absl::StatusOr<Prediction> Predict(const Observations& observations, const Model& model, bool details,
+absl::StatusOr<Prediction> Predict(const Observations& observations, const model::Model& model, bool details,
                                    bool curvature, ThreadPool* pool);
 
 // Measured minus predicted less its mean over the touch's fingers that report and that the model expects to: only
@@ -46,4 +46,4 @@ SumOfSquares TotalSquares(const Observations& observations, const std::vector<do
 // The square root of their ratio; 0 without any.
 double Rmse(const Observations& observations, const std::vector<double>& residuals);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

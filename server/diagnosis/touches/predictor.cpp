@@ -7,26 +7,27 @@
 #include "server/base/status.h"
 #include "server/touch/batch_row.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr int kBlock = 1024;
 
 // Whether touches of one pose may differ under this model.
-bool DependsOnSession(const Model& model) {
-  return std::any_of(model.effects.begin(), model.effects.end(), [](const EffectInstance& instance) {
-    const EffectNeeds& needs = instance.effect->needs;
+bool DependsOnSession(const model::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const model::EffectInstance& instance) {
+    const model::EffectNeeds& needs = instance.effect->needs;
     return needs.previous_press || needs.session_time || !needs.covariates.empty();
   });
 }
 
 }  // namespace
 
-Model DeterministicPart(const Model& model) {
-  Model part = model;
-  part.effects.erase(std::remove_if(part.effects.begin(), part.effects.end(),
-                                    [](const EffectInstance& instance) { return instance.effect->random(); }),
-                     part.effects.end());
+model::Model DeterministicPart(const model::Model& model) {
+  model::Model part = model;
+  part.effects.erase(
+      std::remove_if(part.effects.begin(), part.effects.end(),
+                     [](const model::EffectInstance& instance) { return instance.effect->random(); }),
+      part.effects.end());
   return part;
 }
 
@@ -57,15 +58,17 @@ std::vector<Predictor::Block> Predictor::MakeBlocks(const Observations& observat
   return blocks;
 }
 
-void Predictor::Fill(const Block& block, const TouchSimulator& simulator, TouchBatch* batch) const {
-  const MeasurementSet& set = *observations_.set;
+void Predictor::Fill(const Block& block, const touch::TouchSimulator& simulator,
+                     effects::TouchBatch* batch) const {
+  const session::MeasurementSet& set = *observations_.set;
   const int size = static_cast<int>(block.touches.size());
   simulator.Prepare(size, batch);
   batch->surface = observations_.surfaces[block.object];
   for (int t = 0; t < size; ++t) {
     const int row = observations_.row[block.touches[t]];
-    const TouchPose pose = {set.target_m[row], set.approach[row], set.lateral[row], set.standoff_m[row]};
-    SetTouch(pose, set.speed_m_s[row], set.session_time_s[row], row, t, batch);
+    const touch::TouchPose pose = {set.target_m[row], set.approach[row], set.lateral[row],
+                                   set.standoff_m[row]};
+    touch::SetTouch(pose, set.speed_m_s[row], set.session_time_s[row], row, t, batch);
   }
   for (const std::string& name : simulator.needed_covariates()) {
     const auto found = set.covariates.find(name);
@@ -87,14 +90,14 @@ void Predictor::ForBlocks(const std::vector<Block>& blocks,
 // One prediction under way: simulation block by block, then copies for the repeats of a pose.
 class Predictor::Task {
  public:
-  Task(const Predictor& predictor, const Model& model, bool details, bool curvature)
+  Task(const Predictor& predictor, const model::Model& model, bool details, bool curvature)
       : predictor_(predictor),
         o_(predictor.observations_),
         details_(details),
         curvature_(curvature && details),
         model_(DeterministicPart(model)),
         every_touch_(DependsOnSession(model_)),
-        simulator_(std::make_shared<const Model>(WithCurvature())),
+        simulator_(std::make_shared<const model::Model>(WithCurvature())),
         blocks_(every_touch_ ? predictor.touch_blocks_ : predictor.pose_blocks_) {}
 
   absl::StatusOr<Prediction> Run() {
@@ -112,14 +115,14 @@ class Predictor::Task {
 
  private:
   // The contact stage fills curvature only for effects that need it.
-  Model WithCurvature() const {
-    Model model = model_;
+  model::Model WithCurvature() const {
+    model::Model model = model_;
     if (!curvature_) return model;
-    auto asks = std::make_shared<Effect>();
+    auto asks = std::make_shared<model::Effect>();
     asks->name = "curvature_of_contacts";
-    asks->stage = Stage::kSensor;
+    asks->stage = model::Stage::kSensor;
     asks->needs.curvature = true;
-    asks->apply = [](absl::Span<const double>, TouchBatch&) {};
+    asks->apply = [](absl::Span<const double>, effects::TouchBatch&) {};
     model.effects.push_back({asks, false, {}, {}});
     return model;
   }
@@ -145,7 +148,7 @@ class Predictor::Task {
     status_ = std::move(status);
   }
 
-  bool SimulateToMotion(const Block& block, TouchBatch* batch, TouchWorkspace* workspace) {
+  bool SimulateToMotion(const Block& block, effects::TouchBatch* batch, touch::TouchWorkspace* workspace) {
     predictor_.Fill(block, simulator_, batch);
     absl::Status ran = simulator_.RunToMotion(batch, workspace);
     if (!ran.ok()) Fail(ran);
@@ -156,8 +159,8 @@ class Predictor::Task {
   void FindPresses() {
     presses_m_.assign(static_cast<size_t>(o_.size()) * o_.fingers, 0);
     predictor_.ForBlocks(blocks_, [this](const Block& block) {
-      thread_local TouchBatch batch;
-      thread_local TouchWorkspace workspace;
+      thread_local effects::TouchBatch batch;
+      thread_local touch::TouchWorkspace workspace;
       if (!SimulateToMotion(block, &batch, &workspace)) return;
       for (size_t t = 0; t < block.touches.size(); ++t)
         for (int i = 0; i < o_.fingers; ++i)
@@ -170,8 +173,8 @@ class Predictor::Task {
   }
 
   void Simulate(const Block& block) {
-    thread_local TouchBatch batch;
-    thread_local TouchWorkspace workspace;
+    thread_local effects::TouchBatch batch;
+    thread_local touch::TouchWorkspace workspace;
     if (!SimulateToMotion(block, &batch, &workspace)) return;
     for (size_t t = 0; t < block.touches.size() && simulator_.needs_previous_press(); ++t) {
       const int previous = o_.previous[block.touches[t]];
@@ -183,7 +186,7 @@ class Predictor::Task {
   }
 
   // Touch t of a batch is touch k.
-  void Keep(const TouchBatch& batch, int t, int k) {
+  void Keep(const effects::TouchBatch& batch, int t, int k) {
     if (details_) p_.first_finger[k] = batch.first_finger[t];
     for (int i = 0; i < o_.fingers; ++i) {
       const size_t to = Entry(k, i);
@@ -224,9 +227,9 @@ class Predictor::Task {
   const Predictor& predictor_;
   const Observations& o_;
   const bool details_, curvature_;
-  const Model model_;
+  const model::Model model_;
   const bool every_touch_;  // else one touch per pose
-  const TouchSimulator simulator_;
+  const touch::TouchSimulator simulator_;
   const std::vector<Block>& blocks_;
   Prediction p_;
   std::vector<double> presses_m_;  // empty unless they are needed
@@ -234,20 +237,21 @@ class Predictor::Task {
   absl::Status status_;
 };
 
-absl::StatusOr<Prediction> Predictor::Run(const Model& model, bool details, bool curvature) const {
+absl::StatusOr<Prediction> Predictor::Run(const model::Model& model, bool details, bool curvature) const {
   return Task(*this, model, details, curvature).Run();
 }
 
-absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const Model& model, double along_lateral_m,
+absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const model::Model& model,
+                                                               double along_lateral_m,
                                                                double along_binormal_m) const {
   const Observations& o = observations_;
-  const TouchSimulator simulator(std::make_shared<const Model>(DeterministicPart(model)));
+  const touch::TouchSimulator simulator(std::make_shared<const model::Model>(DeterministicPart(model)));
   std::vector<double> travel_m(static_cast<size_t>(o.size()) * o.fingers, NAN);
   std::mutex mutex;
   absl::Status status;
   ForBlocks(pose_blocks_, [&](const Block& block) {
-    thread_local TouchBatch batch;
-    thread_local TouchWorkspace workspace;
+    thread_local effects::TouchBatch batch;
+    thread_local touch::TouchWorkspace workspace;
     Fill(block, simulator, &batch);
     for (int t = 0; t < batch.size(); ++t)
       batch.target_m[t] +=
@@ -268,7 +272,7 @@ absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const Model& mode
   return travel_m;
 }
 
-absl::StatusOr<Prediction> Predict(const Observations& observations, const Model& model, bool details,
+absl::StatusOr<Prediction> Predict(const Observations& observations, const model::Model& model, bool details,
                                    bool curvature, ThreadPool* pool) {
   return Predictor(observations, pool).Run(model, details, curvature);
 }
@@ -308,4 +312,4 @@ double Rmse(const Observations& observations, const std::vector<double>& residua
   return total.degrees_of_freedom > 0 ? std::sqrt(total.sum_of_squares / total.degrees_of_freedom) : 0;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

@@ -7,10 +7,10 @@
 #include "server/diagnosis/touches/prediction.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 // The model without random effects (Effect::random).
-Model DeterministicPart(const Model& model);
+model::Model DeterministicPart(const model::Model& model);
 
 class Predictor {
  public:
@@ -18,11 +18,11 @@ class Predictor {
   Predictor(const Observations& observations, ThreadPool* pool);
 
   // See Predict. Touches of one pose are simulated once, unless the model depends on the session's course.
-  absl::StatusOr<Prediction> Run(const Model& model, bool details, bool curvature) const;
+  absl::StatusOr<Prediction> Run(const model::Model& model, bool details, bool curvature) const;
 
   // Contact travel of every touch with the whole end effector moved by `along_lateral_m` along the lateral
   // vector and by `along_binormal_m` along approach x lateral. [k * fingers + finger]
-  absl::StatusOr<std::vector<double>> TravelWhenMoved(const Model& model, double along_lateral_m,
+  absl::StatusOr<std::vector<double>> TravelWhenMoved(const model::Model& model, double along_lateral_m,
                                                       double along_binormal_m) const;
 
   const Observations& observations() const { return observations_; }
@@ -35,7 +35,7 @@ class Predictor {
   };
   class Task;
   static std::vector<Block> MakeBlocks(const Observations& observations, const std::vector<int>& touches);
-  void Fill(const Block& block, const TouchSimulator& simulator, TouchBatch* batch) const;
+  void Fill(const Block& block, const touch::TouchSimulator& simulator, effects::TouchBatch* batch) const;
   void ForBlocks(const std::vector<Block>& blocks, const std::function<void(const Block&)>& body) const;
 
   const Observations& observations_;
@@ -45,4 +45,4 @@ class Predictor {
   std::vector<Block> touch_blocks_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

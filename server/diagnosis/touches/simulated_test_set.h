@@ -15,7 +15,7 @@
 #include "server/touch/plan.h"
 #include "server/touch/simulate.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
 struct HiddenRig {
   std::vector<std::string> objects = {"lat00", "lat10", "lat20"};
@@ -29,35 +29,37 @@ struct HiddenRig {
   uint64_t seed = 1;
 };
 
-inline Model WithEffects(Model model,
-                         const std::vector<std::pair<std::string, std::vector<std::string>>>& effects) {
+inline model::Model WithEffects(
+    model::Model model, const std::vector<std::pair<std::string, std::vector<std::string>>>& effects) {
   for (const auto& [name, values] : effects) {
-    absl::StatusOr<Model> more = AddEffect(model, name, values, Catalogue());
+    absl::StatusOr<model::Model> more = model::AddEffect(model, name, values, effects::Catalogue());
     EXPECT_TRUE(more.ok()) << more.status();
     model = *std::move(more);
   }
   return model;
 }
 
-inline std::shared_ptr<const Surface> TestSurface(const std::string& name) {
-  static std::map<std::string, std::shared_ptr<const Surface>> made;
-  std::shared_ptr<const Surface>& surface = made[name];
-  if (surface == nullptr) surface = *Surface::Create(name, *MakeSupershape(*NamedSupershape(name), 4000));
+inline std::shared_ptr<const geometry::Surface> TestSurface(const std::string& name) {
+  static std::map<std::string, std::shared_ptr<const geometry::Surface>> made;
+  std::shared_ptr<const geometry::Surface>& surface = made[name];
+  if (surface == nullptr)
+    surface =
+        *geometry::Surface::Create(name, *geometry::MakeSupershape(*geometry::NamedSupershape(name), 4000));
   return surface;
 }
 
 inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
   DiagnosisInput input;
-  auto set = std::make_shared<MeasurementSet>();
+  auto set = std::make_shared<session::MeasurementSet>();
   set->origin = "set.csv";
   set->fingers = 3;
   set->has_poses = set->has_session_time = true;
-  const Model nominal =
-      WithEffects(NominalModel(), {{"gaussian_noise", {"sigma_us=" + std::to_string(rig.sigma_us)}}});
-  Model real = WithEffects(nominal, rig.hidden);
-  const TouchSimulator simulator(std::make_shared<const Model>(real));
-  Plan plan;
-  plan.kind = Plan::Kind::kFaces;
+  const model::Model nominal =
+      WithEffects(model::NominalModel(), {{"gaussian_noise", {"sigma_us=" + std::to_string(rig.sigma_us)}}});
+  model::Model real = WithEffects(nominal, rig.hidden);
+  const touch::TouchSimulator simulator(std::make_shared<const model::Model>(real));
+  touch::Plan plan;
+  plan.kind = touch::Plan::Kind::kFaces;
   plan.faces.samples_per_face = rig.samples_per_face;
   plan.faces.rounds = rig.rounds;
   plan.touch_interval_s = 9;
@@ -66,15 +68,15 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
     const auto surface = TestSurface(rig.objects[object]);
     input.surfaces[rig.objects[object]] = surface;
     set->objects.push_back(rig.objects[object]);
-    const auto generator = MakePoseGenerator(plan, surface->bounds(), rig.seed + 17 * object);
-    TouchWorkspace workspace;
+    const auto generator = touch::MakePoseGenerator(plan, surface->bounds(), rig.seed + 17 * object);
+    touch::TouchWorkspace workspace;
     for (uint64_t number = 0; number < generator->Count(); ++number) {
-      const CommandedTouch touch = TouchOfPlan(plan, *generator, number, 0);
-      TouchBatch batch;
+      const touch::CommandedTouch touch = touch::TouchOfPlan(plan, *generator, number, 0);
+      effects::TouchBatch batch;
       simulator.Prepare(1, &batch);
       batch.surface = surface;
       batch.seed = rig.seed;
-      SetTouch(touch, touch.speed_m_s, 9.0 * set->touch.size(), set->touch.size(), 0, &batch);
+      touch::SetTouch(touch, touch.speed_m_s, 9.0 * set->touch.size(), set->touch.size(), 0, &batch);
       batch.previous_press_m = previous_press_m;
       EXPECT_TRUE(simulator.Run(&batch, &workspace).ok());
       previous_press_m = batch.press_m;
@@ -91,8 +93,8 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
     }
   }
   input.set = set;
-  input.model = std::make_shared<const Model>(WithEffects(nominal, rig.known));
+  input.model = std::make_shared<const model::Model>(WithEffects(nominal, rig.known));
   return input;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

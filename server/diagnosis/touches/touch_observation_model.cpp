@@ -5,7 +5,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr double kJumpM = 0.3e-3;  // a finger that moves so far within a step has met another face
@@ -14,7 +14,7 @@ constexpr double kMinCosine = 0.1;
 
 }  // namespace
 
-absl::StatusOr<std::vector<double>> TouchObservationModel::Predict(const Model& model) const {
+absl::StatusOr<std::vector<double>> TouchObservationModel::Predict(const model::Model& model) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(Prediction prediction, predictor_.Run(model, false, false));
   return std::move(prediction.time_s);
 }
@@ -56,9 +56,9 @@ std::vector<int> FirstRowsOfObjects(const Contrasts& contrasts, int objects) {
   return rows;
 }
 
-SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts& contrasts,
-                                         const Prediction& details) {
-  SmoothErrorGeometry geometry;
+inference::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts& contrasts,
+                                                    const Prediction& details) {
+  inference::SmoothErrorGeometry geometry;
   const int objects = static_cast<int>(o.objects.size());
   geometry.sites.resize(objects);
   geometry.distinct_m.resize(objects);
@@ -73,7 +73,7 @@ SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts&
       geometry.mean_row_per_m += details.inverse_speed_s_per_m[entry];
       ++counted;
       if (!seen[o.pose[k]]) geometry.distinct_m[o.object[k]].push_back(details.contact_m[entry]);
-      SmoothErrorSite site;
+      inference::SmoothErrorSite site;
       site.position_m = details.contact_m[entry];
       site.first_row = contrasts.FirstRow(touch);
       const double time_per_m =
@@ -90,4 +90,4 @@ SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts&
   return geometry;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

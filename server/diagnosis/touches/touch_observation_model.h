@@ -10,9 +10,9 @@
 #include "server/diagnosis/touches/prediction.h"
 #include "server/diagnosis/touches/predictor.h"
 
-namespace touchstone {
+namespace touchstone::diagnosis::touches {
 
-class TouchObservationModel : public ObservationModel {
+class TouchObservationModel : public inference::ObservationModel {
  public:
   // All must outlive it. `nominal_s`: the given model's times, which stand in where another model misses.
   TouchObservationModel(const Observations& observations, const Predictor& predictor,
@@ -29,7 +29,7 @@ class TouchObservationModel : public ObservationModel {
   int BlockOfRow(int row) const override { return observations_.pose[TouchOfRow(row)]; }
 
   // Reported times, s, [k * fingers + finger].
-  absl::StatusOr<std::vector<double>> Predict(const Model& model) const override;
+  absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override;
   Eigen::VectorXd Residual(const std::vector<double>& predicted_s) const override;
   Eigen::VectorXd Change(const std::vector<double>& predicted_s,
                          const std::vector<double>& moved_s) const override;
@@ -52,7 +52,7 @@ std::vector<int> FirstRowsOfObjects(const Contrasts& contrasts, int objects);
 
 // How bumps of the objects' surfaces change the contrasts: a bump h along the normal shortens the travel by
 // h / cos(incidence). `details`: of the nominal model, which says where the contacts are.
-SmoothErrorGeometry SurfaceErrorGeometry(const Observations& observations, const Contrasts& contrasts,
-                                         const Prediction& details);
+inference::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& observations,
+                                                    const Contrasts& contrasts, const Prediction& details);
 
-}  // namespace touchstone
+}  // namespace touchstone::diagnosis::touches

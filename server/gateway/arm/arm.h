@@ -15,7 +15,7 @@
 #include "server/gateway/timing/change_notifier.h"
 #include "server/gateway/timing/clock_sync.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // Universal Robots' names and numbers, as RTDE sends them (output robot_mode). Another number may come.
 enum class RobotMode : int {
@@ -122,11 +122,11 @@ class Arm {
   // Without heartbeats that watchdog stops the arm.
   virtual void SendHeartbeat() = 0;
 
-  virtual ClockEstimate ControllerClock() const = 0;  // controller seconds on host seconds
+  virtual timing::ClockEstimate ControllerClock() const = 0;  // controller seconds on host seconds
   virtual double StateRateHz() const = 0;
   virtual std::string Model() const = 0;  // "ur3e"
   virtual std::string Address() const = 0;
   virtual std::string Version() const = 0;  // of the controller's software
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -8,7 +8,7 @@
 
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 class BigEndianReader {
  public:
@@ -83,4 +83,4 @@ class BigEndianWriter {
   std::string bytes_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

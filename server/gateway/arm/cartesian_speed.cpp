@@ -6,7 +6,7 @@
 #include "server/base/units.h"
 #include "server/gateway/arm/ur_script.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kStepM = 0.01, kStepRad = 0.07;
@@ -44,4 +44,4 @@ double LimitedCartesianSpeed(const UrKinematics& kinematics, const Eigen::Isomet
   return line_speed_m_s / slower;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -8,7 +8,7 @@
 
 #include "server/gateway/arm/kinematics.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // rad/s, base to wrist 3.
 const std::array<double, 6>& MaxJointSpeeds();
@@ -19,4 +19,4 @@ double LimitedCartesianSpeed(const UrKinematics& kinematics, const Eigen::Isomet
                              const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,
                              Joints* joints);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

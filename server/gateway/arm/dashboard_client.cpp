@@ -7,7 +7,7 @@
 #include "server/base/status.h"
 #include "server/gateway/timing/change_notifier.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr size_t kLongestLine = 4096;
@@ -22,7 +22,7 @@ absl::StatusOr<std::string> DashboardClient::ReadLine(double until_host_s) {
       return std::string(absl::StripAsciiWhitespace(line));
     }
     if (unread_.size() > kLongestLine) return absl::DataLossError("dashboard: a line without an end");
-    const double left_s = until_host_s - HostNowS();
+    const double left_s = until_host_s - timing::HostNowS();
     if (left_s <= 0) return absl::UnavailableError("dashboard: no reply in time");
     char buffer[1024];
     TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count, socket_->Receive(buffer, sizeof(buffer), left_s));
@@ -32,7 +32,7 @@ absl::StatusOr<std::string> DashboardClient::ReadLine(double until_host_s) {
 
 absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, double timeout_s) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const double until_s = HostNowS() + timeout_s;
+  const double until_s = timing::HostNowS() + timeout_s;
   // A connection that has lain idle may be gone: one more try with a new one.
   for (int attempt = 0;; ++attempt) {
     const bool fresh = socket_ == nullptr;
@@ -49,7 +49,7 @@ absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, dou
     }();
     if (reply.ok()) return reply;
     socket_.reset();  // a late reply must not be taken for that of the next command
-    if (fresh || attempt > 0 || HostNowS() >= until_s)
+    if (fresh || attempt > 0 || timing::HostNowS() >= until_s)
       return absl::UnavailableError(absl::StrCat("'", command, "': ", reply.status().message()));
   }
 }
@@ -62,4 +62,4 @@ absl::Status DashboardClient::Demand(const std::string& command, const std::stri
       absl::StrCat("the controller answers '", command, "' with '", reply.substr(0, 200), "'"));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

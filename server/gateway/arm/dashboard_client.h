@@ -9,7 +9,7 @@
 
 #include "server/gateway/arm/tcp_socket.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // Any thread; one command at a time. Connects when it is needed.
 class DashboardClient {
@@ -31,4 +31,4 @@ class DashboardClient {
   std::string unread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -13,7 +13,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 class FakeServer {
  public:
@@ -73,4 +73,4 @@ class FakeServer {
   std::thread thread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

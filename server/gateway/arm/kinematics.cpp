@@ -8,7 +8,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kSingular = 1e-9;
@@ -163,4 +163,4 @@ bool UrKinematics::Refine(const Eigen::Isometry3d& base_from_flange, Joints* joi
   return (Chain(table_, *joints).inverse() * base_from_flange).translation().norm() < 1e-6;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -8,7 +8,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 using Joints = std::array<double, 6>;  // rad, base to wrist 3
 
@@ -45,4 +45,4 @@ class UrKinematics {
   bool calibrated_ = false;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -6,7 +6,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 UrKinematics Arm(const std::string& model) {
@@ -109,4 +109,4 @@ TEST(UrKinematics, TableOfAnotherArmIsRefused) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -11,7 +11,7 @@
 #include "server/gateway/arm/cartesian_speed.h"
 #include "server/gateway/arm/ur_script.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kStepM = 0.005, kStepRad = 0.035;
@@ -115,4 +115,4 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -10,7 +10,7 @@
 #include "server/gateway/arm/kinematics.h"
 #include "server/gateway/arm/motion_planner.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 class LineCheck {
  public:
@@ -45,4 +45,4 @@ class LineCheck {
 // "(0.300, 0.000, 0.100)"
 std::string PointText(const Eigen::Vector3d& point_m);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

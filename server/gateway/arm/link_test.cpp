@@ -14,7 +14,7 @@
 #include "server/gateway/arm/rtde_client.h"
 #include "server/gateway/arm/ur_arm.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 using ::testing::HasSubstr;
@@ -82,7 +82,7 @@ struct Listening {
   }
   template <typename Done>
   bool Wait(Done done) {
-    for (const double until_s = HostNowS() + kPatienceS; HostNowS() < until_s;) {
+    for (const double until_s = timing::HostNowS() + kPatienceS; timing::HostNowS() < until_s;) {
       if (done()) return true;
       changes.WaitForChange(changes.count(), 0.01);
     }
@@ -90,7 +90,7 @@ struct Listening {
   }
   std::mutex mutex;
   std::optional<RtdeSample> newest;
-  ChangeNotifier changes;
+  timing::ChangeNotifier changes;
   RtdeClient client;
 };
 
@@ -180,7 +180,7 @@ UrArmOptions Nowhere() {
 }
 
 TEST(UrArm, WithoutAControllerEverythingSaysSo) {
-  ChangeNotifier changes;
+  timing::ChangeNotifier changes;
   const auto arm = ConnectUrArm(Nowhere(), &changes);
   ASSERT_TRUE(arm.ok()) << "it goes on trying";
   EXPECT_EQ((*arm)->State().status().code(), absl::StatusCode::kUnavailable);
@@ -199,7 +199,7 @@ TEST(UrArm, StopGoesOverTheDashboardWhereNoProgramCanBeSent) {
   });
   UrArmOptions options = Nowhere();
   options.dashboard_port = dashboard.port();
-  ChangeNotifier changes;
+  timing::ChangeNotifier changes;
   const auto arm = ConnectUrArm(options, &changes);
   ASSERT_TRUE(arm.ok());
   EXPECT_TRUE((*arm)->Stop().ok());
@@ -218,11 +218,11 @@ TEST(UrArm, StopIsSentOverTheProgramPortAlone) {
   });
   UrArmOptions options = Nowhere();
   options.secondary_port = secondary.port();
-  ChangeNotifier changes;
+  timing::ChangeNotifier changes;
   const auto arm = ConnectUrArm(options, &changes);
   ASSERT_TRUE(arm.ok());
   EXPECT_TRUE((*arm)->Stop().ok());
-  for (const double until_s = HostNowS() + kPatienceS; HostNowS() < until_s;) {
+  for (const double until_s = timing::HostNowS() + kPatienceS; timing::HostNowS() < until_s;) {
     std::lock_guard<std::mutex> lock(mutex);
     if (absl::StrContains(heard, "stopl(10)")) break;
   }
@@ -231,7 +231,7 @@ TEST(UrArm, StopIsSentOverTheProgramPortAlone) {
 }
 
 TEST(UrArm, OptionsThatMakeNoSenseAreRefused) {
-  ChangeNotifier changes;
+  timing::ChangeNotifier changes;
   UrArmOptions options = Nowhere();
   options.model = "ur10";
   EXPECT_EQ(ConnectUrArm(options, &changes).status().code(), absl::StatusCode::kInvalidArgument);
@@ -241,4 +241,4 @@ TEST(UrArm, OptionsThatMakeNoSenseAreRefused) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -15,7 +15,7 @@
 #include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kSettleS = 0.05;         // of the arm at the end of a line, and of the program's start
@@ -58,27 +58,29 @@ absl::Status CheckLimits(const MotionLimits& limits) {
 class UrMotionPlanner final : public MotionPlanner {
  public:
   UrMotionPlanner(const std::string& arm_model, const UrKinematics& kinematics, const MotionLimits& limits,
-                  const Calibration& calibration)
+                  const calibration::Calibration& calibration)
       : limits_(limits),
         calibration_(calibration),
         check_(arm_model, kinematics, limits, calibration.flange_from_tip) {}
 
-  absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object, const Bounds& bounds,
-                                    UpFace up_face, const CommandedTouch& touch,
+  absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object,
+                                    const geometry::Bounds& bounds, calibration::UpFace up_face,
+                                    const touch::CommandedTouch& touch,
                                     const std::string& where) const override;
   absl::StatusOr<PlannedTouch> PlanView(const ArmState& from, const Eigen::Isometry3d& base_from_camera,
-                                        const std::string& object, const Bounds& bounds, UpFace up_face,
-                                        const std::string& where) const override;
+                                        const std::string& object, const geometry::Bounds& bounds,
+                                        calibration::UpFace up_face, const std::string& where) const override;
   absl::StatusOr<std::vector<Eigen::Isometry3d>> PlanHome(const ArmState& from) const override;
-  absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const Bounds& bounds,
-                                               UpFace up_face) const override;
+  absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const geometry::Bounds& bounds,
+                                               calibration::UpFace up_face) const override;
   const MotionLimits& limits() const override { return limits_; }
-  const Calibration& calibration() const override { return calibration_; }
+  const calibration::Calibration& calibration() const override { return calibration_; }
 
  private:
-  absl::Status CheckTouch(const std::string& object, UpFace up_face, const CommandedTouch& touch) const;
+  absl::Status CheckTouch(const std::string& object, calibration::UpFace up_face,
+                          const touch::CommandedTouch& touch) const;
   // The height of the clearance plane over an object, base frame.
-  double ClearanceHeight(const Eigen::Isometry3d& base_from_object, const Bounds& bounds) const;
+  double ClearanceHeight(const Eigen::Isometry3d& base_from_object, const geometry::Bounds& bounds) const;
   // Joints where the arm is, as the planner's own kinematics has them.
   absl::StatusOr<Joints> JointsOf(const ArmState& from) const;
   // Follows all lines; the joints at the end.
@@ -90,12 +92,12 @@ class UrMotionPlanner final : public MotionPlanner {
   double TransitDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
 
   const MotionLimits limits_;
-  const Calibration calibration_;
+  const calibration::Calibration calibration_;
   const LineCheck check_;
 };
 
-absl::Status UrMotionPlanner::CheckTouch(const std::string& object, UpFace up_face,
-                                         const CommandedTouch& touch) const {
+absl::Status UrMotionPlanner::CheckTouch(const std::string& object, calibration::UpFace up_face,
+                                         const touch::CommandedTouch& touch) const {
   if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
       !std::isfinite(touch.stroke_m))
     return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
@@ -110,16 +112,18 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, UpFace up_fa
   if (!(touch.stroke_m > 0))
     return absl::OutOfRangeError(
         absl::StrFormat("stroke %.4g mm: must be above 0", touch.stroke_m / kMetresPerMillimetre));
-  const UpFace needed = UpFaceFor(touch.approach);
+  const calibration::UpFace needed = calibration::UpFaceFor(touch.approach);
   if (up_face != needed)
-    return absl::FailedPreconditionError(absl::StrCat(
-        "object '", object, "' must lie with its face ", UpFaceName(needed), " up for an approach along ",
-        PointText(touch.approach), "; it lies with ", UpFaceName(up_face), " up"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("object '", object, "' must lie with its face ", calibration::UpFaceName(needed),
+                     " up for an approach along ", PointText(touch.approach), "; it lies with ",
+                     calibration::UpFaceName(up_face), " up"));
   return absl::OkStatus();
 }
 
-absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string& object, const Bounds& bounds,
-                                                              UpFace up_face) const {
+absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string& object,
+                                                              const geometry::Bounds& bounds,
+                                                              calibration::UpFace up_face) const {
   const auto found = calibration_.base_from_object.find(object);
   if (found == calibration_.base_from_object.end()) {
     std::vector<std::string> known;
@@ -128,11 +132,11 @@ absl::StatusOr<Eigen::Isometry3d> UrMotionPlanner::ObjectPose(const std::string&
                                                       "'", DidYouMean(object, known),
                                                       "; 'touchstone rig calibrate' finds it"));
   }
-  return BaseFromObject(found->second, bounds, up_face);
+  return calibration::BaseFromObject(found->second, bounds, up_face);
 }
 
 double UrMotionPlanner::ClearanceHeight(const Eigen::Isometry3d& base_from_object,
-                                        const Bounds& bounds) const {
+                                        const geometry::Bounds& bounds) const {
   double top_m = -1e300;
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d at(corner & 1 ? bounds.min_m.x() : bounds.max_m.x(),
@@ -206,8 +210,9 @@ double UrMotionPlanner::TransitDuration(Eigen::Isometry3d from,
 }
 
 absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const std::string& object,
-                                                   const Bounds& bounds, UpFace up_face,
-                                                   const CommandedTouch& touch,
+                                                   const geometry::Bounds& bounds,
+                                                   calibration::UpFace up_face,
+                                                   const touch::CommandedTouch& touch,
                                                    const std::string& where) const {
   const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
     TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(object, up_face, touch));
@@ -228,8 +233,9 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
       return absl::OutOfRangeError(
           absl::StrFormat("the approach is tilted %.1f deg from straight down; at most %.1f deg",
                           tilt_rad / kRadiansPerDegree, limits_.max_tilt_rad / kRadiansPerDegree));
-    const double stroke_m =
-        touch.stroke_m < kNoStrokeLimitM ? touch.stroke_m : touch.standoff_m + limits_.stroke_beyond_target_m;
+    const double stroke_m = touch.stroke_m < touch::kNoStrokeLimitM
+                                ? touch.stroke_m
+                                : touch.standoff_m + limits_.stroke_beyond_target_m;
 
     PlannedTouch planned;
     planned.up_face = up_face;
@@ -254,10 +260,9 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
   return absl::Status(plan.status().code(), absl::StrCat(where, ": ", plan.status().message()));
 }
 
-absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(const ArmState& from,
-                                                       const Eigen::Isometry3d& base_from_camera,
-                                                       const std::string& object, const Bounds& bounds,
-                                                       UpFace up_face, const std::string& where) const {
+absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(
+    const ArmState& from, const Eigen::Isometry3d& base_from_camera, const std::string& object,
+    const geometry::Bounds& bounds, calibration::UpFace up_face, const std::string& where) const {
   const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
     if (!calibration_.has_camera)
       return absl::FailedPreconditionError("the calibration has no flange_from_camera");
@@ -309,13 +314,12 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const A
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<MotionPlanner>> MotionPlanner::Create(const std::string& arm_model,
-                                                                     const MotionLimits& limits,
-                                                                     const Calibration& calibration) {
+absl::StatusOr<std::unique_ptr<MotionPlanner>> MotionPlanner::Create(
+    const std::string& arm_model, const MotionLimits& limits, const calibration::Calibration& calibration) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics kinematics, UrKinematics::ForModel(arm_model));
   TOUCHSTONE_RETURN_IF_ERROR(CheckLimits(limits));
   return std::unique_ptr<MotionPlanner>(
       std::make_unique<UrMotionPlanner>(arm_model, kinematics, limits, calibration));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -10,16 +10,16 @@
 #include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 using ::testing::HasSubstr;
 
 // A cube of 150 mm whose centre stands 100 mm high, 300 mm before the arm, as on the emulated rig.
-const Bounds kCube{Eigen::Vector3d::Constant(-0.075), Eigen::Vector3d::Constant(0.075)};
+const geometry::Bounds kCube{Eigen::Vector3d::Constant(-0.075), Eigen::Vector3d::Constant(0.075)};
 
-Calibration Fixture() {
-  Calibration calibration;
+calibration::Calibration Fixture() {
+  calibration::Calibration calibration;
   calibration.flange_from_tip.translation().z() = 0.12;
   calibration.base_from_object["cube"] = Eigen::Isometry3d(Eigen::Translation3d(0.30, 0, 0.10));
   return calibration;
@@ -34,7 +34,8 @@ struct Rig {
     at.joints_rad = with.home_rad;
     at.base_from_tip = check.TipAt(with.home_rad);
   }
-  absl::StatusOr<PlannedTouch> Plan(const CommandedTouch& touch, UpFace up_face = UpFace::kPlusZ) const {
+  absl::StatusOr<PlannedTouch> Plan(const touch::CommandedTouch& touch,
+                                    calibration::UpFace up_face = calibration::UpFace::kPlusZ) const {
     return planner->Plan(at, "cube", kCube, up_face, touch, "touches[3]");
   }
   // As if the arm had made the touch and were back at its start.
@@ -54,16 +55,16 @@ struct Rig {
   ArmState at;
 };
 
-CommandedTouch FromAbove() {
-  CommandedTouch touch;
+touch::CommandedTouch FromAbove() {
+  touch::CommandedTouch touch;
   touch.target_m = Eigen::Vector3d(0, 0, 0.075);
   return touch;
 }
 
 // A touch from above, tilted and turned as far as is asked for.
-CommandedTouch RandomTouch(std::mt19937_64* random, double max_tilt_rad) {
+touch::CommandedTouch RandomTouch(std::mt19937_64* random, double max_tilt_rad) {
   std::uniform_real_distribution<double> unit(0, 1);
-  CommandedTouch touch;
+  touch::CommandedTouch touch;
   touch.target_m = Eigen::Vector3d(0.09 * (unit(*random) - 0.5), 0.09 * (unit(*random) - 0.5), 0.075);
   const double towards = 2 * kPi * unit(*random), roll = 2 * kPi * unit(*random);
   const Eigen::AngleAxisd tilt(max_tilt_rad * unit(*random),
@@ -88,7 +89,7 @@ TEST(MotionPlanner, ReachesTheMiddleSixTenthsOfAFaceFromTwentyDegreesAndAnyRoll)
 TEST(MotionPlanner, TipFrameHasItsZAlongTheApproachAndItsXAlongTheFingers) {
   const Rig rig("ur3e");
   std::mt19937_64 random(2);
-  const CommandedTouch touch = RandomTouch(&random, 0.3);
+  const touch::CommandedTouch touch = RandomTouch(&random, 0.3);
   const auto plan = rig.Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
   const Eigen::Isometry3d start = plan->motion.transit.back();
@@ -103,7 +104,7 @@ TEST(MotionPlanner, TipFrameHasItsZAlongTheApproachAndItsXAlongTheFingers) {
 }
 
 TEST(MotionPlanner, StrokeOfATouchIsItsOwn) {
-  CommandedTouch touch = FromAbove();
+  touch::CommandedTouch touch = FromAbove();
   touch.stroke_m = 0.065;
   const auto plan = Rig("ur3e").Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
@@ -117,7 +118,7 @@ TEST(MotionPlanner, TransitsCrossAboveTheObject) {
   Rig rig("ur3e");
   std::mt19937_64 random(3);
   for (int i = 0; i < 50; ++i) {
-    CommandedTouch touch = RandomTouch(&random, 0.35);
+    touch::CommandedTouch touch = RandomTouch(&random, 0.35);
     touch.standoff_m = 0.02;
     const auto plan = rig.Plan(touch);
     ASSERT_TRUE(plan.ok()) << plan.status();
@@ -156,7 +157,7 @@ void ExpectRefused(const absl::StatusOr<PlannedTouch>& plan, absl::StatusCode co
 
 TEST(MotionPlanner, RefusesWithValueAndLimit) {
   const Rig rig("ur3e");
-  CommandedTouch touch = FromAbove();
+  touch::CommandedTouch touch = FromAbove();
   touch.speed_m_s = 0.2;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"200 mm/s", "100 mm/s"});
   touch = FromAbove();
@@ -168,7 +169,7 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
   touch = FromAbove();
   touch.target_m.x() = 0.2;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"x = 530.0 mm", "500.0 mm"});
-  ExpectRefused(rig.Plan(FromAbove(), UpFace::kPlusX), absl::StatusCode::kFailedPrecondition,
+  ExpectRefused(rig.Plan(FromAbove(), calibration::UpFace::kPlusX), absl::StatusCode::kFailedPrecondition,
                 {"face +z up", "+x up"});
   touch = FromAbove();
   touch.stroke_m = 0.3;
@@ -178,7 +179,7 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
 TEST(MotionPlanner, RefusesTiltBeyondItsLimit) {
   MotionLimits limits;
   limits.max_tilt_rad = 10 * kRadiansPerDegree;
-  CommandedTouch touch = FromAbove();
+  touch::CommandedTouch touch = FromAbove();
   touch.approach = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()) * touch.approach;
   ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
                 {"tilted 17.2 deg", "10.0 deg"});
@@ -187,7 +188,7 @@ TEST(MotionPlanner, RefusesTiltBeyondItsLimit) {
 TEST(MotionPlanner, RefusesWhatTheArmCannotReach) {
   MotionLimits limits;
   limits.box_min_m = Eigen::Vector3d(-2, -2, -1), limits.box_max_m = Eigen::Vector3d(2, 2, 2);
-  CommandedTouch touch = FromAbove();
+  touch::CommandedTouch touch = FromAbove();
   touch.target_m.x() = 0.5;
   ExpectRefused(Rig("ur3", limits).Plan(touch), absl::StatusCode::kOutOfRange, {"out of reach of the ur3"});
 }
@@ -195,7 +196,7 @@ TEST(MotionPlanner, RefusesWhatTheArmCannotReach) {
 TEST(MotionPlanner, RefusesJointsBeyondTheirLimits) {
   MotionLimits limits;
   limits.joint_max_rad[0] = 0.1, limits.joint_min_rad[0] = -0.1;
-  CommandedTouch touch = FromAbove();
+  touch::CommandedTouch touch = FromAbove();
   touch.target_m.y() = 0.07, touch.target_m.x() = -0.07;
   ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
                 {"base", "its limits are -5.7 and 5.7"});
@@ -203,7 +204,8 @@ TEST(MotionPlanner, RefusesJointsBeyondTheirLimits) {
 
 TEST(MotionPlanner, RefusesUnknownObjectAndNamesTheKnownOnes) {
   const Rig rig("ur3e");
-  const auto plan = rig.planner->Plan(rig.at, "cub", kCube, UpFace::kPlusZ, FromAbove(), "touches[3]");
+  const auto plan =
+      rig.planner->Plan(rig.at, "cub", kCube, calibration::UpFace::kPlusZ, FromAbove(), "touches[3]");
   ExpectRefused(plan, absl::StatusCode::kFailedPrecondition, {"'cub'", "'cube'"});
 }
 
@@ -223,7 +225,7 @@ TEST(MotionPlanner, UnwindsTheWristBeforeItsLimit) {
   Rig rig("ur3e");
   bool unwound = false;
   for (int i = 0; i < 12; ++i) {
-    CommandedTouch touch = FromAbove();
+    touch::CommandedTouch touch = FromAbove();
     touch.lateral = Eigen::AngleAxisd(-1.9 * i, Eigen::Vector3d::UnitZ()) * touch.lateral;
     const double before_rad = rig.at.joints_rad[5];
     const auto plan = rig.Plan(touch);
@@ -238,7 +240,7 @@ TEST(MotionPlanner, UnwindsTheWristBeforeItsLimit) {
 TEST(MotionPlanner, HomeLeavesTheObjectAlongTheToolsAxisFirst) {
   Rig rig("ur3e");
   std::mt19937_64 random(8);
-  const CommandedTouch touch = RandomTouch(&random, 0.3);
+  const touch::CommandedTouch touch = RandomTouch(&random, 0.3);
   const auto plan = rig.Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
   rig.Make(*plan);
@@ -251,7 +253,7 @@ TEST(MotionPlanner, HomeLeavesTheObjectAlongTheToolsAxisFirst) {
 }
 
 TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
-  Calibration calibration = Fixture();
+  calibration::Calibration calibration = Fixture();
   calibration.has_camera = true;
   calibration.flange_from_camera.translation() = Eigen::Vector3d(0, 0.06, 0.04);
   const auto planner = MotionPlanner::Create("ur3e", MotionLimits(), calibration);
@@ -260,16 +262,19 @@ TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();
   base_from_camera.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;
   base_from_camera.translation() = Eigen::Vector3d(0.30, 0, 0.40);
-  const auto plan = (*planner)->PlanView(rig.at, base_from_camera, "cube", kCube, UpFace::kPlusZ, "view");
+  const auto plan =
+      (*planner)->PlanView(rig.at, base_from_camera, "cube", kCube, calibration::UpFace::kPlusZ, "view");
   ASSERT_TRUE(plan.ok()) << plan.status();
   const Eigen::Isometry3d camera =
       plan->motion.transit.back() * calibration.flange_from_tip.inverse() * calibration.flange_from_camera;
   EXPECT_TRUE(camera.isApprox(base_from_camera, 1e-9));
   EXPECT_EQ(
-      rig.planner->PlanView(rig.at, base_from_camera, "cube", kCube, UpFace::kPlusZ, "view").status().code(),
+      rig.planner->PlanView(rig.at, base_from_camera, "cube", kCube, calibration::UpFace::kPlusZ, "view")
+          .status()
+          .code(),
       absl::StatusCode::kFailedPrecondition)
       << "without flange_from_camera";
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -6,7 +6,7 @@
 #include "server/base/status.h"
 #include "server/gateway/arm/big_endian.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr size_t kHeaderBytes = 5, kLargestBytes = 1 << 20;
@@ -93,4 +93,4 @@ absl::StatusOr<std::optional<PrimaryUpdate>> PrimaryStream::Next() {
   return std::optional<PrimaryUpdate>(std::move(update));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

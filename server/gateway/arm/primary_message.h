@@ -11,7 +11,7 @@
 
 #include "server/gateway/arm/kinematics.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // What is used of one package; the rest of it is skipped.
 struct PrimaryUpdate {
@@ -33,4 +33,4 @@ class PrimaryStream {
   std::string bytes_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

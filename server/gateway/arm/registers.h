@@ -2,7 +2,7 @@
 // (24 to 47) is kept for RTDE clients.
 #pragma once
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // The gateway writes (RTDE inputs).
 inline constexpr int kHeartbeatRegister = 24;  // input_int_register_24: counts; watched by rtde_set_watchdog
@@ -14,4 +14,4 @@ inline constexpr int kProgramRegister = 24;  // output_int_register_24: the prog
 inline constexpr int kPhaseRegister = 25;    // output_int_register_25: MotionPhase
 inline constexpr double kWatchdogHz = 4;     // of heartbeats, rig time; a slower gateway means a dead one
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -8,7 +8,7 @@
 #include "server/base/status.h"
 #include "server/gateway/arm/big_endian.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 // Host seconds.
@@ -89,7 +89,7 @@ void RtdeClient::Run() {
 
 absl::StatusOr<std::string> RtdeClient::Ask(TcpSocket* socket, RtdeType type, const std::string& payload) {
   TOUCHSTONE_RETURN_IF_ERROR(socket->Send(EncodeRtde(type, payload), kReplyS));
-  const double until_s = HostNowS() + kReplyS;
+  const double until_s = timing::HostNowS() + kReplyS;
   char buffer[4096];
   for (int seen = 0; seen < kMessagesBeforeReply;) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<RtdeMessage> message, framer_.Next());
@@ -98,7 +98,7 @@ absl::StatusOr<std::string> RtdeClient::Ask(TcpSocket* socket, RtdeType type, co
       if (message->type == static_cast<uint8_t>(type)) return std::move(message->payload);
       continue;  // texts, and data of an earlier recipe
     }
-    const double left_s = until_s - HostNowS();
+    const double left_s = until_s - timing::HostNowS();
     if (left_s <= 0 || ending_) break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count,
                                 socket->Receive(buffer, sizeof(buffer), std::min(left_s, kSliceS)));
@@ -150,11 +150,11 @@ absl::Status RtdeClient::Negotiate(TcpSocket* socket) {
 }
 
 absl::Status RtdeClient::Receive(TcpSocket* socket) {
-  double heard_s = HostNowS();
+  double heard_s = timing::HostNowS();
   char buffer[16384];
   while (!ending_) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count, socket->Receive(buffer, sizeof(buffer), kSliceS));
-    const double now_s = HostNowS();
+    const double now_s = timing::HostNowS();
     if (count == 0) {
       if (now_s - heard_s > options_.silence_s)
         return absl::UnavailableError("it has been silent for too long");
@@ -180,4 +180,4 @@ absl::Status RtdeClient::WriteInputs(int32_t heartbeat, int32_t command) {
   return writer_->Send(EncodeInputs(input_recipe_, heartbeat, command), kSendS);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -15,7 +15,7 @@
 #include "server/gateway/arm/tcp_socket.h"
 #include "server/gateway/timing/change_notifier.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 struct RtdeOptions {
   std::string address;
@@ -64,8 +64,8 @@ class RtdeClient {
   uint8_t input_recipe_ = 0;
 
   std::atomic<bool> ending_{false};
-  ChangeNotifier end_;
+  timing::ChangeNotifier end_;
   std::thread thread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

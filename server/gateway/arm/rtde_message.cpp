@@ -9,7 +9,7 @@
 #include "server/gateway/arm/big_endian.h"
 #include "server/gateway/arm/registers.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr size_t kHeaderBytes = 3;
@@ -193,4 +193,4 @@ absl::StatusOr<std::string> ParseText(absl::string_view payload) {
   return absl::StrCat(level < 4 ? kLevels[level] : "message", " of ", source, ": ", message);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -11,7 +11,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 enum class RtdeType : uint8_t {
   kVersion = 'V',
@@ -76,4 +76,4 @@ absl::StatusOr<bool> ParseAccepted(absl::string_view payload);                  
 absl::StatusOr<std::string> ParseControllerVersion(absl::string_view payload);  // "5.12.4.1101661"
 absl::StatusOr<std::string> ParseText(absl::string_view payload);               // "warning of RTDE: ..."
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -9,7 +9,7 @@
 #include "server/gateway/arm/big_endian.h"
 #include "server/gateway/arm/primary_message.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 using ::testing::HasSubstr;
@@ -145,4 +145,4 @@ TEST(PrimaryStream, PackageOfImpossibleSizeIsAnError) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

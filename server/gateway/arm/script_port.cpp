@@ -7,7 +7,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 // Host seconds.
@@ -91,4 +91,4 @@ absl::Status ScriptPort::Receive(TcpSocket* socket) {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -15,7 +15,7 @@
 #include "server/gateway/arm/tcp_socket.h"
 #include "server/gateway/timing/change_notifier.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 class ScriptPort {
  public:
@@ -42,8 +42,8 @@ class ScriptPort {
   mutable std::timed_mutex mutex_;  // of writer_
   std::shared_ptr<TcpSocket> writer_;
   std::atomic<bool> ending_{false};
-  ChangeNotifier end_;
+  timing::ChangeNotifier end_;
   std::thread thread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

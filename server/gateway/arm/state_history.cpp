@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 bool Before(const ArmState& state, double controller_s) {
@@ -33,4 +33,4 @@ double StateHistory::RateHz() const {
   return span_s > 0 ? static_cast<double>(states_.end() - first - 1) / span_s : 0;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

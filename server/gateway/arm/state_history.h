@@ -7,7 +7,7 @@
 
 #include "server/gateway/arm/arm.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 class StateHistory {
  public:
@@ -26,4 +26,4 @@ class StateHistory {
   std::deque<ArmState> states_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

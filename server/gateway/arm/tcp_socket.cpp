@@ -15,7 +15,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 // A peer that acknowledges nothing for so long is gone, whatever the kernel would still hope for.
@@ -116,4 +116,4 @@ absl::StatusOr<size_t> TcpSocket::Receive(char* buffer, size_t size, double time
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

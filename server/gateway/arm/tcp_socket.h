@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // Reading by one thread and sending by another at the same time is fine; two senders need a lock.
 class TcpSocket {
@@ -34,4 +34,4 @@ class TcpSocket {
   const std::string name_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

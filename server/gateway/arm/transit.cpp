@@ -5,7 +5,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kSamePlaceM = 1e-4, kSameTurnRad = 1e-3;
@@ -87,4 +87,4 @@ std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double
   return poses;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

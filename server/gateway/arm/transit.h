@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 struct TransitPath {
   Eigen::Isometry3d from, to;     // base_from_tip
@@ -22,4 +22,4 @@ struct TransitPath {
 // to the height.
 std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double back_m, double height_m);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -9,7 +9,7 @@
 #include "server/gateway/arm/ur_arm_on_tcp.h"
 #include "server/gateway/arm/ur_modes.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kHistoryS = 30;                              // rig time
@@ -23,7 +23,8 @@ double RateOf(const std::string& model) {
 
 }  // namespace
 
-UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, ChangeNotifier* changes)
+UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
+                       timing::ChangeNotifier* changes)
     : options_(options),
       changes_(changes),
       nominal_(nominal),
@@ -48,7 +49,7 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program) 
   withhold_heartbeats_ = false;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    start_ = Start{program_id, HostNowS(), "", false};
+    start_ = Start{program_id, timing::HostNowS(), "", false};
   }
   SendHeartbeat();
   // A stop that comes while the program goes out must reach the controller behind it.
@@ -109,7 +110,7 @@ void UrArmOnTcp::SendHeartbeat() {
 
 absl::Status UrArmOnTcp::WriteHeartbeat() {
   heartbeat_ = (heartbeat_ + 1) & 0x7fffffff;
-  sent_heartbeats_.Sent(heartbeat_, HostNowS());
+  sent_heartbeats_.Sent(heartbeat_, timing::HostNowS());
   return rtde_.WriteInputs(heartbeat_, command_);
 }
 
@@ -144,7 +145,7 @@ absl::Status UrArmOnTcp::Stop() {
 }
 
 absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
-  const double until_s = HostNowS() + kPowerOnHostS + kPowerOnRigS / options_.script.time_scale;
+  const double until_s = timing::HostNowS() + kPowerOnHostS + kPowerOnRigS / options_.script.time_scale;
   bool powered = false, released = false;
   while (true) {
     const uint64_t seen = changes_->count();
@@ -159,7 +160,7 @@ absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
       TOUCHSTONE_RETURN_IF_ERROR(dashboard_.Demand("brake release", "Brake releasing", kDashboardS));
       released = true;
     }
-    if (HostNowS() > until_s)
+    if (timing::HostNowS() > until_s)
       return absl::UnavailableError(absl::StrCat("the arm was powered on but its mode is still ",
                                                  RobotModeName(state.robot_mode),
                                                  ": look at the teach pendant"));
@@ -167,7 +168,8 @@ absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
   }
 }
 
-absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, ChangeNotifier* changes) {
+absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options,
+                                                    timing::ChangeNotifier* changes) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics nominal, UrKinematics::ForModel(options.model));
   if (options.address.empty()) return absl::InvalidArgumentError("arm: the controller's address is missing");
   for (const int port :
@@ -178,12 +180,12 @@ absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options,
   if (!(options.script.time_scale > 0) || !(options.frozen_after_s > 0))
     return absl::InvalidArgumentError("arm: time_scale and frozen_after_s must be above 0");
   auto arm = std::make_unique<UrArmOnTcp>(options, nominal, changes);
-  const double until_s = HostNowS() + options.connect_wait_s;
-  while ((!arm->State().ok() || !arm->ProgramPortsConnected()) && HostNowS() < until_s) {
+  const double until_s = timing::HostNowS() + options.connect_wait_s;
+  while ((!arm->State().ok() || !arm->ProgramPortsConnected()) && timing::HostNowS() < until_s) {
     const uint64_t seen = changes->count();
     changes->WaitForChange(seen, 0.01);
   }
   return std::unique_ptr<UrArm>(std::move(arm));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

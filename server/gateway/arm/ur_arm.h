@@ -10,7 +10,7 @@
 #include "server/gateway/arm/arm.h"
 #include "server/gateway/arm/ur_script.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 struct UrArmOptions {
   std::string model = "ur3e";  // or "ur3"
@@ -38,6 +38,7 @@ class UrArm : public Arm {
 // queued behind anything: it has a connection of its own, goes a second way behind a program that is just
 // being sent, and falls back on the dashboard; if all fail, heartbeats are withheld so that the watchdog
 // stops the program.
-absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options, ChangeNotifier* changes);
+absl::StatusOr<std::unique_ptr<UrArm>> ConnectUrArm(const UrArmOptions& options,
+                                                    timing::ChangeNotifier* changes);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

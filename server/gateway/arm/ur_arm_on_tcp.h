@@ -17,7 +17,7 @@
 #include "server/gateway/arm/state_history.h"
 #include "server/gateway/arm/ur_arm.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // When the last heartbeats were sent, host time.
 class SentHeartbeats {
@@ -48,7 +48,7 @@ class SentHeartbeats {
 
 class UrArmOnTcp final : public UrArm {
  public:
-  UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, ChangeNotifier* changes);
+  UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal, timing::ChangeNotifier* changes);
 
   // ur_arm_states.cpp
   absl::StatusOr<ArmState> State() const override;
@@ -67,7 +67,7 @@ class UrArmOnTcp final : public UrArm {
   void SendHeartbeat() override;
   absl::Status WriteHeartbeat();  // inputs_mutex_ is held
 
-  ClockEstimate ControllerClock() const override {
+  timing::ClockEstimate ControllerClock() const override {
     std::lock_guard<std::mutex> lock(mutex_);
     return clock_.Estimate();
   }
@@ -103,13 +103,13 @@ class UrArmOnTcp final : public UrArm {
   absl::Status StartFailure() const;
 
   const UrArmOptions options_;
-  ChangeNotifier* const changes_;
+  timing::ChangeNotifier* const changes_;
   const UrKinematics nominal_;
   const Eigen::Isometry3d tip_from_flange_;
 
   mutable std::mutex mutex_;  // of what follows
   StateHistory history_;
-  ClockSync clock_;
+  timing::ClockSync clock_;
   Start start_;
   std::optional<DhTable> kinematics_;
 
@@ -126,4 +126,4 @@ class UrArmOnTcp final : public UrArm {
   RtdeClient rtde_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

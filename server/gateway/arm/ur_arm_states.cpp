@@ -8,7 +8,7 @@
 #include "server/gateway/arm/ur_modes.h"
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 constexpr double kDashboardS = 2;  // host time
@@ -30,15 +30,15 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   state.phase = static_cast<MotionPhase>(sample.phase_register);
 
   // The controller sends the pose of whatever tool was set last; ours may not have been set yet.
-  const Eigen::Isometry3d base_from_tcp = PoseFromVector(sample.actual_tcp_pose);
+  const Eigen::Isometry3d base_from_tcp = geometry::PoseFromVector(sample.actual_tcp_pose);
   const Eigen::Vector3d turning(sample.actual_tcp_speed[3], sample.actual_tcp_speed[4],
                                 sample.actual_tcp_speed[5]);
   state.tip_velocity_m_s << sample.actual_tcp_speed[0], sample.actual_tcp_speed[1],
       sample.actual_tcp_speed[2];
   state.base_from_tip = base_from_tcp;
   if (sample.has_tcp_offset) {
-    state.base_from_tip =
-        base_from_tcp * PoseFromVector(sample.tcp_offset).inverse() * options_.script.flange_from_tip;
+    state.base_from_tip = base_from_tcp * geometry::PoseFromVector(sample.tcp_offset).inverse() *
+                          options_.script.flange_from_tip;
     state.tip_velocity_m_s += turning.cross(state.base_from_tip.translation() - base_from_tcp.translation());
   }
   {
@@ -67,7 +67,7 @@ void UrArmOnTcp::OnPrimary(const PrimaryUpdate& update) {
 
 absl::Status UrArmOnTcp::StartFailure() const {
   if (start_.program_id == 0) return absl::OkStatus();
-  const double waited_s = HostNowS() - start_.sent_host_s;
+  const double waited_s = timing::HostNowS() - start_.sent_host_s;
   if (!start_.refused && waited_s < options_.program_start_s) return absl::OkStatus();
   suspect_ = true;
   return absl::UnavailableError(absl::StrCat(
@@ -84,7 +84,7 @@ absl::StatusOr<ArmState> UrArmOnTcp::State() const {
   if (newest == nullptr)
     return absl::UnavailableError(
         absl::StrCat("the controller at ", options_.address, " has sent no state yet"));
-  const double age_s = HostNowS() - newest->host_time_s;
+  const double age_s = timing::HostNowS() - newest->host_time_s;
   if (age_s > options_.frozen_after_s)
     return absl::UnavailableError(
         absl::StrFormat("the controller at %s has been silent for %.1f s", options_.address, age_s));
@@ -111,4 +111,4 @@ absl::Status UrArmOnTcp::Ready() const {
   return absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

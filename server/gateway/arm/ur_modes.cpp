@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 std::string RobotModeName(RobotMode mode) {
   static constexpr const char* kNames[] = {"NO_CONTROLLER", "DISCONNECTED",     "CONFIRM_SAFETY", "BOOTING",
@@ -73,4 +73,4 @@ absl::Status ModesPermitMotion(RobotMode robot_mode, SafetyMode safety_mode) {
                    "'touchstone rig power-on'"));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

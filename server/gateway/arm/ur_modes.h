@@ -7,7 +7,7 @@
 
 #include "server/gateway/arm/arm.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 // Universal Robots' words: "RUNNING", "POWER_OFF", ...; "NORMAL", "PROTECTIVE_STOP", ...; "UNKNOWN (12)" for a
 // number without a name.
@@ -20,4 +20,4 @@ const char* PhaseName(MotionPhase phase);
 absl::Status SafetyPermitsMotion(SafetyMode safety_mode);
 absl::Status ModesPermitMotion(RobotMode robot_mode, SafetyMode safety_mode);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -10,7 +10,7 @@
 #include "server/gateway/arm/registers.h"
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 std::string Number(double value) {
@@ -58,7 +58,7 @@ double TurnRad(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
 
 std::string PoseText(const Eigen::Isometry3d& pose) {
   std::string text = "p[";
-  for (const double value : PoseVectorOf(pose))
+  for (const double value : geometry::PoseVectorOf(pose))
     absl::StrAppend(&text, text.size() > 2 ? "," : "", Number(value));
   return text + "]";
 }
@@ -126,4 +126,4 @@ std::string StopProgram() {
   return "def stop_motion():\n  stopl(10)\nend\n";
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -10,7 +10,7 @@
 #include "server/gateway/arm/kinematics.h"
 #include "server/gateway/arm/registers.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 
 struct ScriptOptions {
   Eigen::Isometry3d flange_from_tip = Eigen::Isometry3d::Identity();
@@ -46,4 +46,4 @@ double LineDuration(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, 
                     double acceleration_m_s2);
 inline constexpr double kMaxTurnRadS = 1.5;  // of the tool on a line
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

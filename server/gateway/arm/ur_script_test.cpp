@@ -5,7 +5,7 @@
 
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::gateway::arm {
 namespace {
 
 using ::testing::HasSubstr;
@@ -104,4 +104,4 @@ TEST(LineDuration, IsThatOfATrapezoid) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::arm

@@ -14,7 +14,7 @@
 
 #include "server/base/status.h"
 
-namespace touchstone {
+namespace touchstone::gateway::audit {
 namespace {
 
 absl::Status FileError(const std::string& path, const std::string& what, const std::string& remedy) {
@@ -129,4 +129,4 @@ absl::StatusOr<std::unique_ptr<AuditLog>> AuditLog::Open(const std::string& path
   return log;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::audit

@@ -9,7 +9,7 @@
 
 #include <absl/status/statusor.h>
 
-namespace touchstone {
+namespace touchstone::gateway::audit {
 
 class AuditLog {
  public:
@@ -22,4 +22,4 @@ class AuditLog {
                              const std::vector<std::pair<std::string, std::string>>& fields) = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::audit

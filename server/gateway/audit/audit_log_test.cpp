@@ -11,7 +11,7 @@
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::gateway::audit {
 namespace {
 
 using ::testing::HasSubstr;
@@ -101,4 +101,4 @@ TEST_F(AuditLogTest, ErrorsNameTheFile) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::audit

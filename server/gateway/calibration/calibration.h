@@ -8,7 +8,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 
 // File (YAML). Rotations are rotation vectors; the keys that are marked optional may be missing.
 //   touchstone: calibration/1
@@ -31,4 +31,4 @@ absl::StatusOr<Calibration> ParseCalibration(const std::string& text, const std:
 absl::StatusOr<Calibration> ReadCalibration(const std::string& path);
 std::string FormatCalibration(const Calibration& calibration);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -12,10 +12,10 @@
 #include "server/geometry/pose.h"
 #include "server/model/yaml_tree.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
-using Kind = YamlNode::Kind;
+using Kind = model::YamlNode::Kind;
 
 constexpr char kFormat[] = "calibration/1";
 constexpr double kFarthestMm = 10'000;
@@ -26,14 +26,14 @@ class CalibrationReader {
  public:
   explicit CalibrationReader(const std::string& origin) : origin_(origin) {}
 
-  absl::StatusOr<Calibration> Read(const YamlNode& root) {
+  absl::StatusOr<Calibration> Read(const model::YamlNode& root) {
     TOUCHSTONE_RETURN_IF_ERROR(
         Want(root, Kind::kMap, "a calibration file",
              "touchstone: calibration/1, flange_from_tip: ..., base_from_object: ..."));
     TOUCHSTONE_RETURN_IF_ERROR(
         CheckKeys(root, "a calibration file",
                   {"touchstone", "flange_from_tip", "flange_from_camera", "base_from_object", "made"}));
-    const YamlNode* format = root.Find("touchstone");
+    const model::YamlNode* format = root.Find("touchstone");
     if (format == nullptr)
       return Error(root,
                    "the first line 'touchstone: calibration/1' is missing: is this a calibration file?");
@@ -41,12 +41,12 @@ class CalibrationReader {
       return Error(*format,
                    absl::StrCat("touchstone is '", format->text, "'; this program reads '", kFormat, "'"));
     // A rig without it would move its flange to where its tip belongs.
-    const YamlNode* tip = root.Find("flange_from_tip");
+    const model::YamlNode* tip = root.Find("flange_from_tip");
     if (tip == nullptr)
       return Error(root, absl::StrCat("'flange_from_tip' is missing; write for example 'flange_from_tip: ",
                                       kPoseExample, "'"));
     TOUCHSTONE_ASSIGN_OR_RETURN(calibration_.flange_from_tip, Pose(*tip, "flange_from_tip"));
-    if (const YamlNode* camera = root.Find("flange_from_camera"); camera != nullptr) {
+    if (const model::YamlNode* camera = root.Find("flange_from_camera"); camera != nullptr) {
       TOUCHSTONE_ASSIGN_OR_RETURN(calibration_.flange_from_camera, Pose(*camera, "flange_from_camera"));
       calibration_.has_camera = true;
     }
@@ -56,7 +56,7 @@ class CalibrationReader {
   }
 
  private:
-  absl::Status ReadObjects(const YamlNode* objects) {
+  absl::Status ReadObjects(const model::YamlNode* objects) {
     if (objects == nullptr || objects->kind == Kind::kNull) return absl::OkStatus();
     TOUCHSTONE_RETURN_IF_ERROR(Want(*objects, Kind::kMap, "base_from_object",
                                     absl::StrCat("one 'object: ", kPoseExample, "' a line")));
@@ -70,13 +70,13 @@ class CalibrationReader {
   }
 
   // For people: any text, and lists of texts by name one level down.
-  absl::Status ReadNotes(const YamlNode* made) {
+  absl::Status ReadNotes(const model::YamlNode* made) {
     if (made == nullptr || made->kind == Kind::kNull) return absl::OkStatus();
     TOUCHSTONE_RETURN_IF_ERROR(
         Want(*made, Kind::kMap, "made", "{date: 2026-01-31, how: \"...\", rms_mm: {lat20: 0.02}}"));
     for (size_t i = 0; i < made->items.size(); ++i) {
       const std::string& key = made->keys[i].text;
-      const YamlNode& item = made->items[i];
+      const model::YamlNode& item = made->items[i];
       if (key.empty() || key.find(' ') != std::string::npos)
         return Error(made->keys[i], absl::StrCat("made: '", key, "' is no name; one without spaces is"));
       if (item.kind == Kind::kMap) {
@@ -93,7 +93,7 @@ class CalibrationReader {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<Eigen::Isometry3d> Pose(const YamlNode& node, const std::string& what) const {
+  absl::StatusOr<Eigen::Isometry3d> Pose(const model::YamlNode& node, const std::string& what) const {
     TOUCHSTONE_RETURN_IF_ERROR(Want(node, Kind::kMap, what, kPoseExample));
     TOUCHSTONE_RETURN_IF_ERROR(CheckKeys(node, what, {"translation_mm", "rotation_deg"}));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Vector3d translation_mm,
@@ -102,14 +102,14 @@ class CalibrationReader {
                                 Vector(node, "rotation_deg", what, kMaxTurnDeg));
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = translation_mm * kMetresPerMillimetre;
-    pose.linear() = RotationFromVector(rotation_deg * kRadiansPerDegree);
+    pose.linear() = geometry::RotationFromVector(rotation_deg * kRadiansPerDegree);
     return pose;
   }
 
   // Three numbers, each between -largest and largest.
-  absl::StatusOr<Eigen::Vector3d> Vector(const YamlNode& pose, const std::string& key,
+  absl::StatusOr<Eigen::Vector3d> Vector(const model::YamlNode& pose, const std::string& key,
                                          const std::string& what, double largest) const {
-    const YamlNode* node = pose.Find(key);
+    const model::YamlNode* node = pose.Find(key);
     if (node == nullptr)
       return Error(pose, absl::StrCat(what, ": '", key, "' is missing; write for example ", kPoseExample));
     const std::string name = absl::StrCat(what, ".", key);
@@ -118,7 +118,7 @@ class CalibrationReader {
       return Error(*node, absl::StrCat(name, " has ", node->items.size(), " numbers; x, y and z are 3"));
     Eigen::Vector3d vector;
     for (int i = 0; i < 3; ++i) {
-      const YamlNode& item = node->items[i];
+      const model::YamlNode& item = node->items[i];
       TOUCHSTONE_RETURN_IF_ERROR(Want(item, Kind::kScalar, name, "three numbers"));
       const absl::StatusOr<double> number = ParseNumber(item.text);
       if (!number.ok()) return Error(item, absl::StrCat(name, ": ", number.status().message()));
@@ -131,22 +131,22 @@ class CalibrationReader {
     return vector;
   }
 
-  absl::Status Error(const YamlNode& node, absl::string_view message) const {
-    return ErrorAt(origin_, node, message);
+  absl::Status Error(const model::YamlNode& node, absl::string_view message) const {
+    return model::ErrorAt(origin_, node, message);
   }
 
-  absl::Status Want(const YamlNode& node, Kind kind, absl::string_view what,
+  absl::Status Want(const model::YamlNode& node, Kind kind, absl::string_view what,
                     absl::string_view example) const {
     if (node.kind == kind) return absl::OkStatus();
-    YamlNode wanted;
+    model::YamlNode wanted;
     wanted.kind = kind;
     return Error(node, absl::StrCat(what, " is ", node.KindInWords(), "; it must be ", wanted.KindInWords(),
                                     ": ", example));
   }
 
-  absl::Status CheckKeys(const YamlNode& map, absl::string_view what,
+  absl::Status CheckKeys(const model::YamlNode& map, absl::string_view what,
                          const std::vector<std::string>& known) const {
-    for (const YamlNode& key : map.keys)
+    for (const model::YamlNode& key : map.keys)
       if (std::find(known.begin(), known.end(), key.text) == known.end())
         return Error(key, absl::StrCat(what, " has no '", key.text, "'", DidYouMean(key.text, known)));
     return absl::OkStatus();
@@ -183,20 +183,20 @@ std::string Numbers(const Eigen::Vector3d& values, double per_unit) {
 
 // Rounded to 1 nm and 1e-9 deg, so that what a person wrote comes back as it was.
 std::string PoseText(const Eigen::Isometry3d& pose) {
-  return absl::StrCat("{translation_mm: ", Numbers(pose.translation() / kMetresPerMillimetre, 1e6),
-                      ", rotation_deg: ", Numbers(RotationVectorOf(pose.linear()) / kRadiansPerDegree, 1e9),
-                      "}");
+  return absl::StrCat(
+      "{translation_mm: ", Numbers(pose.translation() / kMetresPerMillimetre, 1e6),
+      ", rotation_deg: ", Numbers(geometry::RotationVectorOf(pose.linear()) / kRadiansPerDegree, 1e9), "}");
 }
 
 }  // namespace
 
 absl::StatusOr<Calibration> ParseCalibration(const std::string& text, const std::string& origin) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const YamlNode root, ParseYaml(text, origin));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::YamlNode root, model::ParseYaml(text, origin));
   return CalibrationReader(origin).Read(root);
 }
 
 absl::StatusOr<Calibration> ReadCalibration(const std::string& path) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxYamlBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, model::kMaxYamlBytes));
   return ParseCalibration(text, path);
 }
 
@@ -228,4 +228,4 @@ std::string FormatCalibration(const Calibration& calibration) {
   return text;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -4,7 +4,7 @@
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -106,4 +106,4 @@ TEST(CalibrationFile, ErrorsNameThePlaceAndWhatWouldBeRight) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -10,7 +10,7 @@
 #include "server/base/status.h"
 #include "server/model/parameter_values.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 constexpr double kMaxTiltRad = 3 * kRadiansPerDegree;
@@ -166,28 +166,31 @@ absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& give
   return flat;
 }
 
-absl::StatusOr<std::string> CalibratedModelFile(const Model& base, const FlatCalibration& flat,
-                                                const EffectCatalogue& catalogue) {
+absl::StatusOr<std::string> CalibratedModelFile(const model::Model& base, const FlatCalibration& flat,
+                                                const model::EffectCatalogue& catalogue) {
   if (base.fingers != flat.fingers)
     return absl::InvalidArgumentError(absl::StrCat("the base model has ", base.fingers,
                                                    " fingers, the calibration ", flat.fingers,
                                                    "; give a model of the same end effector"));
-  Model model = base;
+  model::Model model = base;
   model.spacing_m = flat.spacing_m;
-  const auto replaced = [](const EffectInstance& instance) {
+  const auto replaced = [](const model::EffectInstance& instance) {
     return instance.effect->name == "finger_length" || instance.effect->name == "gaussian_noise";
   };
   model.effects.erase(std::remove_if(model.effects.begin(), model.effects.end(), replaced),
                       model.effects.end());
   std::vector<std::string> offsets;
-  for (const double offset_m : flat.offset_m) offsets.push_back(FileNumber(Unit::kMillimetre, offset_m));
+  for (const double offset_m : flat.offset_m)
+    offsets.push_back(model::FileNumber(Unit::kMillimetre, offset_m));
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      model, AddEffect(model, "finger_length", {absl::StrCat("offset_mm=", absl::StrJoin(offsets, ","))},
+      model, model::AddEffect(model, "finger_length",
+                              {absl::StrCat("offset_mm=", absl::StrJoin(offsets, ","))}, catalogue));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      model,
+      model::AddEffect(model, "gaussian_noise",
+                       {absl::StrCat("sigma_us=", model::FileNumber(Unit::kMicrosecond, flat.sigma_s))},
                        catalogue));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      model, AddEffect(model, "gaussian_noise",
-                       {absl::StrCat("sigma_us=", FileNumber(Unit::kMicrosecond, flat.sigma_s))}, catalogue));
-  return FormatModel(model);
+  return model::FormatModel(model);
 }
 
 std::vector<double> CorrectedTimes(const FlatTouch& touch, const FlatCalibration& calibration) {
@@ -215,4 +218,4 @@ Uncertain SpeedOf(const Uncertain& distance_m, const Uncertain& time_s) {
   return TimeOf(distance_m, time_s);  // the same quotient
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

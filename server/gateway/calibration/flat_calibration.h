@@ -9,7 +9,7 @@
 
 #include "server/model/model.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 
 struct FlatTouch {
   double speed_m_s = 0;                // measured, or as commanded
@@ -37,8 +37,8 @@ absl::StatusOr<FlatCalibration> CalibrateFlat(const std::vector<FlatTouch>& touc
 
 // The base model with these offsets and this noise instead of its own, as a model file. INVALID_ARGUMENT if
 // it has another number of fingers.
-absl::StatusOr<std::string> CalibratedModelFile(const Model& base, const FlatCalibration& calibration,
-                                                const EffectCatalogue& catalogue);
+absl::StatusOr<std::string> CalibratedModelFile(const model::Model& base, const FlatCalibration& calibration,
+                                                const model::EffectCatalogue& catalogue);
 
 // Contact times as fingers of equal length would have had them, less the earliest: the descriptor.
 // NaN stays NaN.
@@ -55,4 +55,4 @@ Uncertain TimeOf(const Uncertain& distance_m, const Uncertain& speed_m_s);
 Uncertain DistanceOf(const Uncertain& time_s, const Uncertain& speed_m_s);
 Uncertain SpeedOf(const Uncertain& distance_m, const Uncertain& time_s);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

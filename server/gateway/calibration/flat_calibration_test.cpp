@@ -10,7 +10,7 @@
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using ::testing::ElementsAre;
@@ -116,27 +116,27 @@ TEST(FlatCalibration, TheModelFileHasItsValuesAndKeepsTheOthers) {
   flat.spacing_m = kSpacingM;
   flat.offset_m = {0.0004, -0.0005, 0.0001};
   flat.sigma_s = 0.0049;
-  const auto base = ParseModel(
+  const auto base = model::ParseModel(
       "touchstone: model/1\nname: rig\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
       "  - tip_radius: {radius_mm: 3}\n  - gaussian_noise: {sigma_us: 5000}\n",
-      "base.yaml", Catalogue());
+      "base.yaml", effects::Catalogue());
   ASSERT_TRUE(base.ok()) << base.status();
-  const auto file = CalibratedModelFile(*base, flat, Catalogue());
+  const auto file = CalibratedModelFile(*base, flat, effects::Catalogue());
   ASSERT_TRUE(file.ok()) << file.status();
   EXPECT_THAT(*file, HasSubstr("finger_length: {offset_mm: [0.4, -0.5, 0.1]}"));
   EXPECT_THAT(*file, HasSubstr("gaussian_noise: {sigma_us: 4900}"));
   EXPECT_THAT(*file, HasSubstr("tip_radius: {radius_mm: 3}"));
-  EXPECT_TRUE(ParseModel(*file, "new.yaml", Catalogue()).ok());
-  EXPECT_FALSE(CalibratedModelFile(NominalModel(5), flat, Catalogue()).ok());
+  EXPECT_TRUE(model::ParseModel(*file, "new.yaml", effects::Catalogue()).ok());
+  EXPECT_FALSE(CalibratedModelFile(model::NominalModel(5), flat, effects::Catalogue()).ok());
 }
 
 TEST(FlatCalibration, MeasuredOffsetsMakeAFileToo) {
   RandomStream random(6, RandomDomain::kTest);
   const auto flat = CalibrateFlat(Touches(21, {0.0004, -0.0005, 0.0001}, 0.005, {0.019}, &random), kSpacingM);
   ASSERT_TRUE(flat.ok()) << flat.status();
-  const auto file = CalibratedModelFile(NominalModel(), *flat, Catalogue());
+  const auto file = CalibratedModelFile(model::NominalModel(), *flat, effects::Catalogue());
   ASSERT_TRUE(file.ok()) << file.status();
-  EXPECT_TRUE(ParseModel(*file, "new.yaml", Catalogue()).ok());
+  EXPECT_TRUE(model::ParseModel(*file, "new.yaml", effects::Catalogue()).ok());
 }
 
 TEST(FlatCalibration, CorrectedTimesAreThoseOfEqualFingers) {
@@ -163,4 +163,4 @@ TEST(FlatCalibration, TimeDistanceAndSpeedCarryTheirErrors) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -14,7 +14,7 @@
 #include "server/base/units.h"
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Isometry3d;
@@ -55,7 +55,8 @@ Matrix3d Cross(const Vector3d& v) {
 
 class Registration {
  public:
-  Registration(const Surface& surface, const std::vector<RegistrationContact>& contacts) : surface_(surface) {
+  Registration(const geometry::Surface& surface, const std::vector<RegistrationContact>& contacts)
+      : surface_(surface) {
     for (const RegistrationContact& contact : contacts) {
       points_m_.push_back(contact.base_from_tip * Vector3d(contact.finger_x_m, 0, 0));
       approaches_.push_back(contact.base_from_tip.linear() * Vector3d::UnitZ());
@@ -130,7 +131,7 @@ class Registration {
       directions[i] = (object_from_base.linear() * approaches_[i]).normalized();
       origins_m[i] = object_from_base * points_m_[i] - kReachM * directions[i];
     }
-    Contacts contacts;
+    geometry::Contacts contacts;
     surface_.CastLines(origins_m, directions, 2 * kReachM, &contacts);
     Fit fit;
     fit.met.assign(count, false);
@@ -182,7 +183,7 @@ class Registration {
   Isometry3d Moved(const Isometry3d& pose, const Vector6d& change) const {
     const Vector3d turn = change.tail<3>() / length_m_;
     Isometry3d move = Isometry3d::Identity();
-    move.linear() = RotationFromVector(turn);
+    move.linear() = geometry::RotationFromVector(turn);
     move.translation() = pivot_m_ + change.head<3>() - move.linear() * pivot_m_;
     Isometry3d moved = move * pose;
     moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
@@ -284,7 +285,7 @@ class Registration {
     return absl::StrJoin(parts, " with ");
   }
 
-  const Surface& surface_;
+  const geometry::Surface& surface_;
   std::vector<Vector3d> points_m_, approaches_;  // base frame
   Vector3d pivot_m_ = Vector3d::Zero();          // the middle of the contacts
   double length_m_ = 1;
@@ -292,7 +293,7 @@ class Registration {
 
 }  // namespace
 
-absl::StatusOr<ObjectRegistration> RegisterObject(const Surface& surface,
+absl::StatusOr<ObjectRegistration> RegisterObject(const geometry::Surface& surface,
                                                   const std::vector<RegistrationContact>& contacts,
                                                   const Isometry3d& start) {
   if (contacts.size() < kMinRegistrationContacts)
@@ -306,4 +307,4 @@ absl::StatusOr<ObjectRegistration> RegisterObject(const Surface& surface,
   return Registration(surface, contacts).Solve(start);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

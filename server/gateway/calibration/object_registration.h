@@ -11,7 +11,7 @@
 
 #include "server/geometry/surface.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 
 // One contact of one finger.
 struct RegistrationContact {
@@ -38,8 +38,8 @@ inline constexpr size_t kMinRegistrationContacts = 7;
 // INVALID_ARGUMENT: too few contacts. FAILED_PRECONDITION names the directions that the touches cannot
 // determine (a flat face determines neither its shift in its plane nor its rotation about its normal), or says that the contacts fit no
 // pose near the start.
-absl::StatusOr<ObjectRegistration> RegisterObject(const Surface& surface,
+absl::StatusOr<ObjectRegistration> RegisterObject(const geometry::Surface& surface,
                                                   const std::vector<RegistrationContact>& contacts,
                                                   const Eigen::Isometry3d& start);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -8,7 +8,7 @@
 #include "server/base/random.h"
 #include "server/base/units.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Isometry3d;
@@ -16,14 +16,14 @@ using Eigen::Vector3d;
 using ::testing::HasSubstr;
 
 // A box 100 x 60 x 40 mm that rests on z = 0.
-std::shared_ptr<const Surface> Box() {
-  TriangleMesh mesh;
+std::shared_ptr<const geometry::Surface> Box() {
+  geometry::TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner)
     mesh.vertices_m.emplace_back(corner & 1 ? 0.05f : -0.05f, corner & 2 ? 0.03f : -0.03f,
                                  corner & 4 ? 0.04f : 0.0f);
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return *Surface::Create("box", std::move(mesh));
+  return *geometry::Surface::Create("box", std::move(mesh));
 }
 
 Isometry3d Truth() {
@@ -43,7 +43,7 @@ Isometry3d Off(const Isometry3d& pose, const Vector3d& shift_m, const Vector3d& 
 }
 
 // Contacts on the top and two sides (or the top alone), with noise along the approach.
-std::vector<RegistrationContact> Touch(const Surface& surface, size_t count, double noise_m,
+std::vector<RegistrationContact> Touch(const geometry::Surface& surface, size_t count, double noise_m,
                                        RandomStream* random, bool top_only = false) {
   const Isometry3d truth = Truth();
   std::vector<RegistrationContact> contacts;
@@ -58,7 +58,7 @@ std::vector<RegistrationContact> Touch(const Surface& surface, size_t count, dou
             .normalized();
     const Vector3d near_m(random->Uniform(-0.04, 0.04), random->Uniform(-0.02, 0.02),
                           random->Uniform(0.01, 0.03));
-    Contacts hit;
+    geometry::Contacts hit;
     const Vector3d origin_m = near_m - 0.2 * approach;
     surface.CastLines({&origin_m, 1}, {&approach, 1}, 1, &hit);
     if (std::isnan(hit.travel_m[0])) continue;
@@ -157,4 +157,4 @@ TEST(ObjectRegistration, RefusesTooFewContactsAndAnotherObject) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

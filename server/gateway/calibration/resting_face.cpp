@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -50,8 +50,8 @@ absl::StatusOr<UpFace> ParseUpFace(const std::string& name, const std::string& w
       absl::StrCat(where, " = '", name, "': the face that points up, one of +x, -x, +y, -y, +z, -z"));
 }
 
-Eigen::Isometry3d BaseFromObject(const Eigen::Isometry3d& base_from_object_at_plus_z, const Bounds& bounds,
-                                 UpFace face) {
+Eigen::Isometry3d BaseFromObject(const Eigen::Isometry3d& base_from_object_at_plus_z,
+                                 const geometry::Bounds& bounds, UpFace face) {
   const Vector3d centre_m = bounds.Centre();
   const Vector3d half_m = 0.5 * (bounds.max_m - bounds.min_m);
   Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
@@ -75,4 +75,4 @@ UpFace UpFaceFor(const Vector3d& approach) {
   return best;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

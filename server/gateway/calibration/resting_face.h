@@ -9,7 +9,7 @@
 
 #include "server/geometry/mesh.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 
 // A face of the box around an object, object frame; the numbers are those of v1::UpFace.
 enum class UpFace : int { kPlusX = 1, kMinusX = 2, kPlusY = 3, kMinusY = 4, kPlusZ = 5, kMinusZ = 6 };
@@ -24,11 +24,11 @@ absl::StatusOr<UpFace> ParseUpFace(const std::string& name, const std::string& w
 
 // base_from_object when `face` points up: the object is turned about the centre of its box by the rotation of
 // least angle (180 deg about x for -z) and lowered or raised so that it rests as high as at +z.
-Eigen::Isometry3d BaseFromObject(const Eigen::Isometry3d& base_from_object_at_plus_z, const Bounds& bounds,
-                                 UpFace face);
+Eigen::Isometry3d BaseFromObject(const Eigen::Isometry3d& base_from_object_at_plus_z,
+                                 const geometry::Bounds& bounds, UpFace face);
 
 // The face that must point up for a touch along `approach` (object frame) to come most from above; of equal
 // ones the first of kUpFaces.
 UpFace UpFaceFor(const Eigen::Vector3d& approach);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -2,14 +2,14 @@
 
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-Bounds Box() {
-  Bounds bounds;
+geometry::Bounds Box() {
+  geometry::Bounds bounds;
   bounds.min_m = Vector3d(-0.01, -0.02, 0.005);
   bounds.max_m = Vector3d(0.05, 0.03, 0.035);
   return bounds;
@@ -44,7 +44,7 @@ TEST(RestingFace, TheRotationIsTheLeastOneAndMinusZTurnsAboutX) {
 }
 
 TEST(RestingFace, TheBoxKeepsItsCentreInThePlaneAndRestsAsHigh) {
-  const Bounds box = Box();
+  const geometry::Bounds box = Box();
   for (const UpFace face : kUpFaces) {
     const Isometry3d base_from_object = BaseFromObject(Isometry3d::Identity(), box, face);
     double lowest_m = 1e9;
@@ -82,4 +82,4 @@ TEST(RestingFace, OfEqualFacesTheFirstIsTakenWhateverTheRounding) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 // A spread of the rotations of about 3 degrees.
@@ -62,4 +62,4 @@ absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3
   return tool;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

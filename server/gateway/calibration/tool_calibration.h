@@ -7,7 +7,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 
 struct ToolCalibration {
   Eigen::Vector3d flange_from_tip_m;            // translation
@@ -26,4 +26,4 @@ inline constexpr size_t kMinToolPoses = 4;
 // that stays unknown.
 absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3d>& base_from_flange);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

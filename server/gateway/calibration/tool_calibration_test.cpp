@@ -5,7 +5,7 @@
 
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::gateway::calibration {
 namespace {
 
 using Eigen::Isometry3d;
@@ -82,4 +82,4 @@ TEST(ToolCalibration, RefusesTooFewPosesAndTooLittleTurning) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::calibration

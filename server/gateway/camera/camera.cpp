@@ -12,7 +12,7 @@
 #include "server/base/check.h"
 #include "server/gateway/camera/camera_kinds.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 
 void QuietOpenCv() {
   static const bool quiet = [] {
@@ -24,8 +24,8 @@ void QuietOpenCv() {
   (void)quiet;
 }
 
-Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number) {
-  Frame frame;
+image::Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number) {
+  image::Frame frame;
   frame.width = picture.cols;
   frame.height = picture.rows;
   frame.host_time_s = host_time_s;
@@ -55,4 +55,4 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOpt
   return OpenStreamCamera(options);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -12,10 +12,10 @@
 #include "server/gateway/timing/change_notifier.h"
 #include "server/image/photograph.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 
 // OpenCV's YAML or XML file, as its calibration tools write it. Errors name the file and the field.
-absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path);
+absl::StatusOr<image::Intrinsics> ReadIntrinsics(const std::string& path);
 
 // The numbers are those of v1::CameraKind.
 enum class CameraKind : int {
@@ -42,7 +42,7 @@ class CameraDevice {
 
   // A picture that was exposed after `after_host_s`: older ones in the driver's queue are thrown away.
   // UNAVAILABLE if none comes in time, DATA_LOSS if the camera repeats one picture bit by bit (frozen).
-  virtual absl::StatusOr<Frame> Take(double after_host_s) = 0;
+  virtual absl::StatusOr<image::Frame> Take(double after_host_s) = 0;
   virtual CameraKind kind() const = 0;
   virtual std::string Description() const = 0;
   virtual uint64_t frames() const = 0;
@@ -51,7 +51,7 @@ class CameraDevice {
 
 // The picture scaled to width x height pixels of the given vertical field of view without distortion, as a
 // virtual source renders it: rgb or grey.
-std::vector<uint8_t> Rectify(const Frame& frame, const Intrinsics& intrinsics, int width, int height,
-                             double vertical_fov_rad, bool grey);
+std::vector<uint8_t> Rectify(const image::Frame& frame, const image::Intrinsics& intrinsics, int width,
+                             int height, double vertical_fov_rad, bool grey);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -1,7 +1,7 @@
 // What stands in for the rest of this folder in a build without OpenCV (TOUCHSTONE_CAMERA=OFF).
 #include "server/gateway/camera/camera.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 absl::Status Absent() {
@@ -17,14 +17,14 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOpt
   return Absent();
 }
 
-absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& /*path*/) {
+absl::StatusOr<image::Intrinsics> ReadIntrinsics(const std::string& /*path*/) {
   return Absent();
 }
 
 // Without a camera there is no frame, so nobody comes here.
-std::vector<uint8_t> Rectify(const Frame& /*frame*/, const Intrinsics& /*intrinsics*/, int width, int height,
-                             double /*vertical_fov_rad*/, bool grey) {
+std::vector<uint8_t> Rectify(const image::Frame& /*frame*/, const image::Intrinsics& /*intrinsics*/,
+                             int width, int height, double /*vertical_fov_rad*/, bool grey) {
   return std::vector<uint8_t>(static_cast<size_t>(width) * height * (grey ? 1 : 3));
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

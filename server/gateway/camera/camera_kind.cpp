@@ -2,7 +2,7 @@
 
 #include "server/gateway/camera/camera.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 
 CameraKind CameraKindOf(const std::string& uri) {
   if (uri.empty()) return CameraKind::kNone;
@@ -11,4 +11,4 @@ CameraKind CameraKindOf(const std::string& uri) {
   return absl::StrContains(uri, "://") ? CameraKind::kStream : CameraKind::kUvc;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -12,7 +12,7 @@ namespace cv {
 class Mat;
 }
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 
 // A camera that delivers frames all the time: UVC, or pictures over HTTP. Opened again when it was unplugged.
 // Real pictures are never equal bit by bit (but for a covered lens), so equal ones mean that it froze.
@@ -29,8 +29,8 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOption
                                                               const std::string& path);
 
 // Of a picture in OpenCV's order (blue first) or grey.
-Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number);
+image::Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number);
 // OpenCV writes nothing to stderr from now on; its errors come back as exceptions, which are caught here.
 void QuietOpenCv();
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

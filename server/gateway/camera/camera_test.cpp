@@ -16,7 +16,7 @@
 #include "server/base/test_folder.h"
 #include "server/gateway/camera/mjpeg_server.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 using testing::HasSubstr;
@@ -38,7 +38,7 @@ class CameraTest : public testing::Test {
     EXPECT_TRUE(camera.ok()) << camera.status();
     return camera.ok() ? *std::move(camera) : nullptr;
   }
-  static int SceneOf(const Frame& frame) {
+  static int SceneOf(const image::Frame& frame) {
     return MjpegServer::SceneOf(frame.rgb.data(), frame.width, frame.height);
   }
 
@@ -77,7 +77,7 @@ TEST_F(CameraTest, TakesTheNewestPictureOfAFolder) {
   Write(".d.png", 40);
   const auto camera = Open(Options("folder:" + folder_));
   ASSERT_NE(camera, nullptr);
-  const absl::StatusOr<Frame> frame = camera->Take(0);
+  const absl::StatusOr<image::Frame> frame = camera->Take(0);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_EQ(frame->width, 16);
   EXPECT_EQ(frame->height, 12);
@@ -91,13 +91,13 @@ TEST_F(CameraTest, WaitsForAPictureThatIsNewEnough) {
   Write("a.png", 10);
   const auto camera = Open(Options("folder:" + folder_));
   ASSERT_NE(camera, nullptr);
-  const double after_s = HostNowS() + 0.1;
+  const double after_s = timing::HostNowS() + 0.1;
   std::thread writer([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     Write(".part.png", 50);
     std::filesystem::rename(folder_ + "/.part.png", folder_ + "/b.png");
   });
-  const absl::StatusOr<Frame> frame = camera->Take(after_s);
+  const absl::StatusOr<image::Frame> frame = camera->Take(after_s);
   writer.join();
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_EQ(frame->rgb.at(0), 50);
@@ -109,7 +109,7 @@ TEST_F(CameraTest, SaysWhyAFolderGivesNothing) {
   ASSERT_NE(camera, nullptr);
   EXPECT_THAT(std::string(camera->Take(0).status().message()), HasSubstr("it has no picture"));
   Write("a.png", 10);
-  const absl::Status old = camera->Take(HostNowS() + 100).status();
+  const absl::Status old = camera->Take(timing::HostNowS() + 100).status();
   EXPECT_TRUE(absl::IsUnavailable(old)) << old;
   EXPECT_THAT(std::string(old.message()), HasSubstr("a.png, is older than asked for"));
 }
@@ -126,7 +126,7 @@ TEST_F(CameraTest, PlaysAVideoAndBeginsItAnew) {
   const auto camera = Open(Options("video:" + path));
   ASSERT_NE(camera, nullptr);
   for (const int grey : {50, 100, 150, 50}) {
-    const absl::StatusOr<Frame> frame = camera->Take(0);
+    const absl::StatusOr<image::Frame> frame = camera->Take(0);
     ASSERT_TRUE(frame.ok()) << frame.status();
     EXPECT_EQ(frame->width, 64);
     EXPECT_NEAR(frame->rgb.at(1000), grey, 4);
@@ -140,8 +140,8 @@ TEST_F(CameraTest, TakesAPictureOfAfterNotOfBefore) {
   for (int scene = 0; scene < 8; ++scene) {
     server.scene = scene;
     // A picture whose making had begun when the scene changed may still be on its way.
-    const double after_s = HostNowS() + 0.5;
-    const absl::StatusOr<Frame> frame = camera->Take(after_s);
+    const double after_s = timing::HostNowS() + 0.5;
+    const absl::StatusOr<image::Frame> frame = camera->Take(after_s);
     ASSERT_TRUE(frame.ok()) << frame.status();
     EXPECT_EQ(SceneOf(*frame), scene);
     EXPECT_GE(frame->host_time_s, after_s);
@@ -155,13 +155,13 @@ TEST_F(CameraTest, NoticesAFrozenCamera) {
   ASSERT_NE(camera, nullptr);
   ASSERT_TRUE(camera->Take(0).ok());
   server.frozen = true;
-  (void)camera->Take(HostNowS() + 0.2);  // the first of the equal pictures may be new
-  const absl::Status frozen = camera->Take(HostNowS()).status();
+  (void)camera->Take(timing::HostNowS() + 0.2);  // the first of the equal pictures may be new
+  const absl::Status frozen = camera->Take(timing::HostNowS()).status();
   EXPECT_TRUE(absl::IsDataLoss(frozen)) << frozen;
   EXPECT_THAT(std::string(frozen.message()), HasSubstr("repeats one picture bit by bit"));
   server.frozen = false;
-  absl::StatusOr<Frame> frame = camera->Take(HostNowS());
-  for (int i = 0; i < 5 && !frame.ok(); ++i) frame = camera->Take(HostNowS());
+  absl::StatusOr<image::Frame> frame = camera->Take(timing::HostNowS());
+  for (int i = 0; i < 5 && !frame.ok(); ++i) frame = camera->Take(timing::HostNowS());
   EXPECT_TRUE(frame.ok()) << frame.status();
 }
 
@@ -172,11 +172,11 @@ TEST_F(CameraTest, ComesBackAfterTheStreamWasCut) {
   ASSERT_NE(camera, nullptr);
   ASSERT_TRUE(camera->Take(0).ok());
   server.reset();
-  const absl::Status gone = camera->Take(HostNowS() + 0.5).status();
+  const absl::Status gone = camera->Take(timing::HostNowS() + 0.5).status();
   EXPECT_TRUE(absl::IsUnavailable(gone)) << gone;
   server = std::make_unique<MjpegServer>(port);
-  absl::StatusOr<Frame> frame = camera->Take(HostNowS());
-  for (int i = 0; i < 10 && !frame.ok(); ++i) frame = camera->Take(HostNowS());
+  absl::StatusOr<image::Frame> frame = camera->Take(timing::HostNowS());
+  for (int i = 0; i < 10 && !frame.ok(); ++i) frame = camera->Take(timing::HostNowS());
   EXPECT_TRUE(frame.ok()) << frame.status();
 }
 
@@ -186,9 +186,9 @@ TEST_F(CameraTest, TimesOutWhenNothingComes) {
   ASSERT_NE(camera, nullptr);
   ASSERT_TRUE(camera->Take(0).ok());
   server.silent = true;
-  const absl::Status silent = camera->Take(HostNowS() + 0.5).status();
+  const absl::Status silent = camera->Take(timing::HostNowS() + 0.5).status();
   EXPECT_TRUE(absl::IsUnavailable(silent)) << silent;
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -12,7 +12,7 @@
 
 #include "server/gateway/camera/camera_kinds.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 constexpr double kCoarseS = 0.01;  // file systems stamp with the kernel's slow clock
@@ -32,7 +32,8 @@ double ChangedAtS(const std::string& path) {
   if (stat(path.c_str(), &info) != 0) return -1e18;
   const double wall_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  return HostNowS() - (wall_s - (static_cast<double>(info.st_mtim.tv_sec) + 1e-9 * info.st_mtim.tv_nsec));
+  return timing::HostNowS() -
+         (wall_s - (static_cast<double>(info.st_mtim.tv_sec) + 1e-9 * info.st_mtim.tv_nsec));
 }
 
 class FolderCamera : public CameraDevice {
@@ -40,9 +41,9 @@ class FolderCamera : public CameraDevice {
   FolderCamera(CameraOptions options, std::string path)
       : options_(std::move(options)), path_(std::move(path)) {}
 
-  absl::StatusOr<Frame> Take(double after_host_s) override {
+  absl::StatusOr<image::Frame> Take(double after_host_s) override {
     std::lock_guard<std::mutex> lock(mutex_);
-    const double until_s = HostNowS() + options_.timeout_s;
+    const double until_s = timing::HostNowS() + options_.timeout_s;
     while (true) {
       const std::string name = Newest();
       std::string why = "it has no picture";
@@ -61,7 +62,7 @@ class FolderCamera : public CameraDevice {
           why = absl::StrCat(std::filesystem::path(name).filename().string(), " cannot be read");
         }
       }
-      if (HostNowS() >= until_s)
+      if (timing::HostNowS() >= until_s)
         return absl::UnavailableError(
             absl::StrCat("camera folder ", path_, ": no picture in ", options_.timeout_s, " s: ", why));
       std::this_thread::sleep_for(std::chrono::duration<double>(kLookS));
@@ -101,4 +102,4 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> OpenFolderCamera(const CameraOptio
   return std::make_unique<FolderCamera>(options, path);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

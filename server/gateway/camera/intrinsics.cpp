@@ -7,7 +7,7 @@
 #include "server/base/status.h"
 #include "server/gateway/camera/camera_kinds.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 // Under one of the names that OpenCV's tools have used.
@@ -31,11 +31,11 @@ absl::StatusOr<cv::Mat> ReadMatrix(const cv::FileNode& node, const std::string& 
   return doubles;
 }
 
-absl::StatusOr<Intrinsics> Read(const std::string& path) {
+absl::StatusOr<image::Intrinsics> Read(const std::string& path) {
   const cv::FileStorage file(path, cv::FileStorage::READ);
   if (!file.isOpened())
     return absl::InvalidArgumentError(absl::StrCat(path, ": neither YAML nor XML of OpenCV"));
-  Intrinsics intrinsics;
+  image::Intrinsics intrinsics;
   for (const auto& [name, old_name, value] :
        {std::tuple<const char*, const char*, int*>{"image_width", "image_Width", &intrinsics.width},
         {"image_height", "image_Height", &intrinsics.height}}) {
@@ -77,7 +77,7 @@ absl::StatusOr<Intrinsics> Read(const std::string& path) {
 
 }  // namespace
 
-absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path) {
+absl::StatusOr<image::Intrinsics> ReadIntrinsics(const std::string& path) {
   QuietOpenCv();
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
@@ -89,4 +89,4 @@ absl::StatusOr<Intrinsics> ReadIntrinsics(const std::string& path) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

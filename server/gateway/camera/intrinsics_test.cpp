@@ -15,7 +15,7 @@
 #include "server/gateway/camera/camera.h"
 #include "touchstone_test_paths.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 using testing::HasSubstr;
@@ -33,7 +33,7 @@ constexpr char kMatrix[] =
 
 std::string ErrorOf(const std::string& text) {
   const std::string path = WriteText("bad.yml", text);
-  const absl::StatusOr<Intrinsics> intrinsics = ReadIntrinsics(path);
+  const absl::StatusOr<image::Intrinsics> intrinsics = ReadIntrinsics(path);
   std::filesystem::remove(path);
   EXPECT_FALSE(intrinsics.ok());
   EXPECT_THAT(std::string(intrinsics.status().message()), HasSubstr("bad.yml"));
@@ -49,7 +49,7 @@ TEST(Intrinsics, AreReadAsOpenCvWritesThem) {
       file << "camera_matrix" << cv::Mat(cv::Matx33d(500, 0, 320.5, 0, 510, 240.25, 0, 0, 1));
       file << "distortion_coefficients" << cv::Mat(cv::Matx<double, 5, 1>(-0.3, 0.1, 0.001, 0.002, -0.05));
     }
-    const absl::StatusOr<Intrinsics> intrinsics = ReadIntrinsics(path);
+    const absl::StatusOr<image::Intrinsics> intrinsics = ReadIntrinsics(path);
     std::filesystem::remove(path);
     ASSERT_TRUE(intrinsics.ok()) << intrinsics.status();
     EXPECT_EQ(intrinsics->width, 640);
@@ -79,8 +79,8 @@ TEST(Intrinsics, ErrorsNameTheFileAndTheField) {
 }
 
 // A picture of vertical stripes one column each: its value is its column.
-Frame Columns(int width, int height) {
-  Frame frame;
+image::Frame Columns(int width, int height) {
+  image::Frame frame;
   frame.width = width;
   frame.height = height;
   for (int y = 0; y < height; ++y)
@@ -90,14 +90,14 @@ Frame Columns(int width, int height) {
 }
 
 TEST(Rectify, KeepsAPictureThatIsRightAlready) {
-  const Frame frame = Columns(200, 150);
-  EXPECT_EQ(Rectify(frame, Intrinsics(), 200, 150, 0.8, false), frame.rgb);
+  const image::Frame frame = Columns(200, 150);
+  EXPECT_EQ(Rectify(frame, image::Intrinsics(), 200, 150, 0.8, false), frame.rgb);
 }
 
 TEST(Rectify, BlackensWhatTheCameraDidNotSee) {
-  const Frame frame = Columns(100, 100);
+  const image::Frame frame = Columns(100, 100);
   // Twice the tangent of the field of view: half of the picture each way is beyond the camera's.
-  Intrinsics intrinsics;
+  image::Intrinsics intrinsics;
   intrinsics.width = intrinsics.height = 100;
   intrinsics.fx_px = intrinsics.fy_px = 100;
   intrinsics.cx_px = intrinsics.cy_px = 49.5;
@@ -110,18 +110,18 @@ TEST(Rectify, BlackensWhatTheCameraDidNotSee) {
 }
 
 TEST(Rectify, ScalesIntrinsicsToTheFramesSize) {
-  Intrinsics intrinsics;  // of pictures twice as large
+  image::Intrinsics intrinsics;  // of pictures twice as large
   intrinsics.width = 400;
   intrinsics.height = 300;
   intrinsics.fx_px = intrinsics.fy_px = 300 / (2 * std::tan(0.4));
   intrinsics.cx_px = 199.5;
   intrinsics.cy_px = 149.5;
-  const Frame frame = Columns(200, 150);
+  const image::Frame frame = Columns(200, 150);
   EXPECT_EQ(Rectify(frame, intrinsics, 200, 150, 0.8, false), frame.rgb);
 }
 
 TEST(Rectify, FoldsNothingBackIntoThePicture) {
-  Intrinsics intrinsics;
+  image::Intrinsics intrinsics;
   intrinsics.width = intrinsics.height = 100;
   intrinsics.fx_px = intrinsics.fy_px = 100;
   intrinsics.cx_px = intrinsics.cy_px = 49.5;
@@ -185,7 +185,7 @@ TEST(Rectify, StraightensTheRowsOfARealChessboard) {
   std::vector<cv::Mat> rotations, translations;
   cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(corners.size(), flat), corners, size, matrix,
                       distortion, rotations, translations);
-  Intrinsics intrinsics;
+  image::Intrinsics intrinsics;
   intrinsics.width = size.width;
   intrinsics.height = size.height;
   intrinsics.fx_px = matrix.at<double>(0, 0);
@@ -200,7 +200,7 @@ TEST(Rectify, StraightensTheRowsOfARealChessboard) {
   for (size_t i = 0; i < paths.size(); ++i) {
     cv::Mat picture = cv::imread(paths[i]);
     cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
-    Frame frame;
+    image::Frame frame;
     frame.width = picture.cols;
     frame.height = picture.rows;
     frame.rgb.assign(picture.data, picture.data + picture.total() * 3);
@@ -222,4 +222,4 @@ TEST(Rectify, StraightensTheRowsOfARealChessboard) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

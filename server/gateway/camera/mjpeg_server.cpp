@@ -15,7 +15,7 @@
 
 #include "server/base/check.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 constexpr int kWidth = 128, kHeight = 96;
@@ -102,4 +102,4 @@ void MjpegServer::Serve(int client) {
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -5,7 +5,7 @@
 #include <string>
 #include <thread>
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 
 // Serves one client at a time at 127.0.0.1. Every picture is a bright square on noise; the square's column
 // reports the value of `scene` at the time.
@@ -31,4 +31,4 @@ class MjpegServer {
   std::thread thread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

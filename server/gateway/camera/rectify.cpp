@@ -8,7 +8,7 @@
 #include "server/base/check.h"
 #include "server/gateway/camera/camera.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 constexpr int kMaxSamples = 8;  // a side, of one pixel
@@ -35,8 +35,8 @@ double FoldsAt(const std::vector<double>& k, double most) {
 
 }  // namespace
 
-std::vector<uint8_t> Rectify(const Frame& frame, const Intrinsics& intrinsics, int width, int height,
-                             double vertical_fov_rad, bool grey) {
+std::vector<uint8_t> Rectify(const image::Frame& frame, const image::Intrinsics& intrinsics, int width,
+                             int height, double vertical_fov_rad, bool grey) {
   TOUCHSTONE_CHECK(width > 0 && height > 0 && vertical_fov_rad > 0 && vertical_fov_rad < 3.1);
   TOUCHSTONE_CHECK(frame.width > 0 && frame.height > 0 &&
                    frame.rgb.size() == static_cast<size_t>(frame.width) * frame.height * 3);
@@ -80,4 +80,4 @@ std::vector<uint8_t> Rectify(const Frame& frame, const Intrinsics& intrinsics, i
   return std::vector<uint8_t>(fine.data, fine.data + fine.total() * fine.elemSize());
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

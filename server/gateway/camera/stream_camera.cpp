@@ -14,7 +14,7 @@
 
 #include "server/gateway/camera/camera_kinds.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 // A picture for which nobody had to wait so long stood in a queue; a queue is empty after kDrainS.
@@ -47,7 +47,7 @@ class StreamCamera : public CameraDevice {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<Frame> Take(double after_host_s) override {
+  absl::StatusOr<image::Frame> Take(double after_host_s) override {
     std::lock_guard<std::mutex> one(take_mutex_);
     std::unique_lock<std::mutex> lock(mutex_);
     wanted_ = true;
@@ -55,7 +55,7 @@ class StreamCamera : public CameraDevice {
     repeated_ = false;
     has_result_ = false;
     // Of what is asked for ahead of time, the time until then does not count.
-    const double patience_s = options_.timeout_s + std::clamp(after_host_s - HostNowS(), 0.0, 60.0);
+    const double patience_s = options_.timeout_s + std::clamp(after_host_s - timing::HostNowS(), 0.0, 60.0);
     changed_.wait_for(lock, std::chrono::duration<double>(patience_s), [this] { return has_result_; });
     wanted_ = false;
     if (has_result_) return std::move(result_);
@@ -123,9 +123,9 @@ class StreamCamera : public CameraDevice {
   // The next picture off the queue; false if the stream broke.
   bool Next() {
     try {
-      const double began_s = HostNowS();
+      const double began_s = timing::HostNowS();
       if (!stream_.grab()) return false;
-      const double came_s = HostNowS();
+      const double came_s = timing::HostNowS();
       bool decode;
       {
         std::lock_guard<std::mutex> lock(mutex_);
@@ -172,7 +172,7 @@ class StreamCamera : public CameraDevice {
   bool stopping_ = false;
   bool wanted_ = false, has_result_ = false, repeated_ = false;
   double wanted_after_s_ = 0;
-  Frame result_;
+  image::Frame result_;
   std::string why_;
   uint64_t frames_ = 0, stale_frames_ = 0;
 };
@@ -185,4 +185,4 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptio
   return camera;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

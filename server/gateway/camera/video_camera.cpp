@@ -7,7 +7,7 @@
 
 #include "server/gateway/camera/camera_kinds.h"
 
-namespace touchstone {
+namespace touchstone::gateway::camera {
 namespace {
 
 class VideoCamera : public CameraDevice {
@@ -21,7 +21,7 @@ class VideoCamera : public CameraDevice {
     }
     return absl::InvalidArgumentError(absl::StrCat("camera: ", path_, " is no video that OpenCV can read"));
   }
-  absl::StatusOr<Frame> Take(double /*after_host_s*/) override {
+  absl::StatusOr<image::Frame> Take(double /*after_host_s*/) override {
     std::lock_guard<std::mutex> lock(mutex_);
     try {
       cv::Mat picture;
@@ -31,7 +31,7 @@ class VideoCamera : public CameraDevice {
         if (!video_.open(path_) || !video_.read(picture))
           return absl::UnavailableError(absl::StrCat("camera: video ", path_, " cannot be read any more"));
       }
-      return FrameOf(picture, HostNowS(), ++frames_);
+      return FrameOf(picture, timing::HostNowS(), ++frames_);
     } catch (const cv::Exception& problem) {
       return absl::UnavailableError(absl::StrCat("camera: video ", path_, ": ", problem.err));
     }
@@ -63,4 +63,4 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOption
   return camera;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::camera

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 int EffectorTouch::Contacts() const {
   return static_cast<int>(
@@ -86,4 +86,4 @@ bool ContactRecord::OnReading(const firmware::Recalled& recalled, uint64_t max_t
   return true;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

@@ -11,7 +11,7 @@
 #include "firmware/core/messages.h"
 #include "server/gateway/effector/effector.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 class ContactRecord {
  public:
@@ -61,4 +61,4 @@ std::vector<std::optional<uint64_t>> ContactsOf(const firmware::Recalled& recall
 // Whether both say the same, apart from contacts that were made between them.
 bool Agree(const firmware::Recalled& earlier, const firmware::Recalled& later);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

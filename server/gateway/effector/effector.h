@@ -15,7 +15,7 @@
 #include "server/gateway/timing/change_notifier.h"
 #include "server/gateway/timing/clock_sync.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 // "optical", "microswitch" or "resistor". INVALID_ARGUMENT begins with `where`.
 absl::StatusOr<firmware::Sensor> ParseSensor(const std::string& name, const std::string& where);
@@ -62,7 +62,8 @@ struct EffectorState {
 class Effector {
  public:
   // Opens the port and agrees on version and fingers; keeps trying in the background if nothing answers.
-  static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options, ChangeNotifier* changes);
+  static absl::StatusOr<std::unique_ptr<Effector>> Open(EffectorOptions options,
+                                                        timing::ChangeNotifier* changes);
   virtual ~Effector() = default;
 
   // Starts the capture of a touch's contacts (id above 0) and returns once the device has confirmed it.
@@ -78,7 +79,7 @@ class Effector {
   virtual absl::StatusOr<EffectorTouch> Recall(uint32_t touch) = 0;
 
   virtual EffectorState State() const = 0;
-  virtual ClockEstimate Clock() const = 0;  // device seconds on host seconds
+  virtual timing::ClockEstimate Clock() const = 0;  // device seconds on host seconds
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

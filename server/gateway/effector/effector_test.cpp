@@ -13,7 +13,7 @@
 
 #include "server/gateway/effector/fake_device.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 namespace {
 
 using testing::HasSubstr;
@@ -39,8 +39,8 @@ class EffectorTest : public testing::Test {
     effector_ = *std::move(effector);
   }
   bool WaitFor(const std::function<bool()>& done) {
-    const double until_s = HostNowS() + kLongS;
-    while (HostNowS() < until_s) {
+    const double until_s = timing::HostNowS() + kLongS;
+    while (timing::HostNowS() < until_s) {
       const uint64_t seen = changes_.count();
       if (done()) return true;
       changes_.WaitForChange(seen, 0.02);  // not every change that tests look at is notified
@@ -66,7 +66,7 @@ class EffectorTest : public testing::Test {
     return status;
   }
 
-  ChangeNotifier changes_;
+  timing::ChangeNotifier changes_;
   std::unique_ptr<FakeDevice> device_;
   std::unique_ptr<Effector> effector_;
 };
@@ -382,11 +382,11 @@ TEST_F(EffectorTest, TellsTheDevicesClockInHostTime) {
     Open(options);
     ASSERT_TRUE(WaitFor([&] { return effector_->Clock().round_trips >= 100; }));
     ASSERT_TRUE(effector_->StartCapture(1).ok());
-    const double before_s = HostNowS();
+    const double before_s = timing::HostNowS();
     const uint64_t ticks = device_->Press(0);
-    const double after_s = HostNowS();
+    const double after_s = timing::HostNowS();
     ASSERT_TRUE(WaitForContacts(1));
-    const ClockEstimate clock = effector_->Clock();
+    const timing::ClockEstimate clock = effector_->Clock();
     const double contact_s = clock.HostOf(ticks * 1e-6);
     // However slow the machine, the truth is within the shortest round trip.
     const double unsure_s = clock.shortest_round_trip_s + 1e-4;
@@ -407,4 +407,4 @@ TEST_F(EffectorTest, ShowsWhichFingersArePressed) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

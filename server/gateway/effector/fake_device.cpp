@@ -14,7 +14,7 @@
 #include "server/base/check.h"
 #include "server/gateway/timing/change_notifier.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 FakeDevice::FakeDevice(const Options& options) : options_(options) {
   std::string pattern = testing::TempDir() + "/touchstone_device_XXXXXX";
@@ -37,7 +37,7 @@ FakeDevice::~FakeDevice() {
 }
 
 void FakeDevice::StartCore() {
-  began_host_s_ = HostNowS();
+  began_host_s_ = timing::HostNowS();
   firmware::Identity identity;
   identity.boot_id = options_.boot_id;
   identity.tick_hz = 1000000;
@@ -53,7 +53,8 @@ void FakeDevice::StartCore() {
 }
 
 uint64_t FakeDevice::NowTicks() const {
-  return options_.first_tick + static_cast<uint64_t>((HostNowS() - began_host_s_) * options_.ticks_per_s);
+  return options_.first_tick +
+         static_cast<uint64_t>((timing::HostNowS() - began_host_s_) * options_.ticks_per_s);
 }
 
 void FakeDevice::SetLine(const Line& line) {
@@ -173,4 +174,4 @@ void FakeDevice::WriteRaw(const uint8_t* data, size_t size) {
   (void)!write(master_, data, size);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

@@ -11,7 +11,7 @@
 #include "firmware/core/effector.h"
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 class FakeDevice {
  public:
@@ -84,4 +84,4 @@ class FakeDevice {
   std::thread thread_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

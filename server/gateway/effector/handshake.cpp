@@ -6,7 +6,7 @@
 #include "server/base/status.h"
 #include "server/gateway/effector/serial_effector.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 namespace {
 
 firmware::FingerConfig ConfigOf(const EffectorFinger& finger) {
@@ -85,7 +85,7 @@ absl::Status SerialEffector::ExchangeHello() {
     state_.tick_hz = reply.tick_hz;
     unfinished = record_.touch().touch != 0 && record_.lost().empty() && !record_.Final();
     if (!same_boot) {
-      clock_ = ClockEstimate();
+      clock_ = timing::ClockEstimate();
       if (unfinished)
         record_.MarkLost(absl::StrCat("the device was reset during touch ", record_.touch().touch,
                                       "; its record is gone"));
@@ -117,4 +117,4 @@ absl::Status SerialEffector::ExchangeHello() {
   });
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

@@ -12,7 +12,7 @@
 #include "server/base/status.h"
 #include "server/gateway/effector/serial_effector.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 namespace {
 
 constexpr size_t kMaxUnsent = 4096;
@@ -74,7 +74,7 @@ absl::Status SerialEffector::AskPayload(const uint8_t* payload, size_t payload_s
   for (int i = 0; i < kTries && status.ok() && reply_ == Reply::kNo && !Stopping(); ++i) {
     status = SendPayload(payload, payload_size);
     if (status.ok())
-      status = Pump(HostNowS() + options_.reply_timeout_s, [this] { return reply_ != Reply::kNo; });
+      status = Pump(timing::HostNowS() + options_.reply_timeout_s, [this] { return reply_ != Reply::kNo; });
   }
   matcher_ = nullptr;
   if (!status.ok() || reply_ == Reply::kYes) return status;
@@ -90,7 +90,7 @@ absl::Status SerialEffector::Pump(double until_host_s, const std::function<bool(
   for (bool first = true;; first = false) {
     if (done != nullptr && done()) return absl::OkStatus();
     if (!session_error_.empty()) return absl::UnavailableError(std::exchange(session_error_, ""));
-    double now_s = HostNowS();
+    double now_s = timing::HostNowS();
     if (!first && (now_s >= until_host_s || Stopping())) return absl::OkStatus();
     if (now_s - heard_at_s_ > options_.silence_s && handshake_done_)
       return absl::UnavailableError(
@@ -121,7 +121,7 @@ absl::Status SerialEffector::Pump(double until_host_s, const std::function<bool(
 absl::Status SerialEffector::ReadAll() {
   uint8_t bytes[512];
   TOUCHSTONE_ASSIGN_OR_RETURN(const size_t size, port_.Read(bytes, sizeof bytes));
-  const double host_s = HostNowS();
+  const double host_s = timing::HostNowS();
   for (size_t i = 0; i < size; ++i)
     if (parser_.Push(bytes[i])) Handle(parser_.payload(), parser_.size(), host_s);
   std::lock_guard<std::mutex> lock(mutex_);
@@ -130,7 +130,7 @@ absl::Status SerialEffector::ReadAll() {
 }
 
 void SerialEffector::QueryClock() {
-  const double now_s = HostNowS();
+  const double now_s = timing::HostNowS();
   query_at_s_ = now_s + options_.clock_query_s;
   if (!unsent_.empty()) return;  // it would wait behind others
   queries_[next_query_] = now_s;
@@ -170,7 +170,7 @@ void SerialEffector::HandleClock(const firmware::ClockReply& reply, size_t paylo
   queries_.erase(query);
   const double tick_s = 1.0 / state_.tick_hz;
   sync_.AddRoundTrip(sent_s, reply.receive_ticks * tick_s, reply.send_ticks * tick_s, came_s);
-  const ClockEstimate estimate = sync_.Estimate();
+  const timing::ClockEstimate estimate = sync_.Estimate();
   std::lock_guard<std::mutex> lock(mutex_);
   clock_ = estimate;
 }
@@ -223,8 +223,8 @@ void SerialEffector::HandleEvent(const firmware::Event& event) {
 
 uint64_t SerialEffector::MaxTicks() const {
   if (!clock_.valid) return 0;
-  const double ticks = (clock_.RemoteOf(HostNowS() + kClockSlackS)) * state_.tick_hz;
+  const double ticks = (clock_.RemoteOf(timing::HostNowS() + kClockSlackS)) * state_.tick_hz;
   return ticks > 0 ? static_cast<uint64_t>(ticks) : 0;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

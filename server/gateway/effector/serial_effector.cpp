@@ -14,7 +14,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 namespace {
 
 absl::Status CheckOptions(const EffectorOptions& options) {
@@ -53,14 +53,15 @@ absl::StatusOr<firmware::Sensor> ParseSensor(const std::string& name, const std:
                                                  DidYouMean(name, {"optical", "microswitch", "resistor"})));
 }
 
-absl::StatusOr<std::unique_ptr<Effector>> Effector::Open(EffectorOptions options, ChangeNotifier* changes) {
+absl::StatusOr<std::unique_ptr<Effector>> Effector::Open(EffectorOptions options,
+                                                         timing::ChangeNotifier* changes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckOptions(options));
   auto effector = std::make_unique<SerialEffector>(std::move(options), changes);
   TOUCHSTONE_RETURN_IF_ERROR(effector->Start());
   return effector;
 }
 
-SerialEffector::SerialEffector(EffectorOptions options, ChangeNotifier* changes)
+SerialEffector::SerialEffector(EffectorOptions options, timing::ChangeNotifier* changes)
     : options_(std::move(options)), changes_(changes), sync_(options_.time_scale) {
   state_.why = "not yet connected";
   state_.pressed.resize(options_.fingers.size());
@@ -82,7 +83,7 @@ absl::Status SerialEffector::Start() {
   wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_fd_ < 0) return absl::ResourceExhaustedError("end effector: no more file descriptors");
   // Nonces differ between processes, so that an old reply is not taken for a new one.
-  next_nonce_ = static_cast<uint32_t>(std::fmod(HostNowS() * 1e6, 4294967291.0));
+  next_nonce_ = static_cast<uint32_t>(std::fmod(timing::HostNowS() * 1e6, 4294967291.0));
   thread_ = std::thread([this] { Run(); });
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return first_try_over_; });
@@ -197,9 +198,9 @@ EffectorState SerialEffector::State() const {
   return state_;
 }
 
-ClockEstimate SerialEffector::Clock() const {
+timing::ClockEstimate SerialEffector::Clock() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return clock_;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

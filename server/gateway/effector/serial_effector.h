@@ -21,11 +21,11 @@
 #include "server/gateway/effector/effector.h"
 #include "server/gateway/effector/serial_port.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 class SerialEffector : public Effector {
  public:
-  SerialEffector(EffectorOptions options, ChangeNotifier* changes);
+  SerialEffector(EffectorOptions options, timing::ChangeNotifier* changes);
   ~SerialEffector() override;
   // Starts the thread and waits for the first session to begin or fail.
   absl::Status Start();
@@ -35,7 +35,7 @@ class SerialEffector : public Effector {
   absl::StatusOr<EffectorTouch> Touch() const override;
   absl::StatusOr<EffectorTouch> Recall(uint32_t touch) override;
   EffectorState State() const override;
-  ClockEstimate Clock() const override;
+  timing::ClockEstimate Clock() const override;
 
  private:
   // What a message is to the request that waits: no reply to it, the reply, or its refusal.
@@ -98,7 +98,7 @@ class SerialEffector : public Effector {
   static constexpr double kClockSlackS = 1;  // by which a device time may seem wrong, in host seconds
 
   const EffectorOptions options_;
-  ChangeNotifier* const changes_;
+  timing::ChangeNotifier* const changes_;
   int wake_fd_ = -1;
   std::thread thread_;
 
@@ -106,7 +106,7 @@ class SerialEffector : public Effector {
   SerialPort port_;
   firmware::FrameParser parser_;
   std::vector<uint8_t> unsent_;
-  ClockSync sync_;
+  timing::ClockSync sync_;
   ReplyMatcher matcher_;
   Reply reply_ = Reply::kNo;
   firmware::Refused refused_;
@@ -129,8 +129,8 @@ class SerialEffector : public Effector {
   bool work_done_ = false;
   absl::Status work_status_;
   EffectorState state_;
-  ClockEstimate clock_;
+  timing::ClockEstimate clock_;
   ContactRecord record_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

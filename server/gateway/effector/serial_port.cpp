@@ -16,7 +16,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 namespace {
 
 struct Rate {
@@ -113,4 +113,4 @@ absl::StatusOr<size_t> SerialPort::Write(const uint8_t* data, size_t size) {
   return Problem(path_, "the other end is gone");
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

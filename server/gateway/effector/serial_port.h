@@ -8,7 +8,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 
 class SerialPort {
  public:
@@ -37,4 +37,4 @@ class SerialPort {
   double seconds_per_byte_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

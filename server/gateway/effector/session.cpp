@@ -9,11 +9,11 @@
 #include "server/base/status.h"
 #include "server/gateway/effector/serial_effector.h"
 
-namespace touchstone {
+namespace touchstone::gateway::effector {
 absl::Status SerialEffector::RunSession() {
   const uint8_t delimiter = 0;  // ends whatever an earlier owner of the port began
   unsent_.assign(1, delimiter);
-  heard_at_s_ = HostNowS();
+  heard_at_s_ = timing::HostNowS();
   session_error_.clear();
   TOUCHSTONE_RETURN_IF_ERROR(Handshake());
   if (Stopping()) return absl::OkStatus();
@@ -48,7 +48,7 @@ absl::Status SerialEffector::RunSession() {
       changed_.notify_all();
       if (absl::IsUnavailable(status)) return status;
     } else {
-      TOUCHSTONE_RETURN_IF_ERROR(Pump(HostNowS() + 1, [this] {
+      TOUCHSTONE_RETURN_IF_ERROR(Pump(timing::HostNowS() + 1, [this] {
         std::lock_guard<std::mutex> lock(mutex_);
         return record_.NeedsReconciliation() || (work_ != nullptr && !work_done_);
       }));
@@ -70,7 +70,7 @@ absl::Status SerialEffector::ReadRecord(uint32_t touch,
     // The clock may not be known yet, without which no time is accepted.
     if (!clock_.valid)
       TOUCHSTONE_RETURN_IF_ERROR(
-          Pump(HostNowS() + options_.reply_timeout_s, [this] { return clock_.valid; }));
+          Pump(timing::HostNowS() + options_.reply_timeout_s, [this] { return clock_.valid; }));
   }
   return absl::UnavailableError(
       absl::StrCat("the device's records of touch ", touch, " contradict each other"));
@@ -115,11 +115,11 @@ absl::StatusOr<EffectorTouch> SerialEffector::RecallTouch(uint32_t touch) {
 absl::Status SerialEffector::StartCaptureOnDevice(uint32_t touch) {
   // Times of events are checked against the device's clock, so that must be known.
   const auto clock_known = [this] { return clock_.valid; };
-  TOUCHSTONE_RETURN_IF_ERROR(Pump(HostNowS() + kTries * options_.reply_timeout_s, clock_known));
+  TOUCHSTONE_RETURN_IF_ERROR(Pump(timing::HostNowS() + kTries * options_.reply_timeout_s, clock_known));
   if (!clock_known())
     return absl::DeadlineExceededError(
         absl::StrCat("the device at ", options_.port, " answers no query of its clock"));
-  const double least = (clock_.RemoteOf(HostNowS() - kClockSlackS)) * state_.tick_hz;
+  const double least = (clock_.RemoteOf(timing::HostNowS() - kClockSlackS)) * state_.tick_hz;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     record_.Begin(touch, state_.boot_id, static_cast<int>(options_.fingers.size()));
@@ -165,4 +165,4 @@ absl::Status SerialEffector::EndCaptureOnDevice() {
   return unfinished ? ReconcileTouch() : absl::OkStatus();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::effector

@@ -11,7 +11,7 @@
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 // Host time that the arm and the end effector get to answer before a touch is given up.
@@ -23,8 +23,9 @@ absl::Status Rig::Reconcile() {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto unfinished, journal().Unfinished());
   for (const auto& [session, touch] : unfinished) {
     TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch(session, touch));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalTouch> now, journal().Find(session, touch.id));
-    const bool recovered = now.has_value() && now->stage == TouchStage::kDone;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<session::JournalTouch> now,
+                                journal().Find(session, touch.id));
+    const bool recovered = now.has_value() && now->stage == session::TouchStage::kDone;
     ++(recovered ? status_.recovered_touches : status_.interrupted_touches);
     const std::string outcome = recovered         ? "its result was recovered"
                                 : now.has_value() ? now->error
@@ -35,14 +36,14 @@ absl::Status Rig::Reconcile() {
   return absl::OkStatus();
 }
 
-absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch& touch) {
-  if (touch.stage == TouchStage::kIntent)
+absl::Status Rig::ReconcileTouch(const std::string& session, const session::JournalTouch& touch) {
+  if (touch.stage == session::TouchStage::kIntent)
     return journal().Failed(session, touch.id, "interrupted before anything moved");
 
   // Its program must not run any more: the arm's own watchdog has ended it, or this does.
-  const double give_up_s = HostNowS() + kPatienceS;
-  absl::StatusOr<ArmState> arm = parts_.arm->State();
-  while ((!arm.ok() || !parts_.effector->State().connected) && HostNowS() < give_up_s) {
+  const double give_up_s = timing::HostNowS() + kPatienceS;
+  absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
+  while ((!arm.ok() || !parts_.effector->State().connected) && timing::HostNowS() < give_up_s) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     arm = parts_.arm->State();
   }
@@ -50,15 +51,15 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
     return journal().Failed(
         session, touch.id,
         absl::StrCat("interrupted, and the arm cannot be asked: ", arm.status().message()));
-  if (arm->runtime_state == RuntimeState::kPlaying) parts_.arm->Stop().IgnoreError();
+  if (arm->runtime_state == arm::RuntimeState::kPlaying) parts_.arm->Stop().IgnoreError();
 
   // Contact times stand only if the approach ended as it should: by command or at its stroke, never by the
   // watchdog in mid-way. The program's own registers say which.
-  if (arm->program_id != touch.program_id || arm->phase < MotionPhase::kRetract)
+  if (arm->program_id != touch.program_id || arm->phase < arm::MotionPhase::kRetract)
     return journal().Failed(session, touch.id,
-                            absl::StrCat("interrupted during '", PhaseName(arm->phase), "' of program ",
+                            absl::StrCat("interrupted during '", arm::PhaseName(arm->phase), "' of program ",
                                          arm->program_id, "; it can be made again under the same id"));
-  const absl::StatusOr<EffectorTouch> contacts = parts_.effector->Recall(touch.program_id);
+  const absl::StatusOr<effector::EffectorTouch> contacts = parts_.effector->Recall(touch.program_id);
   if (!contacts.ok())
     return journal().Failed(
         session, touch.id,
@@ -76,10 +77,10 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const JournalTouch&
   record.contacts = *contacts;
   record.contacts.contact_ticks.resize(options_.fingers);
   record.effector_clock = parts_.effector->Clock();
-  TOUCHSTONE_ASSIGN_OR_RETURN(JournalResult result, ResultOf(record));
+  TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalResult result, ResultOf(record));
   result.recovered = true;
-  TOUCHSTONE_ASSIGN_OR_RETURN(result.session_time_s, SessionTimeS(session, UnixNowS()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(result.session_time_s, SessionTimeS(session, timing::UnixNowS()));
   return journal().Done(session, touch.id, result);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

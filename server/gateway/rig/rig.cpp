@@ -13,7 +13,7 @@
 #include "server/gateway/arm/ur_modes.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 // Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens.
@@ -24,7 +24,7 @@ constexpr uint32_t kMaxProgramId = (1u << 28) - kProgramIdBlock;
 
 absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts parts) {
   std::unique_ptr<Rig> rig(new Rig(std::move(options), std::move(parts)));
-  Journal& journal = rig->journal();
+  session::Journal& journal = rig->journal();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string next, journal.Fact("next_program_id"));
   if (!next.empty() && !absl::SimpleAtoi(next, &rig->next_program_id_))
     return absl::DataLossError(
@@ -33,7 +33,8 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.object, journal.Fact("mounted_object"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string up_face, journal.Fact("mounted_placement"));
   if (!up_face.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(rig->up_face_, ParseUpFace(up_face, "the journal's mounted_placement"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(rig->up_face_,
+                                calibration::ParseUpFace(up_face, "the journal's mounted_placement"));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Fact(kStopFact));
   rig->stopped_ = !rig->stop_reason_.empty();
@@ -56,7 +57,7 @@ uint32_t Rig::NextProgramId() {
   return next_program_id_++;
 }
 
-std::optional<UpFace> Rig::MountedUpFace() const {
+std::optional<calibration::UpFace> Rig::MountedUpFace() const {
   std::lock_guard<std::mutex> lock(status_mutex_);
   return up_face_;
 }
@@ -66,13 +67,13 @@ void Rig::Remember(const absl::Status& status) {
   status_.last_error = std::string(status.message());
 }
 
-SourceStatus Rig::Status() const {
-  SourceStatus status;
+source::SourceStatus Rig::Status() const {
+  source::SourceStatus status;
   {
     std::lock_guard<std::mutex> lock(status_mutex_);
     status = status_;
   }
-  const ClockEstimate clock = parts_.effector->Clock();
+  const timing::ClockEstimate clock = parts_.effector->Clock();
   if (clock.valid) status.clock_uncertainty_s = clock.offset_uncertainty_s / clock.rate * options_.time_scale;
   return status;
 }
@@ -80,11 +81,11 @@ SourceStatus Rig::Status() const {
 absl::Status Rig::EnsureSession(const std::string& name) {
   std::lock_guard<std::mutex> lock(sessions_mutex_);
   if (sessions_.count(name) > 0) return absl::OkStatus();
-  JournalSession session;
+  session::JournalSession session;
   session.name = name;
-  session.created_unix_s = UnixNowS();
+  session.created_unix_s = timing::UnixNowS();
   session.provenance = Provenance();
-  session.calibration = FormatCalibration(parts_.planner->calibration());
+  session.calibration = calibration::FormatCalibration(parts_.planner->calibration());
   session.fingers = options_.fingers;
   session.spacing_m = options_.spacing_m;
   TOUCHSTONE_RETURN_IF_ERROR(journal().EnsureSession(session));
@@ -93,27 +94,29 @@ absl::Status Rig::EnsureSession(const std::string& name) {
 }
 
 std::string Rig::Provenance() const {
-  const EffectorState effector = parts_.effector->State();
+  const effector::EffectorState effector = parts_.effector->State();
   return absl::StrCat(options_.provenance_note, options_.provenance_note.empty() ? "" : "; ",
                       parts_.arm->Model(), " at ", parts_.arm->Address(), ", end effector ",
                       effector.firmware, " at ", options_.effector_port);
 }
 
-absl::StatusOr<std::optional<JournalTouch>> Rig::FindDone(const TouchCommand& command) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> touch,
+absl::StatusOr<std::optional<session::JournalTouch>> Rig::FindDone(
+    const source::TouchCommand& command) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<session::JournalTouch> touch,
                               parts_.journal->Find(command.session, command.id));
   if (!touch.has_value()) return touch;
-  if (touch->object != command.object || !SameCommand(touch->command, command.bytes))
+  if (touch->object != command.object || !session::SameCommand(touch->command, command.bytes))
     return absl::AlreadyExistsError(absl::StrCat("touch id '", command.id, "' of session '", command.session,
                                                  "' stands for another touch already: take a new id"));
-  if (touch->stage != TouchStage::kDone) return std::optional<JournalTouch>();
+  if (touch->stage != session::TouchStage::kDone) return std::optional<session::JournalTouch>();
   return touch;
 }
 
-absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const MotionGuard& caller) {
-  const MotionGuard guard = UntilStopped(caller);
+absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& command,
+                                                 const source::MotionGuard& caller) {
+  const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<JournalTouch> known, FindDone(command));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<session::JournalTouch> known, FindDone(command));
   if (known.has_value()) return *std::move(known);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(command));  // made while this one waited
@@ -121,25 +124,25 @@ absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const Motio
 
   // Everything that can forbid it, before anything is written or moved.
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
-  if (const EffectorState effector = parts_.effector->State(); !effector.connected)
+  if (const effector::EffectorState effector = parts_.effector->State(); !effector.connected)
     return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
-  const UpFace up_face = UpFaceFor(command.touch.approach);
+  const calibration::UpFace up_face = calibration::UpFaceFor(command.touch.approach);
   TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      PlannedTouch plan, parts_.planner->Plan(from, command.object, command.bounds, up_face, command.touch,
-                                              "touch '" + command.id + "'"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(arm::PlannedTouch plan,
+                              parts_.planner->Plan(from, command.object, command.bounds, up_face,
+                                                   command.touch, "touch '" + command.id + "'"));
 
-  const double began_s = HostNowS(), began_unix_s = UnixNowS();
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const JournalTouch intent,
-      journal().Begin(command.session, command.id, command.object, UpFaceName(up_face), command.bytes));
-  if (intent.stage == TouchStage::kDone) return intent;
+  const double began_s = timing::HostNowS(), began_unix_s = timing::UnixNowS();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalTouch intent,
+                              journal().Begin(command.session, command.id, command.object,
+                                              calibration::UpFaceName(up_face), command.bytes));
+  if (intent.stage == session::TouchStage::kDone) return intent;
   const uint32_t program_id = NextProgramId();
   TOUCHSTONE_RETURN_IF_ERROR(
       journal().Executing(command.session, command.id, program_id, parts_.effector->State().boot_id));
   ++motions_;
-  absl::StatusOr<JournalResult> result = MakeTouch(plan, program_id, command, guard);
+  absl::StatusOr<session::JournalResult> result = MakeTouch(plan, program_id, command, guard);
   --motions_;
   if (!result.ok()) {
     Remember(result.status());
@@ -160,7 +163,7 @@ absl::StatusOr<JournalTouch> Rig::Touch(const TouchCommand& command, const Motio
   TOUCHSTONE_RETURN_IF_ERROR(journal().Done(command.session, command.id, *result));
   {
     std::lock_guard<std::mutex> status_lock(status_mutex_);
-    const double took_s = HostNowS() - began_s;
+    const double took_s = timing::HostNowS() - began_s;
     status_.touch_duration_s = status_.touches == 0 ? took_s : 0.9 * status_.touch_duration_s + 0.1 * took_s;
     ++status_.touches;
   }
@@ -182,21 +185,21 @@ absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix
   return (unix_s - first_s) * options_.time_scale;
 }
 
-Intrinsics Rig::IntrinsicsOf(const Frame& frame) const {
+image::Intrinsics Rig::IntrinsicsOf(const image::Frame& frame) const {
   if (parts_.intrinsics.has_value()) return *parts_.intrinsics;
-  return PinholeIntrinsics(frame.width, frame.height, parts_.vertical_fov_rad);
+  return image::PinholeIntrinsics(frame.width, frame.height, parts_.vertical_fov_rad);
 }
 
-absl::StatusOr<PlannedTouch> Rig::Check(const std::string& object, const Bounds& bounds,
-                                        const CommandedTouch& touch, const ArmState* from,
-                                        const std::string& where) const {
-  ArmState here;
+absl::StatusOr<arm::PlannedTouch> Rig::Check(const std::string& object, const geometry::Bounds& bounds,
+                                             const touch::CommandedTouch& touch, const arm::ArmState* from,
+                                             const std::string& where) const {
+  arm::ArmState here;
   if (from != nullptr) {
     here = *from;
   } else {
     TOUCHSTONE_ASSIGN_OR_RETURN(here, parts_.arm->State());
   }
-  return parts_.planner->Plan(here, object, bounds, UpFaceFor(touch.approach), touch, where);
+  return parts_.planner->Plan(here, object, bounds, calibration::UpFaceFor(touch.approach), touch, where);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -9,32 +9,34 @@
 #include "server/geometry/pose.h"
 #include "server/image/encode.h"
 
-namespace touchstone {
-absl::Status Rig::PowerUp(const MotionGuard& guard) {
+namespace touchstone::gateway {
+absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   constexpr double kPatienceS = 10;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, parts_.arm->State());
-  if (state.robot_mode == RobotMode::kRunning || !SafetyPermitsMotion(state.safety_mode).ok())
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
+  if (state.robot_mode == arm::RobotMode::kRunning || !arm::SafetyPermitsMotion(state.safety_mode).ok())
     return parts_.arm->Ready();
-  audit().Write("power_on", {{"robot_mode", RobotModeName(state.robot_mode)}}).IgnoreError();
+  audit().Write("power_on", {{"robot_mode", arm::RobotModeName(state.robot_mode)}}).IgnoreError();
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn(guard));
   // The states report it a little later than the dashboard.
-  for (const double until_s = HostNowS() + kPatienceS; !parts_.arm->Ready().ok() && HostNowS() < until_s;) {
+  for (const double until_s = timing::HostNowS() + kPatienceS;
+       !parts_.arm->Ready().ok() && timing::HostNowS() < until_s;) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
   return parts_.arm->Ready();
 }
 
-absl::Status Rig::PowerOn(const MotionGuard& caller) {
-  const MotionGuard guard = UntilStopped(caller);
+absl::Status Rig::PowerOn(const source::MotionGuard& caller) {
+  const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   const absl::Status status = PowerUp(guard);
   if (!status.ok()) Remember(status);
   return status;
 }
 
-absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGuard& caller) {
-  const MotionGuard guard = UntilStopped(caller);
+absl::StatusOr<image::Frame> Rig::Photograph(const source::ViewCommand& command,
+                                             const source::MotionGuard& caller) {
+  const source::MotionGuard guard = UntilStopped(caller);
   if (parts_.camera == nullptr)
     return absl::FailedPreconditionError(
         "this rig has no camera: set camera.uri in the gateway's configuration");
@@ -43,29 +45,29 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
         "the calibration file has no flange_from_camera: where the camera sits");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
-  const UpFace up_face = UpFaceFor(command.object_from_camera.rotation().col(2));
+  const calibration::UpFace up_face = calibration::UpFaceFor(command.object_from_camera.rotation().col(2));
   TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
                               parts_.planner->ObjectPose(command.object, command.bounds, up_face));
   const Eigen::Isometry3d base_from_camera = base_from_object * command.object_from_camera;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      const PlannedTouch plan,
+      const arm::PlannedTouch plan,
       parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, up_face, "view"));
   TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
-  const absl::StatusOr<Frame> frame = parts_.camera->Take(HostNowS());
+  const absl::StatusOr<image::Frame> frame = parts_.camera->Take(timing::HostNowS());
   if (!frame.ok()) {
     Remember(frame.status());
     return frame;
   }
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
-  JournalImage image;
-  image.id = ViewId(command);
-  image.object = command.object, image.placement = UpFaceName(up_face);
-  image.base_from_camera = PoseVectorOf(base_from_camera);
-  image.unix_s = UnixNowS();
+  session::JournalImage image;
+  image.id = source::ViewId(command);
+  image.object = command.object, image.placement = calibration::UpFaceName(up_face);
+  image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
+  image.unix_s = timing::UnixNowS();
   image.width = frame->width, image.height = frame->height;
-  TOUCHSTONE_ASSIGN_OR_RETURN(image.png, EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
+  TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
   TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(command.session, image));
   std::lock_guard<std::mutex> status_lock(status_mutex_);
   ++status_.images;
@@ -75,45 +77,47 @@ absl::StatusOr<Frame> Rig::Photograph(const ViewCommand& command, const MotionGu
 
 absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
-                              const MotionGuard& guard) {
+                              const source::MotionGuard& guard) {
   const uint32_t program_id = NextProgramId();
   ++motions_;
   absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
   if (status.ok())
-    status = Supervise(
-        program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
-        [](const ArmState& state) -> absl::StatusOr<bool> { return state.phase == MotionPhase::kDone; });
+    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
+                       [](const arm::ArmState& state) -> absl::StatusOr<bool> {
+                         return state.phase == arm::MotionPhase::kDone;
+                       });
   --motions_;
   if (!status.ok()) Remember(status);
   return status;
 }
 
-absl::Status Rig::Home(const MotionGuard& caller) {
-  const MotionGuard guard = UntilStopped(caller);
+absl::Status Rig::Home(const source::MotionGuard& caller) {
+  const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   return MoveHome(guard);
 }
 
-absl::Status Rig::MoveHome(const MotionGuard& guard) {
+absl::Status Rig::MoveHome(const source::MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState from, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
   return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, guard);
 }
 
-absl::Status Rig::EnsureMounted(const std::string& object, UpFace up_face, const MotionGuard& guard) {
-  const SourceStatus now = Status();
-  const std::optional<UpFace> mounted_face = MountedUpFace();
+absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace up_face,
+                                const source::MotionGuard& guard) {
+  const source::SourceStatus now = Status();
+  const std::optional<calibration::UpFace> mounted_face = MountedUpFace();
   if (now.object == object && mounted_face == up_face) return absl::OkStatus();
-  const std::string face = UpFaceName(up_face);
+  const std::string face = calibration::UpFaceName(up_face);
   if (options_.mount_command.empty())
     return absl::FailedPreconditionError(absl::StrCat(
-        now.object.empty()
-            ? "what lies on the fixture is unknown"
-            : absl::StrCat("'", now.object, "' lies on the fixture",
-                           mounted_face.has_value()
-                               ? absl::StrCat(" with its face ", UpFaceName(*mounted_face), " up")
-                               : ""),
+        now.object.empty() ? "what lies on the fixture is unknown"
+                           : absl::StrCat("'", now.object, "' lies on the fixture",
+                                          mounted_face.has_value()
+                                              ? absl::StrCat(" with its face ",
+                                                             calibration::UpFaceName(*mounted_face), " up")
+                                              : ""),
         ": put '", object, "' there with its face ", face, " up, then: touchstone rig mount ", object, " ",
         face));
   // The tool leaves before anything is moved there.
@@ -125,20 +129,21 @@ absl::Status Rig::EnsureMounted(const std::string& object, UpFace up_face, const
   return NoteMounted(object, up_face);
 }
 
-absl::Status Rig::NoteMounted(const std::string& object, UpFace up_face) {
+absl::Status Rig::NoteMounted(const std::string& object, calibration::UpFace up_face) {
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", UpFaceName(up_face)));
-  audit().Write("mounted", {{"object", object}, {"up_face", UpFaceName(up_face)}}).IgnoreError();
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", calibration::UpFaceName(up_face)));
+  audit().Write("mounted", {{"object", object}, {"up_face", calibration::UpFaceName(up_face)}}).IgnoreError();
   std::lock_guard<std::mutex> lock(status_mutex_);
   status_.object = object, up_face_ = up_face;
   return absl::OkStatus();
 }
 
-absl::Status Rig::Mount(const std::string& object, UpFace up_face, const MotionGuard& caller) {
-  const MotionGuard guard = UntilStopped(caller);
+absl::Status Rig::Mount(const std::string& object, calibration::UpFace up_face,
+                        const source::MotionGuard& caller) {
+  const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   if (!options_.mount_command.empty()) return EnsureMounted(object, up_face, guard);
   return NoteMounted(object, up_face);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -8,9 +8,9 @@
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 
-MotionGuard Rig::UntilStopped(const MotionGuard& caller) const {
+source::MotionGuard Rig::UntilStopped(const source::MotionGuard& caller) const {
   return [this, caller, stops = stops_.load()]() -> absl::Status {
     if (stops_ == stops && !stopped_) return caller();
     const std::string reason = StopReason();
@@ -20,7 +20,7 @@ MotionGuard Rig::UntilStopped(const MotionGuard& caller) const {
   };
 }
 
-absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const MotionGuard& guard) {
+absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const source::MotionGuard& guard) {
   for (;;) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     std::unique_lock<std::timed_mutex> lock(moving_, std::chrono::milliseconds(10));
@@ -55,8 +55,8 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
 absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
   const uint64_t stops = stops_;
   if (!stopped_) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState arm, parts_.arm->State());
-  if (const absl::Status safety = SafetyPermitsMotion(arm.safety_mode); !safety.ok())
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState arm, parts_.arm->State());
+  if (const absl::Status safety = arm::SafetyPermitsMotion(arm.safety_mode); !safety.ok())
     return absl::FailedPreconditionError(
         absl::StrCat("the stop holds: ", safety.message(), "; then reset again"));
   {
@@ -76,29 +76,29 @@ std::string Rig::StopReason() const {
   return stop_reason_;
 }
 
-SourceState Rig::State() const {
-  const absl::StatusOr<ArmState> arm = parts_.arm->State();
-  if (!arm.ok()) return SourceState::kDisconnected;
+source::SourceState Rig::State() const {
+  const absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
+  if (!arm.ok()) return source::SourceState::kDisconnected;
   switch (arm->safety_mode) {
-    case SafetyMode::kNormal:
-    case SafetyMode::kReduced:
+    case arm::SafetyMode::kNormal:
+    case arm::SafetyMode::kReduced:
       break;
-    case SafetyMode::kProtectiveStop:
-      return SourceState::kProtectiveStop;
-    case SafetyMode::kRecovery:
-      return SourceState::kRecovery;
-    case SafetyMode::kSafeguardStop:
-      return SourceState::kSafeguardStop;
-    case SafetyMode::kSystemEmergencyStop:
-    case SafetyMode::kRobotEmergencyStop:
-      return SourceState::kEmergencyStop;
+    case arm::SafetyMode::kProtectiveStop:
+      return source::SourceState::kProtectiveStop;
+    case arm::SafetyMode::kRecovery:
+      return source::SourceState::kRecovery;
+    case arm::SafetyMode::kSafeguardStop:
+      return source::SourceState::kSafeguardStop;
+    case arm::SafetyMode::kSystemEmergencyStop:
+    case arm::SafetyMode::kRobotEmergencyStop:
+      return source::SourceState::kEmergencyStop;
     default:
-      return SourceState::kFault;
+      return source::SourceState::kFault;
   }
-  if (stopped_) return SourceState::kStopped;
-  if (arm->robot_mode != RobotMode::kRunning) return SourceState::kPoweredOff;
-  if (!parts_.effector->State().connected) return SourceState::kDisconnected;
-  return motions_ > 0 ? SourceState::kBusy : SourceState::kIdle;
+  if (stopped_) return source::SourceState::kStopped;
+  if (arm->robot_mode != arm::RobotMode::kRunning) return source::SourceState::kPoweredOff;
+  if (!parts_.effector->State().connected) return source::SourceState::kDisconnected;
+  return motions_ > 0 ? source::SourceState::kBusy : source::SourceState::kIdle;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -17,7 +17,7 @@
 
 extern char** environ;
 
-namespace touchstone {
+namespace touchstone::gateway {
 
 absl::Status RunCommand(const std::vector<std::string>& arguments, double timeout_s,
                         const std::function<absl::Status()>& guard) {
@@ -68,4 +68,4 @@ absl::Status RunCommand(const std::vector<std::string>& arguments, double timeou
   }
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

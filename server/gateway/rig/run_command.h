@@ -7,11 +7,11 @@
 
 #include <absl/status/status.h>
 
-namespace touchstone {
+namespace touchstone::gateway {
 
 // The program (found in PATH) with its arguments; stdin is empty, what it prints goes to stderr. Errors tell
 // how it ended. `guard` is asked all the time; if it fails, or after timeout_s, the program is killed.
 absl::Status RunCommand(const std::vector<std::string>& arguments, double timeout_s,
                         const std::function<absl::Status()>& guard);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

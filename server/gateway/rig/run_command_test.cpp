@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 using testing::HasSubstr;
@@ -37,4 +37,4 @@ TEST(RunCommand, EndsAtItsTime) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway

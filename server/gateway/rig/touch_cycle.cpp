@@ -11,7 +11,7 @@
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 constexpr double kHeartbeatPeriodS = 0.01;  // host time; also how soon a lost lease is noticed
@@ -19,9 +19,10 @@ constexpr double kProgramStartsS = 2;       // host time that a program may take
 
 }  // namespace
 
-absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what, const MotionGuard& guard,
-                            const std::function<absl::StatusOr<bool>(const ArmState&)>& done) {
-  const double began_s = HostNowS();
+absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what,
+                            const source::MotionGuard& guard,
+                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done) {
+  const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
   // Whatever ends the watch before it is done stops the arm first.
@@ -33,15 +34,15 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   };
   for (;;) {
     const uint64_t changes = parts_.changes->count();
-    const double now_s = HostNowS();
+    const double now_s = timing::HostNowS();
     if (now_s - last_heartbeat_s_ >= kHeartbeatPeriodS) {
       parts_.arm->SendHeartbeat();
       last_heartbeat_s_ = now_s;
     }
     if (const absl::Status allowed = guard(); !allowed.ok()) return give_up(allowed);
-    const absl::StatusOr<ArmState> state = parts_.arm->State();
+    const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
-    if (const absl::Status safety = SafetyPermitsMotion(state->safety_mode); !safety.ok())
+    if (const absl::Status safety = arm::SafetyPermitsMotion(state->safety_mode); !safety.ok())
       return give_up(safety);
     seen = seen || state->program_id == program_id;
     if (seen) {
@@ -51,11 +52,11 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     }
 
     // A program that ended by itself, or never began.
-    const bool rests = state->runtime_state == RuntimeState::kStopped && now_s - began_s > 0.5;
+    const bool rests = state->runtime_state == arm::RuntimeState::kStopped && now_s - began_s > 0.5;
     at_rest_since_s = !rests ? 0 : at_rest_since_s == 0 ? now_s : at_rest_since_s;
     if (seen && rests && now_s - at_rest_since_s > 0.5)
       return give_up(absl::UnavailableError(absl::StrCat("the arm's program ended during ", what,
-                                                         " at phase '", PhaseName(state->phase), "'")));
+                                                         " at phase '", arm::PhaseName(state->phase), "'")));
     if (!seen && now_s - began_s > kProgramStartsS + 1)
       return give_up(
           absl::UnavailableError(absl::StrCat("the arm never began program ", program_id, " (", what,
@@ -67,8 +68,9 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   }
 }
 
-absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t program_id,
-                                             const TouchCommand& command, const MotionGuard& guard) {
+absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
+                                                      const source::TouchCommand& command,
+                                                      const source::MotionGuard& guard) {
   TouchRecording record;
   record.motion = plan.motion;
   record.motion.program_id = program_id;
@@ -76,14 +78,14 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   record.time_scale = options_.time_scale;
   const double host_per_rig = 1 / options_.time_scale;
   const double limit_s = 2 * plan.motion.duration_s * host_per_rig + 15;
-  const auto phase_is = [](MotionPhase phase) {
-    return [phase](const ArmState& state) -> absl::StatusOr<bool> { return state.phase == phase; };
+  const auto phase_is = [](arm::MotionPhase phase) {
+    return [phase](const arm::ArmState& state) -> absl::StatusOr<bool> { return state.phase == phase; };
   };
 
   // To the start. The capture begins there, at rest and with every finger free.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
   TOUCHSTONE_RETURN_IF_ERROR(
-      Supervise(program_id, limit_s, "the transit to the start", guard, phase_is(MotionPhase::kReady)));
+      Supervise(program_id, limit_s, "the transit to the start", guard, phase_is(arm::MotionPhase::kReady)));
   if (const absl::Status started = parts_.effector->StartCapture(program_id); !started.ok()) {
     parts_.arm->Stop().IgnoreError();
     return started;
@@ -96,9 +98,9 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   bool ended = false;
   std::optional<double> pressed_from_m;
   TOUCHSTONE_RETURN_IF_ERROR(Supervise(
-      program_id, limit_s, "the approach", guard, [&](const ArmState& state) -> absl::StatusOr<bool> {
-        if (state.phase == MotionPhase::kDone) return true;
-        TOUCHSTONE_ASSIGN_OR_RETURN(const EffectorTouch contacts, parts_.effector->Touch());
+      program_id, limit_s, "the approach", guard, [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
+        if (state.phase == arm::MotionPhase::kDone) return true;
+        TOUCHSTONE_ASSIGN_OR_RETURN(const effector::EffectorTouch contacts, parts_.effector->Touch());
         const int count = contacts.Contacts();
         const double distance_m = approach.dot(state.base_from_tip.translation());
         if (count > 0 && !pressed_from_m.has_value()) pressed_from_m = distance_m;
@@ -118,10 +120,10 @@ absl::StatusOr<JournalResult> Rig::MakeTouch(const PlannedTouch& plan, uint32_t 
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, parts_.arm->State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
   const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
   record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
   return ResultOf(record);
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -10,7 +10,7 @@
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -42,14 +42,14 @@ std::array<double, 6> NoPose() {
 
 }  // namespace
 
-std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
+std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,
                                         double max_gap_s) {
-  const auto after =
-      std::lower_bound(states.begin(), states.end(), controller_s,
-                       [](const ArmState& state, double time_s) { return state.controller_time_s < time_s; });
+  const auto after = std::lower_bound(
+      states.begin(), states.end(), controller_s,
+      [](const arm::ArmState& state, double time_s) { return state.controller_time_s < time_s; });
   if (after == states.begin() || after == states.end()) return std::nullopt;
-  const ArmState& a = *(after - 1);
-  const ArmState& b = *after;
+  const arm::ArmState& a = *(after - 1);
+  const arm::ArmState& b = *after;
   const double gap_s = b.controller_time_s - a.controller_time_s;
   if (!(gap_s > 0) || gap_s > max_gap_s) return std::nullopt;
   const double share = (controller_s - a.controller_time_s) / gap_s;
@@ -71,7 +71,7 @@ struct Approach {
 };
 
 absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
-  const ArmTouch& motion = record.motion;
+  const arm::ArmTouch& motion = record.motion;
   const Eigen::Vector3d start = motion.transit.back().translation();
   const Eigen::Vector3d direction = (motion.end.translation() - start).normalized();
   const double ramp_m = motion.speed_m_s * motion.speed_m_s / (2 * record.acceleration_m_s2);
@@ -79,8 +79,8 @@ absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
   Approach approach;
   std::vector<std::pair<double, double>> full_speed;  // time since the first state, distance from the start
   double min_scaling = 1, origin_s = 0;
-  for (const ArmState& state : record.states) {
-    if (state.program_id != motion.program_id || state.phase != MotionPhase::kApproach) continue;
+  for (const arm::ArmState& state : record.states) {
+    if (state.program_id != motion.program_id || state.phase != arm::MotionPhase::kApproach) continue;
     if (!approach.seen) origin_s = state.controller_time_s;
     approach.seen = true;
     min_scaling = std::min(min_scaling, state.speed_scaling);
@@ -110,11 +110,11 @@ absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
 }
 
 // Contact times since the device's `began_device_s`, and poses at contact where `synchronised`.
-std::vector<JournalFinger> FingersOf(const TouchRecording& record, double began_device_s, double device_rate,
-                                     bool synchronised) {
-  std::vector<JournalFinger> fingers;
+std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, double began_device_s,
+                                              double device_rate, bool synchronised) {
+  std::vector<session::JournalFinger> fingers;
   for (const auto& ticks : record.contacts.contact_ticks) {
-    JournalFinger finger;
+    session::JournalFinger finger;
     finger.contact_time_s = kNaN;
     finger.base_from_tip = NoPose();
     if (ticks.has_value()) {
@@ -124,7 +124,7 @@ std::vector<JournalFinger> FingersOf(const TouchRecording& record, double began_
       if (synchronised) {
         const double controller_s = record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
         if (const auto pose = PoseAt(record.states, controller_s, 0.1 * std::max(1.0, record.time_scale)))
-          finger.base_from_tip = PoseVectorOf(*pose);
+          finger.base_from_tip = geometry::PoseVectorOf(*pose);
       }
     }
     fingers.push_back(finger);
@@ -133,15 +133,15 @@ std::vector<JournalFinger> FingersOf(const TouchRecording& record, double began_
   // took (on a clock that is accelerated, when the host is busy): the fingers share that error, so it is removed,
   // and their differences stay.
   double early_s = 0;
-  for (const JournalFinger& finger : fingers)
+  for (const session::JournalFinger& finger : fingers)
     if (finger.contact_time_s < early_s) early_s = finger.contact_time_s;
-  for (JournalFinger& finger : fingers) finger.contact_time_s -= early_s;
+  for (session::JournalFinger& finger : fingers) finger.contact_time_s -= early_s;
   return fingers;
 }
 
 }  // namespace
 
-absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
+absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Approach approach, ApproachOf(record));
   const bool synchronised = approach.seen && record.controller_clock.valid && record.effector_clock.valid;
   const double scale = record.time_scale;
@@ -160,7 +160,7 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
                      " s apart in a touch of about ", ShortestNumber(std::round(record.motion.duration_s)),
                      " s: its counter must be wrong"));
 
-  JournalResult result;
+  session::JournalResult result;
   result.speed_m_s = approach.speed_m_s;
   // Device seconds at which the approach began; without a record of the arm, the first contact stands for it.
   const double began_device_s =
@@ -181,4 +181,4 @@ absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record) {
   return result;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -11,27 +11,27 @@
 #include "server/gateway/timing/clock_sync.h"
 #include "server/session/journal.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 
 struct TouchRecording {
-  ArmTouch motion;
+  arm::ArmTouch motion;
   double acceleration_m_s2 = 0;
   double time_scale = 1;
   uint32_t tick_hz = 1;
-  EffectorTouch contacts;
-  ClockEstimate effector_clock;    // device seconds on host seconds
-  ClockEstimate controller_clock;  // controller seconds on host seconds
-  std::vector<ArmState> states;    // of the whole touch, oldest first
+  effector::EffectorTouch contacts;
+  timing::ClockEstimate effector_clock;    // device seconds on host seconds
+  timing::ClockEstimate controller_clock;  // controller seconds on host seconds
+  std::vector<arm::ArmState> states;       // of the whole touch, oldest first
 };
 
 // Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds). Session and
 // Unix times stay 0. FAILED_PRECONDITION if the controller scaled the speed during the approach: times would
 // not be comparable.
-absl::StatusOr<JournalResult> ResultOf(const TouchRecording& record);
+absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record);
 
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within
 // 0.1 rig s.
-std::optional<Eigen::Isometry3d> PoseAt(const std::vector<ArmState>& states, double controller_s,
+std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,
                                         double max_gap_s);
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway

@@ -5,7 +5,7 @@
 
 #include "server/gateway/rig/touch_result.h"
 
-namespace touchstone {
+namespace touchstone::gateway {
 namespace {
 
 constexpr double kSpeed = 0.02, kAcceleration = 1.2;
@@ -35,11 +35,11 @@ struct Made {
     record.controller_clock = {true, 50, 87, 1 + 50e-6, 2e-5, 1e-7, 100, 1e-3};
     record.effector_clock = {true, 50, 1234, 1 - 120e-6, 1e-5, 1e-7, 100, 1e-3};
     for (int k = -50; k < 2000; ++k) {
-      ArmState state;
+      arm::ArmState state;
       state.controller_time_s = 100 + 0.002 * k;
       const double t = (state.controller_time_s - began_controller_s) / record.controller_clock.rate;
       state.program_id = 7;
-      state.phase = t < 0 ? MotionPhase::kReady : MotionPhase::kApproach;
+      state.phase = t < 0 ? arm::MotionPhase::kReady : arm::MotionPhase::kApproach;
       state.base_from_tip.translation() = Eigen::Vector3d(0.3, 0, 0.3 - Distance(t));
       state.tip_velocity_m_s = Eigen::Vector3d(0, 0, -(Distance(t + 5e-4) - Distance(t - 5e-4)) / 1e-3);
       state.speed_scaling = scale;
@@ -75,8 +75,8 @@ TEST(TouchResult, DifferencesAreInHostTimeWhateverTheEffectorsClockDoes) {
 
 TEST(TouchResult, OneStateAtFullSpeedTellsWhenTheApproachBegan) {
   Made made({{1.2}, {1.0}, {2.5}});
-  std::vector<ArmState> few;
-  for (const ArmState& state : made.record.states)
+  std::vector<arm::ArmState> few;
+  for (const arm::ArmState& state : made.record.states)
     if (std::abs(state.controller_time_s - 101.0) < 1e-6 || state.controller_time_s < 100)
       few.push_back(state);
   made.record.states = few;
@@ -149,9 +149,9 @@ TEST(PoseAt, NothingIsMadeUpAcrossAGap) {
   EXPECT_TRUE(PoseAt(made.record.states, 101.0005, 0.1).has_value());
   EXPECT_FALSE(PoseAt(made.record.states, 99.0, 0.1).has_value());
   EXPECT_FALSE(PoseAt(made.record.states, 1e6, 0.1).has_value());
-  std::vector<ArmState> sparse = {made.record.states.front(), made.record.states.back()};
+  std::vector<arm::ArmState> sparse = {made.record.states.front(), made.record.states.back()};
   EXPECT_FALSE(PoseAt(sparse, 101, 0.1).has_value());
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway

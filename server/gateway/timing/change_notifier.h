@@ -8,7 +8,7 @@
 
 #include "server/gateway/timing/host_time.h"
 
-namespace touchstone {
+namespace touchstone::gateway::timing {
 
 // An event count: no lock is held while it waits, so that the woken thread may lock anything.
 class ChangeNotifier {
@@ -38,4 +38,4 @@ class ChangeNotifier {
   uint64_t count_ = 0;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::timing

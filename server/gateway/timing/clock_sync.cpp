@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace touchstone {
+namespace touchstone::gateway::timing {
 namespace {
 
 constexpr double kKeptS = 240;
@@ -291,4 +291,4 @@ bool ClockSync::Fit(double window_s, ClockEstimate* estimate) const {
   return true;
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::timing

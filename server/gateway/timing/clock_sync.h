@@ -5,7 +5,7 @@
 #include <deque>
 #include <vector>
 
-namespace touchstone {
+namespace touchstone::gateway::timing {
 
 // remote_s = remote_at_s + rate * (host_s - host_at_s).
 struct ClockEstimate {
@@ -86,4 +86,4 @@ class ClockSync {
   mutable ClockEstimate estimate_;
 };
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::timing

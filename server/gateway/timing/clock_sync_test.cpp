@@ -10,7 +10,7 @@
 
 #include "server/base/random.h"
 
-namespace touchstone {
+namespace touchstone::gateway::timing {
 namespace {
 
 // A remote clock at the end of a line, all of it simulated.
@@ -243,4 +243,4 @@ TEST(ClockSync, ForgetsAllAtReset) {
 }
 
 }  // namespace
-}  // namespace touchstone
+}  // namespace touchstone::gateway::timing

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace touchstone {
+namespace touchstone::gateway::timing {
 
 double HostNowS() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -12,4 +12,4 @@ double UnixNowS() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-}  // namespace touchstone
+}  // namespace touchstone::gateway::timing

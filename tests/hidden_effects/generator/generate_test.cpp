@@ -45,17 +45,18 @@ double Deviation(const Set& set, double power = 2) {
 // The one place where the oracle meets the product: same commands, same meshes, both alone.
 void ExpectTheProductAgrees(const std::vector<Hidden>& hidden, const std::string& effects_yaml) {
   const Set set = Generate(With(hidden), 7);
-  auto model =
-      ParseModel("touchstone: model/1\nname: n\nend_effector: {fingers: 3, spacing_mm: 30}\n" + effects_yaml,
-                 "test", Catalogue());
+  auto model = model::ParseModel(
+      "touchstone: model/1\nname: n\nend_effector: {fingers: 3, spacing_mm: 30}\n" + effects_yaml, "test",
+      effects::Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
-  const TouchSimulator simulator(std::make_shared<const Model>(*model));
+  const touch::TouchSimulator simulator(std::make_shared<const model::Model>(*model));
   for (size_t object = 0; object < set.truth.objects.size(); ++object) {
     const std::string& name = set.truth.objects[object]->name();
-    TouchBatch batch;
-    TouchWorkspace workspace;
+    effects::TouchBatch batch;
+    touch::TouchWorkspace workspace;
     simulator.Prepare(set.touches, &batch);
-    batch.surface = *Surface::Create(name, *MakeSupershape(*NamedSupershape(name), kTriangles));
+    batch.surface = *geometry::Surface::Create(
+        name, *geometry::MakeSupershape(*geometry::NamedSupershape(name), kTriangles));
     for (int k = 0; k < set.touches; ++k) {
       batch.target_m[k] = set.commands[k].target_mm / 1000;
       batch.approach[k] = set.commands[k].approach;

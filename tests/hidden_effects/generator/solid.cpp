@@ -17,7 +17,7 @@ using Vec = Eigen::Vector3d;
 
 constexpr uint32_t kLeafTriangles = 4;
 
-Triangles FromMesh(const TriangleMesh& mesh) {
+Triangles FromMesh(const geometry::TriangleMesh& mesh) {
   Triangles out;
   for (const auto& vertex : mesh.vertices_m) out.vertices_mm.push_back(vertex.cast<double>() * 1000);
   out.corners = mesh.triangles;
@@ -57,15 +57,15 @@ double TimeToEdge(const Vec& centre, const Vec& direction, const Vec& p, const V
 }  // namespace
 
 Triangles ReadTriangles(const std::string& off_path) {
-  auto mesh = ReadMeshFile(off_path);
+  auto mesh = geometry::ReadMeshFile(off_path);
   if (!mesh.ok()) throw std::runtime_error(std::string(mesh.status().message()));
   return FromMesh(*mesh);
 }
 
 Triangles SupershapeTriangles(const std::string& name, uint64_t triangles) {
-  auto parameters = NamedSupershape(name);
+  auto parameters = geometry::NamedSupershape(name);
   if (!parameters.ok()) throw std::runtime_error(std::string(parameters.status().message()));
-  return FromMesh(MakeSupershape(*parameters, triangles).value());
+  return FromMesh(geometry::MakeSupershape(*parameters, triangles).value());
 }
 
 Solid::Solid(std::string name, Triangles triangles)

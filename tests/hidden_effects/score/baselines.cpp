@@ -28,11 +28,11 @@ std::vector<int> RowsOf(const std::vector<double>& residuals) {
 }
 
 // The step of the finite difference of each value, SI.
-std::vector<std::vector<double>> Steps(const Effect& effect, int fingers) {
+std::vector<std::vector<double>> Steps(const model::Effect& effect, int fingers) {
   std::vector<std::vector<double>> steps;
   const std::vector<double> neutral = effect.NeutralValues(fingers);
   size_t at = 0;
-  for (const ParameterInfo& info : effect.parameters) {
+  for (const model::ParameterInfo& info : effect.parameters) {
     for (int k = 0; k < info.Count(fingers); ++k, ++at) {
       std::vector<double> values = neutral;
       if (effect.name == "acceleration_ramp")
@@ -97,8 +97,9 @@ std::vector<std::string> Forward(const std::vector<Columns>& candidates, const E
 
 // Log evidence that a Gaussian process over the surface of each object (squared exponential, 25 mm, as random
 // waves) gains over none, at its best amplitude.
-double GaussianProcessNats(const Observations& observations, const Prediction& prediction,
-                           const std::vector<int>& rows, const Eigen::VectorXd& y, double sigma_s) {
+double GaussianProcessNats(const diagnosis::touches::Observations& observations,
+                           const diagnosis::touches::Prediction& prediction, const std::vector<int>& rows,
+                           const Eigen::VectorXd& y, double sigma_s) {
   constexpr int kWaves = 40;
   constexpr double kLengthM = 0.025;
   std::mt19937_64 random(1);
@@ -148,29 +149,30 @@ double GaussianProcessNats(const Observations& observations, const Prediction& p
 
 }  // namespace
 
-absl::StatusOr<Baselines> RunBaselines(const DiagnosisInput& input) {
+absl::StatusOr<Baselines> RunBaselines(const diagnosis::DiagnosisInput& input) {
   Baselines out;
   if (!input.set->has_poses) return out;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Observations observations, MakeObservations(input));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction nominal,
-                              Predict(observations, *input.model, true, false, nullptr));
-  const std::vector<double> residuals = Residuals(observations, nominal);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::touches::Observations observations,
+                              diagnosis::touches::MakeObservations(input));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::touches::Prediction nominal,
+                              diagnosis::touches::Predict(observations, *input.model, true, false, nullptr));
+  const std::vector<double> residuals = diagnosis::touches::Residuals(observations, nominal);
   std::vector<int> rows = RowsOf(residuals);
 
   std::vector<Columns> candidates;
-  for (const auto& effect : Catalogue().All()) {
+  for (const auto& effect : effects::Catalogue().All()) {
     Columns columns{effect->name, Eigen::MatrixXd(residuals.size(), 0), 0};
     if (effect->parameters.empty() || effect->name == "surface_error") continue;
     bool in_model = false;
-    for (const EffectInstance& instance : input.model->effects)
+    for (const model::EffectInstance& instance : input.model->effects)
       in_model |= instance.effect->name == effect->name;
     if (in_model) continue;
     for (const std::vector<double>& values : Steps(*effect, observations.fingers)) {
-      Model model = *input.model;
+      model::Model model = *input.model;
       model.effects.push_back({effect, false, values, {}});
-      TOUCHSTONE_ASSIGN_OR_RETURN(const Prediction moved,
-                                  Predict(observations, model, false, false, nullptr));
-      const std::vector<double> then = Residuals(observations, moved);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::touches::Prediction moved,
+                                  diagnosis::touches::Predict(observations, model, false, false, nullptr));
+      const std::vector<double> then = diagnosis::touches::Residuals(observations, moved);
       Eigen::VectorXd column(residuals.size());
       // Where a contact jumps to another face, the difference is none.
       for (size_t k = 0; k < residuals.size(); ++k) {

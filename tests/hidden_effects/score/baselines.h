@@ -15,6 +15,6 @@ struct Baselines {
 };
 
 // All linear: derivatives by finite differences, at the nominal model.
-absl::StatusOr<Baselines> RunBaselines(const DiagnosisInput& input);
+absl::StatusOr<Baselines> RunBaselines(const diagnosis::DiagnosisInput& input);
 
 }  // namespace touchstone::hidden

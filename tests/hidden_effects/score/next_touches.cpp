@@ -21,16 +21,18 @@ constexpr double kSure = 0.9975;
 constexpr const char* kEffects[] = {"tip_radius", "oblique_slip", "finger_spacing", "object_scale",
                                     "tool_yaw"};
 
-bool RightAndSure(const Diagnosis& diagnosis, const std::string& effect) {
+bool RightAndSure(const diagnosis::report::Diagnosis& diagnosis, const std::string& effect) {
   return diagnosis.steps.size() == 1 && diagnosis.steps[0].effect == effect &&
          diagnosis.steps[0].equivalent.empty() && diagnosis.steps[0].probability >= kSure;
 }
 
-absl::StatusOr<std::vector<Command>> Proposed(const DiagnosisInput& input, const Scenario& scenario) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, Propose(input, kAddedAtOnce, {}));
+absl::StatusOr<std::vector<Command>> Proposed(const diagnosis::DiagnosisInput& input,
+                                              const Scenario& scenario) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis,
+                              diagnosis::Propose(input, kAddedAtOnce, {}));
   std::vector<Command> commands;
-  for (const ProposedTouch& proposed : diagnosis.next_touches) {
-    const CommandedTouch& touch = proposed.touch;
+  for (const diagnosis::design::ProposedTouch& proposed : diagnosis.next_touches) {
+    const touch::CommandedTouch& touch = proposed.touch;
     Command command;
     while (command.object < static_cast<int>(scenario.objects.size()) &&
            scenario.objects[command.object]->name() != proposed.object)
@@ -54,8 +56,8 @@ absl::StatusOr<int> Added(const TestObjects& objects, const Scenario& scenario, 
   std::vector<Command> commands(random.begin(), random.begin() + kBegin);
   for (;;) {
     const Set set = GenerateFor(scenario, commands, seed);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const DiagnosisInput input, InputFor(set, objects));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Diagnosis diagnosis, Diagnose(input, {}));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input, InputFor(set, objects));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, diagnosis::Diagnose(input, {}));
     const int added = static_cast<int>(commands.size()) - kBegin;
     *arrived = RightAndSure(diagnosis, scenario.hidden.front().effect);
     if (*arrived || added >= kMaxAdded) return added;

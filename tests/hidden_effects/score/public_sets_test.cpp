@@ -22,20 +22,20 @@ class PublicSets : public testing::Test {
   static void TearDownTestSuite() { delete objects_; }
 
   v1::Report Diagnosed(const std::string& file) {
-    auto set = ReadMeasurementSet(kFolder + file);
+    auto set = session::ReadMeasurementSet(kFolder + file);
     EXPECT_TRUE(set.ok()) << set.status();
-    auto model = ParseModel(
+    auto model = model::ParseModel(
         "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
         "  - gaussian_noise: {sigma_us: 5000}\n",
-        "nominal.yaml", Catalogue());
-    DiagnosisInput input;
-    input.set = std::make_shared<const MeasurementSet>(*std::move(set));
-    input.model = std::make_shared<const Model>(*std::move(model));
+        "nominal.yaml", effects::Catalogue());
+    diagnosis::DiagnosisInput input;
+    input.set = std::make_shared<const session::MeasurementSet>(*std::move(set));
+    input.model = std::make_shared<const model::Model>(*std::move(model));
     for (const std::string& object : input.set->objects)
       input.surfaces[object] = objects_->surfaces.at(object);
-    const auto diagnosis = Diagnose(input, {});
+    const auto diagnosis = diagnosis::Diagnose(input, {});
     EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
-    return diagnosis.ok() ? ToReport(*diagnosis) : v1::Report();
+    return diagnosis.ok() ? diagnosis::report::ToReport(*diagnosis) : v1::Report();
   }
 
   static double Value(const v1::Step& step, const std::string& finger = "") {

@@ -62,7 +62,7 @@ TEST(Strengths, UnlistedEffectsHaveTheRmsThatWasAskedFor) {
 }
 
 TEST(Arms, KnowEveryEffectOfTheCatalogueWithItsNumberOfValues) {
-  for (const auto& effect : Catalogue().All()) {
+  for (const auto& effect : effects::Catalogue().All()) {
     if (effect->parameters.empty()) continue;  // formulas
     EXPECT_EQ(ValueCount(effect->name, 5), effect->ValueCount(5)) << effect->name;
     EXPECT_EQ(IsNoise(effect->name),

@@ -12,17 +12,17 @@
 namespace touchstone::hidden {
 
 struct TestObjects {
-  std::vector<std::shared_ptr<const Solid>> solids;                // lat00 .. lat20
-  std::map<std::string, std::shared_ptr<const Surface>> surfaces;  // the same for the diagnosis
+  std::vector<std::shared_ptr<const Solid>> solids;                          // lat00 .. lat20
+  std::map<std::string, std::shared_ptr<const geometry::Surface>> surfaces;  // the same for the diagnosis
 };
 
 // Reads lat*.off from a folder; computes the shapes where a file is missing. Aborts if neither works.
 TestObjects LoadTestObjects(const std::string& mesh_folder);
 
 // A set as input of the diagnosis.
-absl::StatusOr<DiagnosisInput> InputFor(const Set& set, const TestObjects& objects);
-absl::StatusOr<DiagnosisInput> InputFor(const std::string& csv, const std::string& model_yaml,
-                                        const TestObjects& objects);
+absl::StatusOr<diagnosis::DiagnosisInput> InputFor(const Set& set, const TestObjects& objects);
+absl::StatusOr<diagnosis::DiagnosisInput> InputFor(const std::string& csv, const std::string& model_yaml,
+                                                   const TestObjects& objects);
 
 // How far the predictions of a model are from the oracle's exact times, us: the RMSE of
 // proto/README.md without noise.

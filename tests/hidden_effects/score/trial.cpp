@@ -82,10 +82,10 @@ Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool b
   const auto input = InputFor(out.set, objects);
   if (!input.ok()) return out.error = input.status().ToString(), out;
   const double start_s = ThreadSeconds();
-  const auto diagnosis = Diagnose(*input, {});
+  const auto diagnosis = diagnosis::Diagnose(*input, {});
   out.seconds = ThreadSeconds() - start_s;
   if (diagnosis.ok())
-    out.report = ToReport(*diagnosis);
+    out.report = diagnosis::report::ToReport(*diagnosis);
   else
     out.error = diagnosis.status().ToString();
   // Without a report every question is answered wrongly.

@@ -243,15 +243,16 @@ void Endurance::CompareWithTruth() {
 }
 
 void Endurance::CompareWithJournal() {
-  const auto journal = Journal::Open((folder_ / "rig" / "rig.db").string(), Journal::Mode::kReadOnly);
+  const auto journal =
+      session::Journal::Open((folder_ / "rig" / "rig.db").string(), session::Journal::Mode::kReadOnly);
   if (!journal.ok()) return Remark(std::string(journal.status().message()));
   std::set<std::string> seen;
-  const absl::Status read = (*journal)->ForEachTouch("test", [&](const JournalTouch& touch) {
-    if (touch.stage != TouchStage::kDone && touch.stage != TouchStage::kFailed) {
+  const absl::Status read = (*journal)->ForEachTouch("test", [&](const session::JournalTouch& touch) {
+    if (touch.stage != session::TouchStage::kDone && touch.stage != session::TouchStage::kFailed) {
       ++report_.unfinished;
       Remark(touch.id + " is neither done nor given up");
     }
-    if (touch.stage != TouchStage::kDone) return true;
+    if (touch.stage != session::TouchStage::kDone) return true;
     const auto answered = answered_s_.find(touch.id);
     if (!seen.insert(touch.id).second || answered == answered_s_.end()) {
       ++report_.doubled;
@@ -259,7 +260,8 @@ void Endurance::CompareWithJournal() {
       return true;
     }
     std::vector<double> times_s;
-    for (const JournalFinger& finger : touch.result.fingers) times_s.push_back(finger.contact_time_s);
+    for (const session::JournalFinger& finger : touch.result.fingers)
+      times_s.push_back(finger.contact_time_s);
     if (!SameNumbers(times_s, answered->second)) {
       ++report_.lost;
       Remark(touch.id + ": the journal holds another result than the client got");

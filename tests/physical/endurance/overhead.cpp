@@ -25,41 +25,42 @@ class Overhead : public PhysicalTest {
  private:
   void TestBody() override {}
   absl::Status Open();
-  absl::StatusOr<double> FirstHeardS(const ArmState& last, MotionPhase phase) const;
+  absl::StatusOr<double> FirstHeardS(const gateway::arm::ArmState& last,
+                                     gateway::arm::MotionPhase phase) const;
 
   Stamps stamps_;
-  std::unique_ptr<Rig> made_rig_;
-  Bounds bounds_;
+  std::unique_ptr<gateway::Rig> made_rig_;
+  geometry::Bounds bounds_;
 };
 
 // As the gateway puts its rig together, with stamps between the parts.
 absl::Status Overhead::Open() {
   const std::string config = emulator_->config_path();
   const char* argv[] = {"touchstone-gateway", "--config", config.c_str(), "--supershape-triangles", "2000"};
-  auto flags = ParseGatewayFlags(5, argv);
+  auto flags = service::ParseGatewayFlags(5, argv);
   if (!flags.ok()) return flags.status();
-  const GatewayOptions& options = flags->options;
+  const service::GatewayOptions& options = flags->options;
   ThreadPool pool(0);
-  auto objects = ObjectStore::Load(options.common.meshes, options.common.supershape_triangles, &pool);
+  auto objects = source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles, &pool);
   if (!objects.ok()) return objects.status();
   auto object = objects->Find("lat00", "object");
   if (!object.ok()) return object.status();
   bounds_ = (*object)->surface->bounds();
 
-  RigParts parts;
-  parts.changes = std::make_unique<ChangeNotifier>();
-  auto calibration = ReadCalibration(options.calibration);
+  gateway::RigParts parts;
+  parts.changes = std::make_unique<gateway::timing::ChangeNotifier>();
+  auto calibration = gateway::calibration::ReadCalibration(options.calibration);
   if (!calibration.ok()) return calibration.status();
-  auto planner = MotionPlanner::Create(options.arm.model, options.limits, *calibration);
+  auto planner = gateway::arm::MotionPlanner::Create(options.arm.model, options.limits, *calibration);
   if (!planner.ok()) return planner.status();
   parts.planner = *std::move(planner);
-  auto journal = Journal::Open(options.journal, Journal::Mode::kCreateOrReadWrite);
+  auto journal = session::Journal::Open(options.journal, session::Journal::Mode::kCreateOrReadWrite);
   if (!journal.ok()) return journal.status();
   parts.journal = std::make_unique<StampedJournal>(*std::move(journal), &stamps_);
-  auto audit = AuditLog::Open(options.audit_log);
+  auto audit = gateway::audit::AuditLog::Open(options.audit_log);
   if (!audit.ok()) return audit.status();
   parts.audit = *std::move(audit);
-  UrArmOptions arm;
+  gateway::arm::UrArmOptions arm;
   arm.model = options.arm.model, arm.address = options.arm.address;
   arm.dashboard_port = options.arm.dashboard_port, arm.primary_port = options.arm.primary_port;
   arm.secondary_port = options.arm.secondary_port, arm.rtde_port = options.arm.rtde_port;
@@ -68,29 +69,31 @@ absl::Status Overhead::Open() {
   arm.script.transit_speed_m_s = options.limits.transit_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
-  auto connected = ConnectUrArm(arm, parts.changes.get());
+  auto connected = gateway::arm::ConnectUrArm(arm, parts.changes.get());
   if (!connected.ok()) return connected.status();
   parts.arm = std::make_unique<StampedArm>(*std::move(connected), &stamps_);
-  auto effector = Effector::Open(options.effector, parts.changes.get());
+  auto effector = gateway::effector::Effector::Open(options.effector, parts.changes.get());
   if (!effector.ok()) return effector.status();
   const int fingers = static_cast<int>(options.effector.fingers.size());
   parts.effector = std::make_unique<StampedEffector>(*std::move(effector), fingers, &stamps_);
-  RigOptions rig;
+  gateway::RigOptions rig;
   rig.fingers = fingers;
   rig.time_scale = options.time_scale;
   rig.max_overtravel_m = options.max_overtravel_mm / 1000;
   rig.mount_command = options.mount_command;
-  auto made = Rig::Create(std::move(rig), std::move(parts));
+  auto made = gateway::Rig::Create(std::move(rig), std::move(parts));
   if (!made.ok()) return made.status();
   made_rig_ = *std::move(made);
   return absl::OkStatus();
 }
 
 // Host time at which the first state of this program with this phase arrived.
-absl::StatusOr<double> Overhead::FirstHeardS(const ArmState& last, MotionPhase phase) const {
-  for (const ArmState& state : made_rig_->arm().History(last.controller_time_s - 29, last.controller_time_s))
+absl::StatusOr<double> Overhead::FirstHeardS(const gateway::arm::ArmState& last,
+                                             gateway::arm::MotionPhase phase) const {
+  for (const gateway::arm::ArmState& state :
+       made_rig_->arm().History(last.controller_time_s - 29, last.controller_time_s))
     if (state.program_id == last.program_id && state.phase == phase) return state.host_time_s;
-  return absl::NotFoundError(std::string("no state has the phase ") + PhaseName(phase));
+  return absl::NotFoundError(std::string("no state has the phase ") + gateway::arm::PhaseName(phase));
 }
 
 void PrintRow(const char* name, std::vector<double> times_s) {
@@ -107,26 +110,27 @@ int Overhead::Measure(int touches, double speedup) {
     std::fprintf(stderr, "error: %s\n", std::string(opened.message()).c_str());
     return 1;
   }
-  WaitUntil([this] { return made_rig_->State() == SourceState::kIdle; }, "the rig is ready");
+  WaitUntil([this] { return made_rig_->State() == source::SourceState::kIdle; }, "the rig is ready");
   std::vector<double> before_s, go_s, retreat_s, after_s, all_s, disk_s, answers_s, wall_s;
   for (int k = -2; k < touches; ++k) {  // the first two mount the object and are not counted
     const v1::CommandedTouch message = FromAbove(0.02 + 1e-5 * k, k % 4);
-    TouchCommand command;
+    source::TouchCommand command;
     command.session = "overhead", command.id = std::to_string(k), command.object = "lat00",
     command.bounds = bounds_;
-    command.touch = *FromProto(message, "touch");
-    command.bytes = CommandBytes(message);
+    command.touch = *service::FromProto(message, "touch");
+    command.bytes = session::CommandBytes(message);
     stamps_ = Stamps();
-    const double began_s = HostNowS();
+    const double began_s = gateway::timing::HostNowS();
     const auto made = made_rig_->Touch(command, [] { return absl::OkStatus(); });
-    const double ended_s = HostNowS();
+    const double ended_s = gateway::timing::HostNowS();
     const auto last = made_rig_->arm().State();
     if (!made.ok() || !last.ok()) {
       std::fprintf(stderr, "error: %s\n",
                    std::string((made.ok() ? last.status() : made.status()).message()).c_str());
       return 1;
     }
-    const auto ready = FirstHeardS(*last, MotionPhase::kReady), done = FirstHeardS(*last, MotionPhase::kDone);
+    const auto ready = FirstHeardS(*last, gateway::arm::MotionPhase::kReady),
+               done = FirstHeardS(*last, gateway::arm::MotionPhase::kDone);
     if (!ready.ok() || !done.ok() || stamps_.all_heard_s == 0 || k < 0) continue;
     wall_s.push_back(ended_s - began_s);
     before_s.push_back(stamps_.program_sent_s - began_s - stamps_.disk_before_s);

@@ -20,28 +20,29 @@ struct Stamps {
   double effector_arm_s = 0, effector_disarm_s = 0;  // waited for the end effector's answers
 };
 
-class StampedArm : public Arm {
+class StampedArm : public gateway::arm::Arm {
  public:
-  StampedArm(std::unique_ptr<Arm> arm, Stamps* stamps) : arm_(std::move(arm)), stamps_(stamps) {}
-  absl::StatusOr<ArmState> State() const override { return arm_->State(); }
-  std::vector<ArmState> History(double from_s, double to_s) const override {
+  StampedArm(std::unique_ptr<gateway::arm::Arm> arm, Stamps* stamps)
+      : arm_(std::move(arm)), stamps_(stamps) {}
+  absl::StatusOr<gateway::arm::ArmState> State() const override { return arm_->State(); }
+  std::vector<gateway::arm::ArmState> History(double from_s, double to_s) const override {
     return arm_->History(from_s, to_s);
   }
   absl::Status Ready() const override { return arm_->Ready(); }
-  absl::Status StartTouch(const ArmTouch& touch) override {
+  absl::Status StartTouch(const gateway::arm::ArmTouch& touch) override {
     const absl::Status status = arm_->StartTouch(touch);
-    stamps_->program_sent_s = HostNowS();
+    stamps_->program_sent_s = gateway::timing::HostNowS();
     stamps_->disk_before_s = stamps_->disk_s;
     return status;
   }
   absl::Status BeginApproach(uint32_t program_id) override {
     const absl::Status status = arm_->BeginApproach(program_id);
-    stamps_->go_sent_s = HostNowS();
+    stamps_->go_sent_s = gateway::timing::HostNowS();
     return status;
   }
   absl::Status EndApproach(uint32_t program_id) override {
     const absl::Status status = arm_->EndApproach(program_id);
-    stamps_->retract_sent_s = HostNowS();
+    stamps_->retract_sent_s = gateway::timing::HostNowS();
     return status;
   }
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
@@ -51,65 +52,69 @@ class StampedArm : public Arm {
   absl::Status Stop() override { return arm_->Stop(); }
   absl::Status PowerOn(const std::function<absl::Status()>& guard) override { return arm_->PowerOn(guard); }
   void SendHeartbeat() override { arm_->SendHeartbeat(); }
-  ClockEstimate ControllerClock() const override { return arm_->ControllerClock(); }
+  gateway::timing::ClockEstimate ControllerClock() const override { return arm_->ControllerClock(); }
   double StateRateHz() const override { return arm_->StateRateHz(); }
   std::string Model() const override { return arm_->Model(); }
   std::string Address() const override { return arm_->Address(); }
   std::string Version() const override { return arm_->Version(); }
 
  private:
-  const std::unique_ptr<Arm> arm_;
+  const std::unique_ptr<gateway::arm::Arm> arm_;
   Stamps* const stamps_;
 };
 
-class StampedEffector : public Effector {
+class StampedEffector : public gateway::effector::Effector {
  public:
-  StampedEffector(std::unique_ptr<Effector> effector, int fingers, Stamps* stamps)
+  StampedEffector(std::unique_ptr<gateway::effector::Effector> effector, int fingers, Stamps* stamps)
       : effector_(std::move(effector)), fingers_(fingers), stamps_(stamps) {}
   absl::Status StartCapture(uint32_t touch) override {
-    const double began_s = HostNowS();
+    const double began_s = gateway::timing::HostNowS();
     const absl::Status status = effector_->StartCapture(touch);
-    stamps_->effector_arm_s = HostNowS() - began_s;
+    stamps_->effector_arm_s = gateway::timing::HostNowS() - began_s;
     return status;
   }
   absl::Status EndCapture() override {
-    const double began_s = HostNowS();
+    const double began_s = gateway::timing::HostNowS();
     const absl::Status status = effector_->EndCapture();
-    stamps_->effector_disarm_s = HostNowS() - began_s;
+    stamps_->effector_disarm_s = gateway::timing::HostNowS() - began_s;
     return status;
   }
-  absl::StatusOr<EffectorTouch> Touch() const override {
-    const double now_s = HostNowS();
-    absl::StatusOr<EffectorTouch> touch = effector_->Touch();
+  absl::StatusOr<gateway::effector::EffectorTouch> Touch() const override {
+    const double now_s = gateway::timing::HostNowS();
+    absl::StatusOr<gateway::effector::EffectorTouch> touch = effector_->Touch();
     if (touch.ok() && stamps_->all_heard_s == 0 && touch->Contacts() == fingers_)
       stamps_->all_heard_s = now_s;
     return touch;
   }
-  absl::StatusOr<EffectorTouch> Recall(uint32_t touch) override { return effector_->Recall(touch); }
-  EffectorState State() const override { return effector_->State(); }
-  ClockEstimate Clock() const override { return effector_->Clock(); }
+  absl::StatusOr<gateway::effector::EffectorTouch> Recall(uint32_t touch) override {
+    return effector_->Recall(touch);
+  }
+  gateway::effector::EffectorState State() const override { return effector_->State(); }
+  gateway::timing::ClockEstimate Clock() const override { return effector_->Clock(); }
 
  private:
-  const std::unique_ptr<Effector> effector_;
+  const std::unique_ptr<gateway::effector::Effector> effector_;
   const int fingers_;
   Stamps* const stamps_;
 };
 
-class StampedJournal : public Journal {
+class StampedJournal : public session::Journal {
  public:
-  StampedJournal(std::unique_ptr<Journal> journal, Stamps* stamps)
+  StampedJournal(std::unique_ptr<session::Journal> journal, Stamps* stamps)
       : journal_(std::move(journal)), stamps_(stamps) {}
-  absl::Status EnsureSession(const JournalSession& session) override {
+  absl::Status EnsureSession(const session::JournalSession& session) override {
     return journal_->EnsureSession(session);
   }
-  absl::StatusOr<std::vector<JournalSession>> Sessions() const override { return journal_->Sessions(); }
-  absl::StatusOr<JournalSession> Session(const std::string& name) const override {
+  absl::StatusOr<std::vector<session::JournalSession>> Sessions() const override {
+    return journal_->Sessions();
+  }
+  absl::StatusOr<session::JournalSession> Session(const std::string& name) const override {
     return journal_->Session(name);
   }
   absl::Status DeleteSession(const std::string& name) override { return journal_->DeleteSession(name); }
-  absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
-                                     const std::string& object, const std::string& placement,
-                                     const std::string& command) override {
+  absl::StatusOr<session::JournalTouch> Begin(const std::string& session, const std::string& id,
+                                              const std::string& object, const std::string& placement,
+                                              const std::string& command) override {
     const Timed timed(stamps_);
     return journal_->Begin(session, id, object, placement, command);
   }
@@ -118,35 +123,37 @@ class StampedJournal : public Journal {
     const Timed timed(stamps_);
     return journal_->Executing(session, id, program_id, boot_id);
   }
-  absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result) override {
+  absl::Status Done(const std::string& session, const std::string& id,
+                    const session::JournalResult& result) override {
     const Timed timed(stamps_);
     return journal_->Done(session, id, result);
   }
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override {
     return journal_->Failed(session, id, error);
   }
-  absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) override {
+  absl::Status AddFinished(const std::string& session,
+                           const std::vector<session::JournalTouch>& touches) override {
     return journal_->AddFinished(session, touches);
   }
-  absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
-                                                   const std::string& id) const override {
+  absl::StatusOr<std::optional<session::JournalTouch>> Find(const std::string& session,
+                                                            const std::string& id) const override {
     return journal_->Find(session, id);
   }
   absl::Status ForEachTouch(const std::string& session,
-                            const std::function<bool(const JournalTouch&)>& each) const override {
+                            const std::function<bool(const session::JournalTouch&)>& each) const override {
     return journal_->ForEachTouch(session, each);
   }
-  absl::StatusOr<std::vector<std::pair<std::string, JournalTouch>>> Unfinished() const override {
+  absl::StatusOr<std::vector<std::pair<std::string, session::JournalTouch>>> Unfinished() const override {
     return journal_->Unfinished();
   }
-  absl::Status AddImage(const std::string& session, const JournalImage& image) override {
+  absl::Status AddImage(const std::string& session, const session::JournalImage& image) override {
     return journal_->AddImage(session, image);
   }
   absl::Status ForEachImage(const std::string& session,
-                            const std::function<bool(const JournalImage&)>& each) const override {
+                            const std::function<bool(const session::JournalImage&)>& each) const override {
     return journal_->ForEachImage(session, each);
   }
-  absl::Status CopySession(const std::string& name, Journal* to) const override {
+  absl::Status CopySession(const std::string& name, session::Journal* to) const override {
     return journal_->CopySession(name, to);
   }
   absl::Status SetFact(const std::string& key, const std::string& value) override {
@@ -157,12 +164,12 @@ class StampedJournal : public Journal {
 
  private:
   struct Timed {
-    explicit Timed(Stamps* stamps) : stamps(stamps), began_s(HostNowS()) {}
-    ~Timed() { stamps->disk_s += HostNowS() - began_s; }
+    explicit Timed(Stamps* stamps) : stamps(stamps), began_s(gateway::timing::HostNowS()) {}
+    ~Timed() { stamps->disk_s += gateway::timing::HostNowS() - began_s; }
     Stamps* const stamps;
     const double began_s;
   };
-  const std::unique_ptr<Journal> journal_;
+  const std::unique_ptr<session::Journal> journal_;
   Stamps* const stamps_;
 };
 

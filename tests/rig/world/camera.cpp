@@ -21,7 +21,7 @@ constexpr char kBoundary[] = "touchstone-emulated-frame";
 EmulatedCamera::EmulatedCamera(const CameraOptions& options, std::function<CameraView()> look,
                                const Faults* faults)
     : options_(options), look_(std::move(look)), faults_(faults), random_(options.seed) {
-  auto renderer = CreateCpuRenderer();
+  auto renderer = image::CreateCpuRenderer();
   if (!renderer.ok()) throw std::runtime_error(std::string(renderer.status().message()));
   renderer_ = *renderer;
   server_ = std::make_unique<TcpServer>(options.address, options.port,
@@ -48,13 +48,13 @@ std::string EmulatedCamera::Picture() {
   const CameraView view = look_();
   std::vector<uint8_t> pixels(static_cast<size_t>(options_.width) * options_.height, 0);
   if (view.surface) {
-    Camera camera;
+    image::Camera camera;
     camera.eye_m = view.mesh_from_camera.translation();
     const Eigen::Vector3d ahead = view.mesh_from_camera.linear().col(2).normalized();
     camera.at_m = camera.eye_m + ahead * kLookAheadM;
     camera.up = -view.mesh_from_camera.linear().col(1);
     camera.vertical_fov_rad = options_.vertical_fov_rad;
-    ImageOptions image;
+    image::ImageOptions image;
     image.width = options_.width, image.height = options_.height;
     // An object that is not before the camera at all gives no picture, but a dark one.
     if (auto rendered = renderer_->Render(view.surface, camera, image); rendered.ok())
@@ -64,7 +64,7 @@ std::string EmulatedCamera::Picture() {
     const int noise = static_cast<int>(random_() % (2 * kNoiseLevels + 1)) - kNoiseLevels;
     level = static_cast<uint8_t>(std::clamp(std::max<int>(level, kGroundLevel) + noise, 0, 255));
   }
-  auto jpeg = EncodeJpeg(pixels.data(), options_.width, options_.height, 1, kJpegQuality);
+  auto jpeg = image::EncodeJpeg(pixels.data(), options_.width, options_.height, 1, kJpegQuality);
   return jpeg.ok() ? *jpeg : std::string();
 }
 

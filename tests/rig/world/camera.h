@@ -33,7 +33,7 @@ struct CameraOptions {
 
 // What is before the camera now.
 struct CameraView {
-  std::shared_ptr<const Surface> surface;                          // none: nothing is mounted
+  std::shared_ptr<const geometry::Surface> surface;                // none: nothing is mounted
   Eigen::Affine3d mesh_from_camera = Eigen::Affine3d::Identity();  // z looks ahead, y down
 };
 
@@ -58,7 +58,7 @@ class EmulatedCamera {
   const CameraOptions options_;
   const std::function<CameraView()> look_;
   const Faults* const faults_;
-  std::shared_ptr<Renderer> renderer_;
+  std::shared_ptr<image::Renderer> renderer_;
   std::mt19937_64 random_;
 
   mutable std::mutex mutex_;

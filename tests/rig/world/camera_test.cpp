@@ -53,7 +53,9 @@ std::vector<uint8_t> Decode(const std::string& jpeg, int* width, int* height) {
 class EmulatedCameraTest : public testing::Test {
  protected:
   EmulatedCameraTest() {
-    surface_ = Surface::Create("lat20", MakeSupershape(*NamedSupershape("lat20"), 2000).value()).value();
+    surface_ = geometry::Surface::Create(
+                   "lat20", geometry::MakeSupershape(*geometry::NamedSupershape("lat20"), 2000).value())
+                   .value();
     camera_ = std::make_unique<EmulatedCamera>(
         CameraOptions(),
         [this] {
@@ -67,7 +69,7 @@ class EmulatedCameraTest : public testing::Test {
         &faults_);
   }
   Faults faults_;
-  std::shared_ptr<const Surface> surface_;
+  std::shared_ptr<const geometry::Surface> surface_;
   std::unique_ptr<EmulatedCamera> camera_;
 };
 

@@ -112,7 +112,7 @@ std::optional<Eigen::Affine3d> Fingers::BaseFromMesh() const {
     if (hidden.effect != "object_pose") continue;
     const double* six = hidden.values.data() + (hidden.values.size() > 6 ? 6 * object : 0);
     object_from_mesh.translation() = Vec(six[0], six[1], six[2]) * 1e-3;
-    object_from_mesh.linear() = RotationFromVector(Vec(six[3], six[4], six[5]) * (M_PI / 180));
+    object_from_mesh.linear() = geometry::RotationFromVector(Vec(six[3], six[4], six[5]) * (M_PI / 180));
   }
   object_from_mesh.linear() *= 1 + session_.rig.Value("object_scale");
   return Eigen::Affine3d(BaseFromObject()) * object_from_mesh;

@@ -149,7 +149,7 @@ std::vector<std::shared_ptr<const hidden::Solid>> ReadObjects(const std::vector<
     objects.push_back(std::make_shared<hidden::Solid>(name, hidden::ReadTriangles(file)));
   }
   if (meshes.empty())
-    for (const std::string& name : SupershapeNames())
+    for (const std::string& name : geometry::SupershapeNames())
       objects.push_back(std::make_shared<hidden::Solid>(name, hidden::SupershapeTriangles(name, triangles)));
   return objects;
 }
