@@ -97,11 +97,19 @@ TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {
   EXPECT_EQ((*touches)[1].touch, 2u);
 }
 
-// Every column, NaN where NaN is.
-void ExpectSame(const MeasurementSet& a, const MeasurementSet& b) {
-  const auto same = [](const std::vector<double>& x, const std::vector<double>& y) {
-    return std::equal(x.begin(), x.end(), y.begin(), y.end(),
-                      [](double p, double q) { return p == q || (std::isnan(p) && std::isnan(q)); });
+// Every column, NaN where NaN is; numbers within the relative `tolerance`.
+void ExpectSame(const MeasurementSet& a, const MeasurementSet& b, double tolerance) {
+  const auto near = [&](double p, double q) {
+    return std::abs(p - q) <= tolerance * std::abs(p) || p == q || (std::isnan(p) && std::isnan(q));
+  };
+  const auto same = [&](const std::vector<double>& x, const std::vector<double>& y) {
+    return std::equal(x.begin(), x.end(), y.begin(), y.end(), near);
+  };
+  const auto same_vectors = [&](const std::vector<Eigen::Vector3d>& x,
+                                const std::vector<Eigen::Vector3d>& y) {
+    return std::equal(x.begin(), x.end(), y.begin(), y.end(), [&](const auto& p, const auto& q) {
+      return near(p.x(), q.x()) && near(p.y(), q.y()) && near(p.z(), q.z());
+    });
   };
   EXPECT_EQ(a.origin, b.origin);
   EXPECT_EQ(a.fingers, b.fingers);
@@ -110,12 +118,12 @@ void ExpectSame(const MeasurementSet& a, const MeasurementSet& b) {
   EXPECT_EQ(a.objects, b.objects);
   EXPECT_EQ(a.touch, b.touch);
   EXPECT_EQ(a.object, b.object);
-  EXPECT_EQ(a.target_m, b.target_m);
-  EXPECT_EQ(a.approach, b.approach);
-  EXPECT_EQ(a.lateral, b.lateral);
-  EXPECT_EQ(a.standoff_m, b.standoff_m);
-  EXPECT_EQ(a.speed_m_s, b.speed_m_s);
-  EXPECT_EQ(a.session_time_s, b.session_time_s);
+  EXPECT_TRUE(same_vectors(a.target_m, b.target_m));
+  EXPECT_TRUE(same_vectors(a.approach, b.approach));
+  EXPECT_TRUE(same_vectors(a.lateral, b.lateral));
+  EXPECT_TRUE(same(a.standoff_m, b.standoff_m));
+  EXPECT_TRUE(same(a.speed_m_s, b.speed_m_s));
+  EXPECT_TRUE(same(a.session_time_s, b.session_time_s));
   EXPECT_EQ(a.round, b.round);
   EXPECT_EQ(a.face, b.face);
   EXPECT_EQ(a.line, b.line);
@@ -130,7 +138,7 @@ TEST_F(SessionFiles, ASessionIsTheSetThatItsFileIsReadAs) {
   const auto file = ParseMeasurementSet(kCsv, "s");
   const auto direct = SessionMeasurementSet(*journal_, "s", "s");
   ASSERT_TRUE(file.ok() && direct.ok()) << direct.status();
-  ExpectSame(*direct, *file);
+  ExpectSame(*direct, *file, 0);
 }
 
 TEST_F(SessionFiles, WhatARigMeasuredIsTheSetThatItsFileIsReadAs) {
@@ -165,7 +173,8 @@ TEST_F(SessionFiles, WhatARigMeasuredIsTheSetThatItsFileIsReadAs) {
   const auto file = ParseMeasurementSet(*ReadFile(out), "rig");
   const auto direct = SessionMeasurementSet(*journal_, "rig", "rig");
   ASSERT_TRUE(file.ok() && direct.ok()) << file.status() << direct.status();
-  ExpectSame(*direct, *file);
+  // The file's millimetres and microseconds are rounded.
+  ExpectSame(*direct, *file, 4 * std::numeric_limits<double>::epsilon());
 }
 
 TEST_F(SessionFiles, ASetIsRefusedWhereItsFileWouldBe) {

@@ -57,7 +57,7 @@ TEST_F(StepwiseSearchTest, AddsTheEffectThatTheRowsFollow) {
 TEST_F(StepwiseSearchTest, RemovesAnEffectThatTwoOthersMakeSuperfluous) {
   // The third column looks like the sum of the first two, which are the causes.
   rows.columns["gravity_sag"] =
-      rows.columns["object_push"] + rows.columns["oblique_slip"] + rows.Random(20, 0.3 * kColumn);
+      rows.columns["object_push"] + rows.columns["oblique_slip"] + rows.Random(20, 0.8 * kColumn);
   rows.measured += kPushM * (rows.columns["object_push"] + rows.columns["oblique_slip"]);
   std::vector<std::string> names = Names(Search().Run(Nominal(), 0)->fit);
   std::sort(names.begin(), names.end());
