@@ -46,13 +46,17 @@ if(TOUCHSTONE_SANITIZE)
   set(TOUCHSTONE_TEST_TIMEOUT_S 1800)
 endif()
 
-# touchstone_test(NAME SOURCES a_test.cpp ... LINKS ...): one test binary a folder, NAME_test.
+# touchstone_test(NAME [SLOW] SOURCES a_test.cpp ... LINKS ...): one test binary per folder, NAME_test. SLOW: it takes
+# minutes without optimisation; such tests are labelled so.
 function(touchstone_test name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name}_test ${ARG_SOURCES})
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
   add_test(NAME ${name} COMMAND ${name}_test)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S})
+  if(ARG_SLOW)
+    set_tests_properties(${name} PROPERTIES LABELS slow)
+  endif()
 endfunction()
 
 # touchstone_link(TARGET PUBLIC|PRIVATE links...)

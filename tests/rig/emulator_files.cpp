@@ -90,6 +90,9 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
       "%d\nrtde_port = %d\n",
       Quoted(options.arm), Quoted(options.address), addresses.arm.dashboard, addresses.arm.primary,
       addresses.arm.secondary, addresses.arm.rtde);
+  // The watchdog counts host time, and a busy host may leave the gateway without the processor for a while; only an
+  // arm that could hurt somebody needs it sooner.
+  if (options.speedup > 1) text += "watchdog_hz = 0.5\n";
   text += absl::StrFormat(
       "\n[effector]\nport = %s\nbaud = 115200\nfingers = %d\nspacing_mm = %.9g\nsensor = %s\n",
       Quoted(dir + "/effector"), options.fingers, options.spacing_mm, Quoted(options.sensor));
