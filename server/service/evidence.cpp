@@ -65,7 +65,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
   for (const v1::MeshFile& file : message.meshes())
     if (!files.emplace(file.name(), &file).second)
       return absl::InvalidArgumentError(
-          absl::StrCat("meshes: two are named '", file.name(), "'; one an object was expected"));
+          absl::StrCat("meshes: two are named '", file.name(), "'; one per object was expected"));
   std::vector<std::string> missing;
   for (const std::string& name : input->set->objects) {
     const auto file = files.find(name);

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
@@ -11,15 +11,15 @@ namespace {
 constexpr double kSigmaS = 0.005;
 
 // Contacts come early by 1 ms per degree of incidence, on every finger.
-touches::MadeUpSet EarlyOnSlopes() {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 1);
+touches::SyntheticSet EarlyOnSlopes() {
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
   set.Finish();
   return set;
 }
 
-std::vector<ResidualCurve> Curves(const touches::MadeUpSet& set) {
+std::vector<ResidualCurve> Curves(const touches::SyntheticSet& set) {
   return MakeResidualCurves(set.observations, set.prediction, set.residuals, set.residuals, 0);
 }
 
@@ -33,7 +33,7 @@ double CurveP(const std::vector<ResidualCurve>& curves, const std::string& name)
 TEST(ResidualCurves, AreFlatUnderNoiseAndTheirPIsHonest) {
   int claims = 0, curves = 0;
   for (int seed = 0; seed < 20; ++seed) {
-    const auto made = Curves(touches::MadeUpSet(3, 48, 4, kSigmaS, 100 + seed));
+    const auto made = Curves(touches::SyntheticSet(3, 48, 4, kSigmaS, 100 + seed));
     for (const ResidualCurve& curve : made) {
       ++curves;
       claims += curve.p_value < 0.05;
@@ -62,7 +62,7 @@ TEST(ResidualCurves, RepeatsOfAPoseAreNotTakenForEvidence) {
   // Every pose has an error of its own that no covariate explains.
   int claims = 0;
   for (int seed = 0; seed < 20; ++seed) {
-    touches::MadeUpSet set(2, 48, 8, kSigmaS, 200 + seed);
+    touches::SyntheticSet set(2, 48, 8, kSigmaS, 200 + seed);
     for (int k = 0; k < set.size(); ++k)
       for (int i = 0; i < 3; ++i)
         set.observations.time_s[k * 3 + i] +=
@@ -75,7 +75,7 @@ TEST(ResidualCurves, RepeatsOfAPoseAreNotTakenForEvidence) {
 }
 
 TEST(ResidualCurves, ADriftIsSeenThroughTheRepeats) {
-  touches::MadeUpSet set(2, 48, 8, kSigmaS, 4);
+  touches::SyntheticSet set(2, 48, 8, kSigmaS, 4);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.01 * set.observations.set->session_time_s[k] / 7680;
   set.Finish();

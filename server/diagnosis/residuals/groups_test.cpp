@@ -6,7 +6,7 @@
 #include <map>
 
 #include "server/diagnosis/residuals/worst_touches.h"
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
@@ -14,15 +14,15 @@ namespace {
 constexpr double kSigmaS = 0.005;
 
 // Contacts come early by 1 ms per degree of incidence, on every finger.
-touches::MadeUpSet EarlyOnSlopes() {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 1);
+touches::SyntheticSet EarlyOnSlopes() {
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
   set.Finish();
   return set;
 }
 
-GroupedErrors Group(const touches::MadeUpSet& set) {
+GroupedErrors Group(const touches::SyntheticSet& set) {
   return GroupErrors(set.observations, set.residuals, kSigmaS);
 }
 
@@ -41,13 +41,13 @@ TEST(ErrorGroups, EveryKindAddsUpToAllTouchesAndToTheWholeExcess) {
 }
 
 TEST(ErrorGroups, OfNoiseHaveTheRmseSigma) {
-  const GroupedErrors grouped = Group(touches::MadeUpSet(5, 48, 4, kSigmaS, 2));
+  const GroupedErrors grouped = Group(touches::SyntheticSet(5, 48, 4, kSigmaS, 2));
   for (const ErrorGroup& group : grouped.groups)
     EXPECT_NEAR(group.rmse_s, kSigmaS, group.touches > 500 ? 0.0004 : 0.0011) << group.name;
 }
 
 TEST(ErrorGroups, OfALateFingerHaveTwoThirdsOfItAsItsBias) {
-  touches::MadeUpSet set(2, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(2, 48, 4, kSigmaS, 3);
   for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 2] += 0.03;
   set.observations.time_s[77 * 3] -= 1;
   set.observations.time_s[99 * 3] -= 2;
@@ -58,7 +58,7 @@ TEST(ErrorGroups, OfALateFingerHaveTwoThirdsOfItAsItsBias) {
 }
 
 TEST(WorstTouches, AreThoseThatCountWithTheLargestFirst) {
-  touches::MadeUpSet set(2, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(2, 48, 4, kSigmaS, 3);
   set.observations.time_s[77 * 3] -= 1;
   set.observations.time_s[99 * 3] -= 2;
   set.observations.used[99] = 0;

@@ -3,19 +3,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr double kSigmaS = 0.005;
 
-std::vector<ComparedHistogram> Histograms(const touches::MadeUpSet& set, uint64_t seed = 0) {
+std::vector<ComparedHistogram> Histograms(const touches::SyntheticSet& set, uint64_t seed = 0) {
   return MakeHistograms(set.observations, set.prediction, set.prediction, {kSigmaS, 0.03, seed});
 }
 
 TEST(ResidualHistograms, OfARightModelAgree) {
-  const touches::MadeUpSet set(5, 48, 4, kSigmaS, 5);
+  const touches::SyntheticSet set(5, 48, 4, kSigmaS, 5);
   const auto right = Histograms(set);
   EXPECT_EQ(right.size(), 12u);  // two quantities, five objects and all
   int small = 0;
@@ -31,10 +31,10 @@ TEST(ResidualHistograms, OfARightModelAgree) {
 }
 
 TEST(ResidualHistograms, SeeAShiftOfTheMiddleFingerInTheCurvature) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 6);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 6);
   for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] -= 20 * kSigmaS;
   set.Finish();
-  touches::MadeUpSet true_set = set;
+  touches::SyntheticSet true_set = set;
   for (int k = 0; k < set.size(); ++k) true_set.prediction.time_s[k * 3 + 1] -= 20 * kSigmaS;
   true_set.Finish();
   const auto histograms =
@@ -49,7 +49,7 @@ TEST(ResidualHistograms, SeeAShiftOfTheMiddleFingerInTheCurvature) {
 TEST(ResidualHistograms, AreCalibrated) {
   int small = 0;
   for (int seed = 0; seed < 60; ++seed) {
-    const auto made = Histograms(touches::MadeUpSet(1, 48, 4, kSigmaS, 300 + seed), seed);
+    const auto made = Histograms(touches::SyntheticSet(1, 48, 4, kSigmaS, 300 + seed), seed);
     for (const ComparedHistogram& histogram : made) small += histogram.p_simulated < 0.1;
   }
   EXPECT_GE(small, 2);  // 120 tests at 0.1: 12 are expected

@@ -3,26 +3,26 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr double kSigmaS = 0.005;
 
-std::vector<ErrorSlice> Slices(const touches::MadeUpSet& set) {
+std::vector<ErrorSlice> Slices(const touches::SyntheticSet& set) {
   return FindSlices(set.observations, set.prediction, set.residuals, kSigmaS);
 }
 
 TEST(ErrorSlices, NoiseAloneHasNoSlices) {
   int claims = 0;
   for (int seed = 0; seed < 100; ++seed)
-    claims += !Slices(touches::MadeUpSet(5, 48, 4, kSigmaS, seed)).empty();
+    claims += !Slices(touches::SyntheticSet(5, 48, 4, kSigmaS, seed)).empty();
   EXPECT_LE(claims, 1);
 }
 
 TEST(ErrorSlices, ABiasBeyondAnAngleIsFoundThereWithItsSignAndSize) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 1);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (set.IncidenceDeg(k, i) > 20) set.observations.time_s[k * 3 + i] -= 0.03;
@@ -38,7 +38,7 @@ TEST(ErrorSlices, ABiasBeyondAnAngleIsFoundThereWithItsSignAndSize) {
 }
 
 TEST(ErrorSlices, OneFingerOfOneObjectIsTwoConditions) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 2);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 2);
   for (int k = 0; k < set.size(); ++k)
     if (set.observations.object[k] == 3) set.observations.time_s[k * 3 + 2] += 0.03;
   set.Finish();
@@ -54,7 +54,7 @@ TEST(ErrorSlices, OneFingerOfOneObjectIsTwoConditions) {
 }
 
 TEST(ErrorSlices, TheFirstFingerIsSaidInWords) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 3);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (i != set.prediction.first_finger[k]) set.observations.time_s[k * 3 + i] += 0.015;
@@ -67,7 +67,7 @@ TEST(ErrorSlices, TheFirstFingerIsSaidInWords) {
 }
 
 TEST(ErrorSlices, AWeakBiasOfOneFingerIsSeenAlthoughTheExcessIsSmall) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 4);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 4);
   for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] += 0.3 * kSigmaS;
   set.Finish();
   const auto slices = Slices(set);
@@ -76,7 +76,7 @@ TEST(ErrorSlices, AWeakBiasOfOneFingerIsSeenAlthoughTheExcessIsSmall) {
 }
 
 TEST(ErrorSlices, ATouchThatIsLeftOutCountsNowhere) {
-  touches::MadeUpSet set(5, 48, 4, kSigmaS, 5);
+  touches::SyntheticSet set(5, 48, 4, kSigmaS, 5);
   for (int k = 0; k < set.size(); ++k)
     if (set.observations.object[k] == 2) {
       set.observations.time_s[k * 3] += 1;
@@ -88,7 +88,7 @@ TEST(ErrorSlices, ATouchThatIsLeftOutCountsNowhere) {
 
 TEST(ErrorSlices, AFewTouchesAndMissingFingersAreNoTrouble) {
   for (const int poses : {1, 2, 5, 12}) {
-    touches::MadeUpSet set(1, poses, 4, kSigmaS, 6);
+    touches::SyntheticSet set(1, poses, 4, kSigmaS, 6);
     for (int k = 0; k < set.size(); k += 3) set.observations.time_s[k * 3 + k % 2] = NAN;
     for (int i = 0; i < 3; ++i) set.observations.time_s[i] = NAN;
     set.Finish();
@@ -97,7 +97,7 @@ TEST(ErrorSlices, AFewTouchesAndMissingFingersAreNoTrouble) {
 }
 
 TEST(ErrorSlices, CountsAllTouchesOfALargeSet) {
-  touches::MadeUpSet set(5, 500, 40, kSigmaS, 7);
+  touches::SyntheticSet set(5, 500, 40, kSigmaS, 7);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (set.IncidenceDeg(k, i) > 20) set.observations.time_s[k * 3 + i] -= 0.03;

@@ -4,18 +4,18 @@
 
 #include <cmath>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
 TEST(Rmse, EqualsSigmaWhereTheModelIsPerfect) {
-  const touches::MadeUpSet set(5, 48, 4, 0.005, 1);
+  const touches::SyntheticSet set(5, 48, 4, 0.005, 1);
   EXPECT_NEAR(touches::Rmse(set.observations, set.residuals), 0.005, 0.0002);
 }
 
 TEST(PureError, IsTheScatterOfRepeatsWhateverTheMisfit) {
-  touches::MadeUpSet set(5, 48, 4, 0.005, 2);
+  touches::SyntheticSet set(5, 48, 4, 0.005, 2);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.05 * std::sin(set.observations.pose[k]);
   set.Finish();
@@ -29,14 +29,14 @@ TEST(LackOfFit, IsUniformWhereNothingIsMissing) {
   int below_tenth = 0;
   constexpr int kSets = 200;
   for (int seed = 0; seed < kSets; ++seed) {
-    const touches::MadeUpSet set(3, 10, 3, 0.005, 100 + seed);
+    const touches::SyntheticSet set(3, 10, 3, 0.005, 100 + seed);
     below_tenth += LackOfFitP(set.observations, set.residuals, 0) < 0.1;
   }
   EXPECT_NEAR(below_tenth, 0.1 * kSets, 4 * std::sqrt(0.09 * kSets));
 }
 
 TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
-  touches::MadeUpSet set(5, 48, 4, 0.005, 3);
+  touches::SyntheticSet set(5, 48, 4, 0.005, 3);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.005 * std::sin(set.observations.pose[k]);
   set.Finish();
@@ -44,7 +44,7 @@ TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
 }
 
 TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
-  const touches::MadeUpSet set(5, 48, 1, 0.005, 4);
+  const touches::SyntheticSet set(5, 48, 1, 0.005, 4);
   const NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
   EXPECT_FALSE(floor.from_repeats);
   EXPECT_NEAR(floor.sigma_s, 5000e-6, 400e-6);

@@ -4,13 +4,13 @@
 
 #include <cmath>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
 
 TEST(Contrasts, AreBlindToAShiftOfAWholeTouch) {
-  MadeUpSet set(2, 6, 2, 0.005, 1);
+  SyntheticSet set(2, 6, 2, 0.005, 1);
   const Contrasts contrasts(set.observations, set.prediction.time_s);
   std::vector<double> times = set.observations.time_s;
   const Eigen::VectorXd before = contrasts.Apply(times);
@@ -19,7 +19,7 @@ TEST(Contrasts, AreBlindToAShiftOfAWholeTouch) {
 }
 
 TEST(Contrasts, KeepTheLengthOfAResidual) {
-  MadeUpSet set(2, 6, 2, 0.005, 1);
+  SyntheticSet set(2, 6, 2, 0.005, 1);
   const Contrasts contrasts(set.observations, set.prediction.time_s);
   double squares = 0;
   for (const double r : set.residuals) squares += r * r;
@@ -27,7 +27,7 @@ TEST(Contrasts, KeepTheLengthOfAResidual) {
 }
 
 TEST(Contrasts, LeaveOutFingersThatDidNotReport) {
-  MadeUpSet set(1, 4, 1, 0.005, 1);
+  SyntheticSet set(1, 4, 1, 0.005, 1);
   set.observations.time_s[0] = NAN;                               // touch 0: two fingers left
   set.observations.time_s[3] = set.observations.time_s[4] = NAN;  // touch 1: one
   const Contrasts contrasts(set.observations, set.prediction.time_s);
@@ -40,7 +40,7 @@ TEST(Contrasts, LeaveOutFingersThatDidNotReport) {
 }
 
 TEST(Contrasts, StandSortedByObject) {
-  MadeUpSet set(3, 5, 2, 0.005, 1);
+  SyntheticSet set(3, 5, 2, 0.005, 1);
   const Contrasts contrasts(set.observations, set.prediction.time_s);
   for (int row = 1; row < contrasts.rows(); ++row)
     EXPECT_LE(contrasts.object_of_row()[row - 1], contrasts.object_of_row()[row]);

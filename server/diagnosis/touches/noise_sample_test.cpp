@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/diagnosis/touches/made_up_test_set.h"
+#include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
@@ -14,7 +14,7 @@ constexpr double kSigma = 0.005;
 
 template <typename Draw>
 inference::NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
-  MadeUpSet set(5, 48, 4, 0, seed);
+  SyntheticSet set(5, 48, 4, 0, seed);
   std::vector<double> tangents(set.observations.time_s.size());
   for (size_t e = 0; e < tangents.size(); ++e) {
     tangents[e] =
@@ -67,7 +67,7 @@ TEST(FindNoise, TellsOutliersFromHeavyTails) {
 }
 
 TEST(FindNoise, FindsTheTicksOfAPollingLoop) {
-  MadeUpSet set(3, 20, 2, kSigma, 5);
+  SyntheticSet set(3, 20, 2, kSigma, 5);
   for (double& time_s : set.observations.time_s) time_s = std::ceil(time_s / 0.0125) * 0.0125;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
@@ -77,7 +77,7 @@ TEST(FindNoise, FindsTheTicksOfAPollingLoop) {
 }
 
 TEST(FindNoise, CountsContactsThatAreMissed) {
-  MadeUpSet set(3, 20, 2, kSigma, 6);
+  SyntheticSet set(3, 20, 2, kSigma, 6);
   for (size_t e = 0; e < set.observations.time_s.size(); e += 11) set.observations.time_s[e] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
@@ -87,7 +87,7 @@ TEST(FindNoise, CountsContactsThatAreMissed) {
 }
 
 TEST(FindNoise, AFingerThatIsSilentInEveryRepeatIsOutOfReachAndNoChance) {
-  MadeUpSet set(3, 20, 4, kSigma, 6);
+  SyntheticSet set(3, 20, 4, kSigma, 6);
   const Observations& o = set.observations;
   for (int k = 0; k < o.size(); ++k)
     if (o.pose[k] % 10 == 0) set.observations.time_s[static_cast<size_t>(k) * o.fingers + 2] = NAN;

@@ -24,7 +24,7 @@ struct Observations {
   std::shared_ptr<const session::MeasurementSet> set;
   int fingers = 0;
   std::vector<std::string> objects;                                // as in the set
-  std::vector<std::shared_ptr<const geometry::Surface>> surfaces;  // one an object
+  std::vector<std::shared_ptr<const geometry::Surface>> surfaces;  // one per object
   std::vector<int> row;                                            // touch -> row of the set
   std::vector<int> object;                                         // touch -> index into objects
   std::vector<int> pose;  // touch -> group of equal commanded touches, numbered by first appearance

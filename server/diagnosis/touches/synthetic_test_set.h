@@ -1,4 +1,4 @@
-// For tests: an experiment whose prediction is made up, so that residuals are what the test wants.
+// For tests: an experiment whose prediction is synthetic, so that residuals are what the test wants.
 #pragma once
 
 #include <cmath>
@@ -11,13 +11,13 @@
 
 namespace touchstone::diagnosis::touches {
 
-struct MadeUpSet {
+struct SyntheticSet {
   Observations observations;
   Prediction prediction;
   std::vector<double> residuals;
 
   // `objects` x `poses` x `rounds` touches, three fingers, incidence up to 30 deg, travel 40 to 90 mm.
-  MadeUpSet(int objects, int poses, int rounds, double sigma_s, uint64_t seed) {
+  SyntheticSet(int objects, int poses, int rounds, double sigma_s, uint64_t seed) {
     auto set = std::make_shared<session::MeasurementSet>();
     set->fingers = observations.fingers = prediction.fingers = 3;
     set->has_poses = set->has_session_time = true;
