@@ -1,6 +1,7 @@
 #include "server/base/touch_limits.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 #include <random>
