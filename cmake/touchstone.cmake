@@ -24,11 +24,21 @@ if(CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
-# touchstone_library(NAME SOURCES a.cpp ... LINKS base geometry absl::status ...)
-# makes the static library touchstone_NAME; a plain word in LINKS is a folder of this project.
+# Files of a folder are compiled several at a time, so that what they include is read once for all of them. Names of
+# files' own are therefore unique within a folder, as people who read it would have them. Off, a change of one file
+# compiles that one alone; the steps no_egl and tsan of deploy/test show that files stand on their own.
+option(TOUCHSTONE_UNITY "Compile the files of a folder several at a time" ON)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 6)
+
+# touchstone_library(NAME [SEPARATE] SOURCES a.cpp ... LINKS base geometry absl::status ...)
+# makes the static library touchstone_NAME; a plain word in LINKS is a folder of this project. SEPARATE: its files
+# use the same names, each for itself, and are compiled one by one.
 function(touchstone_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "SEPARATE" "" "SOURCES;LINKS" ${ARGN})
   add_library(touchstone_${name} STATIC ${ARG_SOURCES})
+  if(TOUCHSTONE_UNITY AND NOT ARG_SEPARATE)
+    set_target_properties(touchstone_${name} PROPERTIES UNITY_BUILD ON)
+  endif()
   touchstone_link(touchstone_${name} PUBLIC ${ARG_LINKS})
 endfunction()
 
@@ -51,6 +61,7 @@ endif()
 function(touchstone_test name)
   cmake_parse_arguments(ARG "SLOW" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name}_test ${ARG_SOURCES})
+  set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${TOUCHSTONE_UNITY})
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
   add_test(NAME ${name} COMMAND ${name}_test)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S})

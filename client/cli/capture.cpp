@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CaptureOptions {
   TouchFlags touch;
   ImageFlags image;
   MotionFlags motion;
@@ -33,7 +33,7 @@ absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std:
   return v;
 }
 
-absl::Status AddViews(const Options& options, v1::CaptureRequest* request) {
+absl::Status AddViews(const CaptureOptions& options, v1::CaptureRequest* request) {
   const int given = !options.plan.empty() + !options.eye_mm.empty() + !options.touch.approach.empty();
   if (given != 1)
     return absl::InvalidArgumentError(
@@ -112,7 +112,7 @@ absl::StatusOr<std::string> EncodingOf(const std::string& output) {
       absl::StrCat("-o: '", output, "' does not say the format; its name ends in .png or .jpg"));
 }
 
-absl::Status RunCapture(const Cli& cli, const Options& options) {
+absl::Status RunCapture(const Cli& cli, const CaptureOptions& options) {
   const fs::path output(options.output);
   v1::CaptureRequest request;
   request.set_object(options.object);
@@ -162,7 +162,7 @@ absl::Status RunCapture(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddCapture(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CaptureOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "capture", "Photographs an object: PNG or JPEG, with depth and mask on request.",
       "touchstone capture lat20 --approach 0,0,-1 -o top.png\n"

@@ -31,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxModelBytes = 1 << 20;
+constexpr uint64_t kMaxTermsBytes = 1 << 20;
 constexpr size_t kMaxInline = 16 << 20;  // a larger set is sent in pieces, as a session
 constexpr size_t kPiece = 1 << 20;
 constexpr int kWidthOfNoTerminal = 110;
@@ -187,7 +187,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     TOUCHSTONE_RETURN_IF_ERROR(
         model::ParseModel(evidence.model().yaml(), options.model, effects::Catalogue()).status());
   for (const std::string& path : options.also) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxModelBytes));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxTermsBytes));
     TOUCHSTONE_RETURN_IF_ERROR(
         model::ParseModel(service::AsModelFile(text), path, effects::Catalogue()).status());
     evidence.add_also_yaml(text);

@@ -9,13 +9,13 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options : ComparisonOptions {
+struct DiagnoseOptions : ComparisonOptions {
   std::string save_model;
   std::string keep_as;
 };
 
 // The improved model under the file's name, or the model itself where nothing had to change.
-absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report& report,
+absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1::Report& report,
                        Comparison* comparison) {
   const bool changed = !report.improved_model_yaml().empty();
   std::string yaml = report.improved_model_yaml();
@@ -42,7 +42,7 @@ absl::Status SaveModel(const Cli& cli, const Options& options, const v1::Report&
   return absl::OkStatus();
 }
 
-absl::Status RunDiagnose(const Cli& cli, const Options& options) {
+absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(
       cli, {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
   if (!options.keep_as.empty() && cli.source().servers.empty())
@@ -65,7 +65,7 @@ absl::Status RunDiagnose(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddDiagnose(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DiagnoseOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
       "Says how wrong a model is against measured touches, where, why, and what to add, until "

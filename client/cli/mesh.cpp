@@ -13,7 +13,7 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options {
+struct MeshOptions {
   std::string input;
   std::string output;
   std::string unit = "mm";
@@ -104,7 +104,7 @@ void Report(const Cli& cli, const std::string& name, const geometry::TriangleMes
     cli.Print(ReportInWords(name, mesh, report)).IgnoreError();
 }
 
-absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const Options& options) {
+absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--unit", options.unit, geometry::MeshUnitNames()).status());
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--up", options.up, geometry::MeshUpAxisNames()).status());
   geometry::MeshImport import;
@@ -119,7 +119,7 @@ absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const Options& optio
   return mesh;
 }
 
-absl::Status Write(const Cli& cli, const Options& options, const geometry::TriangleMesh& mesh) {
+absl::Status Write(const Cli& cli, const MeshOptions& options, const geometry::TriangleMesh& mesh) {
   // The ending names the format; standard output gets OFF.
   const std::string extension = std::filesystem::path(options.output).extension().string();
   const std::string format = IsStandardOutput(options.output) ? "off"
@@ -134,12 +134,12 @@ absl::Status Write(const Cli& cli, const Options& options, const geometry::Trian
   return absl::OkStatus();
 }
 
-absl::Status RunImport(const Cli& cli, const Options& options) {
+absl::Status RunImport(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
   return Write(cli, options, mesh);
 }
 
-absl::Status RunInfo(const Cli& cli, const Options& options) {
+absl::Status RunInfo(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
   Report(cli, options.input, mesh);
   return absl::OkStatus();
@@ -165,7 +165,7 @@ absl::StatusOr<geometry::Superformula> ParseSuperformula(const std::string& name
   return formula;
 }
 
-absl::Status RunSupershape(const Cli& cli, const Options& options) {
+absl::Status RunSupershape(const Cli& cli, const MeshOptions& options) {
   geometry::SupershapeParameters parameters;
   if (!options.name.empty()) {
     if (!options.longitude.empty() || !options.latitude.empty())
@@ -185,7 +185,7 @@ absl::Status RunSupershape(const Cli& cli, const Options& options) {
   return Write(cli, options, mesh);
 }
 
-void AddImportOptions(CLI::App* command, Options* options) {
+void AddImportOptions(CLI::App* command, MeshOptions* options) {
   const auto add = [&](const std::string& name, auto& value, const std::string& type,
                        const std::string& text) { command->add_option(name, value, text)->type_name(type); };
   add("--unit", options->unit, "UNIT", "Of the file's coordinates: mm, cm, m or inch. Default: mm");
@@ -198,7 +198,7 @@ void AddImportOptions(CLI::App* command, Options* options) {
 }  // namespace
 
 void AddMesh(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MeshOptions>();
   CLI::App* group = cli->AddGroup("mesh", "Converts, makes and inspects mesh files.",
                                   "touchstone mesh info cup.stl --unit inch\n"
                                   "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"

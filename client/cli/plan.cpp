@@ -7,7 +7,7 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options {
+struct PlanCommandOptions {
   PlanOptions plan;
   std::vector<std::string> objects;
   uint64_t seed = 0;
@@ -19,7 +19,7 @@ struct Options {
 // Touches that one request asks for.
 constexpr uint32_t kTouchesPerRequest = 10000;
 
-absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
+absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool count_given) {
   v1::ExpandPlanRequest request;
   TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_plan(), MakePlan(options.plan, nullptr));
   request.set_seed(options.seed);
@@ -76,7 +76,7 @@ absl::Status RunPlan(const Cli& cli, const Options& options, bool count_given) {
 }  // namespace
 
 void AddPlan(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlanCommandOptions>();
   auto count = std::make_shared<CLI::Option*>(nullptr);
   CLI::App* command = cli->AddCommand(
       nullptr, "plan", "Writes the commanded touches of a plan as CSV, a measurement file without times.",

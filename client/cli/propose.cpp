@@ -10,12 +10,12 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options : ComparisonOptions {
+struct ProposeOptions : ComparisonOptions {
   uint32_t touches = 24;
   std::string output;
 };
 
-absl::Status RunPropose(const Cli& cli, const Options& options) {
+absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
   if (options.touches < 1)
     return absl::InvalidArgumentError("--touches: 0 is out of range; 1 or more was expected");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
@@ -57,7 +57,7 @@ absl::Status RunPropose(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddPropose(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProposeOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "propose",
       "Writes a plan of the touches that would best tell apart the explanations that are left.",

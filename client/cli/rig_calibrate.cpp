@@ -24,15 +24,13 @@ constexpr double kStraight = 0.9999;  // an approach along an axis of the object
 constexpr double kStandoffM = 0.03;
 constexpr int kMaxTouches = 10000;
 
-using Options = CalibrateOptions;
-
 struct FlatTouches {
   std::vector<gateway::calibration::FlatTouch> touches;
   double spacing_m = 0;
 };
 
 // Repeated touches straight onto the middle of the upper face.
-absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const Options& options) {
+absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const CalibrateOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Object object, FindObject(rig.connection.get(), options.object));
   const v1::Vector3 &low = object.bounds_min_m(), &high = object.bounds_max_m();
@@ -75,7 +73,7 @@ absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const Options& options) {
 }
 
 // Those of a recorded session that came straight onto a face.
-absl::StatusOr<FlatTouches> RecordedFlat(const Options& options) {
+absl::StatusOr<FlatTouches> RecordedFlat(const CalibrateOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.from));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
                               FindSession(*journal, options.from, options.motion.session));
@@ -96,7 +94,7 @@ absl::StatusOr<FlatTouches> RecordedFlat(const Options& options) {
   return flat;
 }
 
-absl::Status RunFlat(const Cli& cli, const Options& options) {
+absl::Status RunFlat(const Cli& cli, const CalibrateOptions& options) {
   FlatTouches flat;
   if (options.from.empty()) {
     if (options.object.empty())
@@ -141,7 +139,7 @@ absl::Status RunFlat(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunTip(const Cli& cli, const Options& options) {
+absl::Status RunTip(const Cli& cli, const CalibrateOptions& options) {
   if (options.calibration.empty())
     return absl::InvalidArgumentError("--calibration is missing: the file that the gateway runs with now");
   if (options.poses < 4 || options.poses > 100)
@@ -186,7 +184,7 @@ absl::Status RunTip(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunCalibrate(const Cli& cli, const Options& options) {
+absl::Status RunCalibrate(const Cli& cli, const CalibrateOptions& options) {
   if (!(options.speed_mm_s > 0))
     return absl::InvalidArgumentError(absl::StrCat("--speed-mm-s: ", options.speed_mm_s, " is not above 0"));
   if (!(options.spacing_mm >= 0))
@@ -236,7 +234,7 @@ absl::StatusOr<v1::Object> FindObject(client::Connection* connection, const std:
 }
 
 void AddRigCalibrate(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command = cli->AddCommand(
       group, "calibrate",
       "Measures the rig itself: the fingers' offsets and noise on a flat face (a model file), or where the "

@@ -24,7 +24,7 @@ constexpr double kTiltsRad[] = {15 * kRadiansPerDegree, 30 * kRadiansPerDegree,
 constexpr double kSpread = 0.5;       // targets lie within this share of the box's half sides
 constexpr double kHeight = 0.4;       // and this share of its half height above its middle
 constexpr double kBeyondBoxM = 0.03;  // every finger starts so far outside the box
-constexpr size_t kMaxLines = 5;
+constexpr size_t kMaxTargetsShown = 5;
 constexpr size_t kMinTouches = 6;
 constexpr uint64_t kTriangles = 20000;
 
@@ -97,7 +97,7 @@ absl::StatusOr<std::vector<PlannedRow>> PlanTouches(const Cli& cli, const Calibr
     rows.push_back(std::move(row));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRows(connection, all, &rows, nullptr));
-  const std::string impossible = ImpossibleTable(rows, kMaxLines);
+  const std::string impossible = ImpossibleTable(rows, kMaxTargetsShown);
   if (!impossible.empty()) cli.Log(impossible + "these are left out");
   return rows;
 }

@@ -12,9 +12,9 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kMaxLines = 40;
+constexpr size_t kMaxPathsShown = 40;
 
-struct Options {
+struct DryRunOptions {
   std::string plan, drawing;
 };
 
@@ -34,8 +34,8 @@ Eigen::Vector3d VectorOf(const v1::Vector3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-std::string Drawing(const Options& options, const v1::RigState& state, const std::vector<PlannedRow>& rows,
-                    const std::vector<v1::TouchCheck>& checks) {
+std::string Drawing(const DryRunOptions& options, const v1::RigState& state,
+                    const std::vector<PlannedRow>& rows, const std::vector<v1::TouchCheck>& checks) {
   client::PathDrawing drawing;
   drawing.title =
       absl::StrCat(options.plan, " on ", state.arm().model(), ": ", Counted(rows.size(), "touch", "touches"));
@@ -58,7 +58,7 @@ std::string Drawing(const Options& options, const v1::RigState& state, const std
   return client::DrawPaths(drawing);
 }
 
-absl::Status RunDryRun(const Cli& cli, const Options& options) {
+absl::Status RunDryRun(const Cli& cli, const DryRunOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> plan, ReadTouches(options.plan));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<PlannedRow> rows,
                               RowsOf(plan, client::SessionNameOf(options.plan), options.plan));
@@ -94,7 +94,7 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
                {"groups", list},
                {"checks", RowsJson(rows)}});
   } else {
-    std::string text = ImpossibleTable(rows, kMaxLines);
+    std::string text = ImpossibleTable(rows, kMaxPathsShown);
     if (!text.empty()) text += "\n";
     Table table({"OBJECT", "FACE UP", "TOUCHES", "TIME"});
     for (const RigGroup& group : groups)
@@ -114,7 +114,7 @@ absl::Status RunDryRun(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddRigDryRun(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DryRunOptions>();
   CLI::App* command = cli->AddCommand(
       group, "dry-run",
       "Checks every touch of a plan as a run would, without motion. Exit code 4 if any is impossible.",

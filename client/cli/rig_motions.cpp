@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::chrono::seconds kStopAnswer{5};
 
-struct Options {
+struct MotionCommandOptions {
   MotionFlags motion;
   std::string reason, object, up_face = "+z";
 };
@@ -18,7 +18,7 @@ const std::vector<std::string>& UpFaceNames() {
 }
 
 // As fast as it goes: no question before the call.
-absl::Status RunStop(const Cli& cli, const Options& options) {
+absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
   if (cli.source().servers.empty())
     return absl::InvalidArgumentError(
         "--server is missing: which rig is to stop? For instance --server 127.0.0.1:50052");
@@ -42,7 +42,7 @@ absl::Status RunStop(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunReset(const Cli& cli, const Options& options) {
+absl::Status RunReset(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   v1::ResetRequest request;
   request.set_holder(client::LeaseHolder());
@@ -62,7 +62,7 @@ void Report(const Cli& cli, const std::string& what, const v1::RigState& state) 
   cli.Log(what);
 }
 
-absl::Status RunPowerOn(const Cli& cli, const Options& options) {
+absl::Status RunPowerOn(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
   const StopOnInterrupt stop_on_interrupt(source.get());
@@ -73,7 +73,7 @@ absl::Status RunPowerOn(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunHome(const Cli& cli, const Options& options) {
+absl::Status RunHome(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
   const StopOnInterrupt stop_on_interrupt(source.get());
@@ -82,7 +82,7 @@ absl::Status RunHome(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunMount(const Cli& cli, const Options& options) {
+absl::Status RunMount(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("FACE", options.up_face, UpFaceNames()).status());
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
@@ -100,7 +100,7 @@ absl::Status RunMount(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddRigMotions(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MotionCommandOptions>();
   const std::string server = " --server 127.0.0.1:50052";
 
   CLI::App* stop = cli->AddCommand(

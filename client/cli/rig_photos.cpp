@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMargin = 1.05;  // the object's sphere fills the picture but for this
 
-struct Options {
+struct PhotosOptions {
   MotionFlags motion;
   ImageFlags image;
   std::string object, folder, sequence = "ring";
@@ -61,7 +61,7 @@ v1::View ViewOf(const Eigen::Vector3d& centre, double distance_m, const Eigen::V
   return view;
 }
 
-absl::Status RunPhotos(const Cli& cli, const Options& options) {
+absl::Status RunPhotos(const Cli& cli, const PhotosOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--sequence", options.sequence, {"seed", "ring"}).status());
   if (options.turns < 1 || options.turns > static_cast<int>(Turns().size()))
     return absl::InvalidArgumentError(absl::StrCat(
@@ -154,7 +154,7 @@ absl::Status RunPhotos(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddRigPhotos(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PhotosOptions>();
   CLI::App* command = cli->AddCommand(group, "photos",
                                       "Photographs an object in a fixed sequence of camera poses, and asks "
                                       "for it to be turned in between. Pictures "

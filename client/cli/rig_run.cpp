@@ -16,9 +16,9 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kMaxLines = 20;
+constexpr size_t kMaxRefusalsShown = 20;
 
-struct Options {
+struct RunOptions {
   MotionFlags motion;
   std::string plan, output;
   bool skip_impossible = false;
@@ -26,7 +26,7 @@ struct Options {
 
 class Run {
  public:
-  Run(const Cli& cli, const Options& options) : cli_(cli), options_(options), bar_(!cli.output().quiet) {}
+  Run(const Cli& cli, const RunOptions& options) : cli_(cli), options_(options), bar_(!cli.output().quiet) {}
 
   absl::Status Go() {
     session_ =
@@ -66,7 +66,7 @@ class Run {
     TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig_.connection.get(), wanted, &rows_, nullptr));
     for (const PlannedRow& row : rows_) impossible_ += !row.possible;
     if (impossible_ == 0) return absl::OkStatus();
-    cli_.Log(ImpossibleTable(rows_, kMaxLines));
+    cli_.Log(ImpossibleTable(rows_, kMaxRefusalsShown));
     if (options_.skip_impossible) {
       cli_.Log(absl::StrCat(impossible_, " impossible touches are left out"));
       return absl::OkStatus();
@@ -188,7 +188,7 @@ class Run {
   }
 
   const Cli& cli_;
-  const Options& options_;
+  const RunOptions& options_;
   ProgressBar bar_;
   std::string session_, journal_path_;
   std::vector<PlannedRow> rows_;
@@ -202,7 +202,7 @@ class Run {
 }  // namespace
 
 void AddRigRun(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RunOptions>();
   CLI::App* command = cli->AddCommand(
       group, "run",
       "Makes the touches of a plan, object by object and face by face. "

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kPartsPerMillion = 1e6;
 
-struct Options {
+struct StatusOptions {
   bool watch = false;
   double every_s = 1;
 };
@@ -149,7 +149,7 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
   return absl::OkStatus();
 }
 
-absl::Status RunStatus(const Cli& cli, const Options& options) {
+absl::Status RunStatus(const Cli& cli, const StatusOptions& options) {
   if (!(options.every_s > 0) || options.every_s > 3600)
     return absl::InvalidArgumentError(
         absl::StrCat("--every-s: ", Rounded(options.every_s), " is out of range; above 0, at most 3600"));
@@ -167,7 +167,7 @@ absl::Status RunStatus(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddRigStatus(Cli* cli, CLI::App* group) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StatusOptions>();
   CLI::App* command =
       cli->AddCommand(group, "status", "Shows the state of every part of the rig. Needs no lease.",
                       "touchstone rig status --server 127.0.0.1:50052\n"

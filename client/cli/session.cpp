@@ -20,7 +20,7 @@ namespace {
 
 constexpr size_t kPiece = 1 << 20;
 
-struct Options {
+struct SessionOptions {
   std::string name, file, output;
   std::string in_journal;  // the session's name where NAME is a journal
   bool check = false;
@@ -91,7 +91,7 @@ absl::Status ListJournal(const Cli& cli, const std::string& path) {
   return cli.Print(table.Text());
 }
 
-absl::Status ShowJournal(const Cli& cli, const Options& options) {
+absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
                               FindSession(*journal, options.name, options.in_journal));
@@ -106,7 +106,7 @@ absl::Status ShowJournal(const Cli& cli, const Options& options) {
       "\n  Source    ", session.provenance, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
 }
 
-absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {
+absl::Status DeleteFromJournal(const Cli& cli, const SessionOptions& options) {
   if (options.in_journal.empty())
     return absl::InvalidArgumentError(
         absl::StrCat(options.name, ": which session? touchstone session delete ", options.name,
@@ -120,14 +120,14 @@ absl::Status DeleteFromJournal(const Cli& cli, const Options& options) {
 }
 
 // A word after the name is a session of a journal, and of nothing else.
-absl::Status CheckInJournal(const Options& options) {
+absl::Status CheckInJournal(const SessionOptions& options) {
   if (options.in_journal.empty() || IsJournalPath(options.name)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("'", options.in_journal, "' is one argument too many: '",
                                                  options.name,
                                                  "' is no journal (.db), but a server's session"));
 }
 
-absl::Status RunImport(const Cli& cli, const Options& options) {
+absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
   if (!IsJournalPath(options.output))
     return absl::InvalidArgumentError(
         absl::StrCat("-o: '", options.output, "' is no journal; its name ends in .db"));
@@ -141,7 +141,7 @@ absl::Status RunImport(const Cli& cli, const Options& options) {
 
 // --- Sessions of a server
 
-absl::Status RunCreate(const Cli& cli, const Options& options) {
+absl::Status RunCreate(const Cli& cli, const SessionOptions& options) {
   std::ifstream file(options.file, std::ios::binary);
   std::error_code error;
   if (!file || !std::filesystem::is_regular_file(options.file, error))
@@ -172,7 +172,7 @@ absl::Status RunCreate(const Cli& cli, const Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status RunList(const Cli& cli, const Options& options) {
+absl::Status RunList(const Cli& cli, const SessionOptions& options) {
   if (!options.file.empty()) {
     if (IsJournalPath(options.file)) return ListJournal(cli, options.file);
     return absl::InvalidArgumentError(
@@ -201,7 +201,7 @@ absl::Status RunList(const Cli& cli, const Options& options) {
   return cli.Print(table.Text());
 }
 
-absl::Status RunShow(const Cli& cli, const Options& options) {
+absl::Status RunShow(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
   if (IsJournalPath(options.name)) return ShowJournal(cli, options);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
@@ -219,7 +219,7 @@ absl::Status RunShow(const Cli& cli, const Options& options) {
                                 " bytes\n"));
 }
 
-absl::Status RunExport(const Cli& cli, const Options& options) {
+absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
   if (IsJournalPath(options.name))
     return ExportFromJournal(options.name, options.in_journal, options.output, cli.output().force);
@@ -236,7 +236,7 @@ absl::Status RunExport(const Cli& cli, const Options& options) {
   return cli.Write(options.output, csv);
 }
 
-absl::Status RunDelete(const Cli& cli, const Options& options) {
+absl::Status RunDelete(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
   if (IsJournalPath(options.name)) return DeleteFromJournal(cli, options);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
@@ -251,7 +251,7 @@ absl::Status RunDelete(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddSession(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SessionOptions>();
   CLI::App* group = cli->AddGroup(
       "session",
       "Measured sets: at a server, where its replicas and other people find them, or in a rig's journal.",

@@ -17,7 +17,7 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options {
+struct StreamOptions {
   PlanOptions plan;
   ImageFlags image;
   MotionFlags motion;
@@ -54,7 +54,7 @@ bool Contains(const google::protobuf::RepeatedPtrField<std::string>& names, cons
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const Options& o, client::ShardFormat format,
+absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o, client::ShardFormat format,
                                          client::Connection* connection) {
   v1::DatasetSpec spec;
   std::vector<std::string> objects_of_file;
@@ -116,7 +116,7 @@ absl::Status ParseShards(const std::string& text, client::DatasetJob* job) {
 }
 
 // What another dataset was made of, so that it is made again.
-absl::Status RepeatManifest(const Options& o, client::DatasetJob* job, bool shard_size_given) {
+absl::Status RepeatManifest(const StreamOptions& o, client::DatasetJob* job, bool shard_size_given) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(o.like, kMaxManifestBytes));
   TOUCHSTONE_ASSIGN_OR_RETURN(const client::DatasetManifest manifest, client::ParseManifest(text, o.like));
   TOUCHSTONE_ASSIGN_OR_RETURN(job->spec, client::SpecOfManifest(manifest.identity, o.like));
@@ -153,7 +153,7 @@ void Summarise(const Cli& cli, const client::DatasetJob& job, const client::Data
                                                  " comes with the last of the ", job.job_count, " jobs"));
 }
 
-absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) {
+absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_given) {
   client::DatasetJob job;
   job.folder = o.output;
   job.shard_size = o.shard_size;
@@ -212,7 +212,7 @@ absl::Status RunStream(const Cli& cli, const Options& o, bool shard_size_given) 
 }  // namespace
 
 void AddStream(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StreamOptions>();
   auto shard_size = std::make_shared<CLI::Option*>(nullptr);
   CLI::App* command = cli->AddCommand(
       nullptr, "stream",

@@ -12,7 +12,7 @@
 namespace touchstone::cli {
 namespace {
 
-struct Options {
+struct TouchOptions {
   TouchFlags touch;
   MotionFlags motion;
   std::string object;
@@ -30,7 +30,7 @@ struct TouchRow {
   v1::TouchResult result;
 };
 
-absl::StatusOr<std::vector<TouchRow>> CommandedRows(const Options& options) {
+absl::StatusOr<std::vector<TouchRow>> CommandedRows(const TouchOptions& options) {
   std::vector<client::MeasuredTouch> touches;
   if (!options.plan.empty()) {
     if (!options.touch.approach.empty())
@@ -60,7 +60,7 @@ absl::StatusOr<std::vector<TouchRow>> CommandedRows(const Options& options) {
 // Rows of one object that follow each other are one session; the noise depends on the row's number alone. A
 // physical source gets one at a time, with ids: those of a plan's touches are always the same, so that a
 // repeated command resumes where it stopped.
-absl::Status TouchAll(const Cli& cli, const Options& options, std::vector<TouchRow>* rows,
+absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<TouchRow>* rows,
                       std::string* model_hash) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
@@ -132,7 +132,7 @@ Json RowJson(const TouchRow& row) {
           {"normal", Numbers(r.normal(), Unit::kNone)}};
 }
 
-absl::Status RunTouch(const Cli& cli, const Options& options) {
+absl::Status RunTouch(const Cli& cli, const TouchOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<TouchRow> rows, CommandedRows(options));
   std::string model_hash;
   TOUCHSTONE_RETURN_IF_ERROR(TouchAll(cli, options, &rows, &model_hash));
@@ -154,7 +154,7 @@ absl::Status RunTouch(const Cli& cli, const Options& options) {
 }  // namespace
 
 void AddTouch(Cli* cli) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TouchOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "touch",
       "Touches an object and prints a measurement file: one row per touch, t_*_us when each finger met it.",

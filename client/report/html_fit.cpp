@@ -11,11 +11,11 @@
 namespace touchstone::client {
 namespace {
 
-constexpr int kMaxPoints = 6000;
+constexpr int kMaxParityPoints = 6000;
 
 std::string Parity(const v1::Report& report) {
   if (report.parity().empty()) return "";
-  const int step = 1 + report.parity_size() / kMaxPoints;
+  const int step = 1 + report.parity_size() / kMaxParityPoints;
   const bool improved = !report.improved_model_yaml().empty();
   RangeFinder finder;
   for (int i = 0; i < report.parity_size(); i += step) {

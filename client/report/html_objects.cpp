@@ -16,7 +16,7 @@ namespace touchstone::client {
 namespace {
 
 constexpr int kColours = 7;
-constexpr size_t kMaxPoints = 6000;  // of all objects together
+constexpr size_t kMaxSurfacePoints = 6000;  // of all objects together
 constexpr size_t kMaxObjects = 12;
 
 struct Object {
@@ -26,7 +26,7 @@ struct Object {
 
 std::map<std::string, Object> Objects(const v1::Report& report, std::vector<std::string>* order) {
   std::map<std::string, Object> objects;
-  const size_t step = 1 + report.surface_points_size() / kMaxPoints;
+  const size_t step = 1 + report.surface_points_size() / kMaxSurfacePoints;
   for (const v1::ObjectOutline& outline : report.outlines()) {
     if (objects.count(outline.object()) == 0) order->push_back(outline.object());
     objects[outline.object()].outline = &outline;

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/report/html_page.h"
+#include "client/report/occurrences.h"
 #include "client/report/report.h"
 #include "client/report/sample_reports.h"
 #include "client/report/svg_chart.h"
@@ -20,12 +21,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-int Times(const std::string& text, const std::string& piece) {
-  int times = 0;
-  for (size_t at = text.find(piece); at != std::string::npos; at = text.find(piece, at + 1)) ++times;
-  return times;
-}
 
 TEST(Escape, LeavesNoMarkup) {
   EXPECT_EQ(Escape("<b a=\"1\" c='2'>&\x01"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;");
@@ -71,10 +66,10 @@ TEST(HtmlReport, EscapesWhatUsersNamed) {
   }
   for (auto& candidate : *report.mutable_candidates()) candidate.set_note(evil);
   const std::string html = HtmlReport(report);
-  EXPECT_EQ(Times(html, "<script>alert"), 0);
-  EXPECT_EQ(Times(html, "<script>"), 1) << "the page's own";
+  EXPECT_EQ(Occurrences(html, "<script>alert"), 0);
+  EXPECT_EQ(Occurrences(html, "<script>"), 1) << "the page's own";
   // One script of data, one of code, each closed once.
-  EXPECT_EQ(Times(html, "</script>"), 2);
+  EXPECT_EQ(Occurrences(html, "</script>"), 2);
   const size_t data = html.find('{', html.find("id=\"objects-data\""));
   const auto json = nlohmann::json::parse(html.substr(data, html.find("</script>", data) - data));
   EXPECT_EQ(json["objects"][0]["name"], evil);
@@ -83,23 +78,23 @@ TEST(HtmlReport, EscapesWhatUsersNamed) {
 TEST(HtmlReport, HasEverySectionWhoseDataAreThere) {
   const std::string html = HtmlReport(MissingEffectsReport());
   for (const char* id : {"todo", "why", "where", "objects", "fit", "next", "data", "methods"}) {
-    EXPECT_EQ(Times(html, absl::StrCat("<section id=\"", id, "\"")), 1) << id;
+    EXPECT_EQ(Occurrences(html, absl::StrCat("<section id=\"", id, "\"")), 1) << id;
   }
-  EXPECT_EQ(Times(HtmlReport(UnexplainedReport()), "<section id=\"unexplained\""), 1);
-  EXPECT_EQ(Times(HtmlReport(WithoutPosesReport()), "<section id=\"distributions\""), 1);
+  EXPECT_EQ(Occurrences(HtmlReport(UnexplainedReport()), "<section id=\"unexplained\""), 1);
+  EXPECT_EQ(Occurrences(HtmlReport(WithoutPosesReport()), "<section id=\"distributions\""), 1);
 }
 
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
   const std::string html = HtmlReport(v1::Report());
-  EXPECT_EQ(Times(html, "<section"), 0);
-  EXPECT_GE(Times(html, "Nothing could be compared."), 1);
-  EXPECT_EQ(Times(HtmlReport(AdequateReport()), "<section id=\"todo\""), 0);
+  EXPECT_EQ(Occurrences(html, "<section"), 0);
+  EXPECT_GE(Occurrences(html, "Nothing could be compared."), 1);
+  EXPECT_EQ(Occurrences(HtmlReport(AdequateReport()), "<section id=\"todo\""), 0);
 }
 
 TEST(HtmlReport, SaysTheVerdictFirstAndOnce) {
   for (const NamedReport& sample : AllSampleReports()) {
     const std::string html = HtmlReport(sample.report);
-    EXPECT_EQ(Times(html, "<h1>"), 1) << sample.name;
+    EXPECT_EQ(Occurrences(html, "<h1>"), 1) << sample.name;
     const size_t section = html.find("<section");
     if (section != std::string::npos) {
       EXPECT_LT(html.find("<h1>"), section) << sample.name;
@@ -111,17 +106,17 @@ TEST(HtmlReport, SaysWarningsOnce) {
   v1::Report report = MissingEffectsReport();
   report.add_warnings("A warning like no other.");
   const std::string html = HtmlReport(report);
-  EXPECT_EQ(Times(html, "A warning like no other."), 1);
-  EXPECT_EQ(Times(html, report.steps(0).check_on_rig().substr(0, 20)), 1);
-  EXPECT_EQ(Times(html, "33</td>"), 1) << "rows not used";
+  EXPECT_EQ(Occurrences(html, "A warning like no other."), 1);
+  EXPECT_EQ(Occurrences(html, report.steps(0).check_on_rig().substr(0, 20)), 1);
+  EXPECT_EQ(Occurrences(html, "33</td>"), 1) << "rows not used";
 }
 
 TEST(HtmlReport, ShowsTheSummaryWhereNoPartSaysTheSame) {
   v1::Report report = WithoutPosesReport();
   report.set_summary("A summary like no other.");
-  EXPECT_EQ(Times(HtmlReport(report), "A summary like no other."), 1);
+  EXPECT_EQ(Occurrences(HtmlReport(report), "A summary like no other."), 1);
   *report.mutable_initial() = MissingEffectsReport().initial();
-  EXPECT_EQ(Times(HtmlReport(report), "A summary like no other."), 0);
+  EXPECT_EQ(Occurrences(HtmlReport(report), "A summary like no other."), 0);
 }
 
 TEST(HtmlReport, HasNoIdTwice) {
@@ -139,7 +134,7 @@ TEST(HtmlReport, FetchesNothing) {
   for (const NamedReport& sample : AllSampleReports()) {
     const std::string html = HtmlReport(sample.report);
     for (const char* trace : {"http://", "https://", "src=", "url(", "@import", "<link", "<img"}) {
-      EXPECT_EQ(Times(html, trace), 0) << sample.name;
+      EXPECT_EQ(Occurrences(html, trace), 0) << sample.name;
     }
   }
 }
@@ -156,7 +151,7 @@ TEST(HtmlReport, ThinsPointsOfLargeSets) {
   }
   const std::string html = HtmlReport(report);
   EXPECT_LT(html.size(), 1500000u);
-  EXPECT_GE(Times(html, " of 20 160 contacts are drawn"), 1);
+  EXPECT_GE(Occurrences(html, " of 20 160 contacts are drawn"), 1);
 }
 
 TEST(HtmlReport, ClosesEveryElementItOpens) {
@@ -165,8 +160,9 @@ TEST(HtmlReport, ClosesEveryElementItOpens) {
     for (const char* tag : {"section", "figure", "table", "tbody", "thead", "tr",     "td",   "th",     "div",
                             "svg",     "g",      "dl",    "dt",    "dd",    "ol",     "ul",   "li",     "p",
                             "span",    "pre",    "h2",    "h3",    "h4",    "button", "text", "details"}) {
-      EXPECT_EQ(Times(html, absl::StrCat("<", tag, " ")) + Times(html, absl::StrCat("<", tag, ">")),
-                Times(html, absl::StrCat("</", tag, ">")))
+      EXPECT_EQ(
+          Occurrences(html, absl::StrCat("<", tag, " ")) + Occurrences(html, absl::StrCat("<", tag, ">")),
+          Occurrences(html, absl::StrCat("</", tag, ">")))
           << tag << " in " << sample.name;
     }
   }
@@ -186,7 +182,7 @@ TEST(HtmlReport, ShowsNoNanAsANumber) {
   report.mutable_histograms(0)->set_measured(0, nan);
   const std::string html = HtmlReport(report);
   for (const char* word : {" nan", ">nan", "\"nan", "-nan", "Lnan", "Mnan", "Vnan", "NaN", "inf "}) {
-    EXPECT_EQ(Times(html, word), 0) << word;
+    EXPECT_EQ(Occurrences(html, word), 0) << word;
   }
 }
 

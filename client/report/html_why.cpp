@@ -13,11 +13,7 @@
 namespace touchstone::client {
 namespace {
 
-constexpr int kMaxParameters = 4;  // of a candidate
-
-double Unseen(double heldout_us, double rmse_us) {
-  return heldout_us > 0 ? heldout_us : rmse_us;
-}
+constexpr int kMaxCandidateParameters = 4;  // of a candidate
 
 // "offset_mm l", "relative lat10".
 std::string ShortName(const v1::ParameterValue& parameter) {
@@ -46,7 +42,8 @@ std::string NotFitted(const v1::Report& report) {
 template <typename Parameters>
 std::string ParameterCells(const Parameters& parameters) {
   std::string names, pictures;
-  const int shown = parameters.size() > kMaxParameters ? kMaxParameters - 1 : parameters.size();
+  const int shown =
+      parameters.size() > kMaxCandidateParameters ? kMaxCandidateParameters - 1 : parameters.size();
   for (int i = 0; i < shown; ++i) {
     const v1::ParameterValue& parameter = parameters[i];
     const std::string interval = Interval(parameter);
@@ -63,18 +60,18 @@ std::string ParameterCells(const Parameters& parameters) {
 
 std::string CandidateTable(const v1::Report& report) {
   if (report.candidates().empty()) return "";
-  const double initial = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+  const double initial = UnseenError(report.initial().heldout_rmse_us(), report.initial().rmse_us());
   const double floor = NoiseFloorOf(report).sigma_us;
   double largest = initial;
   for (const v1::Candidate& c : report.candidates())
-    largest = std::max(largest, Unseen(c.heldout_rmse_us(), c.rmse_us()));
+    largest = std::max(largest, UnseenError(c.heldout_rmse_us(), c.rmse_us()));
   std::string table = absl::StrCat("<div class=\"scroll\"><table class=\"why\">",
                                    HeaderRow({"Effect", ">Probability", ">It would leave", "",
                                               "Parameter \u00b1 standard error", "95 % interval"}),
                                    "<tbody>");
   for (const v1::Candidate& candidate : report.candidates()) {
     if (!(candidate.rmse_us() > 0) && !candidate.note().empty()) continue;
-    const double left = Unseen(candidate.heldout_rmse_us(), candidate.rmse_us());
+    const double left = UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us());
     const double p = candidate.probability();
     absl::StrAppend(
         &table, p < 0.05 ? "<tr class=\"dim\">" : "<tr>",

@@ -3,17 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/report/occurrences.h"
+
 namespace touchstone::client {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-size_t Times(const std::string& text, const std::string& word) {
-  size_t times = 0;
-  for (size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++times;
-  return times;
-}
 
 DrawnTouch Possible(int number) {
   DrawnTouch touch;
@@ -36,9 +32,9 @@ TEST(DrawPaths, ShowsEveryTouchInBothViews) {
   impossible.target_m = Eigen::Vector3d(0.4, 0, 0.1);
   drawing.touches.push_back(impossible);
   const std::string svg = DrawPaths(drawing);
-  EXPECT_EQ(Times(svg, "<circle class=\"start\""), 10u);
-  EXPECT_EQ(Times(svg, "<polyline class=\"transit\""), 10u);
-  EXPECT_EQ(Times(svg, "class=\"badnumber\" x"), 2u);
+  EXPECT_EQ(Occurrences(svg, "<circle class=\"start\""), 10);
+  EXPECT_EQ(Occurrences(svg, "<polyline class=\"transit\""), 10);
+  EXPECT_EQ(Occurrences(svg, "class=\"badnumber\" x"), 2);
   EXPECT_THAT(svg, HasSubstr("plan &lt;1&gt; &amp; more"));
   EXPECT_THAT(svg, HasSubstr("out of reach &gt; far"));
   EXPECT_THAT(svg, HasSubstr("5 of 6 touches are possible"));

@@ -15,7 +15,7 @@
 namespace touchstone::client {
 namespace {
 
-using Cell = TextLayout::Cell;
+using TextCell = TextLayout::Cell;
 constexpr int kMaxParameters = 6;  // of one effect
 constexpr int kMaxCompetingEffects = 3;
 
@@ -41,7 +41,7 @@ bool OnlyFingersDiffer(const google::protobuf::RepeatedPtrField<v1::ParameterVal
 // One row per effect, and one more for each further parameter.
 template <typename Effect>
 void AddEffect(const Effect& effect, const std::string& name, double probability, const std::string& change,
-               const std::string& note, TextLayout::Style style, std::vector<std::vector<Cell>>* rows) {
+               const std::string& note, TextLayout::Style style, std::vector<std::vector<TextCell>>* rows) {
   auto parameters = effect.parameters();
   if (OnlyFingersDiffer(parameters)) {
     for (auto& parameter : parameters) {
@@ -72,10 +72,6 @@ void AddEffect(const Effect& effect, const std::string& name, double probability
   }
 }
 
-double Unseen(double heldout_us, double rmse_us) {
-  return heldout_us > 0 ? heldout_us : rmse_us;
-}
-
 // Without poses there is no RMSE.
 std::string Change(double before_us, double after_us) {
   return before_us > 0 && after_us > 0 ? TimeChange(before_us, after_us) : "";
@@ -93,10 +89,10 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
                               comparison.plan().empty() ? "" : absl::StrCat(" (", comparison.plan(), ")"),
                               "."));
   if (comparison.statistics_size() > 0) {
-    std::vector<std::vector<Cell>> rows = {{{"", false},
-                                            {"measured", true, TextLayout::kDim},
-                                            {"simulated", true, TextLayout::kDim},
-                                            {"p", true, TextLayout::kDim}}};
+    std::vector<std::vector<TextCell>> rows = {{{"", false},
+                                                {"measured", true, TextLayout::kDim},
+                                                {"simulated", true, TextLayout::kDim},
+                                                {"p", true, TextLayout::kDim}}};
     for (const v1::StatisticTest& test : comparison.statistics()) {
       const bool time = test.unit() == "us";
       const std::string unit = test.unit().empty() ? "" : absl::StrCat(" ", test.unit());
@@ -116,8 +112,8 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
 }
 
 void AddWhy(const v1::Report& report, TextLayout* out) {
-  std::vector<std::vector<Cell>> rows;
-  double before = Unseen(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+  std::vector<std::vector<TextCell>> rows;
+  double before = UnseenError(report.initial().heldout_rmse_us(), report.initial().rmse_us());
   if (report.steps_size() > 0) {
     const char* unseen = before > 0 ? "unseen touches" : "";
     rows.push_back(
@@ -134,7 +130,7 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   }
   for (int i = 0; i < report.steps_size(); ++i) {
     const v1::Step& step = report.steps(i);
-    const double after = Unseen(step.heldout_rmse_us(), step.rmse_us());
+    const double after = UnseenError(step.heldout_rmse_us(), step.rmse_us());
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(before, after), "", TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
@@ -142,8 +138,8 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
       const v1::Candidate& candidate = report.candidates(c);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                Change(before, Unseen(candidate.heldout_rmse_us(), candidate.rmse_us())), candidate.note(),
-                TextLayout::kDim, &rows);
+                Change(before, UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us())),
+                candidate.note(), TextLayout::kDim, &rows);
       ++shown;
     }
     before = after;

@@ -14,7 +14,7 @@
 namespace touchstone::client {
 namespace {
 
-using Cell = TextLayout::Cell;
+using TextCell = TextLayout::Cell;
 
 void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
@@ -67,7 +67,7 @@ void AddHowWrong(const v1::Report& report, TextLayout* out) {
 void AddWhere(const v1::Report& report, TextLayout* out) {
   if (report.where().empty()) return;
   out->Label("Where");
-  std::vector<std::vector<Cell>> rows;
+  std::vector<std::vector<TextCell>> rows;
   for (int i = 0; i < std::min(report.where_size(), 6); ++i) {
     const v1::Slice& slice = report.where(i);
     const std::string words = slice.words().empty()
@@ -103,7 +103,7 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
   }
   const bool wide = out->width() >= 96;
   const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11), 10, 40);
-  std::vector<std::vector<Cell>> rows;
+  std::vector<std::vector<TextCell>> rows;
   if (wide && (heldout || p)) {
     rows.push_back({{""},
                     {""},
@@ -112,9 +112,9 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
                     {p ? "lack of fit p" : "", true, TextLayout::kDim}});
   }
   for (const Rung& rung : rungs) {
-    std::vector<Cell> row = {{rung.name},
-                             {std::string(BarLength(rung.rmse_us, largest, bar), '#'), false,
-                              rung.kind == Rung::kFloor ? TextLayout::kDim : TextLayout::kBar}};
+    std::vector<TextCell> row = {{rung.name},
+                                 {std::string(BarLength(rung.rmse_us, largest, bar), '#'), false,
+                                  rung.kind == Rung::kFloor ? TextLayout::kDim : TextLayout::kBar}};
     row.push_back({Time(rung.rmse_us), true});
     if (wide && (heldout || p)) {
       row.push_back({std::isnan(rung.heldout_rmse_us) ? "" : Time(rung.heldout_rmse_us), true});

@@ -101,6 +101,10 @@ std::string TimeChange(double from_us, double to_us) {
   return absl::StrCat(Fixed(from, decimals), " -> ", Fixed(to, decimals), " ", unit.symbol);
 }
 
+double UnseenError(double heldout_us, double rmse_us) {
+  return heldout_us > 0 ? heldout_us : rmse_us;
+}
+
 std::string Probability(double p) {
   if (std::isnan(p)) return "n/a";
   if (p < 1e-15) return "< 1e-15";

@@ -45,6 +45,9 @@ inline constexpr double kMetresPerMillimetre = 1e-3;
 inline constexpr double kMillimetresPerMetre = 1e3;
 inline constexpr double kSecondsPerMicrosecond = 1e-6;
 inline constexpr double kMicrosecondsPerSecond = 1e6;
+inline double Microseconds(double time_s) {
+  return time_s * kMicrosecondsPerSecond;
+}
 inline constexpr double kSecondsPerMillisecond = 1e-3;
 inline constexpr double kMillisecondsPerSecond = 1e3;
 inline constexpr double kRadiansPerDegree = kPi / 180.0;

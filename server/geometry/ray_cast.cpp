@@ -6,12 +6,11 @@
 #include <limits>
 
 #include "server/base/check.h"
+#include "server/base/nan.h"
 #include "server/geometry/search.h"
 
 namespace touchstone::geometry {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // A proposal on a triangle met at a cosine above the first is off in travel by less than the second times the
 // mesh's reach: vertices are inflated by at most 5e-5 of it, and 5e-5 / 0.02 is 0.0025.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "server/base/check.h"
+#include "server/base/nan.h"
 #include "server/geometry/lanes.h"
 #include "server/geometry/search.h"
 #include "server/geometry/swept_triangle.h"
@@ -13,7 +14,6 @@
 namespace touchstone::geometry {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 using Lanes = Float8;
 using Lanes3 = Triple<Float8>;
 

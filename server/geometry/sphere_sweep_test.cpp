@@ -11,35 +11,36 @@
 namespace touchstone::geometry {
 namespace {
 
-constexpr double kLongestM = 1.0;
+constexpr double kLongestSweepM = 1.0;
 constexpr double kUnderMicrometreM = 1e-6;
 
-std::shared_ptr<const Surface> Make(const TriangleMesh& mesh) {
+std::shared_ptr<const Surface> MakeSurface(const TriangleMesh& mesh) {
   return *Surface::Create("test", mesh);
 }
 
 Contacts Sweep(const Surface& surface, const Vector3d& origin, const Vector3d& direction, double radius_m) {
   Contacts contacts;
-  surface.SweepSpheres({&origin, 1}, {&direction, 1}, radius_m, kLongestM, &contacts);
+  surface.SweepSpheres({&origin, 1}, {&direction, 1}, radius_m, kLongestSweepM, &contacts);
   return contacts;
 }
 
 // Compares with the oracle, and checks that point and normal belong to the contact.
 void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m) {
-  const auto surface = Make(mesh);
+  const auto surface = MakeSurface(mesh);
   Contacts contacts;
-  surface->SweepSpheres(lines.origins_m, lines.directions, radius_m, kLongestM, &contacts);
+  surface->SweepSpheres(lines.origins_m, lines.directions, radius_m, kLongestSweepM, &contacts);
   double worst = 0;
   int touched = 0;
   for (size_t i = 0; i < lines.origins_m.size(); ++i) {
     const Vector3d& direction = lines.directions[i];
     const Vector3d start = lines.origins_m[i] - radius_m * direction;
-    const double expected = BruteForceBall(surface->mesh(), start, direction, radius_m, kLongestM);
+    const double expected = BruteForceBall(surface->mesh(), start, direction, radius_m, kLongestSweepM);
     if (contacts.triangle[i] == kNoTriangle || !std::isfinite(expected)) {
       // A grazing sphere may go either way: then one that is a nanometre larger or smaller does.
       if ((contacts.triangle[i] == kNoTriangle) == std::isinf(expected)) continue;
-      EXPECT_NE(std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestM)),
-                std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestM)))
+      EXPECT_NE(
+          std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestSweepM)),
+          std::isinf(BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestSweepM)))
           << "line " << i << ", expected " << expected;
       continue;
     }
@@ -47,8 +48,10 @@ void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m)
     const double off = std::fabs(contacts.travel_m[i] - expected);
     // A sphere that first slips by an edge: how far it goes then depends on the last nanometre of its radius.
     if (off > kUnderMicrometreM) {
-      const double larger = BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestM);
-      const double smaller = BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestM);
+      const double larger =
+          BruteForceBall(surface->mesh(), start, direction, radius_m + 1e-9, kLongestSweepM);
+      const double smaller =
+          BruteForceBall(surface->mesh(), start, direction, radius_m - 1e-9, kLongestSweepM);
       EXPECT_TRUE(larger - 1e-9 <= contacts.travel_m[i] && contacts.travel_m[i] <= smaller + 1e-9)
           << "line " << i << ": " << contacts.travel_m[i] << ", expected " << expected;
       continue;
@@ -68,7 +71,7 @@ void ExpectOracle(const TriangleMesh& mesh, const Lines& lines, double radius_m)
 }
 
 TEST(SweepSpheres, OnAPlaneIsEarlyByRadiusOverCosineLessRadius) {
-  const auto plate = Make(Box({-0.2f, -0.2f, -0.1f}, {0.2f, 0.2f, 0.0f}));
+  const auto plate = MakeSurface(Box({-0.2f, -0.2f, -0.1f}, {0.2f, 0.2f, 0.0f}));
   for (const double angle : {0.0, 0.1, 0.5, 1.0, 1.3}) {
     for (const double radius_m : {0.0001, 0.002, 0.005}) {
       const Vector3d direction(std::sin(angle), 0, -std::cos(angle));
@@ -82,7 +85,7 @@ TEST(SweepSpheres, OnAPlaneIsEarlyByRadiusOverCosineLessRadius) {
 }
 
 TEST(SweepSpheres, OnAnEdgeFollowsTheCircleRoundIt) {
-  const auto box = Make(Box({0, -0.2f, -0.2f}, {0.2f, 0.2f, 0}));  // an edge along y at x = z = 0
+  const auto box = MakeSurface(Box({0, -0.2f, -0.2f}, {0.2f, 0.2f, 0}));  // an edge along y at x = z = 0
   const double radius_m = 0.004;
   for (const double beside_m : {0.0005, 0.002, 0.0039}) {
     const Contacts contacts = Sweep(*box, {-beside_m, 0.013, 0.1}, {0, 0, -1}, radius_m);
@@ -95,7 +98,7 @@ TEST(SweepSpheres, OnAnEdgeFollowsTheCircleRoundIt) {
 }
 
 TEST(SweepSpheres, OnACornerFollowsTheBallRoundIt) {
-  const auto box = Make(Box({0, 0, -0.2f}, {0.2f, 0.2f, 0}));
+  const auto box = MakeSurface(Box({0, 0, -0.2f}, {0.2f, 0.2f, 0}));
   const double radius_m = 0.005;
   const Contacts contacts = Sweep(*box, {-0.002, -0.003, 0.1}, {0, 0, -1}, radius_m);
   EXPECT_NEAR(contacts.travel_m[0], 0.1 + radius_m - std::sqrt(0.000025 - 0.000004 - 0.000009), 1e-12);
@@ -105,7 +108,7 @@ TEST(SweepSpheres, OnACornerFollowsTheBallRoundIt) {
 
 TEST(SweepSpheres, OnABallActsLikeAPointOnALargerBall) {
   const double ball_m = 0.05;
-  const auto ball = Make(Sphere(ball_m, 120));  // facets stand at most 6 um below the sphere
+  const auto ball = MakeSurface(Sphere(ball_m, 120));  // facets stand at most 6 um below the sphere
   for (const double radius_m : {0.001, 0.005}) {
     for (const double beside_m : {0.0, 0.01, 0.03, 0.045}) {
       const double sum_m = ball_m + radius_m;
@@ -116,7 +119,7 @@ TEST(SweepSpheres, OnABallActsLikeAPointOnALargerBall) {
 }
 
 TEST(SweepSpheres, ThatStartOnTheSurfaceHaveTravelZero) {
-  const auto box = Make(Box({-0.1f, -0.1f, -0.1f}, {0.1f, 0.1f, 0}));
+  const auto box = MakeSurface(Box({-0.1f, -0.1f, -0.1f}, {0.1f, 0.1f, 0}));
   // The centre starts 3 mm above the face, 5 mm is the radius; it moves away, along and into the surface.
   for (const Vector3d& direction : {Vector3d(0, 0, 1), Vector3d(1, 0, 0), Vector3d(0, 0, -1)}) {
     const Vector3d origin = Vector3d(0.01, 0.02, 0.003) + 0.005 * direction;
@@ -147,10 +150,10 @@ TEST(SweepSpheres, AgreeWithTheDistanceToEveryTriangle) {
 TEST(SweepSpheres, HangOnNothingButTheLine) {
   for (const TriangleMesh& mesh :
        {*MakeSupershape(*NamedSupershape("lat10"), 5000), Awkward(), Soup(500, 0.01, 3)}) {
-    const auto surface = Make(mesh);
+    const auto surface = MakeSurface(mesh);
     const Lines lines = AimedLines(surface->mesh(), 2000, 14);
     Contacts whole;
-    surface->SweepSpheres(lines.origins_m, lines.directions, 0.003, kLongestM, &whole);
+    surface->SweepSpheres(lines.origins_m, lines.directions, 0.003, kLongestSweepM, &whole);
     std::vector<size_t> order(2000);
     std::iota(order.begin(), order.end(), 0);
     std::mt19937 random(1);
@@ -162,7 +165,7 @@ TEST(SweepSpheres, HangOnNothingButTheLine) {
       origins.push_back(lines.origins_m[i]);
       directions.push_back(lines.directions[i]);
     }
-    const auto fresh = Make(surface->mesh());
+    const auto fresh = MakeSurface(surface->mesh());
     std::atomic<int> different{0};
     std::vector<std::thread> threads;
     for (int n = 0; n < 4; ++n) {
@@ -170,7 +173,7 @@ TEST(SweepSpheres, HangOnNothingButTheLine) {
         Contacts part;
         const size_t begin = 500 * n;
         fresh->SweepSpheres(absl::MakeSpan(origins).subspan(begin, 500),
-                            absl::MakeSpan(directions).subspan(begin, 500), 0.003, kLongestM, &part);
+                            absl::MakeSpan(directions).subspan(begin, 500), 0.003, kLongestSweepM, &part);
         for (size_t i = 0; i < 500; ++i) {
           const size_t j = order[begin + i];
           different += std::memcmp(&part.travel_m[i], &whole.travel_m[j], sizeof(double)) != 0 ||

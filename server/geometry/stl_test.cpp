@@ -11,12 +11,12 @@ namespace {
 using testing::HasSubstr;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
-absl::StatusOr<TriangleMesh> Read(const std::string& bytes, std::vector<std::string>* notes = nullptr) {
+absl::StatusOr<TriangleMesh> ReadStl(const std::string& bytes, std::vector<std::string>* notes = nullptr) {
   return ReadMeshBytes("t.stl", "stl", bytes, MeshImport(), notes);
 }
 
-std::string Refusal(const std::string& bytes) {
-  return std::string(Read(bytes).status().message());
+std::string StlRefusal(const std::string& bytes) {
+  return std::string(ReadStl(bytes).status().message());
 }
 
 std::string Facet(const std::string& a, const std::string& b, const std::string& c) {
@@ -44,7 +44,7 @@ std::string Binary(const std::string& header, float last = 0) {
 TEST(Stl, TextAndBinaryGiveTheSameSquareOfFourVertices) {
   for (const std::string& bytes :
        {kTwo, Binary(""), Binary("solid facet"), Binary("solid\nfacet normal 0 0 1\n")}) {
-    const absl::StatusOr<TriangleMesh> mesh = Read(bytes);
+    const absl::StatusOr<TriangleMesh> mesh = ReadStl(bytes);
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     EXPECT_EQ(mesh->vertices_m.size(), 4u);
     EXPECT_EQ(mesh->triangles, (Triangles{{0, 1, 2}, {0, 2, 3}}));
@@ -55,51 +55,51 @@ TEST(Stl, TextAndBinaryGiveTheSameSquareOfFourVertices) {
 
 TEST(Stl, TextMayHoldSeveralSolidsInAnyCase) {
   const absl::StatusOr<TriangleMesh> mesh =
-      Read("SOLID\r\n" + Facet("0 0 0", "1 0 0", "0 1 0") + "ENDSOLID\r\n\r\n  Solid B\r\n" +
-           Facet("0 0 0", "0 1 0", "0 0 1e0") + "EndSolid B");
+      ReadStl("SOLID\r\n" + Facet("0 0 0", "1 0 0", "0 1 0") + "ENDSOLID\r\n\r\n  Solid B\r\n" +
+              Facet("0 0 0", "0 1 0", "0 0 1e0") + "EndSolid B");
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_EQ(mesh->triangles.size(), 2u);
   EXPECT_EQ(mesh->vertices_m.size(), 4u);
 }
 
 TEST(Stl, SaysWhatIsWrongAndWhereInText) {
-  EXPECT_THAT(Refusal("solid\nendsolid\n"), HasSubstr("no vertex and no face"));
-  EXPECT_THAT(Refusal(kTwo.substr(0, kTwo.size() - 20)),
+  EXPECT_THAT(StlRefusal("solid\nendsolid\n"), HasSubstr("no vertex and no face"));
+  EXPECT_THAT(StlRefusal(kTwo.substr(0, kTwo.size() - 20)),
               HasSubstr("line 15: found 'endfac'; expected endfacet"));
-  EXPECT_THAT(Refusal("solid\n" + Facet("0 0 0", "1 0 0", "0 1 0")), HasSubstr("ends before endsolid"));
-  EXPECT_THAT(Refusal("solid\n" + Facet("0 0 0", "1 0 zero", "0 1 0")),
+  EXPECT_THAT(StlRefusal("solid\n" + Facet("0 0 0", "1 0 0", "0 1 0")), HasSubstr("ends before endsolid"));
+  EXPECT_THAT(StlRefusal("solid\n" + Facet("0 0 0", "1 0 zero", "0 1 0")),
               HasSubstr("line 5: found 'zero'; expected a coordinate"));
-  EXPECT_THAT(Refusal("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"),
+  EXPECT_THAT(StlRefusal("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"),
               HasSubstr("line 6: found 'endloop'; expected vertex"));
   EXPECT_THAT(
-      Refusal(
+      StlRefusal(
           "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\n"),
       HasSubstr("line 7: found 'vertex'; expected endloop"));
-  EXPECT_THAT(Refusal("solid\nfacet normal 0 0\nouter loop\n"), HasSubstr("three numbers of the normal"));
-  EXPECT_THAT(Refusal(kTwo.substr(0, kTwo.size() - 26)),
+  EXPECT_THAT(StlRefusal("solid\nfacet normal 0 0\nouter loop\n"), HasSubstr("three numbers of the normal"));
+  EXPECT_THAT(StlRefusal(kTwo.substr(0, kTwo.size() - 26)),
               HasSubstr("ends where endfacet should stand; it is cut off"));
-  EXPECT_THAT(Refusal("solid\nendsolid\nrubbish\n"), HasSubstr("line 3: found 'rubbish'; expected solid"));
+  EXPECT_THAT(StlRefusal("solid\nendsolid\nrubbish\n"), HasSubstr("line 3: found 'rubbish'; expected solid"));
 }
 
 TEST(Stl, SaysWhatIsWrongAndWhereInBytes) {
-  EXPECT_THAT(Refusal(""), HasSubstr("the file is empty"));
-  EXPECT_THAT(Refusal("hello"), HasSubstr("has 5 bytes"));
-  EXPECT_THAT(Refusal(Binary("").substr(0, 84 + 99)),
+  EXPECT_THAT(StlRefusal(""), HasSubstr("the file is empty"));
+  EXPECT_THAT(StlRefusal("hello"), HasSubstr("has 5 bytes"));
+  EXPECT_THAT(StlRefusal(Binary("").substr(0, 84 + 99)),
               HasSubstr("byte 80: the header promises 2 triangles, but the bytes "
                         "behind it hold 1"));
-  EXPECT_THAT(Refusal(Binary("solid").substr(0, 84 + 99)), HasSubstr("byte 80"));
+  EXPECT_THAT(StlRefusal(Binary("solid").substr(0, 84 + 99)), HasSubstr("byte 80"));
   std::string huge = Binary("");
   huge.replace(80, 4, "\xFF\xFF\xFF\xFF");
-  EXPECT_THAT(Refusal(huge), HasSubstr("promises 4294967295 triangles"));
+  EXPECT_THAT(StlRefusal(huge), HasSubstr("promises 4294967295 triangles"));
   huge.replace(80, 4, std::string(4, '\0'));
-  EXPECT_THAT(Refusal(huge.substr(0, 84)), HasSubstr("no vertex and no face"));
-  EXPECT_THAT(Refusal(Binary("", std::numeric_limits<float>::quiet_NaN())),
+  EXPECT_THAT(StlRefusal(huge.substr(0, 84)), HasSubstr("no vertex and no face"));
+  EXPECT_THAT(StlRefusal(Binary("", std::numeric_limits<float>::quiet_NaN())),
               HasSubstr("byte 178: triangle 1 has the coordinate nan"));
 }
 
 TEST(Stl, TellsOfBytesBehindTheLastTriangle) {
   std::vector<std::string> notes;
-  ASSERT_TRUE(Read(Binary("") + "extra", &notes).ok());
+  ASSERT_TRUE(ReadStl(Binary("") + "extra", &notes).ok());
   EXPECT_THAT(notes, testing::ElementsAre(HasSubstr("5 bytes behind the last triangle")));
 }
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/base/nan.h"
 #include "server/base/units.h"
 #include "server/image/renderer.h"
 #include "server/image/view.h"
@@ -12,8 +13,6 @@ namespace touchstone::image {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Camera GoodCamera() {
   Camera camera;
@@ -156,7 +155,7 @@ TEST(ImageRequest, RefusesSizesByName) {
 
 TEST(ImageRequest, RefusesCamerasThatSeeNothing) {
   Camera camera = GoodCamera();
-  camera.eye_m.y() = kNan;
+  camera.eye_m.y() = kNaN;
   ExpectRefused(camera, {}, "camera.eye_m is (0.3, nan, 0)", "finite");
   camera = GoodCamera();
   camera.at_m.x() = std::numeric_limits<double>::infinity();
@@ -167,14 +166,14 @@ TEST(ImageRequest, RefusesCamerasThatSeeNothing) {
   camera = GoodCamera();
   camera.up = {0, 0, 0};
   ExpectRefused(camera, {}, "camera.up is (0, 0, 0)", "not zero");
-  camera.up = {0, kNan, 0};
+  camera.up = {0, kNaN, 0};
   ExpectRefused(camera, {}, "camera.up is (0, nan, 0)", "finite");
   camera.up = {-2, 0, 0};
   ExpectRefused(camera, {}, "camera.up is (-2, 0, 0), parallel", "image's top");
   camera = GoodCamera();
   camera.vertical_fov_rad = kPi;
   ExpectRefused(camera, {}, "camera.vertical_fov_rad is 3.14159", "170 deg");
-  camera.vertical_fov_rad = kNan;
+  camera.vertical_fov_rad = kNaN;
   ExpectRefused(camera, {}, "camera.vertical_fov_rad is nan", "170 deg");
   camera = GoodCamera();
   camera.near_m = -1;

@@ -10,6 +10,7 @@
 #include <limits>
 #include <thread>
 
+#include "server/base/nan.h"
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
@@ -19,8 +20,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class JournalTest : public ::testing::Test {
  protected:
@@ -88,8 +87,8 @@ TEST_F(JournalTest, ATouchGoesFromIntentOverExecutingToItsResult) {
   EXPECT_EQ((*unfinished)[0].second.program_id, 7u);
   EXPECT_EQ((*unfinished)[0].second.boot_id, 4'000'000'000u);
   JournalResult result = ResultOf(1.25);
-  result.fingers[1].contact_time_s = kNan;
-  result.fingers[1].base_from_tip.fill(kNan);
+  result.fingers[1].contact_time_s = kNaN;
+  result.fingers[1].base_from_tip.fill(kNaN);
   result.recovered = true;
   ASSERT_TRUE(journal->Done("s", "a", result).ok());
   const auto found = journal->Find("s", "a");

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -22,7 +23,6 @@
 namespace touchstone::session {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kMaxColumns = 4096;
 constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
 
@@ -48,7 +48,7 @@ class RowReader {
     }
     if (!columns_.has_session_time) set_.session_time_s.push_back(0);
     const size_t row = set_.line.size() - 1;
-    if (columns_.fingers > 0) set_.time_s.resize((row + 1) * columns_.fingers, kNan);
+    if (columns_.fingers > 0) set_.time_s.resize((row + 1) * columns_.fingers, kNaN);
     for (size_t i = 0; i < fields.size(); ++i) TOUCHSTONE_RETURN_IF_ERROR(ReadField(i, row));
     return columns_.has_poses ? MakeExact(row) : absl::OkStatus();
   }
@@ -118,7 +118,7 @@ class RowReader {
         break;
       }
       case ColumnKind::kCovariate: {
-        double value = kNan;
+        double value = kNaN;
         if (!field.empty()) {
           TOUCHSTONE_ASSIGN_OR_RETURN(value, number());
         }

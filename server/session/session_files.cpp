@@ -6,18 +6,13 @@
 #include <limits>
 #include <set>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 #include "server/session/session_measurements.h"
 
 namespace touchstone::session {
-namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
-
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches,
                               SessionMeasurements(journal, session));
@@ -46,12 +41,12 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
     touch.round = measured[k].round;
     touch.face = measured[k].face;
     touch.result.session_time_s =
-        measured[k].commanded.has_session_time_s() ? measured[k].commanded.session_time_s() : kNan;
-    touch.result.start_unix_s = kNan;
+        measured[k].commanded.has_session_time_s() ? measured[k].commanded.session_time_s() : kNaN;
+    touch.result.start_unix_s = kNaN;
     for (const double time_s : measured[k].time_s) {
       JournalFinger& finger = touch.result.fingers.emplace_back();
       finger.contact_time_s = time_s;
-      finger.base_from_tip.fill(kNan);
+      finger.base_from_tip.fill(kNaN);
     }
   }
   JournalSession session;

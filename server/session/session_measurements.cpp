@@ -7,13 +7,12 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::session {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Eigen::Vector3d VectorOf(const v1::Vector3& v) {
   return {v.x(), v.y(), v.z()};
@@ -89,7 +88,7 @@ absl::StatusOr<MeasurementSet> MakeMeasurementSet(const std::vector<MeasuredTouc
     if (columns.face) set.face.push_back(*touch.face);
     for (auto& [name, values] : set.covariates) {
       const auto found = c.covariates().find(name);
-      values.push_back(found == c.covariates().end() ? kNan : found->second);
+      values.push_back(found == c.covariates().end() ? kNaN : found->second);
     }
     set.time_s.insert(set.time_s.end(), touch.time_s.begin(), touch.time_s.end());
   }

@@ -6,14 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::source {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // A touch as a batch of one, for the table of columns: what a rig does not measure is NaN.
 effects::TouchBatch BatchOf(const TouchCommand& command, const session::JournalTouch& touch, uint64_t index) {
@@ -22,8 +21,8 @@ effects::TouchBatch BatchOf(const TouchCommand& command, const session::JournalT
   touch::SetTouch(command.touch, index, 0, &batch);
   for (int finger = 0; finger < batch.fingers(); ++finger)
     batch.reported_time_s[finger] = touch.result.fingers[finger].contact_time_s;
-  std::fill(batch.contact_m.begin(), batch.contact_m.end(), Eigen::Vector3d::Constant(kNan));
-  std::fill(batch.normal.begin(), batch.normal.end(), Eigen::Vector3d::Constant(kNan));
+  std::fill(batch.contact_m.begin(), batch.contact_m.end(), Eigen::Vector3d::Constant(kNaN));
+  std::fill(batch.normal.begin(), batch.normal.end(), Eigen::Vector3d::Constant(kNaN));
   return batch;
 }
 

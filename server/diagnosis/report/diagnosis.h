@@ -40,6 +40,9 @@ struct Diagnosis {
   std::vector<selection::ConfoundedEffects> confounded;
   std::vector<selection::RankedCandidate> candidates;
   std::optional<selection::UnexplainedRest> unexplained;
+  std::vector<std::string> superfluous;                  // effects of the model that the data do without
+  std::vector<selection::DataProblem> data_problems;     // with kCheckData; no step is claimed beside them
+  int touches_needed = 0;                                // with kTooLittleData
   std::string improved_model_yaml, improved_model_hash;  // empty if nothing changed
   std::vector<design::ProposedTouch> next_touches;
 

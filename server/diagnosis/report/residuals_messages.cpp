@@ -6,10 +6,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-double Us(double time_s) {
-  return time_s * kMicrosecondsPerSecond;
-}
-
 const char* NameOf(residuals::ErrorGroupKind kind) {
   switch (kind) {
     case residuals::ErrorGroupKind::kObject:
@@ -31,8 +27,8 @@ const char* NameOf(residuals::ErrorGroupKind kind) {
 void WriteSlice(const residuals::ErrorSlice& slice, v1::Slice* message) {
   message->set_slice(slice.conditions);
   message->set_touches(static_cast<uint32_t>(slice.touches));
-  message->set_mean_residual_us(Us(slice.mean_residual_s));
-  message->set_rmse_us(Us(slice.rmse_s));
+  message->set_mean_residual_us(Microseconds(slice.mean_residual_s));
+  message->set_rmse_us(Microseconds(slice.rmse_s));
   message->set_share_of_excess_error(slice.share_of_excess_error);
   message->set_words(slice.words);
 }
@@ -41,16 +37,16 @@ void WriteGroup(const residuals::ErrorGroup& group, v1::GroupError* message) {
   message->set_kind(NameOf(group.kind));
   message->set_name(group.name);
   message->set_touches(static_cast<uint32_t>(group.touches));
-  message->set_rmse_us(Us(group.rmse_s));
-  message->set_mean_residual_us(Us(group.mean_residual_s));
+  message->set_rmse_us(Microseconds(group.rmse_s));
+  message->set_mean_residual_us(Microseconds(group.mean_residual_s));
   message->set_share_of_excess_error(group.share_of_excess_error);
 }
 
 void WriteWorstTouch(const residuals::WorstTouch& touch, v1::TouchError* message) {
   message->set_touch(touch.touch);
   message->set_object(touch.object);
-  message->set_norm_us(Us(touch.norm_s));
-  for (const double residual_s : touch.residual_s) message->add_residual_us(Us(residual_s));
+  message->set_norm_us(Microseconds(touch.norm_s));
+  for (const double residual_s : touch.residual_s) message->add_residual_us(Microseconds(residual_s));
 }
 
 void WriteCurve(const residuals::ResidualCurve& curve, int fingers, v1::CovariateCurve* message) {
@@ -62,16 +58,16 @@ void WriteCurve(const residuals::ResidualCurve& curve, int fingers, v1::Covariat
     bin_message->set_finger(model::FingerName(bin.finger, fingers));
     bin_message->set_centre(bin.centre);
     bin_message->set_count(static_cast<uint32_t>(bin.touches));
-    bin_message->set_mean_residual_us(Us(bin.mean_residual_s));
-    bin_message->set_std_error_us(Us(bin.std_error_s));
-    bin_message->set_after_us(Us(bin.improved_mean_residual_s));
+    bin_message->set_mean_residual_us(Microseconds(bin.mean_residual_s));
+    bin_message->set_std_error_us(Microseconds(bin.std_error_s));
+    bin_message->set_after_us(Microseconds(bin.improved_mean_residual_s));
   }
 }
 
 void WriteParity(const residuals::ParityPoint& point, v1::ParityPoint* message) {
-  message->set_simulated_us(Us(point.simulated_s));
-  message->set_measured_us(Us(point.measured_s));
-  message->set_improved_us(Us(point.improved_s));
+  message->set_simulated_us(Microseconds(point.simulated_s));
+  message->set_measured_us(Microseconds(point.measured_s));
+  message->set_improved_us(Microseconds(point.improved_s));
   message->set_finger(static_cast<uint32_t>(point.finger));
 }
 
@@ -80,8 +76,8 @@ void WriteSurfacePoint(const residuals::SurfaceResidual& point, v1::SurfacePoint
   message->set_x_mm(point.contact_m.x() * kMillimetresPerMetre);
   message->set_y_mm(point.contact_m.y() * kMillimetresPerMetre);
   message->set_z_mm(point.contact_m.z() * kMillimetresPerMetre);
-  message->set_residual_us(Us(point.residual_s));
-  message->set_after_us(Us(point.improved_residual_s));
+  message->set_residual_us(Microseconds(point.residual_s));
+  message->set_after_us(Microseconds(point.improved_residual_s));
   message->set_finger(static_cast<uint32_t>(point.finger));
 }
 
@@ -113,7 +109,8 @@ void WriteHistogram(const residuals::ComparedHistogram& histogram, v1::Report* r
 void WriteResiduals(const residuals::ResidualSummary& residuals, int fingers, v1::Report* report) {
   for (const residuals::ErrorSlice& slice : residuals.slices) WriteSlice(slice, report->add_where());
   for (const residuals::ErrorGroup& group : residuals.grouped.groups) WriteGroup(group, report->add_groups());
-  for (const double bias_s : residuals.grouped.finger_bias_s) report->add_finger_bias_us(Us(bias_s));
+  for (const double bias_s : residuals.grouped.finger_bias_s)
+    report->add_finger_bias_us(Microseconds(bias_s));
   for (const residuals::WorstTouch& touch : residuals.worst_touches)
     WriteWorstTouch(touch, report->add_worst_touches());
   for (const residuals::ResidualCurve& curve : residuals.curves)

@@ -99,6 +99,15 @@ std::string Summarize(const Diagnosis& diagnosis) {
     case selection::Verdict::kWrongValues:
       sentences.push_back(absl::StrCat("Then ", TimeInWords(diagnosis.final->rmse_s), " is left."));
       break;
+    case selection::Verdict::kCheckData:
+      for (const selection::DataProblem& problem : diagnosis.data_problems)
+        sentences.push_back(
+            absl::StrCat(problem.words, problem.fix.empty() ? "" : " Mend it with: ", problem.fix));
+      break;
+    case selection::Verdict::kTooLittleData:
+      sentences.push_back(
+          absl::StrCat("That is too little for a verdict; ", diagnosis.touches_needed, " touches would do."));
+      break;
     case selection::Verdict::kNone:
       break;
   }

@@ -9,10 +9,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-double Us(double time_s) {
-  return time_s * kMicrosecondsPerSecond;
-}
-
 v1::Report::Verdict ToMessage(selection::Verdict verdict) {
   switch (verdict) {
     case selection::Verdict::kNone:
@@ -25,6 +21,10 @@ v1::Report::Verdict ToMessage(selection::Verdict verdict) {
       return v1::Report::MISSING_EFFECTS;
     case selection::Verdict::kUnexplained:
       return v1::Report::UNEXPLAINED;
+    case selection::Verdict::kCheckData:
+      return v1::Report::CHECK_DATA;
+    case selection::Verdict::kTooLittleData:
+      return v1::Report::TOO_LITTLE_DATA;
   }
   return v1::Report::VERDICT_UNSPECIFIED;
 }
@@ -64,15 +64,15 @@ void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters
 }
 
 void WriteQuality(const selection::Quality& quality, v1::Quality* message) {
-  message->set_rmse_us(Us(quality.rmse_s));
-  message->set_heldout_rmse_us(Us(quality.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(quality.rmse_s));
+  message->set_heldout_rmse_us(Microseconds(quality.heldout_rmse_s));
   message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
 void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message) {
-  message->set_sigma_us(Us(floor.sigma_s));
-  message->set_lower_us(Us(floor.lower_s));
-  message->set_upper_us(Us(floor.upper_s));
+  message->set_sigma_us(Microseconds(floor.sigma_s));
+  message->set_lower_us(Microseconds(floor.lower_s));
+  message->set_upper_us(Microseconds(floor.upper_s));
   message->set_degrees_of_freedom(static_cast<uint32_t>(floor.degrees_of_freedom));
   message->set_from_repeats(floor.from_repeats);
 }
@@ -82,8 +82,8 @@ void WriteStep(const selection::LadderStep& step, v1::Step* message) {
   for (const std::string& name : step.equivalent) message->add_equivalent(name);
   message->set_probability(step.probability);
   WriteParameters(step.parameters, message);
-  message->set_rmse_us(Us(step.quality.rmse_s));
-  message->set_heldout_rmse_us(Us(step.quality.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(step.quality.rmse_s));
+  message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse_s));
   message->set_lack_of_fit_p(step.quality.lack_of_fit_p);
   message->set_gain_nats(step.gain_nats);
   message->set_meaning(step.meaning);
@@ -91,14 +91,15 @@ void WriteStep(const selection::LadderStep& step, v1::Step* message) {
   message->set_remedy(step.remedy);
   message->set_discriminating_measurement(step.discriminating_measurement);
   message->set_scope(ToMessage(step.scope));
+  message->set_words(step.words);
 }
 
 void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
   message->set_effect(candidate.effect);
   WriteParameters(candidate.parameters, message);
   message->set_probability(candidate.probability);
-  message->set_rmse_us(Us(candidate.rmse_s));
-  message->set_heldout_rmse_us(Us(candidate.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(candidate.rmse_s));
+  message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse_s));
   message->set_gain_nats(candidate.gain_nats);
   message->set_note(ToMessage(candidate.note));
   message->set_scope(ToMessage(candidate.scope));
@@ -114,11 +115,21 @@ void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* m
   message->set_formula(rest.formula);
   message->set_formula_yaml(rest.formula_yaml);
   WriteParameters(rest.parameters, message);
-  message->set_rmse_us(Us(rest.rmse_s));
-  message->set_heldout_rmse_us(Us(rest.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(rest.rmse_s));
+  message->set_heldout_rmse_us(Microseconds(rest.heldout_rmse_s));
   message->set_heldout_gain(rest.heldout_gain);
   message->set_nearest_effect(rest.nearest_effect);
   message->set_nearest_cosine(rest.nearest_cosine);
+  message->set_lookup_yaml(rest.lookup_yaml);
+}
+
+void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {
+  message->set_kind(problem.kind);
+  message->set_detail(problem.detail);
+  message->set_words(problem.words);
+  message->set_fix(problem.fix);
+  message->set_rmse_before_us(Microseconds(problem.rmse_before_s));
+  message->set_rmse_after_us(Microseconds(problem.rmse_after_s));
 }
 
 void WriteData(const touches::DataSummary& data, v1::Report* report) {
@@ -158,6 +169,7 @@ void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
   for (const selection::RankedCandidate& candidate : diagnosis.candidates)
     WriteCandidate(candidate, report->add_candidates());
   if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
+  for (const std::string& effect : diagnosis.superfluous) report->add_superfluous(effect);
   report->set_improved_model_yaml(diagnosis.improved_model_yaml);
   report->set_improved_model_hash(diagnosis.improved_model_hash);
 }
@@ -180,6 +192,9 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   report.set_reducible_share(diagnosis.reducible_share);
   WriteResiduals(diagnosis.residuals, diagnosis.data.fingers, &report);
   WriteCauses(diagnosis, &report);
+  for (const selection::DataProblem& problem : diagnosis.data_problems)
+    WriteDataProblem(problem, report.add_data_problems());
+  report.set_touches_needed(static_cast<uint32_t>(diagnosis.touches_needed));
   for (const design::ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);
   report.set_summary(diagnosis.summary);
   for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);

@@ -8,17 +8,6 @@
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr double kSigmaS = 0.005;
-
-// Contacts come early by 1 ms per degree of incidence, on every finger.
-touches::SyntheticSet EarlyOnSlopes() {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
-  for (int k = 0; k < set.size(); ++k)
-    for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
-  set.Finish();
-  return set;
-}
-
 std::vector<ResidualCurve> Curves(const touches::SyntheticSet& set) {
   return MakeResidualCurves(set.observations, set.prediction, set.residuals, set.residuals, 0);
 }
@@ -33,7 +22,7 @@ double CurveP(const std::vector<ResidualCurve>& curves, const std::string& name)
 TEST(ResidualCurves, AreFlatUnderNoiseAndTheirPIsHonest) {
   int claims = 0, curves = 0;
   for (int seed = 0; seed < 20; ++seed) {
-    const auto made = Curves(touches::SyntheticSet(3, 48, 4, kSigmaS, 100 + seed));
+    const auto made = Curves(touches::SyntheticSet(3, 48, 4, touches::kSyntheticSigmaS, 100 + seed));
     for (const ResidualCurve& curve : made) {
       ++curves;
       claims += curve.p_value < 0.05;
@@ -44,7 +33,7 @@ TEST(ResidualCurves, AreFlatUnderNoiseAndTheirPIsHonest) {
 }
 
 TEST(ResidualCurves, FollowTheEffectAndNameItsCovariateOnly) {
-  const auto curves = Curves(EarlyOnSlopes());
+  const auto curves = Curves(touches::EarlyOnSlopes());
   EXPECT_LT(CurveP(curves, "incidence_deg"), 1e-9);
   EXPECT_GT(CurveP(curves, "session_time_s"), 0.01);
   EXPECT_GT(CurveP(curves, "lateral_z"), 0.01);
@@ -62,11 +51,12 @@ TEST(ResidualCurves, RepeatsOfAPoseAreNotTakenForEvidence) {
   // Every pose has an error of its own that no covariate explains.
   int claims = 0;
   for (int seed = 0; seed < 20; ++seed) {
-    touches::SyntheticSet set(2, 48, 8, kSigmaS, 200 + seed);
+    touches::SyntheticSet set(2, 48, 8, touches::kSyntheticSigmaS, 200 + seed);
     for (int k = 0; k < set.size(); ++k)
       for (int i = 0; i < 3; ++i)
         set.observations.time_s[k * 3 + i] +=
-            4 * kSigmaS * RandomStream(seed, RandomDomain::kTest, set.observations.pose[k] * 3 + i).Normal();
+            4 * touches::kSyntheticSigmaS *
+            RandomStream(seed, RandomDomain::kTest, set.observations.pose[k] * 3 + i).Normal();
     set.Finish();
     const auto made = Curves(set);
     for (const ResidualCurve& curve : made) claims += curve.p_value < 0.05;
@@ -75,7 +65,7 @@ TEST(ResidualCurves, RepeatsOfAPoseAreNotTakenForEvidence) {
 }
 
 TEST(ResidualCurves, ADriftIsSeenThroughTheRepeats) {
-  touches::SyntheticSet set(2, 48, 8, kSigmaS, 4);
+  touches::SyntheticSet set(2, 48, 8, touches::kSyntheticSigmaS, 4);
   for (int k = 0; k < set.size(); ++k)
     set.observations.time_s[k * 3] += 0.01 * set.observations.set->session_time_s[k] / 7680;
   set.Finish();

@@ -8,24 +8,13 @@
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr double kSigmaS = 0.005;
-
-// Contacts come early by 1 ms per degree of incidence, on every finger.
-touches::SyntheticSet EarlyOnSlopes() {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
-  for (int k = 0; k < set.size(); ++k)
-    for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
-  set.Finish();
-  return set;
-}
-
 ResidualSummary Describe(const touches::SyntheticSet& set) {
   return DescribeResiduals(set.observations, set.prediction, set.prediction, set.residuals, set.residuals,
-                           {kSigmaS, 0.03, 0});
+                           {touches::kSyntheticSigmaS, 0.03, 0});
 }
 
 TEST(ResidualPlots, AreThinnedAndParityDiffersByTheResidual) {
-  const touches::SyntheticSet set = EarlyOnSlopes();
+  const touches::SyntheticSet set = touches::EarlyOnSlopes();
   const ResidualSummary summary = Describe(set);
   EXPECT_EQ(summary.parity.size(), 2000u);
   double squares = 0;
@@ -38,7 +27,7 @@ TEST(ResidualPlots, AreThinnedAndParityDiffersByTheResidual) {
 }
 
 TEST(ResidualPlots, OutlinesAreCoarseCopies) {
-  touches::SyntheticSet set(1, 4, 2, kSigmaS, 7);
+  touches::SyntheticSet set(1, 4, 2, touches::kSyntheticSigmaS, 7);
   geometry::TriangleMesh sphere;  // an octahedron divided five times: 8192 triangles, radius 50 mm
   sphere.vertices_m = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   sphere.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
@@ -71,7 +60,7 @@ TEST(ResidualPlots, OutlinesAreCoarseCopies) {
 }
 
 TEST(DescribeResiduals, SaysTheSameTwice) {
-  const touches::SyntheticSet set = EarlyOnSlopes();
+  const touches::SyntheticSet set = touches::EarlyOnSlopes();
   const ResidualSummary once = Describe(set), twice = Describe(set);
   ASSERT_EQ(once.slices.size(), twice.slices.size());
   ASSERT_EQ(once.curves.size(), twice.curves.size());
@@ -91,14 +80,14 @@ TEST(DescribeResiduals, SaysTheSameTwice) {
 }
 
 TEST(DescribeResiduals, ShowsAPartOfManyTouches) {
-  const touches::SyntheticSet set(5, 1000, 12, kSigmaS, 8);
+  const touches::SyntheticSet set(5, 1000, 12, touches::kSyntheticSigmaS, 8);
   const ResidualSummary summary = Describe(set);
   EXPECT_EQ(summary.parity.size(), 2000u);
   EXPECT_LE(summary.surface_points.size(), 4000u);
 }
 
 TEST(DescribeResiduals, WithoutTimesGivesAnEmptySummary) {
-  touches::SyntheticSet set(1, 2, 1, kSigmaS, 9);
+  touches::SyntheticSet set(1, 2, 1, touches::kSyntheticSigmaS, 9);
   for (double& time_s : set.observations.time_s) time_s = NAN;
   set.Finish();
   const ResidualSummary summary = Describe(set);

@@ -11,23 +11,12 @@
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr double kSigmaS = 0.005;
-
-// Contacts come early by 1 ms per degree of incidence, on every finger.
-touches::SyntheticSet EarlyOnSlopes() {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
-  for (int k = 0; k < set.size(); ++k)
-    for (int i = 0; i < 3; ++i) set.observations.time_s[k * 3 + i] -= 1e-3 * set.IncidenceDeg(k, i);
-  set.Finish();
-  return set;
-}
-
 GroupedErrors Group(const touches::SyntheticSet& set) {
-  return GroupErrors(set.observations, set.residuals, kSigmaS);
+  return GroupErrors(set.observations, set.residuals, touches::kSyntheticSigmaS);
 }
 
 TEST(ErrorGroups, EveryKindAddsUpToAllTouchesAndToTheWholeExcess) {
-  const GroupedErrors grouped = Group(EarlyOnSlopes());
+  const GroupedErrors grouped = Group(touches::EarlyOnSlopes());
   std::map<ErrorGroupKind, std::pair<int, double>> sums;
   for (const ErrorGroup& group : grouped.groups) {
     sums[group.kind].first += group.touches;
@@ -41,13 +30,13 @@ TEST(ErrorGroups, EveryKindAddsUpToAllTouchesAndToTheWholeExcess) {
 }
 
 TEST(ErrorGroups, OfNoiseHaveTheRmseSigma) {
-  const GroupedErrors grouped = Group(touches::SyntheticSet(5, 48, 4, kSigmaS, 2));
+  const GroupedErrors grouped = Group(touches::SyntheticSet(5, 48, 4, touches::kSyntheticSigmaS, 2));
   for (const ErrorGroup& group : grouped.groups)
-    EXPECT_NEAR(group.rmse_s, kSigmaS, group.touches > 500 ? 0.0004 : 0.0011) << group.name;
+    EXPECT_NEAR(group.rmse_s, touches::kSyntheticSigmaS, group.touches > 500 ? 0.0004 : 0.0011) << group.name;
 }
 
 TEST(ErrorGroups, OfALateFingerHaveTwoThirdsOfItAsItsBias) {
-  touches::SyntheticSet set(2, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(2, 48, 4, touches::kSyntheticSigmaS, 3);
   for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 2] += 0.03;
   set.observations.time_s[77 * 3] -= 1;
   set.observations.time_s[99 * 3] -= 2;
@@ -58,7 +47,7 @@ TEST(ErrorGroups, OfALateFingerHaveTwoThirdsOfItAsItsBias) {
 }
 
 TEST(WorstTouches, AreThoseThatCountWithTheLargestFirst) {
-  touches::SyntheticSet set(2, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(2, 48, 4, touches::kSyntheticSigmaS, 3);
   set.observations.time_s[77 * 3] -= 1;
   set.observations.time_s[99 * 3] -= 2;
   set.observations.used[99] = 0;

@@ -6,7 +6,7 @@
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr size_t kMaxPoints = 2000;
+constexpr size_t kMaxParityPoints = 2000;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ std::vector<ParityPoint> MakeParity(const touches::Observations& observations,
     if (observations.used[k])
       for (int i = 0; i < fingers; ++i)
         if (!std::isnan(before[size_t(k) * fingers + i])) cells.push_back(size_t(k) * fingers + i);
-  const size_t count = std::min(kMaxPoints, cells.size());
+  const size_t count = std::min(kMaxParityPoints, cells.size());
   std::vector<ParityPoint> points;
   for (size_t n = 0; n < count; ++n) {
     // Evenly over the session; the finger changes from point to point.

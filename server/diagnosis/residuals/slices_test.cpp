@@ -8,21 +8,19 @@
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr double kSigmaS = 0.005;
-
 std::vector<ErrorSlice> Slices(const touches::SyntheticSet& set) {
-  return FindSlices(set.observations, set.prediction, set.residuals, kSigmaS);
+  return FindSlices(set.observations, set.prediction, set.residuals, touches::kSyntheticSigmaS);
 }
 
 TEST(ErrorSlices, NoiseAloneHasNoSlices) {
   int claims = 0;
   for (int seed = 0; seed < 100; ++seed)
-    claims += !Slices(touches::SyntheticSet(5, 48, 4, kSigmaS, seed)).empty();
+    claims += !Slices(touches::SyntheticSet(5, 48, 4, touches::kSyntheticSigmaS, seed)).empty();
   EXPECT_LE(claims, 1);
 }
 
 TEST(ErrorSlices, ABiasBeyondAnAngleIsFoundThereWithItsSignAndSize) {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 1);
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 1);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (set.IncidenceDeg(k, i) > 20) set.observations.time_s[k * 3 + i] -= 0.03;
@@ -38,7 +36,7 @@ TEST(ErrorSlices, ABiasBeyondAnAngleIsFoundThereWithItsSignAndSize) {
 }
 
 TEST(ErrorSlices, OneFingerOfOneObjectIsTwoConditions) {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 2);
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 2);
   for (int k = 0; k < set.size(); ++k)
     if (set.observations.object[k] == 3) set.observations.time_s[k * 3 + 2] += 0.03;
   set.Finish();
@@ -54,7 +52,7 @@ TEST(ErrorSlices, OneFingerOfOneObjectIsTwoConditions) {
 }
 
 TEST(ErrorSlices, TheFirstFingerIsSaidInWords) {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 3);
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 3);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (i != set.prediction.first_finger[k]) set.observations.time_s[k * 3 + i] += 0.015;
@@ -67,8 +65,8 @@ TEST(ErrorSlices, TheFirstFingerIsSaidInWords) {
 }
 
 TEST(ErrorSlices, AWeakBiasOfOneFingerIsSeenAlthoughTheExcessIsSmall) {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 4);
-  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] += 0.3 * kSigmaS;
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 4);
+  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] += 0.3 * touches::kSyntheticSigmaS;
   set.Finish();
   const auto slices = Slices(set);
   ASSERT_FALSE(slices.empty());
@@ -76,7 +74,7 @@ TEST(ErrorSlices, AWeakBiasOfOneFingerIsSeenAlthoughTheExcessIsSmall) {
 }
 
 TEST(ErrorSlices, ATouchThatIsLeftOutCountsNowhere) {
-  touches::SyntheticSet set(5, 48, 4, kSigmaS, 5);
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 5);
   for (int k = 0; k < set.size(); ++k)
     if (set.observations.object[k] == 2) {
       set.observations.time_s[k * 3] += 1;
@@ -88,7 +86,7 @@ TEST(ErrorSlices, ATouchThatIsLeftOutCountsNowhere) {
 
 TEST(ErrorSlices, AFewTouchesAndMissingFingersAreNoTrouble) {
   for (const int poses : {1, 2, 5, 12}) {
-    touches::SyntheticSet set(1, poses, 4, kSigmaS, 6);
+    touches::SyntheticSet set(1, poses, 4, touches::kSyntheticSigmaS, 6);
     for (int k = 0; k < set.size(); k += 3) set.observations.time_s[k * 3 + k % 2] = NAN;
     for (int i = 0; i < 3; ++i) set.observations.time_s[i] = NAN;
     set.Finish();
@@ -97,7 +95,7 @@ TEST(ErrorSlices, AFewTouchesAndMissingFingersAreNoTrouble) {
 }
 
 TEST(ErrorSlices, CountsAllTouchesOfALargeSet) {
-  touches::SyntheticSet set(5, 500, 40, kSigmaS, 7);
+  touches::SyntheticSet set(5, 500, 40, touches::kSyntheticSigmaS, 7);
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i)
       if (set.IncidenceDeg(k, i) > 20) set.observations.time_s[k * 3 + i] -= 0.03;

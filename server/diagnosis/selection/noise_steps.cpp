@@ -15,7 +15,7 @@ constexpr double kRelevant = 0.02;     // relative change, for a refit
 constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
 constexpr double kMinFloorUs = 2;      // of noise as a step: less is the rounding of the file
 constexpr double kCertainNats = 1e3;   // noise is there or not: any scatter beyond rounding proves it
-constexpr double kMaxExponent = 700;   // of a probability's odds
+constexpr double kMaxLogOdds = 700;    // of a probability's odds
 
 class NoiseStepWriter {
  public:
@@ -67,7 +67,7 @@ class NoiseStepWriter {
     step.check_on_rig = effect->check_on_rig;
     step.remedy = effect->remedy;
     step.gain_nats = gain_nats;
-    step.probability = 1 / (1 + std::exp(-std::min(gain_nats, kMaxExponent)));
+    step.probability = 1 / (1 + std::exp(-std::min(gain_nats, kMaxLogOdds)));
     step.parameters = {estimate};
     step.quality = ladder_.final;  // noise changes no expectation: the errors stay
     ladder_.steps.push_back(std::move(step));

@@ -16,6 +16,8 @@ enum class Verdict {
   kWrongValues,     // no effect is missing, values must change
   kMissingEffects,  // the steps bring the rest down to noise
   kUnexplained,     // a structure remains that no built-in effect explains
+  kCheckData,       // a mistake in the file explains the error far better than physics can
+  kTooLittleData,   // fewer touches than a verdict needs
 };
 
 enum class EffectScope { kRig, kObject };
@@ -52,6 +54,7 @@ struct LadderStep {
   std::vector<inference::ParameterEstimate> parameters;
   Quality quality;  // with this step, all earlier ones and refits, everything fitted anew
   std::string meaning, check_on_rig, remedy;  // for people, from the catalogue
+  std::string words;                          // where it acts, if not everywhere: "on lat10 only"
 };
 
 enum class CandidateNote {
@@ -96,6 +99,16 @@ struct UnexplainedRest {
   double heldout_gain = 0;                // share of the held-out excess error that it removes, 0 to 1
   std::string nearest_effect;             // of the catalogue, and the cosine between the two
   double nearest_cosine = 0;
+  std::string lookup_yaml;  // a curve in place of a formula, as a whole effect for a model file; empty: none
+};
+
+// A discrete mistake in a measurement file, and how to mend it.
+struct DataProblem {
+  std::string kind, detail;  // "finger_order", "l <-> m"; the kinds are those of v1::DataProblem
+  std::string words;         // a sentence for people, with the evidence
+  std::string fix;           // the command that mends the file; empty: none does
+  double rmse_before_s = 0,
+         rmse_after_s = 0;  // of the model as it was given, on the file as it is and would be
 };
 
 }  // namespace touchstone::diagnosis::selection

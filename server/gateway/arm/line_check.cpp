@@ -14,7 +14,7 @@
 namespace touchstone::gateway::arm {
 namespace {
 
-constexpr double kStepM = 0.005, kStepRad = 0.035;
+constexpr double kCheckStepM = 0.005, kCheckStepRad = 0.035;
 constexpr double kJumpRad = 0.35;  // of a joint from sample to sample: another branch, or a wrist that flips
 constexpr double kPostureRad = 1;
 constexpr double kBoxToleranceM = 1e-6, kJointToleranceRad = 1e-4;
@@ -75,8 +75,8 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   if (Joints unused; !JointsAt(to, *joints, &unused)) return OutOfReach(to, what);
   const Eigen::Vector3d line_m = to.translation() - from.translation();
   const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
-  const int steps =
-      std::max(1, static_cast<int>(std::ceil(std::max(line_m.norm() / kStepM, turn.angle() / kStepRad))));
+  const int steps = std::max(
+      1, static_cast<int>(std::ceil(std::max(line_m.norm() / kCheckStepM, turn.angle() / kCheckStepRad))));
   const double step_s =
       std::max(line_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMaxTurnRadS) / steps;
   for (int step = 0; step <= steps; ++step) {

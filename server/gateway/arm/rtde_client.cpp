@@ -12,8 +12,7 @@ namespace touchstone::gateway::arm {
 namespace {
 
 // Host seconds.
-constexpr double kConnectS = 1, kReplyS = 1, kSendS = 0.01;
-constexpr double kFirstPauseS = 0.05, kLongestPauseS = 1;
+constexpr double kReplyS = 1, kSendS = 0.01;
 constexpr double kSliceS = 0.05;  // how soon a waiting thread notices that it shall end
 constexpr int kMessagesBeforeReply = 2000;
 

@@ -12,7 +12,7 @@
 namespace touchstone::gateway::arm {
 namespace {
 
-constexpr size_t kHeaderBytes = 3;
+constexpr size_t kPackageHeaderBytes = 3;
 
 struct Field {
   std::string name, type;
@@ -87,7 +87,7 @@ bool Finite(const std::array<double, 6>& values) {
 
 std::string EncodeRtde(RtdeType type, absl::string_view payload) {
   return BigEndianWriter()
-      .U16(static_cast<uint16_t>(payload.size() + kHeaderBytes))
+      .U16(static_cast<uint16_t>(payload.size() + kPackageHeaderBytes))
       .U8(static_cast<uint8_t>(type))
       .Bytes(payload)
       .bytes();
@@ -98,12 +98,12 @@ absl::StatusOr<std::optional<RtdeMessage>> RtdeFramer::Next() {
   const size_t there = bytes_.size() - begin_;
   if (there >= 2) {
     const size_t size = reader.U16();
-    if (size < kHeaderBytes)
+    if (size < kPackageHeaderBytes)
       return absl::DataLossError(absl::StrCat("RTDE: a message of ", size, " bytes; the header alone has 3"));
     if (there >= size) {
       RtdeMessage message;
       message.type = reader.U8();
-      message.payload = std::string(reader.Bytes(size - kHeaderBytes));
+      message.payload = std::string(reader.Bytes(size - kPackageHeaderBytes));
       begin_ += size;
       return std::optional<RtdeMessage>(std::move(message));
     }

@@ -11,8 +11,7 @@ namespace touchstone::gateway::arm {
 namespace {
 
 // Host seconds.
-constexpr double kConnectS = 1, kSendS = 0.05, kSliceS = 0.1;
-constexpr double kFirstPauseS = 0.05, kLongestPauseS = 1;
+constexpr double kScriptSendS = 0.05, kScriptSliceS = 0.1;
 
 }  // namespace
 
@@ -36,7 +35,7 @@ absl::Status ScriptPort::SendLocked(const std::string& program) {
   if (writer_ == nullptr)
     return absl::UnavailableError(
         absl::StrCat("no connection to the controller's interface at ", address_, ":", port_));
-  const absl::Status sent = writer_->Send(program, kSendS);
+  const absl::Status sent = writer_->Send(program, kScriptSendS);
   if (!sent.ok()) writer_.reset();  // half a program may have gone out; the receiving thread connects anew
   return sent;
 }
@@ -79,7 +78,7 @@ absl::Status ScriptPort::Receive(TcpSocket* socket) {
   PrimaryStream stream;
   char buffer[8192];
   while (!ending_) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count, socket->Receive(buffer, sizeof(buffer), kSliceS));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const size_t count, socket->Receive(buffer, sizeof(buffer), kScriptSliceS));
     stream.Append(absl::string_view(buffer, count));
     while (true) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PrimaryUpdate> update, stream.Next());

@@ -11,6 +11,9 @@
 
 namespace touchstone::gateway::arm {
 
+// How long a connection may take, and the pause before the next attempt, which doubles each time.
+inline constexpr double kConnectS = 1, kFirstPauseS = 0.05, kLongestPauseS = 1;
+
 // Reading by one thread and sending by another at the same time is fine; two senders need a lock.
 class TcpSocket {
  public:

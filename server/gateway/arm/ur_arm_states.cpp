@@ -11,7 +11,7 @@
 namespace touchstone::gateway::arm {
 namespace {
 
-constexpr double kDashboardS = 2;  // host time
+constexpr double kRemoteControlAnswerS = 2;  // host time
 
 }  // namespace
 
@@ -101,7 +101,7 @@ absl::Status UrArmOnTcp::Ready() const {
                                                "; trying again"));
   // Only e-Series controllers know local control, and only a program that did not begin makes one suspect it.
   if (suspect_ && options_.model == "ur3e") {
-    const absl::StatusOr<std::string> remote = dashboard_.Ask("is in remote control", kDashboardS);
+    const absl::StatusOr<std::string> remote = dashboard_.Ask("is in remote control", kRemoteControlAnswerS);
     if (remote.ok() && absl::AsciiStrToLower(*remote) == "false")
       return absl::FailedPreconditionError(
           "the controller is in local control and runs no programs from outside: switch it to remote control "

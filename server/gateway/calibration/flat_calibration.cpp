@@ -16,7 +16,7 @@ namespace {
 constexpr double kMaxTiltRad = 3 * kRadiansPerDegree;
 constexpr double kMinReported = 0.8;   // of the touches, by every finger
 constexpr double kSignificant = 4;     // standard errors
-constexpr double kOutlier = 6;         // robust standard deviations
+constexpr double kFlatOutlier = 6;     // robust standard deviations
 constexpr size_t kMinForOutliers = 8;  // below, a spread cannot be estimated robustly
 
 // A touch's times less their mean: what an unknown start leaves.
@@ -58,7 +58,7 @@ std::vector<FlatTouch> WithoutOutliers(const std::vector<FlatTouch>& touches) {
     for (double& off : off_m) off = std::abs(off - median_m);
     const double spread_m = 1.4826 * Median(off_m);
     for (size_t k = 0; k < touches.size(); ++k)
-      if (spread_m > 0 && off_m[k] > kOutlier * spread_m) keep[k] = false;
+      if (spread_m > 0 && off_m[k] > kFlatOutlier * spread_m) keep[k] = false;
   }
   std::vector<FlatTouch> kept;
   for (size_t k = 0; k < touches.size(); ++k)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/random.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
@@ -17,7 +18,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSpacingM = 0.03;
 
 std::vector<FlatTouch> Touches(size_t count, const std::vector<double>& offset_m, double sigma_s,
@@ -90,7 +90,7 @@ TEST(FlatCalibration, RefusesWhatTellsNothing) {
   EXPECT_THAT(message(Touches(9, {-slope * kSpacingM, 0, slope * kSpacingM}, 0, {0.02}, &random)),
               HasSubstr("met at 5.0 degrees"));
   std::vector<FlatTouch> dead = Touches(10, {0, 0, 0}, 1e-3, {0.02}, &random);
-  for (int k = 0; k < 4; ++k) dead[k].contact_time_s[1] = kNan;
+  for (int k = 0; k < 4; ++k) dead[k].contact_time_s[1] = kNaN;
   EXPECT_THAT(message(dead), HasSubstr("finger 1 (of 0 to 2) reported in 6 of 10 flat touches"));
   std::vector<FlatTouch> still = Touches(5, {0, 0, 0}, 1e-3, {0.02}, &random);
   still[3].speed_m_s = 0;
@@ -101,7 +101,7 @@ TEST(FlatCalibration, LeavesOutWhatNoNoiseExplainsAndSaysSo) {
   RandomStream random(5, RandomDomain::kTest);
   std::vector<FlatTouch> touches = Touches(30, {0.0004, -0.0005, 0.0001}, 1e-3, {0.02}, &random);
   touches[7].contact_time_s[2] += 0.5;
-  touches[9].contact_time_s[0] = kNan;
+  touches[9].contact_time_s[0] = kNaN;
   const auto flat = CalibrateFlat(touches, kSpacingM);
   ASSERT_TRUE(flat.ok()) << flat.status();
   EXPECT_EQ(flat->touches, 28u);
@@ -142,7 +142,7 @@ TEST(FlatCalibration, MeasuredOffsetsMakeAFileToo) {
 TEST(FlatCalibration, CorrectedTimesAreThoseOfEqualFingers) {
   FlatCalibration flat;
   flat.offset_m = {0.0004, -0.0005, 0.0001};
-  const FlatTouch touch{0.02, {1 + 0.0004 / 0.02, 1.5 - 0.0005 / 0.02, kNan}};
+  const FlatTouch touch{0.02, {1 + 0.0004 / 0.02, 1.5 - 0.0005 / 0.02, kNaN}};
   const std::vector<double> times_s = CorrectedTimes(touch, flat);
   EXPECT_NEAR(times_s[0], 0, 1e-15);
   EXPECT_NEAR(times_s[1], 0.5, 1e-15);

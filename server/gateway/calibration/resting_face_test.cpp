@@ -8,7 +8,7 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-geometry::Bounds Box() {
+geometry::Bounds BoxBounds() {
   geometry::Bounds bounds;
   bounds.min_m = Vector3d(-0.01, -0.02, 0.005);
   bounds.max_m = Vector3d(0.05, 0.03, 0.035);
@@ -22,7 +22,7 @@ Vector3d Normal(UpFace face) {
 
 TEST(RestingFace, TheNamedFacePointsUp) {
   for (const UpFace face : kUpFaces) {
-    const Isometry3d base_from_object = BaseFromObject(Isometry3d::Identity(), Box(), face);
+    const Isometry3d base_from_object = BaseFromObject(Isometry3d::Identity(), BoxBounds(), face);
     EXPECT_EQ(base_from_object.linear() * Normal(face), Vector3d(Vector3d::UnitZ())) << UpFaceName(face);
     EXPECT_EQ(base_from_object.linear().determinant(), 1) << UpFaceName(face);
   }
@@ -31,20 +31,20 @@ TEST(RestingFace, TheNamedFacePointsUp) {
 TEST(RestingFace, PlusZIsTheObjectAsItWasRegistered) {
   Isometry3d registered = Isometry3d::Identity();
   registered.translate(Vector3d(0.3, 0.1, 0.02)).rotate(Eigen::AngleAxisd(0.4, Vector3d::UnitZ()));
-  EXPECT_TRUE(BaseFromObject(registered, Box(), UpFace::kPlusZ).isApprox(registered, 1e-15));
+  EXPECT_TRUE(BaseFromObject(registered, BoxBounds(), UpFace::kPlusZ).isApprox(registered, 1e-15));
 }
 
 TEST(RestingFace, TheRotationIsTheLeastOneAndMinusZTurnsAboutX) {
   for (const UpFace face : {UpFace::kPlusX, UpFace::kMinusX, UpFace::kPlusY, UpFace::kMinusY}) {
-    const Eigen::AngleAxisd turn(BaseFromObject(Isometry3d::Identity(), Box(), face).linear());
+    const Eigen::AngleAxisd turn(BaseFromObject(Isometry3d::Identity(), BoxBounds(), face).linear());
     EXPECT_NEAR(turn.angle(), M_PI / 2, 1e-12) << UpFaceName(face);
   }
-  const Eigen::Matrix3d over = BaseFromObject(Isometry3d::Identity(), Box(), UpFace::kMinusZ).linear();
+  const Eigen::Matrix3d over = BaseFromObject(Isometry3d::Identity(), BoxBounds(), UpFace::kMinusZ).linear();
   EXPECT_EQ(over * Vector3d::UnitX(), Vector3d(Vector3d::UnitX()));
 }
 
 TEST(RestingFace, TheBoxKeepsItsCentreInThePlaneAndRestsAsHigh) {
-  const geometry::Bounds box = Box();
+  const geometry::Bounds box = BoxBounds();
   for (const UpFace face : kUpFaces) {
     const Isometry3d base_from_object = BaseFromObject(Isometry3d::Identity(), box, face);
     double lowest_m = 1e9;
@@ -64,7 +64,7 @@ TEST(RestingFace, ATiltedRegistrationTiltsEveryFaceAlike) {
   Isometry3d registered = Isometry3d::Identity();
   registered.rotate(Eigen::AngleAxisd(0.05, Vector3d::UnitX()));
   for (const UpFace face : kUpFaces) {
-    const Vector3d up = BaseFromObject(registered, Box(), face).linear() * Normal(face);
+    const Vector3d up = BaseFromObject(registered, BoxBounds(), face).linear() * Normal(face);
     EXPECT_NEAR((up - registered.linear() * Vector3d::UnitZ()).norm(), 0, 1e-15) << UpFaceName(face);
   }
 }

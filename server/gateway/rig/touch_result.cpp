@@ -6,14 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
 
 namespace touchstone::gateway {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // A straight line through (time, distance), by least squares.
 struct Line {

@@ -5,11 +5,11 @@
 #include <limits>
 
 #include "tests/rig/controller/machine_motion.h"
+#include "tests/rig/controller/never.h"
 
 namespace touchstone::rig {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kPowerOnS = 1.0, kBootS = 1.5, kBrakesS = 1.0, kUnlockS = 0.5;
 constexpr double kUnlockAfterS = 5, kDashboardLagS = 0.6;
 // A late host catches up with that many control cycles of a waiting program at most; the rest are skipped.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/rig/controller/never.h"
 // Noise. In the log of a UR5e in motion that the project's shared data hold (125 samples a second), a joint
 // that stands still scatters by 2.3e-5 rad about its target; moving joints lag by 2e-4 to 4e-4 rad and their
 // speeds scatter by 2e-3 to 4e-3 rad/s. Speeds are trapezoids: level at the commanded 60 deg/s between
@@ -12,7 +13,6 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kHaltLine = 5, kHaltJoints = 10;  // m/s^2, rad/s^2, of stops that nobody gave a number for
 constexpr double kFarM = 2;                        // speedl goes on so far at most: beyond any reach
 constexpr double kFirstTimestampS = 60;            // some clients wait for a time stamp of 40 s

@@ -4,12 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/rig/controller/never.h"
 namespace touchstone::rig {
-namespace {
-
-constexpr double kNever = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 SpeedProfile::SpeedProfile(double start_s, double length, double speed, double acceleration,
                            double first_speed)

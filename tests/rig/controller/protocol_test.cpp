@@ -8,7 +8,7 @@
 namespace touchstone::rig {
 namespace {
 
-ControllerOptions Powered() {
+ControllerOptions PoweredWithoutNoise() {
   ControllerOptions options;
   options.powered = true;
   options.position_noise_m = options.joint_noise_rad = 0;
@@ -23,7 +23,7 @@ std::string Bytes(std::initializer_list<int> bytes) {
 
 struct Session {
   explicit Session(const std::string& model = "ur3e")
-      : machine(Powered(), nullptr, nullptr), rtde(&machine, model, &taken) {}
+      : machine(PoweredWithoutNoise(), nullptr, nullptr), rtde(&machine, model, &taken) {}
   std::string Ask(std::string bytes) {
     const std::string answer = rtde.Receive(&bytes);
     EXPECT_EQ(bytes, "");
@@ -82,7 +82,7 @@ TEST(Rtde, WritesAsManyBytesAsTheTypeSays) {
   const std::map<std::string, size_t> sizes = {
       {"BOOL", 1},   {"UINT8", 1},     {"INT32", 4},     {"UINT32", 4},        {"UINT64", 8},
       {"DOUBLE", 8}, {"VECTOR3D", 24}, {"VECTOR6D", 48}, {"VECTOR6INT32", 24}, {"VECTOR6UINT32", 24}};
-  Machine machine(Powered(), nullptr, nullptr);
+  Machine machine(PoweredWithoutNoise(), nullptr, nullptr);
   const RobotState state = machine.State();
   for (const auto& [name, output] : RtdeOutputs()) {
     WireWriter to;
@@ -130,7 +130,7 @@ TEST(Rtde, SetsTheSpeedSlider) {
 }
 
 TEST(Primary, PacksTheSubPackagesThatClientsLookFor) {
-  Machine machine(Powered(), nullptr, nullptr);
+  Machine machine(PoweredWithoutNoise(), nullptr, nullptr);
   const std::string packet = StatePacket(machine.State(), machine.geometry(), "ur3e");
   EXPECT_EQ(packet.size(), 5u + 47 + 251 + 101 + 225 + 445);
   WireReader from(packet);
@@ -202,7 +202,7 @@ TEST(Dashboard, SpeaksTheTextsOfTheController) {
 
 TEST(Dashboard, TellsAProtectiveStopLateAndUnlocksItAfterFiveSeconds) {
   Faults faults;
-  Machine machine(Powered(), &faults, nullptr);
+  Machine machine(PoweredWithoutNoise(), &faults, nullptr);
   machine.Advance(1, nullptr);
   faults.Set("protective_stop", 1);
   machine.Advance(2, nullptr);
@@ -222,7 +222,7 @@ TEST(Dashboard, TellsAProtectiveStopLateAndUnlocksItAfterFiveSeconds) {
 }
 
 TEST(Dashboard, StopsTheProgramAndTheArm) {
-  Machine machine(Powered(), nullptr, nullptr);
+  Machine machine(PoweredWithoutNoise(), nullptr, nullptr);
   machine.StartProgram("movej([1,-1.5,-1.5,-1.5,1.5,0])\n");
   machine.Advance(0.5, nullptr);
   EXPECT_EQ(Ask(&machine, "running"), "Program running: true");

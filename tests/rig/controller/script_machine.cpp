@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/rig/controller/never.h"
 namespace touchstone::rig {
-namespace {
-
-constexpr double kNever = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 ScriptMachine::ScriptMachine(ScriptProgram program, ScriptHost* host, double cycle_s)
     : program_(std::move(program)), host_(host), cycle_s_(cycle_s) {

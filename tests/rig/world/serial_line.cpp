@@ -11,17 +11,14 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
+
+#include "tests/rig/world/system_error.h"
 
 namespace touchstone::rig {
 namespace {
 
 // A driver keeps so much for a program that does not read; older bytes go then.
 constexpr int kMaxUnreadBytes = 3000;
-
-[[noreturn]] void Fail(const std::string& what) {
-  throw std::runtime_error(what + ": " + std::strerror(errno));
-}
 
 }  // namespace
 
@@ -40,11 +37,11 @@ void SerialLine::Plug() {
   char name[128];
   if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0 ||
       ptsname_r(master_, name, sizeof name) != 0)
-    Fail("cannot make a pseudo-terminal");
+    FailWithErrno("cannot make a pseudo-terminal");
   // Our own end of the other side keeps it raw while nobody has it open.
   slave_ = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC);
   termios raw{};
-  if (slave_ < 0 || tcgetattr(slave_, &raw) != 0) Fail(std::string("cannot open ") + name);
+  if (slave_ < 0 || tcgetattr(slave_, &raw) != 0) FailWithErrno(std::string("cannot open ") + name);
   cfmakeraw(&raw);
   tcsetattr(slave_, TCSANOW, &raw);
 
@@ -52,7 +49,7 @@ void SerialLine::Plug() {
   const std::string part = link_ + ".part";
   unlink(part.c_str());
   if (symlink(name, part.c_str()) != 0 || rename(part.c_str(), link_.c_str()) != 0)
-    Fail("cannot link " + link_);
+    FailWithErrno("cannot link " + link_);
 }
 
 void SerialLine::Unplug() {
@@ -105,7 +102,7 @@ std::vector<uint8_t> SerialLine::Exchange(double now_s) {
     int unread = 0;
     if (ioctl(slave_, FIONREAD, &unread) == 0 && unread > kMaxUnreadBytes) tcflush(slave_, TCIFLUSH);
     if (write(master_, bytes.data(), bytes.size()) < 0 && errno != EAGAIN && errno != EIO)
-      Fail("cannot write to " + link_);
+      FailWithErrno("cannot write to " + link_);
     from_device_.chunks.pop_front();
   }
   return arrived;

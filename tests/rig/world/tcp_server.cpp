@@ -11,17 +11,14 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
+
+#include "tests/rig/world/system_error.h"
 
 namespace touchstone::rig {
 namespace {
 
 constexpr size_t kLongestLine = 4096;
 constexpr int kAcceptTurnMs = 100;
-
-[[noreturn]] void Fail(const std::string& what) {
-  throw std::runtime_error(what + ": " + std::strerror(errno));
-}
 
 }  // namespace
 
@@ -68,7 +65,7 @@ TcpServer::TcpServer(const std::string& address, int port, std::function<void(Li
     const int error = errno;
     if (listener_ >= 0) close(listener_);
     errno = error;
-    Fail("cannot listen on " + address + ":" + std::to_string(port));
+    FailWithErrno("cannot listen on " + address + ":" + std::to_string(port));
   }
   port_ = ntohs(where.sin_port);
   thread_ = std::thread([this] { Accept(); });
@@ -149,7 +146,7 @@ std::string AskOnce(const std::string& host_and_port, const std::string& line, d
   const bool answered = connected && connection.Send(line + "\n") && connection.ReadLine(&answer);
   close(fd);
   errno = error;
-  if (!connected) Fail("cannot connect to " + host_and_port);
+  if (!connected) FailWithErrno("cannot connect to " + host_and_port);
   if (!answered) throw std::runtime_error(host_and_port + " did not answer '" + line + "'");
   return answer;
 }
