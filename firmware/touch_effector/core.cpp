@@ -2,6 +2,7 @@
 // has to be on the include path (README.md).
 #include "firmware/core/debouncer.cpp"
 #include "firmware/core/effector.cpp"
+#include "firmware/core/effector_requests.cpp"
 #include "firmware/core/frame.cpp"
 #include "firmware/core/messages.cpp"
 #include "firmware/core/ticks.cpp"
