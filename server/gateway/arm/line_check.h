@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "server/gateway/arm/kinematics.h"
-#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/arm/motion_limits.h"
 
 namespace touchstone::gateway::arm {
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -21,39 +20,6 @@ namespace {
 constexpr double kSettleS = 0.05;         // of the arm at the end of a line, and of the program's start
 constexpr double kWristReserveRad = 0.2;  // that a transit leaves of wrist 3's range, where it can
 constexpr double kMinStandoffM = 1e-3;
-constexpr double kMaxTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
-
-absl::Status Invalid(const std::string& what, double value, const std::string& right) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("limits: ", what, " = ", ShortestNumber(value), ": must be ", right));
-}
-
-absl::Status CheckLimits(const MotionLimits& limits) {
-  for (const auto& [what, value] : {std::pair<const char*, double>{"max_speed_m_s", limits.max_speed_m_s},
-                                    {"transit_speed_m_s", limits.transit_speed_m_s},
-                                    {"acceleration_m_s2", limits.acceleration_m_s2},
-                                    {"max_standoff_m", limits.max_standoff_m},
-                                    {"stroke_beyond_target_m", limits.stroke_beyond_target_m},
-                                    {"clearance_m", limits.clearance_m}})
-    if (!(value > 0) || !(value <= 10)) return Invalid(what, value, "above 0 and at most 10");
-  if (!(limits.max_tilt_rad >= 0) || !(limits.max_tilt_rad <= kMaxTiltRad))
-    return Invalid("max_tilt_rad", limits.max_tilt_rad, "from 0 to 1.4");
-  if (!(limits.outermost_finger_m >= 0) || !(limits.outermost_finger_m <= 0.5))
-    return Invalid("outermost_finger_m", limits.outermost_finger_m, "from 0 to 0.5");
-  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.max_payload_kg))
-    return Invalid("payload_kg", limits.payload_kg,
-                   absl::StrCat("from 0 to max_payload_kg = ", ShortestNumber(limits.max_payload_kg)));
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(limits.box_min_m[axis] < limits.box_max_m[axis]))
-      return Invalid(absl::StrCat("box_min_m[", axis, "]"), limits.box_min_m[axis], "below box_max_m");
-  for (size_t i = 0; i < 6; ++i) {
-    if (!(limits.joint_min_rad[i] < limits.joint_max_rad[i]))
-      return Invalid(absl::StrCat("joint_min_rad[", i, "]"), limits.joint_min_rad[i], "below joint_max_rad");
-    if (!(limits.home_rad[i] >= limits.joint_min_rad[i]) || !(limits.home_rad[i] <= limits.joint_max_rad[i]))
-      return Invalid(absl::StrCat("home_rad[", i, "]"), limits.home_rad[i], "within the joint's limits");
-  }
-  return absl::OkStatus();
-}
 
 class UrMotionPlanner final : public MotionPlanner {
  public:
@@ -317,7 +283,7 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const A
 absl::StatusOr<std::unique_ptr<MotionPlanner>> MotionPlanner::Create(
     const std::string& arm_model, const MotionLimits& limits, const calibration::Calibration& calibration) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics kinematics, UrKinematics::ForModel(arm_model));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckLimits(limits));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMotionLimits(limits));
   return std::unique_ptr<MotionPlanner>(
       std::make_unique<UrMotionPlanner>(arm_model, kinematics, limits, calibration));
 }
