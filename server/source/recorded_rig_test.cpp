@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
+#include "server/base/test_folder.h"
 #include "server/session/command_bytes.h"
 #include "server/source/test_source.h"
 
@@ -14,9 +13,8 @@ namespace {
 class RecordedRigTest : public testing::Test {
  protected:
   RecordedRigTest() {
-    std::string folder = testing::TempDir() + "recorded_rig_XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    auto journal = *session::Journal::Open(folder_ + "/rig.db", session::Journal::Mode::kCreateOrReadWrite);
+    auto journal =
+        *session::Journal::Open(folder_.Path("rig.db"), session::Journal::Mode::kCreateOrReadWrite);
     session::JournalSession session;
     session.name = "monday";
     EXPECT_TRUE(journal->EnsureSession(session).ok());
@@ -32,11 +30,7 @@ class RecordedRigTest : public testing::Test {
     }
     EXPECT_TRUE(journal->AddFinished("monday", touches).ok());
     journal.reset();
-    rig_ = *RecordedRig::Open(folder_ + "/rig.db");
-  }
-  ~RecordedRigTest() override {
-    rig_.reset();
-    std::filesystem::remove_all(folder_);
+    rig_ = *RecordedRig::Open(folder_.Path("rig.db"));
   }
 
   static TouchCommand Command(const std::string& id, const touch::CommandedTouch& touch,
@@ -50,7 +44,7 @@ class RecordedRigTest : public testing::Test {
     return command;
   }
 
-  std::string folder_;
+  const TestFolder folder_;
   std::unique_ptr<RecordedRig> rig_;
 };
 

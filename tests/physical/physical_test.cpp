@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "server/session/command_bytes.h"
@@ -64,22 +65,15 @@ void KeptLease::StopRenewing() {
   if (keeper_.joinable()) keeper_.join();
 }
 
-PhysicalTest::PhysicalTest() {
-  std::string name = (std::filesystem::temp_directory_path() / "touchstone_physical_XXXXXX").string();
-  folder_ = mkdtemp(name.data());
-}
-
 PhysicalTest::~PhysicalTest() {
   StopGateway();
   if (process_ > 0) KillGatewayProcess();
   emulator_ = nullptr;
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
 }
 
 void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& change) {
   rig::EmulatorOptions options;
-  options.dir = (folder_ / "rig").string();
+  options.dir = folder_.Path("rig");
   options.speedup = 20;
   options.supershape_triangles = 2000;
   options.powered = true;
@@ -108,7 +102,7 @@ void PhysicalTest::StopGateway() {
 void PhysicalTest::StartGatewayProcess() {
   const std::string program =
       std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone-gateway";
-  const std::string out = (folder_ / "gateway.out").string();
+  const std::string out = folder_.Path("gateway.out");
   std::filesystem::remove(out);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
@@ -244,8 +238,7 @@ v1::RigState PhysicalTest::RigState() {
 
 std::vector<session::JournalTouch> PhysicalTest::Journalled() const {
   std::vector<session::JournalTouch> touches;
-  const auto journal =
-      session::Journal::Open((folder_ / "rig" / "rig.db").string(), session::Journal::Mode::kReadOnly);
+  const auto journal = session::Journal::Open(folder_.Path("rig/rig.db"), session::Journal::Mode::kReadOnly);
   EXPECT_TRUE(journal.ok()) << journal.status();
   if (!journal.ok()) return touches;
   const absl::Status read = (*journal)->ForEachTouch("test", [&](const session::JournalTouch& touch) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <atomic>
-#include <filesystem>
 #include <functional>
 #include <future>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include "server/base/test_folder.h"
 #include "server/service/gateway_server.h"
 #include "server/session/journal.h"
 #include "tests/rig/emulator.h"
@@ -43,7 +43,6 @@ class KeptLease {
 
 class PhysicalTest : public testing::Test {
  protected:
-  PhysicalTest();
   ~PhysicalTest() override;
 
   // With changes to the emulator's options before it begins. Touches from above of lat00 need no change
@@ -84,7 +83,7 @@ class PhysicalTest : public testing::Test {
   // are of the same one: nothing lost, doubled or at a wrong pose.
   void ExpectEveryResultIsItsOwnTouch();
 
-  std::filesystem::path folder_;
+  const TestFolder folder_;
   std::unique_ptr<rig::Emulator> emulator_;
   std::unique_ptr<service::GatewayServer> gateway_;
   std::shared_ptr<grpc::Channel> channel_;

@@ -32,7 +32,7 @@ TEST_F(Safety, StopDuringMotionNeedsNoLeaseAndHolds) {
   EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
   ExpectEveryResultIsItsOwnTouch();
-  std::ifstream audit(folder_ / "rig" / "audit.jsonl");
+  std::ifstream audit(folder_.Path("rig/audit.jsonl"));
   const std::string log((std::istreambuf_iterator<char>(audit)), {});
   EXPECT_THAT(log, testing::AllOf(HasSubstr("\"stop\""), HasSubstr("a test")));
 }

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -13,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/base/test_folder.h"
 #include "tests/rig/world/camera.h"
 #include "tests/rig/world/device.h"
 #include "tests/rig/world/tcp_server.h"
@@ -26,9 +25,7 @@ constexpr double kPatienceS = 30;  // of the host: a loaded machine
 class EmulatorTest : public testing::Test {
  protected:
   void SetUp() override {
-    dir_ = std::filesystem::temp_directory_path() / ("touchstone-emulator-" + std::to_string(getpid()));
-    std::filesystem::create_directories(dir_);
-    std::ofstream off(dir_ / "box.off");
+    std::ofstream off(folder_.Path("box.off"));
     off << "OFF\n8 12 0\n";
     for (int k = 0; k < 8; ++k)
       off << (k & 1 ? 75 : -75) << ' ' << (k & 2 ? 50 : -50) << ' ' << (k & 4 ? 30 : -30) << '\n';
@@ -37,14 +34,10 @@ class EmulatorTest : public testing::Test {
       off << "3 " << face << '\n';
     off.close();
     EmulatorOptions options;
-    options.dir = dir_ / "rig", options.meshes = {"box=" + (dir_ / "box.off").string()};
+    options.dir = folder_.Path("rig"), options.meshes = {"box=" + folder_.Path("box.off")};
     options.sigma_us = 0, options.powered = true, options.speedup = 4, options.program = "/usr/bin/true";
     options.hide = {"channel_latency.latency_us=1000,0,-1000"};
     emulator_ = Emulator::Start(options);
-  }
-  void TearDown() override {
-    emulator_.reset();
-    std::filesystem::remove_all(dir_);
   }
   std::string Text(const std::string& path) {
     std::ifstream file(path);
@@ -53,14 +46,13 @@ class EmulatorTest : public testing::Test {
     return text.str();
   }
 
-  std::filesystem::path dir_;
+  const TestFolder folder_;
   std::unique_ptr<Emulator> emulator_;
 };
 
 TEST_F(EmulatorTest, WritesWhatAGatewayNeedsAndSaysThatItIsEmulated) {
-  for (const std::string& path :
-       {emulator_->config_path(), emulator_->calibration_path(), (dir_ / "rig" / "emulator.json").string(),
-        (dir_ / "rig" / "emulator.log").string()})
+  for (const std::string& path : {emulator_->config_path(), emulator_->calibration_path(),
+                                  folder_.Path("rig/emulator.json"), folder_.Path("rig/emulator.log")})
     EXPECT_NE(Text(path).find("emulated rig"), std::string::npos) << path;
   const std::string config = Text(emulator_->config_path());
   for (const char* key :
@@ -133,11 +125,10 @@ TEST_F(EmulatorTest, TouchesTheBoxWhereItIsAsAProgramMovesTheArm) {
 }
 
 TEST(Emulator, RefusesOptionsThatMakeNoSense) {
-  const auto dir =
-      std::filesystem::temp_directory_path() / ("touchstone-refused-" + std::to_string(getpid()));
+  const TestFolder folder;
   for (const int which : {0, 1, 2, 3, 4, 5}) {
     EmulatorOptions options;
-    options.dir = dir, options.supershape_triangles = 200;
+    options.dir = folder.path(), options.supershape_triangles = 200;
     if (which == 0) options.hide = {"ghost.size_mm=1"};
     if (which == 1) options.arm = "ur5";
     if (which == 2) options.sensor = "nose";
@@ -146,7 +137,6 @@ TEST(Emulator, RefusesOptionsThatMakeNoSense) {
     if (which == 5) options.object = "lat99";
     EXPECT_ANY_THROW(Emulator::Start(options)) << which;
   }
-  std::filesystem::remove_all(dir);
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 
 #include <gtest/gtest.h>
 
@@ -16,11 +15,7 @@
 
 namespace touchstone::gateway::effector {
 
-FakeDevice::FakeDevice(const Options& options) : options_(options) {
-  std::string pattern = testing::TempDir() + "/touchstone_device_XXXXXX";
-  TOUCHSTONE_CHECK(mkdtemp(pattern.data()) != nullptr);
-  directory_ = pattern;
-  port_ = directory_ + "/port";
+FakeDevice::FakeDevice(const Options& options) : options_(options), port_(folder_.Path("port")) {
   StartCore();
   Plug();
   thread_ = std::thread([this] { Run(); });
@@ -33,7 +28,6 @@ FakeDevice::~FakeDevice() {
   }
   thread_.join();
   if (master_ >= 0) Unplug();
-  rmdir(directory_.c_str());
 }
 
 void FakeDevice::StartCore() {

@@ -10,6 +10,7 @@
 
 #include "firmware/core/effector.h"
 #include "server/base/random.h"
+#include "server/base/test_folder.h"
 
 namespace touchstone::gateway::effector {
 
@@ -70,7 +71,8 @@ class FakeDevice {
   void WriteFrame(const uint8_t* frame, size_t size);
 
   Options options_;
-  std::string directory_, port_;
+  const TestFolder folder_;
+  const std::string port_;
   mutable std::mutex mutex_;
   int master_ = -1;
   bool stopping_ = false, mute_ = false;

@@ -243,8 +243,7 @@ void Endurance::CompareWithTruth() {
 }
 
 void Endurance::CompareWithJournal() {
-  const auto journal =
-      session::Journal::Open((folder_ / "rig" / "rig.db").string(), session::Journal::Mode::kReadOnly);
+  const auto journal = session::Journal::Open(folder_.Path("rig/rig.db"), session::Journal::Mode::kReadOnly);
   if (!journal.ok()) return Remark(std::string(journal.status().message()));
   std::set<std::string> seen;
   const absl::Status read = (*journal)->ForEachTouch("test", [&](const session::JournalTouch& touch) {

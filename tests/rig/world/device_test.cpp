@@ -18,6 +18,7 @@
 
 #include "firmware/core/frame.h"
 #include "firmware/core/messages.h"
+#include "server/base/test_folder.h"
 
 namespace touchstone::rig {
 namespace {
@@ -113,19 +114,13 @@ class Host {
 class DeviceTest : public testing::Test {
  protected:
   void Start(const std::string& sensor = "optical", double byte_s = 0, bool unplug_resets = false) {
-    dir_ = std::filesystem::temp_directory_path() / ("touchstone-device-" + std::to_string(getpid()));
-    std::filesystem::create_directories(dir_);
     DeviceOptions options;
-    options.link = dir_ / "effector";
+    options.link = Port();
     options.sensor = sensor, options.byte_s = byte_s, options.unplug_resets = unplug_resets;
     options.drift_ppm = 40;
     device_ = std::make_unique<Device>(options, &clock_, &faults_);
   }
-  void TearDown() override {
-    device_.reset();
-    std::filesystem::remove_all(dir_);
-  }
-  std::string Port() const { return dir_ / "effector"; }
+  std::string Port() const { return folder_.Path("effector"); }
   // Contacts of the three fingers at these moments from now on.
   std::vector<double> Press(const std::vector<double>& after_s, double known_after_s = 0) {
     std::vector<double> at_s;
@@ -144,7 +139,7 @@ class DeviceTest : public testing::Test {
 
   SimClock clock_;
   Faults faults_;
-  std::filesystem::path dir_;
+  TestFolder folder_;
   std::unique_ptr<Device> device_;
 };
 
