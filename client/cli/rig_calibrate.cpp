@@ -16,6 +16,7 @@
 #include "server/gateway/calibration/tool_calibration.h"
 #include "server/geometry/pose.h"
 #include "server/model/model.h"
+#include "server/session/base_pose.h"
 
 namespace touchstone::cli {
 namespace {
@@ -208,11 +209,7 @@ std::string Today() {
 }
 
 Eigen::Isometry3d PoseOf(const v1::BasePose& pose) {
-  const Eigen::Vector3d rotation(pose.rotation_rad().x(), pose.rotation_rad().y(), pose.rotation_rad().z());
-  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-  result.linear() = geometry::RotationFromVector(rotation);
-  result.translation() = Eigen::Vector3d(pose.position_m().x(), pose.position_m().y(), pose.position_m().z());
-  return result;
+  return geometry::PoseFromVector(session::ParseBasePose(pose));
 }
 
 std::string InMillimetres(const Eigen::Vector3d& metres) {
@@ -271,7 +268,7 @@ void AddRigCalibrate(Cli* cli, CLI::App* group) {
   command->get_option("--session")
       ->description(
           "flat: the session that journals the touches, or the one of --from. Default: calibration");
-  cli->AddSourceOptions(command);
+  cli->AddRigOptions(command);
 }
 
 }  // namespace touchstone::cli

@@ -5,18 +5,13 @@
 
 #include <chrono>
 #include <filesystem>
-#include <limits>
 
 #include "client/cli/journal_session.h"
 #include "server/base/status.h"
+#include "server/session/base_pose.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::cli {
-namespace {
-
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
 
 absl::StatusOr<std::string> JournalPathOf(const std::string& output) {
   if (absl::EndsWith(output, ".db")) return output;
@@ -33,13 +28,8 @@ session::JournalResult ResultOfMessage(const v1::TouchResult& message) {
   for (int i = 0; i < message.contact_time_s_size(); ++i) {
     session::JournalFinger finger;
     finger.contact_time_s = message.contact_time_s(i);
-    finger.base_from_tip.fill(kUnknown);
-    if (i < measured.base_from_tip_at_contact_size() &&
-        measured.base_from_tip_at_contact(i).has_position_m()) {
-      const v1::Vector3& p = measured.base_from_tip_at_contact(i).position_m();
-      const v1::Vector3& r = measured.base_from_tip_at_contact(i).rotation_rad();
-      finger.base_from_tip = {p.x(), p.y(), p.z(), r.x(), r.y(), r.z()};
-    }
+    finger.base_from_tip = session::ParseBasePose(
+        i < measured.base_from_tip_at_contact_size() ? measured.base_from_tip_at_contact(i) : v1::BasePose());
     result.fingers.push_back(finger);
   }
   result.speed_m_s = measured.speed_m_s();

@@ -10,15 +10,13 @@
 #include "server/geometry/pose.h"
 #include "server/service/call_guard.h"
 #include "server/service/convert.h"
+#include "server/session/base_pose.h"
 
 namespace touchstone::service {
 namespace {
 
 v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
-  v1::BasePose message;
-  *message.mutable_position_m() = ToProto(Eigen::Vector3d(pose.translation()));
-  *message.mutable_rotation_rad() = ToProto(geometry::RotationVectorOf(pose.linear()));
-  return message;
+  return session::BasePoseMessage(geometry::PoseVectorOf(pose));
 }
 
 v1::ArmStatus ArmStatusOf(const gateway::arm::Arm& arm, double time_scale) {

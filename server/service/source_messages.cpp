@@ -1,9 +1,8 @@
 // Results of a source to the messages of touchstone.v1.Source.
 #include "server/service/source_messages.h"
 
-#include <cmath>
-
 #include "server/service/convert.h"
+#include "server/session/base_pose.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::service {
@@ -55,13 +54,8 @@ const char* PlanName(touch::Plan::Kind kind) {
 v1::Measured MeasuredToProto(const session::JournalTouch& touch, const std::string& session) {
   v1::Measured measured;
   const session::JournalResult& result = touch.result;
-  for (const session::JournalFinger& finger : result.fingers) {
-    v1::BasePose* pose = measured.add_base_from_tip_at_contact();
-    const auto& p = finger.base_from_tip;
-    if (std::isnan(p[0])) continue;
-    *pose->mutable_position_m() = ToProto(Eigen::Vector3d(p[0], p[1], p[2]));
-    *pose->mutable_rotation_rad() = ToProto(Eigen::Vector3d(p[3], p[4], p[5]));
-  }
+  for (const session::JournalFinger& finger : result.fingers)
+    *measured.add_base_from_tip_at_contact() = session::BasePoseMessage(finger.base_from_tip);
   measured.set_touch_id(touch.id);
   measured.set_session(session);
   measured.set_speed_m_s(result.speed_m_s);
