@@ -137,7 +137,7 @@ absl::Status JournalFile::CopySession(const std::string& name, Journal* to) cons
   });
 }
 
-absl::Status JournalFile::SetFact(const std::string& key, const std::string& value) {
+absl::Status JournalFile::SetMetadata(const std::string& key, const std::string& value) {
   const std::lock_guard<std::mutex> lock(mutex_);
   return Write([&] {
     return file_
@@ -150,7 +150,7 @@ absl::Status JournalFile::SetFact(const std::string& key, const std::string& val
   });
 }
 
-absl::StatusOr<std::string> JournalFile::Fact(const std::string& key) const {
+absl::StatusOr<std::string> JournalFile::Metadata(const std::string& key) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   SqliteStatement row = file_->Prepare("SELECT value FROM fact WHERE key = ?");
   row.Bind(key);

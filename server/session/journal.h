@@ -45,7 +45,8 @@ struct JournalResult {
 struct JournalTouch {
   std::string id;       // the client's
   uint64_t number = 0;  // in its session, in the order of the intents, from 0
-  std::string object, placement;
+  std::string object;
+  std::string up_face;  // face of the object's box that pointed up: "+z"
   // Serialised touchstone.v1.CommandedTouch (command_bytes.h): what says whether an id is used again.
   std::string command;
   TouchStage stage = TouchStage::kIntent;
@@ -59,7 +60,8 @@ struct JournalTouch {
 struct JournalImage {
   std::string id;  // the client's, or made
   uint64_t number = 0;
-  std::string object, placement;
+  std::string object;
+  std::string up_face;  // face of the object's box that pointed up: "+z"
   std::array<double, 6> base_from_camera{};
   double unix_s = 0;
   int width = 0, height = 0;
@@ -99,7 +101,7 @@ class Journal {
   // object or command: ALREADY_EXISTS. kIntent or kExecuting: ABORTED, since it is under way or not yet
   // reconciled.
   virtual absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
-                                             const std::string& object, const std::string& placement,
+                                             const std::string& object, const std::string& up_face,
                                              const std::string& command) = 0;
   virtual absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                                  uint32_t boot_id) = 0;
@@ -128,9 +130,9 @@ class Journal {
   // Copies a session with all that it has into another journal (which must not have one of that name).
   virtual absl::Status CopySession(const std::string& name, Journal* to) const = 0;
 
-  // Small facts that outlive the process: "mounted_object", "next_program_id".
-  virtual absl::Status SetFact(const std::string& key, const std::string& value) = 0;
-  virtual absl::StatusOr<std::string> Fact(const std::string& key) const = 0;  // "" if it is not there
+  // What a rig remembers beyond its process: "mounted_object", "next_program_id".
+  virtual absl::Status SetMetadata(const std::string& key, const std::string& value) = 0;
+  virtual absl::StatusOr<std::string> Metadata(const std::string& key) const = 0;  // "" if it is not there
 };
 
 }  // namespace touchstone::session

@@ -242,7 +242,7 @@ TEST_F(JournalDamage, AReaderWritesNothing) {
   const absl::Status status = (*reader)->Begin("s", "new", "cup", "+z", "1").status();
   EXPECT_TRUE(absl::IsFailedPrecondition(status));
   EXPECT_THAT(Message(status), HasSubstr("was opened for reading only"));
-  EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->SetFact("a", "b")));
+  EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->SetMetadata("a", "b")));
   EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->DeleteSession("s")));
   EXPECT_EQ((*reader)->Session("s")->touches, 1u);
 }

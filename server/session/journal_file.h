@@ -31,7 +31,7 @@ class JournalFile : public Journal {
   absl::StatusOr<JournalSession> Session(const std::string& name) const override;
   absl::Status DeleteSession(const std::string& name) override;
   absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
-                                     const std::string& object, const std::string& placement,
+                                     const std::string& object, const std::string& up_face,
                                      const std::string& command) override;
   absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                          uint32_t boot_id) override;
@@ -47,8 +47,8 @@ class JournalFile : public Journal {
   absl::Status ForEachImage(const std::string& session,
                             const std::function<bool(const JournalImage&)>& each) const override;
   absl::Status CopySession(const std::string& name, Journal* to) const override;
-  absl::Status SetFact(const std::string& key, const std::string& value) override;
-  absl::StatusOr<std::string> Fact(const std::string& key) const override;
+  absl::Status SetMetadata(const std::string& key, const std::string& value) override;
+  absl::StatusOr<std::string> Metadata(const std::string& key) const override;
 
  private:
   struct Known {

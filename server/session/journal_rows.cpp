@@ -92,7 +92,7 @@ absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouc
         "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
         "?)");
     insert.Bind(session_id).Bind(touch.id).Bind(static_cast<int64_t>(touch.number));
-    insert.Bind(touch.object).Bind(touch.placement).Bind(static_cast<int64_t>(touch.stage));
+    insert.Bind(touch.object).Bind(touch.up_face).Bind(static_cast<int64_t>(touch.stage));
     insert.Bind(int64_t{touch.attempt}).Bind(int64_t{touch.program_id}).Bind(int64_t{touch.boot_id});
     insert.Bind(touch.error);
     BindOptional(touch.round, &insert);
@@ -137,7 +137,7 @@ absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImag
       "rotation_z_rad, unix_s, width_px, height_px, png) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
       "?)");
   insert.Bind(session_id).Bind(image.id).Bind(static_cast<int64_t>(image.number));
-  insert.Bind(image.object).Bind(image.placement);
+  insert.Bind(image.object).Bind(image.up_face);
   BindPose(image.base_from_camera, &insert);
   insert.Bind(image.unix_s).Bind(int64_t{image.width}).Bind(int64_t{image.height}).BindBlob(image.png);
   return insert.Run();
@@ -158,7 +158,7 @@ absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id) {
     touch.id = row.Text(0);
     touch.number = static_cast<uint64_t>(row.Integer(1));
     touch.object = row.Text(2);
-    touch.placement = row.Text(3);
+    touch.up_face = row.Text(3);
     touch.stage = static_cast<TouchStage>(row.Integer(4));
     touch.attempt = static_cast<int>(row.Integer(5));
     touch.program_id = static_cast<uint32_t>(row.Integer(6));
@@ -202,7 +202,7 @@ absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
   image.id = row.Text(0);
   image.number = static_cast<uint64_t>(row.Integer(1));
   image.object = row.Text(2);
-  image.placement = row.Text(3);
+  image.up_face = row.Text(3);
   image.base_from_camera = ReadPose(row, 4);
   image.unix_s = row.Double(10);
   image.width = static_cast<int>(row.Integer(11));

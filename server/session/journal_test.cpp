@@ -95,7 +95,7 @@ TEST_F(JournalTest, ATouchGoesFromIntentOverExecutingToItsResult) {
   ASSERT_TRUE(found.ok() && found->has_value());
   EXPECT_EQ((*found)->stage, TouchStage::kDone);
   EXPECT_EQ((*found)->command, "command");
-  EXPECT_EQ((*found)->placement, "+z");
+  EXPECT_EQ((*found)->up_face, "+z");
   const JournalResult& kept = (*found)->result;
   ASSERT_EQ(kept.fingers.size(), 3u);
   EXPECT_EQ(kept.fingers[0].contact_time_s, 1.25);
@@ -165,7 +165,7 @@ TEST_F(JournalTest, AFailedTouchMayBeTriedAgainAndThenStandsWhereItWasMade) {
   EXPECT_EQ(again->number, 2u);
   EXPECT_EQ(again->program_id, 0u);
   const auto found = *journal->Find("s", "a");
-  EXPECT_EQ(found->placement, "-z");
+  EXPECT_EQ(found->up_face, "-z");
   EXPECT_EQ(found->error, "");
   EXPECT_EQ(found->stage, TouchStage::kIntent);
   std::vector<std::string> order;
@@ -316,11 +316,11 @@ TEST_F(JournalTest, FinishedTouchesComeTogetherOrNotAtAll) {
 TEST_F(JournalTest, FactsOutliveTheProcess) {
   {
     auto journal = Open();
-    EXPECT_EQ(*journal->Fact("mounted_object"), "");
-    ASSERT_TRUE(journal->SetFact("mounted_object", "cup").ok());
-    ASSERT_TRUE(journal->SetFact("mounted_object", "mug").ok());
+    EXPECT_EQ(*journal->Metadata("mounted_object"), "");
+    ASSERT_TRUE(journal->SetMetadata("mounted_object", "cup").ok());
+    ASSERT_TRUE(journal->SetMetadata("mounted_object", "mug").ok());
   }
-  EXPECT_EQ(*Open()->Fact("mounted_object"), "mug");
+  EXPECT_EQ(*Open()->Metadata("mounted_object"), "mug");
 }
 
 TEST_F(JournalTest, WhatIsToldMayUseTheJournal) {

@@ -23,7 +23,7 @@ const char* StageInWords(TouchStage stage) {
 }
 
 absl::StatusOr<JournalTouch> JournalFile::Begin(const std::string& session, const std::string& id,
-                                                const std::string& object, const std::string& placement,
+                                                const std::string& object, const std::string& up_face,
                                                 const std::string& command) {
   const std::lock_guard<std::mutex> lock(mutex_);
   TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", id));
@@ -48,7 +48,7 @@ absl::StatusOr<JournalTouch> JournalFile::Begin(const std::string& session, cons
   touch = JournalTouch{};
   touch.id = id;
   touch.object = object;
-  touch.placement = placement;
+  touch.up_face = up_face;
   touch.command = touch_id == 0 ? command : before.command;
   touch.attempt = touch_id == 0 ? 1 : before.attempt + 1;
   TOUCHSTONE_RETURN_IF_ERROR(Write([&]() -> absl::Status {
@@ -60,7 +60,7 @@ absl::StatusOr<JournalTouch> JournalFile::Begin(const std::string& session, cons
             "0, "
             "error = '', round = NULL, face = NULL WHERE touch_id = ?")
         .Bind(static_cast<int64_t>(touch.number))
-        .Bind(placement)
+        .Bind(up_face)
         .Bind(int64_t{touch.attempt})
         .Bind(touch_id)
         .Run();

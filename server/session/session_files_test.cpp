@@ -219,7 +219,7 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
   std::vector<JournalTouch> more(1);
   more[0].id = "with poses";
   more[0].object = "cup";
-  more[0].placement = "-x";
+  more[0].up_face = "-x";
   more[0].command = std::string("bytes that are \0 no command", 27);
   more[0].stage = TouchStage::kDone;
   more[0].attempt = 3;
@@ -266,7 +266,7 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
   for (size_t k = 0; k < 4; ++k) {
     EXPECT_EQ(after[k].id, before[k].id);
     EXPECT_EQ(after[k].object, before[k].object);
-    EXPECT_EQ(after[k].placement, before[k].placement);
+    EXPECT_EQ(after[k].up_face, before[k].up_face);
     EXPECT_EQ(after[k].command, before[k].command);
     EXPECT_EQ(after[k].attempt, before[k].attempt);
     EXPECT_EQ(after[k].round, before[k].round);

@@ -21,14 +21,14 @@ void Append(const v1::Vector3& v, std::vector<double>* values) {
 
 void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf5Columns* columns) {
   const hsize_t rows = touches.size();
-  std::vector<std::string> ids, objects, placements, commands;
+  std::vector<std::string> ids, objects, up_faces, commands;
   std::vector<uint64_t> attempt, round, face, recovered, ticks;
   std::vector<double> target, approach, lateral, standoff, commanded_speed, speed, session_time, start,
       time_uncertainty, synchronisation, drift, time, position, rotation;
   for (const JournalTouch& touch : touches) {
     ids.push_back(touch.id);
     objects.push_back(touch.object);
-    placements.push_back(touch.placement);
+    up_faces.push_back(touch.up_face);
     commands.push_back(touch.command);
     attempt.push_back(static_cast<uint64_t>(touch.attempt));
     round.push_back(touch.round ? static_cast<uint64_t>(*touch.round) : kNoNumber);
@@ -56,7 +56,7 @@ void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf
   }
   columns->Texts("id", ids);
   columns->Texts("object", objects);
-  columns->Texts("placement", placements);
+  columns->Texts("placement", up_faces);
   columns->Numbers("target_m", "m", target, {rows, 3});
   columns->Numbers("approach", "", approach, {rows, 3});
   columns->Numbers("lateral", "", lateral, {rows, 3});
@@ -83,7 +83,7 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
                          std::vector<JournalTouch>* touches) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("id", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("object", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto placements, file.Texts("placement", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto up_faces, file.Texts("placement", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto commands, file.Bytes("command", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto attempt, file.Whole("attempt", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto round, file.Whole("round", rows));
@@ -107,7 +107,7 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
     JournalTouch& touch = (*touches)[k];
     touch.id = ids[k];
     touch.object = objects[k];
-    touch.placement = placements[k];
+    touch.up_face = up_faces[k];
     touch.command = commands[k];
     touch.stage = TouchStage::kDone;
     touch.attempt = static_cast<int>(attempt[k]);
@@ -135,13 +135,13 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
 
 void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) {
   const hsize_t rows = images.size();
-  std::vector<std::string> ids, objects, placements, pngs;
+  std::vector<std::string> ids, objects, up_faces, pngs;
   std::vector<uint64_t> sizes;
   std::vector<double> poses, unix_s;
   for (const JournalImage& image : images) {
     ids.push_back(image.id);
     objects.push_back(image.object);
-    placements.push_back(image.placement);
+    up_faces.push_back(image.up_face);
     pngs.push_back(image.png);
     sizes.insert(sizes.end(), {static_cast<uint64_t>(image.width), static_cast<uint64_t>(image.height)});
     poses.insert(poses.end(), image.base_from_camera.begin(), image.base_from_camera.end());
@@ -149,7 +149,7 @@ void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) 
   }
   columns->Texts("images/id", ids);
   columns->Texts("images/object", objects);
-  columns->Texts("images/placement", placements);
+  columns->Texts("images/placement", up_faces);
   columns->Whole("images/width_height_px", sizes, {rows, 2});
   columns->Numbers("images/base_from_camera_m_rad", "m, rad", poses, {rows, 6});
   columns->Numbers("images/unix_s", "s", unix_s, {rows});
@@ -159,7 +159,7 @@ void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) 
 absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vector<JournalImage>* images) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("images/id", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("images/object", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto placements, file.Texts("images/placement", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto up_faces, file.Texts("images/placement", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto sizes, file.Whole("images/width_height_px", 2 * rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto poses, file.Numbers("images/base_from_camera_m_rad", 6 * rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto unix_s, file.Numbers("images/unix_s", rows));
@@ -169,7 +169,7 @@ absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vecto
     JournalImage& image = (*images)[k];
     image.id = ids[k];
     image.object = objects[k];
-    image.placement = placements[k];
+    image.up_face = up_faces[k];
     image.width = static_cast<int>(sizes[2 * k]);
     image.height = static_cast<int>(sizes[2 * k + 1]);
     for (int i = 0; i < 6; ++i) image.base_from_camera[i] = poses[6 * k + i];

@@ -25,18 +25,18 @@ constexpr uint32_t kMaxProgramId = (1u << 28) - kProgramIdBlock;
 absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts parts) {
   std::unique_ptr<Rig> rig(new Rig(std::move(options), std::move(parts)));
   session::Journal& journal = rig->journal();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string next, journal.Fact("next_program_id"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string next, journal.Metadata("next_program_id"));
   if (!next.empty() && !absl::SimpleAtoi(next, &rig->next_program_id_))
     return absl::DataLossError(
         absl::StrCat("the journal's next_program_id is '", next, "': a number was expected"));
   rig->reserved_program_id_ = rig->next_program_id_;
-  TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.object, journal.Fact("mounted_object"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string up_face, journal.Fact("mounted_placement"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->status_.object, journal.Metadata("mounted_object"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string up_face, journal.Metadata("mounted_placement"));
   if (!up_face.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(rig->up_face_,
                                 calibration::ParseUpFace(up_face, "the journal's mounted_placement"));
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Fact(kStopFact));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Metadata(kStopKey));
   rig->stopped_ = !rig->stop_reason_.empty();
   if (rig->stopped_) spdlog::warn("still stopped {}; touchstone rig reset releases it", rig->stop_reason_);
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
@@ -51,7 +51,7 @@ uint32_t Rig::NextProgramId() {
   if (next_program_id_ >= kMaxProgramId) next_program_id_ = reserved_program_id_ = 1;
   if (next_program_id_ >= reserved_program_id_) {
     reserved_program_id_ = next_program_id_ + kProgramIdBlock;
-    const absl::Status kept = journal().SetFact("next_program_id", absl::StrCat(reserved_program_id_));
+    const absl::Status kept = journal().SetMetadata("next_program_id", absl::StrCat(reserved_program_id_));
     if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
   }
   return next_program_id_++;
@@ -174,10 +174,10 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
 
 absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix_s) {
   const std::string key = "first_touch_unix_s " + session;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, journal().Fact(key));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, journal().Metadata(key));
   double first_s = unix_s;
   if (text.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact(key, absl::StrFormat("%.6f", unix_s)));
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(key, absl::StrFormat("%.6f", unix_s)));
   } else if (!absl::SimpleAtod(text, &first_s)) {
     return absl::DataLossError(
         absl::StrCat("the journal's '", key, "' is '", text, "': a number was expected"));

@@ -148,8 +148,8 @@ class Rig : public source::RigDevice {
                          const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done);
   void Remember(const absl::Status& status);
 
-  // The journal's fact of who stopped the rig and why; "" once it was reset.
-  static constexpr char kStopFact[] = "stop";
+  // The journal's record of who stopped the rig and why; "" once it was reset.
+  static constexpr char kStopKey[] = "stop";
 
   const RigOptions options_;
   RigParts parts_;

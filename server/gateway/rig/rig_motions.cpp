@@ -63,7 +63,7 @@ absl::StatusOr<image::Frame> Rig::Photograph(const source::ViewCommand& command,
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   session::JournalImage image;
   image.id = source::ViewId(command);
-  image.object = command.object, image.placement = calibration::UpFaceName(up_face);
+  image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
   image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
   image.unix_s = timing::UnixNowS();
   image.width = frame->width, image.height = frame->height;
@@ -130,8 +130,8 @@ absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace u
 }
 
 absl::Status Rig::NoteMounted(const std::string& object, calibration::UpFace up_face) {
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_object", object));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetFact("mounted_placement", calibration::UpFaceName(up_face)));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata("mounted_object", object));
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata("mounted_placement", calibration::UpFaceName(up_face)));
   audit().Write("mounted", {{"object", object}, {"up_face", calibration::UpFaceName(up_face)}}).IgnoreError();
   std::lock_guard<std::mutex> lock(status_mutex_);
   status_.object = object, up_face_ = up_face;

@@ -113,10 +113,10 @@ class StampedJournal : public session::Journal {
   }
   absl::Status DeleteSession(const std::string& name) override { return journal_->DeleteSession(name); }
   absl::StatusOr<session::JournalTouch> Begin(const std::string& session, const std::string& id,
-                                              const std::string& object, const std::string& placement,
+                                              const std::string& object, const std::string& up_face,
                                               const std::string& command) override {
     const Timed timed(stamps_);
-    return journal_->Begin(session, id, object, placement, command);
+    return journal_->Begin(session, id, object, up_face, command);
   }
   absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                          uint32_t boot_id) override {
@@ -156,11 +156,13 @@ class StampedJournal : public session::Journal {
   absl::Status CopySession(const std::string& name, session::Journal* to) const override {
     return journal_->CopySession(name, to);
   }
-  absl::Status SetFact(const std::string& key, const std::string& value) override {
+  absl::Status SetMetadata(const std::string& key, const std::string& value) override {
     const Timed timed(stamps_);
-    return journal_->SetFact(key, value);
+    return journal_->SetMetadata(key, value);
   }
-  absl::StatusOr<std::string> Fact(const std::string& key) const override { return journal_->Fact(key); }
+  absl::StatusOr<std::string> Metadata(const std::string& key) const override {
+    return journal_->Metadata(key);
+  }
 
  private:
   struct Timed {
