@@ -102,7 +102,7 @@ std::string Summarize(const Diagnosis& diagnosis) {
     case selection::Verdict::kCheckData:
       for (const selection::DataProblem& problem : diagnosis.data_problems)
         sentences.push_back(
-            absl::StrCat(problem.words, problem.fix.empty() ? "" : " Mend it with: ", problem.fix));
+            absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
       break;
     case selection::Verdict::kTooLittleData:
       sentences.push_back(

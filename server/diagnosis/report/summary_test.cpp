@@ -1,0 +1,158 @@
+#include "server/diagnosis/report/summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/report/example_diagnosis.h"
+
+namespace touchstone::diagnosis::report {
+namespace {
+
+using selection::Verdict;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+TEST(Summarize, BeginsWithTheErrorAndItsShareOfNoise) {
+  EXPECT_THAT(
+      Summarize(ExampleDiagnosis(Verdict::kAdequate)),
+      StartsWith("The model is off by 41 ms; 5 ms is noise, so 98.5 % of the mean square error is the "
+                 "model's."));
+}
+
+TEST(Summarize, CallsAFloorWithoutRepeatsAnUpperBound) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
+  diagnosis.noise_floor->from_repeats = false;
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("5 ms is noise at most"));
+}
+
+TEST(Summarize, WithoutNoiseGivesTheErrorAlone) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kNone);
+  diagnosis.noise_floor->sigma_s = 0;
+  EXPECT_EQ(Summarize(diagnosis), "The model is off by 41 ms.");
+}
+
+TEST(Summarize, OfAComparisonHasNoVerdict) {
+  const std::string summary = Summarize(ExampleDiagnosis(Verdict::kNone));
+  EXPECT_THAT(summary, Not(HasSubstr("issing")));
+  EXPECT_THAT(summary, Not(HasSubstr("is left")));
+}
+
+TEST(Summarize, OfAnAdequateModelClaimsNothing) {
+  const std::string summary = Summarize(ExampleDiagnosis(Verdict::kAdequate));
+  EXPECT_THAT(summary, HasSubstr("Nothing is missing that these data could show."));
+  EXPECT_THAT(summary, Not(HasSubstr("Missing:")));
+}
+
+TEST(Summarize, NamesAStepWithItsValueAndWhatIsLeft) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
+  diagnosis.steps = {Step("tip_radius")};
+  const std::string summary = Summarize(diagnosis);
+  EXPECT_THAT(summary, HasSubstr("Missing: tip_radius (radius_mm 2.98 +- 0.02 mm)."));
+  EXPECT_THAT(summary, HasSubstr("Then 5 ms is left."));
+  EXPECT_THAT(summary, Not(HasSubstr("cannot tell them apart")));
+}
+
+TEST(Summarize, NamesBothStepsAndWhatWouldTellEquivalentsApart) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
+  diagnosis.steps = {Step("speed_error"), Step("tip_radius")};
+  diagnosis.steps[0].equivalent = {"clock_skew", "contact_slowdown"};
+  diagnosis.steps[0].discriminating_measurement = "Touch at two speeds.";
+  const std::string summary = Summarize(diagnosis);
+  EXPECT_THAT(summary, HasSubstr("Missing: speed_error or clock_skew or contact_slowdown ("));
+  EXPECT_THAT(summary, HasSubstr("These data cannot tell them apart. Touch at two speeds."));
+  EXPECT_THAT(summary, HasSubstr("Missing: tip_radius ("));
+}
+
+TEST(Summarize, CountsValuesThatAreTooManyToWrite) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
+  diagnosis.steps = {Step("object_pose")};
+  diagnosis.steps[0].parameters.assign(6, RadiusMm());
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("Missing: object_pose (6 values)."));
+}
+
+TEST(Summarize, NamesTheFingerOfAValue) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
+  diagnosis.steps = {Step("finger_length")};
+  diagnosis.steps[0].parameters[0].entry = "l";
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("radius_mm l 2.98 +- 0.02 mm"));
+}
+
+TEST(Summarize, SaysWhichValueOfTheModelIsAnother) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kWrongValues);
+  diagnosis.refitted = {{"tip_radius", {RadiusMm()}}};
+  const std::string summary = Summarize(diagnosis);
+  EXPECT_THAT(summary, HasSubstr("tip_radius has another value: radius_mm 2.98 +- 0.02 mm."));
+  EXPECT_THAT(summary, HasSubstr("Then 5 ms is left."));
+  EXPECT_THAT(summary, Not(HasSubstr("Missing:")));
+}
+
+TEST(Summarize, SuggestsAFormulaForWhatNoEffectExplains) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
+  diagnosis.unexplained.emplace();
+  diagnosis.unexplained->covariates = {{"travel_mm", 1e-9, 80}};
+  diagnosis.unexplained->formula = "k * sin(2*pi*travel_mm/lead)";
+  diagnosis.unexplained->rmse_s = 0.007;
+  const std::string summary = Summarize(diagnosis);
+  EXPECT_THAT(summary, HasSubstr("depends on travel_mm"));
+  EXPECT_THAT(summary, HasSubstr("A suggestion: k * sin(2*pi*travel_mm/lead)"));
+  EXPECT_THAT(summary, HasSubstr("would leave 7 ms."));
+  EXPECT_THAT(summary, Not(HasSubstr("Nothing is missing")));
+}
+
+TEST(Summarize, AdmitsThatNotEvenAFormulaFits) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
+  diagnosis.unexplained.emplace();
+  EXPECT_THAT(Summarize(diagnosis),
+              HasSubstr("A structure remains that neither an effect of the catalogue nor a simple formula "
+                        "explains."));
+}
+
+TEST(Summarize, GivesTheMistakeAndTheCommandThatFixesIt) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kCheckData);
+  diagnosis.data_problems = {
+      {"finger_order", "l <-> m", "Fingers l and m are swapped.",
+       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv", 0.041, 0.0051},
+      {"wrong_mesh", "lat20", "lat20 has another shape.", "", 0.041, 0.03}};
+  const std::string summary = Summarize(diagnosis);
+  EXPECT_THAT(summary, HasSubstr("Fingers l and m are swapped."));
+  EXPECT_THAT(summary, HasSubstr("touchstone session fix set.csv --swap-fingers l,m -o fixed.csv"));
+  EXPECT_THAT(summary, testing::EndsWith("lat20 has another shape."));
+}
+
+TEST(Summarize, SaysHowManyTouchesAVerdictNeeds) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kTooLittleData);
+  diagnosis.touches_needed = 60;
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("too little for a verdict; 60 touches would do"));
+}
+
+TEST(Summarize, OfNoTouchesSaysNothingOfTheModel) {
+  Diagnosis diagnosis;
+  diagnosis.verdict = Verdict::kTooLittleData;
+  EXPECT_EQ(Summarize(diagnosis), "No touch could be used: nothing can be said of the model.");
+  EXPECT_THAT(DataWarnings(diagnosis.data), ElementsAre(Summarize(diagnosis)));
+}
+
+TEST(DataWarnings, OfAGoodSetAreNone) {
+  EXPECT_THAT(DataWarnings(ExampleDiagnosis(Verdict::kNone).data), IsEmpty());
+}
+
+TEST(DataWarnings, NameWhatLimitsTheSet) {
+  touches::DataSummary data = ExampleDiagnosis(Verdict::kNone).data;
+  data.touches = 1;
+  data.rows = 10;
+  data.objects = {"lat20"};
+  data.repeats = 0;
+  data.unused = {{"a finger missed", {9, {}}}};
+  const std::vector<std::string> warnings = DataWarnings(data);
+  EXPECT_THAT(warnings, Contains(StartsWith("Only 1 touch took part")));
+  EXPECT_THAT(warnings, Contains(StartsWith("One object only")));
+  EXPECT_THAT(warnings, Contains(StartsWith("No touch was repeated")));
+  EXPECT_THAT(warnings, Contains(StartsWith("9 of 10 rows could not be used")));
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::report
