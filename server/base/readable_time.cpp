@@ -21,9 +21,7 @@ std::string TimeInWords(double time_s) {
   const TimeUnit unit = UnitOfTime(time_us);
   if (unit.symbol == std::string("s")) return absl::StrFormat("%.3g s", time_s);
   const double size = std::abs(time_us) * unit.per_us;
-  const std::string figures = size >= 100  ? absl::StrFormat("%.0f", size)
-                              : size >= 10 ? absl::StrFormat("%.1f", size)
-                                           : absl::StrFormat("%.2g", size);
+  const std::string figures = absl::StrFormat("%.*g", size >= 10 ? 3 : 2, size);
   return absl::StrCat(time_s < 0 ? "-" : "", figures, " ", unit.symbol);
 }
 

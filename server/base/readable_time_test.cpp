@@ -8,6 +8,7 @@ namespace {
 TEST(TimeInWords, HasThreeFiguresAndAUnitThatFits) {
   EXPECT_EQ(TimeInWords(0.0091), "9.1 ms");
   EXPECT_EQ(TimeInWords(0.0412), "41.2 ms");
+  EXPECT_EQ(TimeInWords(0.041), "41 ms");
   EXPECT_EQ(TimeInWords(0.00041), "410 us");
   EXPECT_EQ(TimeInWords(1.25), "1.25 s");
   EXPECT_EQ(TimeInWords(-0.0091), "-9.1 ms");
