@@ -58,12 +58,7 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSamples::Create(const Samp
   if (part.batch_size == 0) part.batch_size = 1;
   if (part.batch_stride == 0) part.batch_stride = 1;
 
-  SampleHeader& header = samples->header_;
-  header.samples = specification.samples;
-  for (const auto& object : specification.objects) header.mesh_hashes.push_back(object->hash());
-  header.fingers = device->fingers();
-  header.spacing_m = device->spacing_m();
-  header.columns = dataset::ColumnsOf(specification.columns, specification.image, header.fingers);
+  samples->header_ = HeaderOf(specification, device->fingers(), device->spacing_m());
   for (const auto& object : specification.objects)
     samples->generators_.push_back(
         touch::MakePoseGenerator(specification.plan, object->bounds(), specification.seed));

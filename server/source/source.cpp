@@ -26,7 +26,7 @@ absl::StatusOr<std::vector<touch::CommandedTouch>> Source::ExpandPlan(const Plan
   const uint64_t limit = limits_.max_touches_per_request;
   if (count > limit)
     return absl::InvalidArgumentError(absl::StrCat("count = ", count, ": at most ", limit,
-                                                   " touches a request; ask in parts by first_index"));
+                                                   " touches per request; ask in parts by first_index"));
   std::vector<touch::CommandedTouch> touches;
   for (uint64_t k = 0; k < count; ++k)
     touches.push_back(touch::TouchOfPlan(request.plan, *generator, request.first_index + k, 0));
@@ -64,6 +64,16 @@ absl::StatusOr<CaptureResults> Source::Capture(const CaptureRequest& request, co
   };
   TOUCHSTONE_RETURN_IF_ERROR(MakePictures(request, *object, guard, take));
   return results;
+}
+
+SampleHeader HeaderOf(const dataset::DatasetSpecification& specification, int fingers, double spacing_m) {
+  SampleHeader header;
+  header.samples = specification.samples;
+  for (const auto& object : specification.objects) header.mesh_hashes.push_back(object->hash());
+  header.fingers = fingers;
+  header.spacing_m = spacing_m;
+  header.columns = dataset::ColumnsOf(specification.columns, specification.image, fingers);
+  return header;
 }
 
 absl::StatusOr<std::unique_ptr<SampleStream>> Source::Stream(const SampleRequest& request) {

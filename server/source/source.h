@@ -109,6 +109,9 @@ struct SampleHeader {
   std::string renderer;  // "egl" or "cpu"; empty: none
 };
 
+// The header of a dataset's stream; the model and the renderer are for those who have one to add.
+SampleHeader HeaderOf(const dataset::DatasetSpecification& specification, int fingers, double spacing_m);
+
 // The batches of a dataset, in order. Not for several threads.
 class SampleStream {
  public:

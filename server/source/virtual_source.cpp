@@ -135,13 +135,9 @@ absl::StatusOr<std::unique_ptr<SampleStream>> VirtualSource::MakeStream(const Sa
                                 RendererFor(specification->image.renderer_kind));
   }
   TOUCHSTONE_RETURN_IF_ERROR(dataset::ValidateDataset(specification.get()));
-  SampleHeader header;
-  header.samples = specification->samples;
+  SampleHeader header =
+      HeaderOf(*specification, specification->model->fingers, specification->model->spacing_m);
   header.model = specification->model;
-  for (const auto& object : specification->objects) header.mesh_hashes.push_back(object->hash());
-  header.fingers = specification->model->fingers;
-  header.spacing_m = specification->model->spacing_m;
-  header.columns = dataset::ColumnsOf(*specification);
   if (specification->columns.image) header.renderer = specification->image.renderer->name();
   TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<dataset::DatasetStream> stream,
                               dataset::DatasetStream::Create(std::move(specification), request.part, pool_));
