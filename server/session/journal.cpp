@@ -4,6 +4,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/session/journal_file.h"
 #include "server/session/journal_rows.h"
 
@@ -20,15 +21,16 @@ absl::Status JournalFile::EnsureSession(const JournalSession& session) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName("a session's name", session.name));
   if (session.fingers < 1 || session.fingers > kMaxFingers || !(session.spacing_m > 0))
     return Wrong(absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
-                              ShortestNumber(session.spacing_m * 1e3), " mm apart; 1 to ", kMaxFingers,
-                              " and more than 0 mm are possible"));
+                              ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart; 1 to ",
+                              kMaxFingers, " and more than 0 mm are possible"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(session.name));
   if (!known) return Write([&] { return InsertSession(file_.get(), session).status(); });
   if (known->fingers == session.fingers && known->spacing_m == session.spacing_m) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat(Called(), "session '", session.name, "' was made with ", known->fingers, " fingers ",
-                   ShortestNumber(known->spacing_m * 1e3), " mm apart, not ", session.fingers, " fingers ",
-                   ShortestNumber(session.spacing_m * 1e3), " mm apart; begin a session of another name"));
+                   ShortestNumber(known->spacing_m * kMillimetresPerMetre), " mm apart, not ",
+                   session.fingers, " fingers ", ShortestNumber(session.spacing_m * kMillimetresPerMetre),
+                   " mm apart; begin a session of another name"));
 }
 
 absl::StatusOr<std::vector<JournalSession>> JournalFile::Sessions() const {

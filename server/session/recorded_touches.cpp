@@ -7,6 +7,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::session {
@@ -46,11 +47,11 @@ absl::StatusOr<std::unique_ptr<RecordedTouches>> RecordedTouches::Read(
       recorded->spacing_m_ = session.spacing_m;
     }
     if (session.fingers != recorded->fingers_ || session.spacing_m != recorded->spacing_m_)
-      return absl::InvalidArgumentError(
-          absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
-                       ShortestNumber(session.spacing_m * 1e3), " mm apart, '", chosen[0].name, "' has ",
-                       recorded->fingers_, " fingers ", ShortestNumber(recorded->spacing_m_ * 1e3),
-                       " mm apart; sessions of one end effector can be served together"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "session '", session.name, "' has ", session.fingers, " fingers ",
+          ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart, '", chosen[0].name, "' has ",
+          recorded->fingers_, " fingers ", ShortestNumber(recorded->spacing_m_ * kMillimetresPerMetre),
+          " mm apart; sessions of one end effector can be served together"));
     TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session.name, [&](const JournalTouch& touch) {
       if (touch.stage == TouchStage::kDone) recorded->Add(touch);
       return true;

@@ -232,7 +232,8 @@ class Registration {
           absl::StrFormat("the contacts fit '%s' badly: %.2f mm are left over, %.1f mm and %.1f degrees from "
                           "the start; check that it is "
                           "the object that lies there, and start within 5 mm and 3 degrees",
-                          surface_.name(), result.rms_m * 1e3, shift_m * 1e3, turn_rad / kRadiansPerDegree));
+                          surface_.name(), result.rms_m * kMillimetresPerMetre,
+                          shift_m * kMillimetresPerMetre, turn_rad / kRadiansPerDegree));
     result.base_from_object = pose;
     const Matrix6d normal = Normal(fit, used);
     Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(normal / static_cast<double>(result.contacts));

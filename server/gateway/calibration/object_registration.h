@@ -36,8 +36,8 @@ inline constexpr size_t kMinRegistrationContacts = 7;
 // Gauss-Newton from `start`, which may be 5 mm and 3 degrees off, minimising the distances along the approach
 // between the measured points of contact and the surface; far-off contacts weigh less and at last nothing.
 // INVALID_ARGUMENT: too few contacts. FAILED_PRECONDITION names the directions that the touches cannot
-// determine (a flat face determines neither its shift in its plane nor its rotation about its normal), or says that the contacts fit no
-// pose near the start.
+// determine (a flat face determines neither its shift in its plane nor its rotation about its normal), or
+// says that the contacts fit no pose near the start.
 absl::StatusOr<ObjectRegistration> RegisterObject(const geometry::Surface& surface,
                                                   const std::vector<RegistrationContact>& contacts,
                                                   const Eigen::Isometry3d& start);

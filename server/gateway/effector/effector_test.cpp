@@ -1,4 +1,5 @@
-// What a touch's contacts, clock and refusals come to while the line is good; effector_line_test.cpp has the bad ones.
+// What a touch's contacts, clock and refusals come to while the line is good; effector_line_test.cpp has the
+// bad ones.
 #include <string>
 #include <vector>
 

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/gateway/effector/serial_effector.h"
 
 namespace touchstone::gateway::effector {
@@ -13,7 +14,7 @@ firmware::FingerConfig ConfigOf(const EffectorFinger& finger) {
   firmware::FingerConfig config;
   config.sensor = finger.sensor;
   config.active_level = finger.active_high ? 1 : 0;
-  config.debounce_us = static_cast<uint32_t>(std::lround(finger.debounce_s * 1e6));
+  config.debounce_us = static_cast<uint32_t>(std::lround(finger.debounce_s * kMicrosecondsPerSecond));
   config.threshold = static_cast<uint16_t>(finger.threshold);
   config.hysteresis = static_cast<uint16_t>(finger.hysteresis);
   return config;

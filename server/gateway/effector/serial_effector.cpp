@@ -13,6 +13,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 
 namespace touchstone::gateway::effector {
 namespace {
@@ -26,9 +27,9 @@ absl::Status CheckOptions(const EffectorOptions& options) {
   for (size_t i = 0; i < options.fingers.size(); ++i) {
     const EffectorFinger& finger = options.fingers[i];
     const std::string name = absl::StrCat("finger ", i + 1, ": ");
-    if (!(finger.debounce_s >= 0 && finger.debounce_s * 1e6 <= firmware::kMaxDebounceUs))
+    if (!(finger.debounce_s >= 0 && finger.debounce_s * kMicrosecondsPerSecond <= firmware::kMaxDebounceUs))
       return wrong(absl::StrCat(name, "debounce_s is ", finger.debounce_s, "; right is 0 to ",
-                                firmware::kMaxDebounceUs * 1e-6));
+                                firmware::kMaxDebounceUs * kSecondsPerMicrosecond));
     if (finger.hysteresis < 0 || finger.threshold <= finger.hysteresis || finger.threshold > 65535)
       return wrong(absl::StrCat(name, "threshold ", finger.threshold, " and hysteresis ", finger.hysteresis,
                                 "; right is 0 <= hysteresis < threshold <= 65535 counts"));
@@ -83,7 +84,7 @@ absl::Status SerialEffector::Start() {
   wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_fd_ < 0) return absl::ResourceExhaustedError("end effector: no more file descriptors");
   // Nonces differ between processes, so that an old reply is not taken for a new one.
-  next_nonce_ = static_cast<uint32_t>(std::fmod(timing::HostNowS() * 1e6, 4294967291.0));
+  next_nonce_ = static_cast<uint32_t>(std::fmod(timing::HostNowS() * kMicrosecondsPerSecond, 4294967291.0));
   thread_ = std::thread([this] { Run(); });
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return first_try_over_; });

@@ -118,7 +118,8 @@ class Rig : public source::RigDevice {
   absl::Status Reconcile();
   absl::Status ReconcileTouch(const std::string& session, const session::JournalTouch& touch);
 
-  // The caller's guard, and that nobody has stopped the rig since this call: every motion asks it from its beginning on.
+  // The caller's guard, and that nobody has stopped the rig since this call: every motion asks it from its
+  // beginning on.
   source::MotionGuard UntilStopped(const source::MotionGuard& caller) const;
   // Holds the rig for one motion; the guard's error if that fails while it waits for another one.
   absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const source::MotionGuard& guard);
