@@ -1,15 +1,18 @@
 // Parsing: the help with examples first, and usage errors that say what was probably meant.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <set>
+#include <limits>
+#include <utility>
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_split.h>
+#include <absl/strings/strip.h>
 
 #include "client/cli/common.h"
+#include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -19,73 +22,7 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kHelpColumn = 32;
-constexpr size_t kHelpWidth = 110;
-constexpr double kMaxWaitS = 3600;
-
-// One line of what it is, then examples, then usage and options.
-class ExamplesFirst : public CLI::Formatter {
- public:
-  explicit ExamplesFirst(std::string examples) : examples_(std::move(examples)) {
-    column_width(kHelpColumn);
-    label("OPTIONS", "OPTIONS");
-    label("Positionals", "Arguments");
-    label("Subcommands", "Commands");
-    label("REQUIRED", "(required)");
-    label("TEXT", "TEXT");
-  }
-
-  std::string make_description(const CLI::App* app) const override {
-    return absl::StrCat(Wrap(app->get_description(), kHelpWidth, 0), "\n\nExamples:\n", examples_, "\n");
-  }
-
-  // One blank line between paragraphs.
-  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
-    std::string help = CLI::Formatter::make_help(app, name, mode);
-    for (size_t at; (at = help.find("\n\n\n")) != std::string::npos;) help.erase(at, 1);
-    while (help.size() > 1 && help.compare(help.size() - 2, 2, "\n\n") == 0) help.pop_back();
-    return help;
-  }
-
-  // The first sentence is enough in a list of commands.
-  std::string make_subcommand(const CLI::App* sub) const override {
-    std::string line = sub->get_description();
-    line = line.substr(0, line.find(". "));
-    if (!line.empty() && line.back() == '.') line.pop_back();
-    std::string text = "  " + sub->get_name();
-    text.append(text.size() < 14 ? 14 - text.size() : 1, ' ');
-    return text + line + "\n";
-  }
-
-  std::string make_option(const CLI::Option* option, bool is_positional) const override {
-    std::string left = "  " + make_option_name(option, is_positional) + make_option_opts(option);
-    if (left.size() + 2 > kHelpColumn)
-      left += "\n" + std::string(kHelpColumn, ' ');
-    else
-      left.append(kHelpColumn - left.size(), ' ');
-    return left + Wrap(make_option_desc(option), kHelpWidth, kHelpColumn) + "\n";
-  }
-
-  std::string make_option_opts(const CLI::Option* option) const override {
-    std::string text;
-    if (option->get_type_size() != 0) text += " " + option->get_type_name();
-    if (option->get_required()) text += " (required)";
-    return text;
-  }
-
- private:
-  std::string examples_;
-};
-
-// "  touchstone objects" for each line of examples.
-std::string Indented(const std::string& lines) {
-  std::string text = "  ";
-  for (const char c : lines) {
-    text += c;
-    if (c == '\n') text += "  ";
-  }
-  return text + "\n";
-}
+constexpr char kWholeNumber[] = "N";  // type of the options that are counts and seeds
 
 std::vector<std::string> OptionNames(const CLI::App* app) {
   std::vector<std::string> names;
@@ -100,9 +37,16 @@ std::vector<std::string> CommandNames(const CLI::App* app) {
   return names;
 }
 
-absl::Status EmbeddedOnly(absl::string_view option) {
-  return absl::InvalidArgumentError(absl::StrCat(
-      option, ": works only without --server; give it to touchstone-server instead (the same option there)"));
+// Counts and seeds: CLI11 would take -1 for 2^64 - 1 and 010 for 8.
+std::string CheckWholeNumber(std::string& text) {
+  uint64_t value = 0;
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos)
+    return absl::StrCat("'", text,
+                        "' is no whole number from 0 on, written with digits alone, for instance 1000");
+  if (!absl::SimpleAtoi(text, &value))
+    return absl::StrCat("'", text, "' is too large; at most ", std::numeric_limits<uint64_t>::max());
+  text = absl::StrCat(value);
+  return "";
 }
 
 int PrintError(absl::string_view message) {
@@ -114,15 +58,17 @@ int PrintError(absl::string_view message) {
 }  // namespace
 
 Cli::Cli()
-    : app_("Touches and photographs objects in simulation, and streams datasets of them to files",
-           "touchstone") {
-  app_.formatter(std::make_shared<ExamplesFirst>(
-      Indented("touchstone objects                                      what can be touched\n"
-               "touchstone touch lat20 --approach 0,0,-1                one touch from above\n"
-               "touchstone capture lat20 --approach 0,0,-1 -o top.png   its photograph\n"
-               "touchstone stream --samples 10000 --out data            a dataset of touches\n"
-               "touchstone diagnose set.csv --model nominal.yaml        where and why a model is wrong\n"
-               "touchstone doctor                                       is everything in order here?")));
+    : app_(
+          "Touches and photographs objects, simulated or on a rig, says what a simulation lacks, and streams "
+          "datasets",
+          "touchstone") {
+  app_.formatter(
+      ExamplesFirst("touchstone objects                                      what can be touched\n"
+                    "touchstone touch lat20 --approach 0,0,-1                one touch from above\n"
+                    "touchstone capture lat20 --approach 0,0,-1 -o top.png   its photograph\n"
+                    "touchstone stream --samples 10000 --out data            a dataset of touches\n"
+                    "touchstone diagnose set.csv --model nominal.yaml        where and why a model is wrong\n"
+                    "touchstone doctor                                       is everything in order here?"));
   app_.set_help_flag("-h,--help", "This text; also touchstone COMMAND --help");
   app_.set_version_flag("--version", absl::StrCat("touchstone ", kVersion), "The version");
   app_.require_subcommand(0, 1);
@@ -137,7 +83,7 @@ CLI::App* Cli::AddCommand(CLI::App* parent, const std::string& name, const std::
                           const std::string& examples, std::function<absl::Status()> run) {
   CLI::App* command = (parent == nullptr ? &app_ : parent)->add_subcommand(name, description);
   command->group("Commands");
-  command->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
+  command->formatter(ExamplesFirst(examples));
   command->footer("");
   runs_[command] = std::move(run);
   return command;
@@ -147,7 +93,7 @@ CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
                         const std::string& examples) {
   CLI::App* group = app_.add_subcommand(name, description);
   group->group("Commands");
-  group->formatter(std::make_shared<ExamplesFirst>(Indented(examples)));
+  group->formatter(ExamplesFirst(examples));
   group->set_help_flag("-h,--help", "This text");
   group->footer("");
   group->require_subcommand(0, 1);
@@ -246,97 +192,6 @@ void Cli::AddOutputOptions(CLI::App* command) {
   command->set_help_flag("-h,--help", "This text")->group("Output");
 }
 
-void Cli::AddSourceOptions(CLI::App* command) {
-  const auto add = [&](const std::string& name, auto& value, const std::string& type,
-                       const std::string& text) {
-    return command->add_option(name, value, text)->type_name(type)->group("Source");
-  };
-  add("--server", source_.servers, "HOST:PORT",
-      "A touchstone-server, or several with commas (the next one takes over from a lost one). "
-      "Default: simulate in this process")
-      ->delimiter(',')
-      ->take_all()
-      ->expected(1);
-  add("--wait-s", source_.wait_s, "S", "How long to wait for a server that is starting, from 0. Default: 10");
-  add("--mesh", source_.meshes, "NAME=FILE",
-      "A mesh to touch besides the built-in shapes, repeatable; with what the file does not say: "
-      "NAME=FILE,unit=mm|cm|m|inch,up=x|y|z,scale=1,fit_mm=150")
-      ->take_all()
-      ->expected(1);
-  add("--mesh-dir", source_.mesh_folder, "FOLDER", "Every mesh file of a folder, named by its stem");
-  add("--renderer", source_.renderer, "KIND",
-      "auto, egl or cpu: what makes images. Default: auto, the faster one");
-  add("--egl-device", source_.egl_device, "N", "EGL device to render on, as touchstone doctor numbers them");
-  add("--threads", source_.threads, "N", "Threads that simulate. Default: one per core");
-}
-
-absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
-  if (!source_.servers.empty()) {
-    const char* embedded_only = !source_.meshes.empty()        ? "--mesh"
-                                : !source_.mesh_folder.empty() ? "--mesh-dir"
-                                                               : nullptr;
-    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
-    return ConnectWithMeshes({});
-  }
-  std::vector<source::MeshSpec> meshes;
-  if (!source_.mesh_folder.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, service::MeshSpecsOfFolder(source_.mesh_folder));
-  }
-  for (const std::string& text : source_.meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(source::MeshSpec mesh, service::ParseMeshSpec(text));
-    meshes.push_back(std::move(mesh));
-  }
-  return ConnectWithMeshes(std::move(meshes));
-}
-
-absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
-  client::ConnectionOptions options;
-  options.servers = SplitCommas(source_.servers);
-  return client::Connection::Open(std::move(options));
-}
-
-absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
-    std::vector<source::MeshSpec> meshes) const {
-  client::ConnectionOptions options;
-  options.servers = SplitCommas(source_.servers);
-  TOUCHSTONE_RETURN_IF_ERROR(Renderer().status());
-  if (!options.servers.empty()) {
-    const char* embedded_only = source_.threads != 0      ? "--threads"
-                                : source_.egl_device >= 0 ? "--egl-device"
-                                                          : nullptr;
-    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
-    if (!(source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS))
-      return absl::InvalidArgumentError(
-          absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
-    options.wait_s = source_.wait_s;
-    options.on_wait = [this](const std::string& line) { Log(line); };
-    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
-    Detail("connected to " + connection->address());
-    return connection;
-  }
-  service::ServerOptions& embedded = options.embedded;
-  embedded.meshes = std::move(meshes);
-  if (source_.threads < 0)
-    return absl::InvalidArgumentError(
-        absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one per core"));
-  embedded.threads = source_.threads;
-  TOUCHSTONE_ASSIGN_OR_RETURN(embedded.renderer, Renderer());
-  return client::Connection::Open(std::move(options));
-}
-
-absl::StatusOr<image::RendererOptions> Cli::Renderer() const {
-  static const std::map<std::string, image::RendererKind> kinds = {{"auto", image::RendererKind::kAuto},
-                                                                   {"egl", image::RendererKind::kEgl},
-                                                                   {"cpu", image::RendererKind::kCpu}};
-  std::vector<std::string> names;
-  for (const auto& [name, kind] : kinds) names.push_back(name);
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, names).status());
-  image::RendererOptions options;
-  options.kind = kinds.at(source_.renderer);
-  options.egl_device = source_.egl_device;
-  return options;
-}
-
 void Cli::Log(absl::string_view line) const {
   if (!output_.quiet) std::fprintf(stderr, "%s\n", std::string(line).c_str());
 }
@@ -372,12 +227,23 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
       return PrintError(absl::StrCat("unknown command '", word, "'", DidYouMean(word, commands), help));
     return PrintError(absl::StrCat("'", word, "' is one argument too many", help));
   }
-  return PrintError(absl::StrCat(error.what(), help));
+  // "Could not convert: --speed-mm-s = 20mm"
+  absl::string_view what = error.what();
+  if (absl::ConsumePrefix(&what, "Could not convert: ")) {
+    const std::pair<absl::string_view, absl::string_view> option =
+        absl::StrSplit(what, absl::MaxSplits(" = ", 1));
+    return PrintError(absl::StrCat(option.first, ": '", option.second,
+                                   "' is not a number; one like 12.5 was expected, without a unit", help));
+  }
+  return PrintError(absl::StrCat(what, help));
 }
 
 int Cli::Run(int argc, char** argv) {
   // Last in every help, since they are the same everywhere.
   for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
+  for (const auto& [command, run] : runs_)
+    for (CLI::Option* option : const_cast<CLI::App*>(command)->get_options())
+      if (option->get_type_name() == kWholeNumber) option->transform(CLI::Validator(CheckWholeNumber, ""));
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -9,15 +9,12 @@
 
 #include <chrono>
 #include <filesystem>
-#include <map>
-#include <random>
 #include <thread>
 
 #include <nlohmann/json.hpp>
 
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
-#include "client/source/dataset_manifest.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/text.h"
 #include "server/service/server.h"
@@ -31,19 +28,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-class CommandLineTest : public RealBinaryTest {
- protected:
-  // Every file under a folder with the hash of its bytes; dataset.json with its text, for the message.
-  std::map<std::string, std::string> Snapshot(const std::string& name) {
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::recursive_directory_iterator(Path(name)))
-      if (entry.is_regular_file())
-        files[fs::relative(entry.path(), Path(name)).string()] =
-            entry.path().extension() == ".json" ? ReadFile(entry.path().string()).value_or("?")
-                                                : Sha256HexOfFile(entry.path().string()).value_or("?");
-    return files;
-  }
-};
+class CommandLineTest : public RealBinaryTest {};
 
 TEST_F(CommandLineTest, HelpBeginsWithExamples) {
   for (const std::vector<std::string>& command : {std::vector<std::string>{},
@@ -80,75 +65,6 @@ TEST_F(CommandLineTest, HelpBeginsWithExamples) {
     EXPECT_LT(examples, outcome.out.find("Usage:"));
     EXPECT_EQ(outcome.err, "");
   }
-}
-
-TEST_F(CommandLineTest, UnknownWordsAreAnsweredWithTheNearestKnown) {
-  const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{"strem"}, "unknown command 'strem', did you mean 'stream'?"},
-      {{"model", "shwo"}, "unknown command 'shwo', did you mean 'show'?"},
-      {{"stream", "--sampels", "5", "--out", "x"}, "unknown option '--sampels', did you mean '--samples'?"},
-      {{"effects", "tip_radios"}, "did you mean 'tip_radius'?"},
-      {{"touch", "lat2", "--approach", "0,0,-1"}, "lat2"},
-      {{"model", "add", "nominal", "tip_radius", "radius=3"}, "did you mean 'radius_mm'?"},
-      {{"stream", "--to", "webdatset", "--out", "x"}, "did you mean 'webdataset'?"},
-      {{"stream", "--columns", "descripter", "--out", "x"}, "did you mean 'descriptor'?"},
-      {{"mesh", "supershape", "lat21", "-o", "x.off"}, "lat21"},
-  };
-  for (const auto& [arguments, words] : cases) {
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
-    EXPECT_THAT(outcome.err, AllOf(StartsWith("touchstone: error: "), HasSubstr(words)));
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << "one line: " << outcome.err;
-    EXPECT_EQ(outcome.out, "");
-  }
-}
-
-TEST_F(CommandLineTest, BadInputIsExitCode2AndNamesFieldAndValue) {
-  Write("bad.csv", "touch,object\n0,lat20\n");
-  Write("bad.yaml", "touchstone: model/1\nname: x\nefects: []\n");
-  const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{"touch", "lat20", "--approach", "0,0"}, "--approach: '0,0' has 2 parts"},
-      {{"touch", "lat20", "--approach", "0,0,0"}, "approach"},
-      {{"touch", "lat20", "--approach", "0,0,nan"}, "not a finite number"},
-      {{"touch", "lat20", "--approach", "0,0,-1", "--lateral", "0,0,1"}, "lateral"},
-      {{"touch", "lat20", "--approach", "0,0,-1", "--speed-mm-s", "-1"}, "speed"},
-      {{"touch", "--plan", "bad.csv"}, "bad.csv:1: column 'speed_mm_s' is missing"},
-      {{"touch", "--plan", "none.csv"}, "none.csv"},
-      {{"touch", "lat20", "--approach", "0,0,-1", "--model", "bad.yaml"}, "efects"},
-      {{"stream", "--out", "d", "--rounds", "3"}, "--rounds belongs to --plan faces"},
-      {{"stream", "--out", "d", "--image", "0x5"}, "--image: '0x5' is no size"},
-      {{"stream", "--out", "d", "--image", "20000x20000"}, "20000"},
-      {{"stream", "--out", "d", "--shards", "4/4"}, "--shards: '4/4'"},
-      {{"stream", "--out", "d", "--to", "hdf5", "--encoding", "png"},
-       "--encoding: png does not go into HDF5"},
-      {{"stream", "--out", "/proc/nowhere"}, "--out: /proc/nowhere"},
-      {{"capture", "lat20", "--approach", "0,0,-1", "-o", "x.gif"}, "x.gif"},
-      {{"objects", "--mesh", "cup"}, "cup"},
-      {{"objects", "--server", "nowhere"}, "'nowhere' is not HOST:PORT"},
-      {{"objects", "--server", "127.0.0.1:1", "--mesh", "a=b.off"}, "--mesh: works only without --server"},
-      {{"objects", "extra"}, "'extra' is one argument too many"},
-      {{"touch", "lat20", "--approach", "0,0,-1", "--session", "a b"},
-       "--session: 'a b' is no session's name"},
-      {{"rig", "status"}, "--server is missing"},
-      {{"rig", "stop"}, "--server is missing"},
-      {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "FACE: '+w'"},
-      {{"rig", "run", "none.csv", "-o", "set.txt"}, "-o: 'set.txt' does not say the format"},
-      {{"session", "list", "set.csv"}, "'set.csv' is no journal"},
-      {{"session", "list", "none.db"}, "none.db"},
-      {{"session", "export", "monday", "tuesday"}, "'tuesday' is one argument too many"},
-      {{"session", "import", "bad.csv", "-o", "set.csv"}, "'set.csv' is no journal"},
-  };
-  for (const auto& [arguments, words] : cases) {
-    const Outcome outcome = Run(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << words << ": " << outcome.err;
-    EXPECT_THAT(outcome.err, AllOf(StartsWith("touchstone: error: "), HasSubstr(words)));
-  }
-}
-
-TEST_F(CommandLineTest, AnUnreachableSourceIsExitCode3) {
-  const Outcome outcome = Run({"objects", "--server", "127.0.0.1:1", "--wait-s", "0"});
-  EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("127.0.0.1:1"));
 }
 
 TEST_F(CommandLineTest, AServerThatIsStartingIsWaitedFor) {
@@ -276,102 +192,6 @@ TEST_F(CommandLineTest, ModelFilesAreNeverChanged) {
   tips.push_back("tips.yaml");
   EXPECT_NE(Run(nominal).out, Run(tips).out);
 }
-
-// The same dataset, three formats: an undisturbed run is what every disturbed one must equal.
-class ResumeTest : public CommandLineTest, public ::testing::WithParamInterface<std::string> {
- protected:
-  std::vector<std::string> Stream(const std::string& out, std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"stream",       "--to",  GetParam(), "--samples", "6000",
-                                          "--shard-size", "250",   "--seed",   "5",         "--objects",
-                                          "lat20,lat00",  "--out", out,        "--quiet"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-};
-
-TEST_P(ResumeTest, KilledAtAnyMomentTheResultIsTheSameByteForByte) {
-  const auto start = std::chrono::steady_clock::now();
-  const Outcome whole = Run(Stream("whole"));
-  ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  const auto took = std::chrono::steady_clock::now() - start;
-  const auto expected = Snapshot("whole");
-  EXPECT_EQ(expected.count("dataset.json"), 1u);
-
-  std::mt19937 random(7);
-  int kills_in_the_middle = 0;
-  for (int attempt = 0; attempt < 8; ++attempt) {
-    const pid_t child = Start(Stream("killed"));
-    std::this_thread::sleep_for(took * (0.3 + 0.6 * (random() % 1000) / 1000.0));
-    ::kill(child, SIGKILL);
-    if (Wait(child).exit_code == 128 + SIGKILL) ++kills_in_the_middle;
-    if (attempt % 2 == 1) continue;
-    const Outcome rest = Run(Stream("killed"));
-    ASSERT_EQ(rest.exit_code, 0) << rest.err;
-    ASSERT_EQ(Snapshot("killed"), expected) << "after attempt " << attempt;
-    fs::remove_all(Path("killed"));
-  }
-  EXPECT_GT(kills_in_the_middle, 0) << "no run was slow enough to be killed; the test shows nothing";
-}
-
-TEST_P(ResumeTest, InterruptedItSaysHowToResumeAndLeavesNoPart) {
-  const pid_t child =
-      Start({"stream", "--to", GetParam(), "--samples", "2000000", "--shard-size", "500", "--out", "d"});
-  // Until the first shard stands.
-  for (int i = 0;
-       i < 3000 && (!fs::exists(Path("d")) || std::distance(fs::directory_iterator(Path("d")), {}) < 3); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  ::kill(child, SIGINT);
-  const Outcome outcome = Wait(child);
-  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("Run the same command again to resume"));
-  int shards = 0;
-  for (const auto& entry : fs::directory_iterator(Path("d"))) {
-    EXPECT_NE(entry.path().extension(), ".part") << entry.path();
-    shards += entry.path().filename().string().rfind("shard-", 0) == 0;
-  }
-  const auto manifest = nlohmann::json::parse(*ReadFile(Path("d/dataset.json")));
-  EXPECT_EQ(manifest["state"], "partial");
-  EXPECT_EQ(manifest["shards"].size(), static_cast<size_t>(shards)) << "every whole shard is listed";
-}
-
-TEST_P(ResumeTest, ParallelJobsMakeTheSameDataset) {
-  ASSERT_EQ(Run(Stream("whole")).exit_code, 0);
-  for (const char* job : {"2/3", "0/3", "1/3"})
-    ASSERT_EQ(Run(Stream("jobs", {"--shards", job})).exit_code, 0) << job;
-  EXPECT_EQ(Snapshot("jobs"), Snapshot("whole"));
-}
-
-TEST_P(ResumeTest, AnotherSpecificationIsRefusedAndNamed) {
-  ASSERT_EQ(Run(Stream("d")).exit_code, 0);
-  const auto before = Snapshot("d");
-  const Outcome other = Run(Stream("d", {"--speed-mm-s", "30"}));
-  EXPECT_EQ(other.exit_code, 2);
-  EXPECT_THAT(other.err, AllOf(HasSubstr("specification.plan.speed_mm_s: 20.0 there, 30.0 now"),
-                               HasSubstr("--restart")));
-  EXPECT_EQ(Snapshot("d"), before);
-  EXPECT_EQ(Run(Stream("d", {"--speed-mm-s", "30", "--restart"})).exit_code, 0);
-  EXPECT_NE(Snapshot("d"), before);
-}
-
-TEST_P(ResumeTest, ADatasetIsMadeAgainFromItsOwnFile) {
-  ASSERT_EQ(Run(Stream("d")).exit_code, 0);
-  const Outcome again = Run({"stream", "--like", "d/dataset.json", "--out", "again", "--quiet"});
-  ASSERT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(Snapshot("again"), Snapshot("d"));
-}
-
-TEST_P(ResumeTest, AServerGivesTheSameBytesAsThisProcess) {
-  const TestServer server;
-  ASSERT_EQ(Run(Stream("embedded")).exit_code, 0);
-  // The first address never answers.
-  const std::string servers = "127.0.0.1:1," + server.address();
-  const Outcome remote = Run(Stream("remote", {"--server", servers, "--batch-size", "77"}));
-  ASSERT_EQ(remote.exit_code, 0) << remote.err;
-  EXPECT_EQ(Snapshot("remote"), Snapshot("embedded"));
-}
-
-INSTANTIATE_TEST_SUITE_P(Formats, ResumeTest, ::testing::Values("webdataset", "folder", "hdf5"),
-                         [](const auto& info) { return info.param; });
 
 TEST_F(CommandLineTest, ImagesComeAsFilesInTheShards) {
   const Outcome outcome = Run({"stream", "--samples", "20", "--image", "32x24", "--renderer", "cpu",

@@ -69,6 +69,10 @@ absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {
     TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMaxModelBytes));
     return ref;
   }
+  std::error_code ignored;
+  if (path.has_extension() && std::filesystem::is_regular_file(path, ignored))
+    return absl::InvalidArgumentError(
+        absl::StrCat("model: '", text, "' is a file, but no model file: the name of one ends in .yaml"));
   const bool hex = text.size() >= 8 && text.size() <= 64 &&
                    text.find_first_not_of("0123456789abcdef") == std::string::npos;
   if (hex)

@@ -70,6 +70,8 @@ class Cli {
 
   // --server, --mesh, ...: for commands that need a source.
   void AddSourceOptions(CLI::App* command);
+  // --server and --wait-s alone: for commands that need a rig.
+  void AddRigOptions(CLI::App* command);
   // The source that those options name.
   absl::StatusOr<std::unique_ptr<client::Connection>> Connect() const;
   // The same at a server, without --wait-s: for what must not wait.
@@ -105,6 +107,7 @@ class Cli {
   CLI::Option* AddOutputOf(CLI::App* command, const std::string& name, std::string* path,
                            const std::string& text, OutputKind kind, bool json_is_a_format);
   void AddOutputOptions(CLI::App* command);
+  void AddServerOptions(CLI::App* command, const std::string& what);
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
 

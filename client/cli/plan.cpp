@@ -51,7 +51,12 @@ absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool cou
       done += step;
     }
   }
-  if (!cli.output().json) return cli.Write(options.output, client::FormatMeasurements(touches));
+  const std::string details = absl::StrCat(" (", Counted(touches.size(), "touch", "touches"), ")");
+  if (!cli.output().json) {
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, client::FormatMeasurements(touches)));
+    cli.LogWritten(options.output, details);
+    return absl::OkStatus();
+  }
 
   Json list = Json::array();
   for (const client::MeasuredTouch& touch : touches) {
@@ -70,7 +75,9 @@ absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool cou
     if (c.has_session_time_s()) item["session_time_s"] = c.session_time_s();
     list.push_back(std::move(item));
   }
-  return cli.Write(options.output, Json({{"touches", list}}).dump(2) + "\n");
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, Json({{"touches", list}}).dump(2) + "\n"));
+  cli.LogWritten(options.output, details);
+  return absl::OkStatus();
 }
 
 }  // namespace

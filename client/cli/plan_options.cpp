@@ -8,6 +8,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/touch_limits.h"
 #include "server/base/units.h"
 
 namespace touchstone::cli {
@@ -242,6 +243,15 @@ absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& o) {
     }
     *touch.mutable_lateral() = lateral;
   }
+  // In the units that the user typed; the source would answer in its own.
+  constexpr double kMaxSpeedMmS = kMaxSpeedMS * kMillimetresPerMetre;
+  constexpr double kMaxStandoffMm = kMaxStandoffM * kMillimetresPerMetre;
+  if (!(o.speed_mm_s > 0) || o.speed_mm_s > kMaxSpeedMmS)
+    return absl::InvalidArgumentError(absl::StrCat("--speed-mm-s: ", ShortestNumber(o.speed_mm_s),
+                                                   " is out of range; above 0 and at most ", kMaxSpeedMmS));
+  if (!(o.standoff_mm >= 0) || o.standoff_mm > kMaxStandoffMm)
+    return absl::InvalidArgumentError(absl::StrCat("--standoff-mm: ", ShortestNumber(o.standoff_mm),
+                                                   " is out of range; from 0 to ", kMaxStandoffMm));
   touch.set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm));
   touch.set_speed_m_s(ToSi(Unit::kMillimetrePerSecond, o.speed_mm_s));
   return touch;

@@ -51,7 +51,9 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
     return absl::OkStatus();
   }
   if (options.ReportOnStdout() && options.output.empty()) return absl::OkStatus();
-  return cli.Write(options.output, client::FormatMeasurements(plan));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, client::FormatMeasurements(plan)));
+  cli.LogWritten(options.output, absl::StrCat(" (", Counted(plan.size(), "touch", "touches"), ")"));
+  return absl::OkStatus();
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the commands of `touchstone rig` share; one file a command.
+// What the commands of `touchstone rig` share; one file per command.
 #pragma once
 
 #include <memory>
@@ -34,7 +34,7 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
 // "2 of 192 touches are impossible: ...", with a line for each of the first few.
 std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines);
 
-// One file a command.
+// One file per command.
 void AddRigStatus(Cli* cli, CLI::App* group);
 void AddRigMotions(Cli* cli, CLI::App* group);  // stop, reset, power-on, home, mount
 void AddRigDryRun(Cli* cli, CLI::App* group);

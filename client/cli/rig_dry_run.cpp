@@ -129,7 +129,7 @@ void AddRigDryRun(Cli* cli, CLI::App* group) {
           ->required());
   cli->AddOutput(command, "-o,--output", &options->drawing,
                  "Draw the path of the tip, from above and from the side (SVG)");
-  cli->AddSourceOptions(command);
+  cli->AddRigOptions(command);
 }
 
 }  // namespace touchstone::cli

@@ -52,7 +52,8 @@ absl::Status RunReset(const Cli& cli, const MotionCommandOptions& options) {
       client::Connection::Call(&v1::Control::Stub::Reset, rig.connection->control(), request));
   const std::string word = client::SourceStateWord(state.state());
   if (cli.output().json) PrintJson({{"state", word}});
-  cli.Log(absl::StrCat("no stop holds; the rig is ", word, ". Whoever moves it next acquires a new lease"));
+  cli.Log(absl::StrCat("no stop holds any more; the rig is ", word,
+                       ". Whoever moves it next acquires a new lease"));
   return absl::OkStatus();
 }
 
@@ -108,7 +109,7 @@ void AddRigMotions(Cli* cli, CLI::App* group) {
       "touchstone rig stop" + server + "\ntouchstone rig stop --reason 'cable caught'" + server,
       [cli, options] { return RunStop(*cli, *options); });
   stop->add_option("--reason", options->reason, "For the log")->type_name("TEXT");
-  cli->AddSourceOptions(stop);
+  cli->AddRigOptions(stop);
 
   CLI::App* reset = cli->AddCommand(
       group, "reset",
@@ -119,19 +120,19 @@ void AddRigMotions(Cli* cli, CLI::App* group) {
   reset->add_option("--reason", options->reason, "Why it may move again, for the log")
       ->type_name("TEXT")
       ->required();
-  cli->AddSourceOptions(reset);
+  cli->AddRigOptions(reset);
 
   CLI::App* power_on = cli->AddCommand(
       group, "power-on", "Powers the arm on and releases its brakes. Never unlocks a protective stop.",
       "touchstone rig power-on" + server, [cli, options] { return RunPowerOn(*cli, *options); });
   AddMotionOptions(power_on, &options->motion, false);
-  cli->AddSourceOptions(power_on);
+  cli->AddRigOptions(power_on);
 
   CLI::App* home =
       cli->AddCommand(group, "home", "Backs the tool out along its own axis and goes to the home joints.",
                       "touchstone rig home" + server, [cli, options] { return RunHome(*cli, *options); });
   AddMotionOptions(home, &options->motion, false);
-  cli->AddSourceOptions(home);
+  cli->AddRigOptions(home);
 
   CLI::App* mount = cli->AddCommand(
       group, "mount",
@@ -151,7 +152,7 @@ void AddRigMotions(Cli* cli, CLI::App* group) {
   for (const char* face : {"-x", "-y", "-z"})
     mount->add_flag_callback(face, [options, face] { options->up_face = face; })->group("");
   AddMotionOptions(mount, &options->motion, false);
-  cli->AddSourceOptions(mount);
+  cli->AddRigOptions(mount);
 }
 
 }  // namespace touchstone::cli

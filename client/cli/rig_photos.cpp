@@ -181,7 +181,7 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
       ->type_name("N");
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);
-  cli->AddSourceOptions(command);
+  cli->AddRigOptions(command);
 }
 
 }  // namespace touchstone::cli

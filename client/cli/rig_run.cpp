@@ -232,7 +232,7 @@ void AddRigRun(Cli* cli, CLI::App* group) {
   command->get_option("--session")
       ->description(
           "The session's name, here and at the source. Default: the plan's name without its ending");
-  cli->AddSourceOptions(command);
+  cli->AddRigOptions(command);
 }
 
 }  // namespace touchstone::cli

@@ -29,9 +29,10 @@ std::string Line(const std::string& name, const std::string& text) {
 
 std::string Pose(const v1::BasePose& pose) {
   const auto three = [](const v1::Vector3& v, double factor) {
-    return absl::StrCat(Rounded(std::round(v.x() * factor * 10) / 10), ", ",
-                        Rounded(std::round(v.y() * factor * 10) / 10), ", ",
-                        Rounded(std::round(v.z() * factor * 10) / 10));
+    const auto tenths = [factor](double value) {
+      return Rounded(std::round(value * factor * 10) / 10 + 0.0);  // + 0.0: no -0
+    };
+    return absl::StrCat(tenths(v.x()), ", ", tenths(v.y()), ", ", tenths(v.z()));
   };
   return absl::StrCat(three(pose.position_m(), kMillimetresPerMetre), " mm; rotation ",
                       three(pose.rotation_rad(), 1 / kRadiansPerDegree), " deg");
@@ -176,7 +177,7 @@ void AddRigStatus(Cli* cli, CLI::App* group) {
                       [cli, options] { return RunStatus(*cli, *options); });
   command->add_flag("--watch", options->watch, "Again and again, until Ctrl-C");
   command->add_option("--every-s", options->every_s, "With --watch: how often. Default: 1")->type_name("S");
-  cli->AddSourceOptions(command);
+  cli->AddRigOptions(command);
 }
 
 }  // namespace touchstone::cli

@@ -141,14 +141,19 @@ absl::Status RunTouch(const Cli& cli, const TouchOptions& options) {
   if (incomplete > 0)
     cli.Log(absl::StrCat(incomplete, " of ", rows.size(),
                          " touches are incomplete: a finger met nothing, its time is left empty"));
+  std::string text;
   if (cli.output().json) {
     Json list = Json::array();
     for (const TouchRow& row : rows) list.push_back(RowJson(row));
-    return cli.Write(options.output, Json({{"model_hash", model_hash}, {"touches", list}}).dump(2) + "\n");
+    text = Json({{"model_hash", model_hash}, {"touches", list}}).dump(2) + "\n";
+  } else {
+    std::vector<client::MeasuredTouch> measured;
+    for (TouchRow& row : rows) measured.push_back(std::move(row.measured));
+    text = client::FormatMeasurements(measured);
   }
-  std::vector<client::MeasuredTouch> measured;
-  for (TouchRow& row : rows) measured.push_back(std::move(row.measured));
-  return cli.Write(options.output, client::FormatMeasurements(measured));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, text));
+  cli.LogWritten(options.output, absl::StrCat(" (", Counted(rows.size(), "touch", "touches"), ")"));
+  return absl::OkStatus();
 }
 
 }  // namespace

@@ -85,8 +85,10 @@ absl::Status Connection::ConnectToNext() {
     if (status.ok()) return status;
     absl::StrAppend(&tried, tried.empty() ? "" : "; ", status.message());
   }
-  return absl::UnavailableError(absl::StrCat(
-      tried, ". Is touchstone-server running there? Without --server the simulation runs in this process"));
+  return absl::UnavailableError(absl::StrCat(tried,
+                                             ". Is touchstone-server running there, or touchstone-gateway if "
+                                             "it is a rig's? A simulation needs neither: "
+                                             "without --server it runs in this process"));
 }
 
 absl::Status Connection::Connect(int server_index) {

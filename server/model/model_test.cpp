@@ -137,7 +137,7 @@ TEST(ModelFile, RefusesRepeatedKeysAndEffects) {
   EXPECT_EQ(ErrorOf(File("effects:\n  - tip_radius: {radius_mm: 1, radius_mm: 2}\n")),
             "m.yaml:4:32: 'radius_mm' is given twice; leave one out");
   EXPECT_EQ(ErrorOf(File("effects:\n  - tip_radius: {}\n  - tip_radius: {}\n")),
-            "m.yaml:5:5: tip_radius is in the model already; change its values instead");
+            "m.yaml:5:5: tip_radius is in the model already; change its values in the file");
 }
 
 TEST(ModelFile, TakesObjectsOnlyInObjectScope) {

@@ -145,7 +145,7 @@ absl::Status CheckAddition(const Model& model, const Effect& effect) {
     if (EffectTitle(*present.effect) == EffectTitle(effect))
       return absl::AlreadyExistsError(
           absl::StrCat(EffectTitle(effect), " is in the model already; ",
-                       effect.formula ? "give the formula another name" : "change its values instead"));
+                       effect.formula ? "give the formula another name" : "change its values in the file"));
   return absl::OkStatus();
 }
 

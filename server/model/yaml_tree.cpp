@@ -1,6 +1,8 @@
 #include "server/model/yaml_tree.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -127,6 +129,17 @@ absl::Status ErrorAtMark(const std::string& origin, const YAML::Mark& mark, absl
   return ErrorAt(origin, place, message);
 }
 
+// What is probably wrong, for the mistakes that people make most.
+const char* HintFor(const YAML::Exception& error, const std::string& text) {
+  if (absl::StrContains(error.msg, "end of map flow")) return "; is a '}' or a comma missing?";
+  if (absl::StrContains(error.msg, "end of sequence flow")) return "; is a ']' or a comma missing?";
+  const std::vector<absl::string_view> lines = absl::StrSplit(text, '\n');
+  if (error.mark.line < 0 || error.mark.line >= static_cast<int>(lines.size())) return "";
+  const absl::string_view line = lines[error.mark.line];
+  const size_t indent = line.find_first_not_of(" \t");
+  return absl::StrContains(line.substr(0, indent), "\t") ? "; lines are indented by spaces, not by tabs" : "";
+}
+
 }  // namespace
 
 const YamlNode* YamlNode::Find(absl::string_view key) const {
@@ -172,7 +185,7 @@ absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& o
   } catch (const Refused& refused) {
     return ErrorAtMark(origin, refused.mark, refused.message);
   } catch (const YAML::Exception& error) {
-    return ErrorAtMark(origin, error.mark, absl::StrCat("not valid YAML: ", error.msg));
+    return ErrorAtMark(origin, error.mark, absl::StrCat("not valid YAML: ", error.msg, HintFor(error, text)));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -49,10 +50,11 @@ absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
     case v1::Plan::kFaces: {
       plan.kind = touch::Plan::Kind::kFaces;
       const v1::FacesPlan& faces = message.faces();
-      constexpr uint32_t kMax = 1'000'000;  // beyond, the plan's check refuses, whatever the number
+      // The plan's check refuses what is too many; a number that no int holds becomes the largest one.
+      constexpr uint32_t kMax = std::numeric_limits<int>::max();
       if (faces.samples_per_face() != 0)
-        plan.faces.samples_per_face = std::min(faces.samples_per_face(), kMax + 1);
-      if (faces.rounds() != 0) plan.faces.rounds = std::min(faces.rounds(), kMax + 1);
+        plan.faces.samples_per_face = static_cast<int>(std::min(faces.samples_per_face(), kMax));
+      if (faces.rounds() != 0) plan.faces.rounds = static_cast<int>(std::min(faces.rounds(), kMax));
       if (faces.has_max_tilt_rad()) plan.faces.max_tilt_rad = faces.max_tilt_rad();
       if (faces.has_spread()) plan.faces.spread = faces.spread();
       if (faces.standoff_m() != 0) plan.faces.standoff_m = faces.standoff_m();

@@ -1,4 +1,5 @@
-// A pose of the journal (x, y, z in metres, then the rotation vector in radians; base frame) as the protocol writes it.
+// A pose of the journal (x, y, z in metres, then the rotation vector in radians; base frame) as the protocol
+// writes it.
 #pragma once
 
 #include <array>

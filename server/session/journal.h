@@ -85,7 +85,7 @@ class Journal {
  public:
   enum class Mode { kReadWrite, kCreateOrReadWrite, kReadOnly };
   // Errors say whether the file is missing, is no journal, or is of another version. Another process that has
-  // it open for writing is an error too (one gateway a journal).
+  // it open for writing is an error too (one gateway per journal).
   static absl::StatusOr<std::unique_ptr<Journal>> Open(const std::string& path, Mode mode);
   virtual ~Journal() = default;
 

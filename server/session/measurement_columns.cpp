@@ -166,7 +166,7 @@ absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const
             place, "is no name of a covariate: letters, digits and '_' were expected after cov_"));
       return absl::InvalidArgumentError(absl::StrCat(place, "is no column of a measurement file",
                                                      DidYouMean(name, KnownNames()),
-                                                     ". Further numbers have names that begin with cov_"));
+                                                     " (further numbers have names that begin with cov_)"));
     }
     switch (column.kind) {
       case ColumnKind::kTime:

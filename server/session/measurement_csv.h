@@ -47,8 +47,7 @@ std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns&
 // A whole file; writes the optional columns that any row has (round and face: that every row has).
 std::string FormatMeasurements(const std::vector<MeasuredTouch>& touches);
 
-// Reads a measurement file or a plan as measurement_set.h does, as messages; the poses must be
-// there.
+// Reads a measurement file or a plan as measurement_set.h does, as messages; the poses must be there.
 absl::StatusOr<std::vector<MeasuredTouch>> ParseMeasurements(const std::string& text,
                                                              const std::string& origin);
 

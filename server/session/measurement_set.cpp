@@ -24,7 +24,8 @@ namespace touchstone::session {
 namespace {
 
 constexpr size_t kMaxColumns = 4096;
-constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
+constexpr double kMaxContactTimeUs = 1e12;  // eleven days: no approach takes longer
+constexpr double kLargestCount = 9e15;      // whole numbers up to here are exact as doubles
 
 // Reads rows into the columns of a set. One object a file.
 class RowReader {
@@ -99,8 +100,10 @@ class RowReader {
       case ColumnKind::kTime: {
         if (field.empty()) break;  // the finger reported nothing
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
-        if (value < 0)
-          return OutOfRange(i, "a time from 0 on was expected, or nothing where the finger reported nothing");
+        if (value < 0 || value > kMaxContactTimeUs)
+          return OutOfRange(i,
+                            absl::StrCat("a time from 0 to ", kMaxContactTimeUs,
+                                         " us was expected, or nothing where the finger reported nothing"));
         set_.time_s[row * columns_.fingers + column.index] = ToSi(Unit::kMicrosecond, value);
         break;
       }

@@ -1,0 +1,126 @@
+// The options that say where touches come from, and the connection that they name.
+#include <map>
+
+#include "client/cli/common.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone::cli {
+namespace {
+
+constexpr char kGroup[] = "Source";
+constexpr double kMaxWaitS = 3600;
+
+absl::Status EmbeddedOnly(absl::string_view option) {
+  return absl::InvalidArgumentError(absl::StrCat(
+      option, ": works only without --server; give it to touchstone-server instead (the same option there)"));
+}
+
+}  // namespace
+
+void Cli::AddServerOptions(CLI::App* command, const std::string& what) {
+  command->add_option("--server", source_.servers, what)
+      ->type_name("HOST:PORT")
+      ->group(kGroup)
+      ->delimiter(',')
+      ->take_all()
+      ->expected(1);
+  command
+      ->add_option("--wait-s", source_.wait_s,
+                   "How long to wait for a server that is starting, from 0. Default: 10")
+      ->type_name("S")
+      ->group(kGroup);
+}
+
+void Cli::AddRigOptions(CLI::App* command) {
+  AddServerOptions(command, "The touchstone-gateway that works the rig");
+}
+
+void Cli::AddSourceOptions(CLI::App* command) {
+  AddServerOptions(command,
+                   "A touchstone-server, or several with commas (the next one takes over from a lost one). "
+                   "Default: simulate in this process");
+  const auto add = [&](const std::string& name, auto& value, const std::string& type,
+                       const std::string& text) {
+    return command->add_option(name, value, text)->type_name(type)->group(kGroup);
+  };
+  add("--mesh", source_.meshes, "NAME=FILE",
+      "A mesh to touch besides the built-in shapes, repeatable; with what the file does not say: "
+      "NAME=FILE,unit=mm|cm|m|inch,up=x|y|z,scale=1,fit_mm=150")
+      ->take_all()
+      ->expected(1);
+  add("--mesh-dir", source_.mesh_folder, "FOLDER", "Every mesh file of a folder, named by its stem");
+  add("--renderer", source_.renderer, "KIND",
+      "auto, egl or cpu: what makes images. Default: auto, the faster one");
+  add("--egl-device", source_.egl_device, "N", "EGL device to render on, as touchstone doctor numbers them");
+  add("--threads", source_.threads, "N", "Threads that simulate. Default: one per core");
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
+  if (!source_.servers.empty()) {
+    const char* embedded_only = !source_.meshes.empty()        ? "--mesh"
+                                : !source_.mesh_folder.empty() ? "--mesh-dir"
+                                                               : nullptr;
+    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
+    return ConnectWithMeshes({});
+  }
+  std::vector<source::MeshSpec> meshes;
+  if (!source_.mesh_folder.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, service::MeshSpecsOfFolder(source_.mesh_folder));
+  }
+  for (const std::string& text : source_.meshes) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(source::MeshSpec mesh, service::ParseMeshSpec(text));
+    meshes.push_back(std::move(mesh));
+  }
+  return ConnectWithMeshes(std::move(meshes));
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
+  client::ConnectionOptions options;
+  options.servers = SplitCommas(source_.servers);
+  return client::Connection::Open(std::move(options));
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
+    std::vector<source::MeshSpec> meshes) const {
+  client::ConnectionOptions options;
+  options.servers = SplitCommas(source_.servers);
+  TOUCHSTONE_RETURN_IF_ERROR(Renderer().status());
+  if (!options.servers.empty()) {
+    const char* embedded_only = source_.threads != 0      ? "--threads"
+                                : source_.egl_device >= 0 ? "--egl-device"
+                                                          : nullptr;
+    if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
+    if (!(source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS))
+      return absl::InvalidArgumentError(
+          absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
+    options.wait_s = source_.wait_s;
+    options.on_wait = [this](const std::string& line) { Log(line); };
+    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
+    Detail("connected to " + connection->address());
+    return connection;
+  }
+  service::ServerOptions& embedded = options.embedded;
+  embedded.meshes = std::move(meshes);
+  if (source_.threads < 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--threads: ", source_.threads, "; 1 or more, or 0 for one per core"));
+  embedded.threads = source_.threads;
+  TOUCHSTONE_ASSIGN_OR_RETURN(embedded.renderer, Renderer());
+  return client::Connection::Open(std::move(options));
+}
+
+absl::StatusOr<image::RendererOptions> Cli::Renderer() const {
+  static const std::map<std::string, image::RendererKind> kinds = {{"auto", image::RendererKind::kAuto},
+                                                                   {"egl", image::RendererKind::kEgl},
+                                                                   {"cpu", image::RendererKind::kCpu}};
+  std::vector<std::string> names;
+  for (const auto& [name, kind] : kinds) names.push_back(name);
+  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--renderer", source_.renderer, names).status());
+  image::RendererOptions options;
+  options.kind = kinds.at(source_.renderer);
+  options.egl_device = source_.egl_device;
+  return options;
+}
+
+}  // namespace touchstone::cli
