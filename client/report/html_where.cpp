@@ -72,6 +72,12 @@ std::string Groups(const v1::Report& report) {
       "noise floor. Last column: the group\u2019s share of the error beyond the floor.</p>\n");
 }
 
+// The curves count "first" from 0, for the finger that touched first.
+std::string AxisTitle(const v1::CovariateCurve& curve) {
+  return curve.covariate() == "first" ? "first finger (0) or later (1)"
+                                      : Covariate(curve.covariate(), curve.unit());
+}
+
 // Before and after share the vertical axis, in the unit that fits the larger.
 std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve) {
   RangeFinder x, y;
@@ -87,7 +93,7 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
   }
   const TimeUnit unit = UnitOfTime(size);
   const Range us = y.Get();
-  const Chart::Axis x_axis = {Covariate(curve.covariate(), curve.unit()), x.Get()};
+  const Chart::Axis x_axis = {AxisTitle(curve), x.Get()};
   const Chart::Axis y_axis = {absl::StrCat("mean residual (", unit.symbol, ")"),
                               {us.low * unit.per_us, us.high * unit.per_us}};
   std::string pair;
