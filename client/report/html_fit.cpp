@@ -47,7 +47,7 @@ std::string Parity(const v1::Report& report) {
   }
   return absl::StrCat(
       "<h3>Parity</h3>\n<div class=\"grid wide\">", pair,
-      "</div>\n<p class=\"note\">One dot a finger and touch: contact times of a touch, relative to each "
+      "</div>\n<p class=\"note\">One dot per finger and touch: contact times of a touch, relative to each "
       "other. On the dashed line, measured and simulated agree. ",
       Count((report.parity_size() + step - 1) / step), " of ", Count(report.parity_size()), " drawn.</p>\n");
 }

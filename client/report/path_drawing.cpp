@@ -32,7 +32,8 @@ constexpr char kStyle[] = R"(
   .many .approach { stroke-width: 1; stroke-opacity: .5; } .many .beyond { stroke-opacity: .15; }
   .number { font-size: 10px; fill: #0f766e; paint-order: stroke; stroke: #ffffff; stroke-width: 3px; }
   .bad { stroke: #dc2626; stroke-width: 2; fill: none; }
-  .badnumber { font-size: 12px; font-weight: 700; fill: #dc2626; paint-order: stroke; stroke: #ffffff; stroke-width: 3px; }
+  .badnumber { font-size: 12px; font-weight: 700; fill: #dc2626; paint-order: stroke; stroke: #ffffff;
+    stroke-width: 3px; }
   .reason { font-size: 13px; } .reasonnumber { font-weight: 700; fill: #dc2626; }
 )";
 

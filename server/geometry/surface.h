@@ -23,7 +23,7 @@ namespace touchstone::geometry {
 
 inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
 
-// First contacts, one entry a line. Arrays are resized by the call and reused between calls.
+// First contacts, one entry per line. Arrays are resized by the call and reused between calls.
 struct Contacts {
   std::vector<double> travel_m;          // from the line's origin along its direction; NaN: no contact
   std::vector<Eigen::Vector3d> normal;   // unit, from the surface towards the finger; zero on a miss

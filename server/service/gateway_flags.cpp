@@ -97,7 +97,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.home_deg", "Six joints", &raw->home_deg},
       {"limits.payload_kg", "Of the end effector", &o.limits.payload_kg},
       {"max_batch_size", "Limit: samples a batch", &o.common.max_batch_size},
-      {"max_touches_per_request", "Limit: explicit touches a request", &o.common.max_touches_per_request},
+      {"max_touches_per_request", "Limit: explicit touches per request", &o.common.max_touches_per_request},
       {"max_images_per_request", "Limit: photographs a request", &o.common.max_images_per_request},
       {"max_streams", "Limit: dataset streams at once", &o.common.max_streams},
       {"max_message_mib", "Limit: size of one message, MiB", &o.common.max_message_mib},

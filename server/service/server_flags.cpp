@@ -41,7 +41,7 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"egl_device", "Index of the EGL device (touchstone doctor lists them); -1: the first that renders",
        &o.renderer.egl_device},
       {"max_batch_size", "Limit: samples a batch", &o.max_batch_size},
-      {"max_touches_per_request", "Limit: explicit touches a request", &o.max_touches_per_request},
+      {"max_touches_per_request", "Limit: explicit touches per request", &o.max_touches_per_request},
       {"max_images_per_request", "Limit: photographs a request", &o.max_images_per_request},
       {"max_streams", "Limit: dataset streams at once", &o.max_streams},
       {"max_message_mib", "Limit: size of one message, MiB", &o.max_message_mib},

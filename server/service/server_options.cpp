@@ -26,8 +26,7 @@ absl::Status CheckName(const std::string& name, const std::string& text) {
 }  // namespace
 
 absl::StatusOr<source::MeshSpec> ParseMeshSpec(const std::string& text) {
-  // FILE[,key=value...] behind NAME=; a comma in a path looks like a key, so it is refused by the
-  // key check.
+  // FILE[,key=value...] behind NAME=; a comma in a path looks like a key, so it is refused by the key check.
   const std::vector<std::string> parts = absl::StrSplit(text, ',');
   const std::pair<std::string, std::string> head = absl::StrSplit(parts[0], absl::MaxSplits('=', 1));
   if (head.second.empty())

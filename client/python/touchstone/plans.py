@@ -165,7 +165,7 @@ def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0
     """The same random poses on the six faces of the bounding box in every round, so that rounds are repeats.
 
     Args:
-      samples_per_face: poses a face.
+      samples_per_face: poses per face.
       rounds: repeats of all poses.
       max_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.
       spread: targets lie within this share of a face's half width and height, 0 to 1.

@@ -1,4 +1,5 @@
-// Everything that a diagnosis prepares once: which touches take part, what the initial model predicts, the likelihood. Large sets are thinned for the search; values and errors are measured on all touches.
+// Everything that a diagnosis prepares once: which touches take part, what the initial model predicts, the
+// likelihood. Large sets are thinned for the search; values and errors are measured on all touches.
 #pragma once
 
 #include <memory>
