@@ -81,15 +81,15 @@ void PermuteTimes(CsvTable* table, const std::vector<int>& from) {
   }
 }
 
-void SortTimes(CsvTable* table) {
-  const std::vector<size_t> times = table->Times();
-  for (Row& row : table->rows) {
-    Row sorted;
-    for (const size_t c : times) sorted.push_back(row[c]);
-    std::sort(sorted.begin(), sorted.end(),
-              [](const auto& a, const auto& b) { return std::atof(a.c_str()) < std::atof(b.c_str()); });
-    for (size_t i = 0; i < times.size(); ++i) row[times[i]] = sorted[i];
-  }
+// In ascending order, as spreadsheets do it to one column; empty cells go last.
+void SortTimes(CsvTable* table, int finger) {
+  const size_t column = table->Times().at(finger);
+  Row sorted;
+  for (const Row& row : table->rows) sorted.push_back(row[column]);
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+    return !a.empty() && (b.empty() || std::atof(a.c_str()) < std::atof(b.c_str()));
+  });
+  for (size_t k = 0; k < sorted.size(); ++k) table->rows[k][column] = sorted[k];
 }
 
 // The name of one object on another, and the other way round if the two are swapped.
@@ -111,9 +111,9 @@ void TurnFrame(CsvTable* table, double deg) {
   for (const auto& columns :
        {table->Vector("target", "_mm"), table->Vector("approach"), table->Vector("lateral")})
     for (Row& row : table->rows) {
-      const double x = std::atof(row[columns[0]].c_str()), y = std::atof(row[columns[1]].c_str());
-      row[columns[0]] = Text(c * x - s * y);
-      row[columns[1]] = Text(s * x + c * y);
+      const double y = std::atof(row[columns[1]].c_str()), z = std::atof(row[columns[2]].c_str());
+      row[columns[1]] = Text(c * y - s * z);
+      row[columns[2]] = Text(s * y + c * z);
     }
 }
 
@@ -151,8 +151,8 @@ std::string WithBlunder(const std::string& csv, const Blunder& blunder) {
     case BlunderKind::kFingersPermuted:
       PermuteTimes(&table, blunder.which);
       break;
-    case BlunderKind::kFingersSorted:
-      SortTimes(&table);
+    case BlunderKind::kColumnSorted:
+      SortTimes(&table, blunder.which.at(0));
       break;
     case BlunderKind::kObjectsSwapped:
     case BlunderKind::kWrongObject:
@@ -194,8 +194,6 @@ std::vector<std::string> ProblemKinds(const Blunder& blunder) {
       if (std::is_sorted(blunder.which.rbegin(), blunder.which.rend()))
         return {"finger_order", "lateral_reversed"};
       return {"finger_order"};
-    case BlunderKind::kFingersSorted:
-      return {"finger_order"};
     case BlunderKind::kApproachReversed:
       return {"approach_reversed"};
     case BlunderKind::kObjectsSwapped:
@@ -210,6 +208,7 @@ std::vector<std::string> ProblemKinds(const Blunder& blunder) {
       return {"object_origin"};
     case BlunderKind::kFrameTurned:
       return {"frame"};
+    case BlunderKind::kColumnSorted:
     case BlunderKind::kRowsShifted:
       return {"row_shift"};
     case BlunderKind::kCopies:
@@ -222,7 +221,7 @@ std::string InWords(const Blunder& blunder) {
   static const char* const kNames[] = {"lateral reversed",
                                        "approach reversed",
                                        "fingers permuted",
-                                       "fingers sorted",
+                                       "column sorted",
                                        "objects swapped",
                                        "wrong object",
                                        "times scaled",

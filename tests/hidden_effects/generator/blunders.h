@@ -10,14 +10,14 @@ enum class BlunderKind {
   kLateralReversed,
   kApproachReversed,
   kFingersPermuted,  // which: the column that each finger's times are taken from
-  kFingersSorted,    // the times of each row in ascending order
+  kColumnSorted,     // which: a finger whose times were sorted, alone
   kObjectsSwapped,   // which: two objects by their place in the file
   kWrongObject,      // which: one object that bears the name of the other
   kTimeUnits,        // number: the times are written times it
   kLengthUnits,      // number: targets and standoffs are written times it
   kSpeedFactor,      // number: the speeds are written times it
   kObjectLower,      // number: the object stands lower by so many mm than the file has it
-  kFrameTurned,      // number: deg about z by which the file's frame stands turned
+  kFrameTurned,      // number: deg about x by which the file's frame stands turned
   kRowsShifted,      // which: by how many rows the times stand too low
   kCopies,           // number: share of the rows; which: how often each of them is there once more
 };

@@ -35,8 +35,6 @@ TEST(Blunder, MixesUpFingers) {
   EXPECT_EQ(Mistaken(BlunderKind::kFingersPermuted, 0, {1, 2, 0}),
             Rows("0,cup,20,60,1,2,3,0,0,-1,1,0,0,500,20000,0\n"
                  "1,jar,20,60,4,5,6,0,1,0,0,0,1,300,0,\n"));
-  EXPECT_THAT(Mistaken(BlunderKind::kFingersSorted),
-              HasSubstr("0,cup,20,60,1,2,3,0,0,-1,1,0,0,0,500,20000\n"));
 }
 
 TEST(Blunder, MixesUpObjects) {
@@ -55,13 +53,15 @@ TEST(Blunder, WritesOtherUnits) {
 
 TEST(Blunder, MovesTheFrame) {
   EXPECT_THAT(Mistaken(BlunderKind::kObjectLower, 20), HasSubstr("0,cup,20,60,1,2,23,0,0,-1,1,0,0,"));
-  // x goes to y.
-  EXPECT_THAT(Mistaken(BlunderKind::kFrameTurned, 90), HasSubstr("0,cup,20,60,-2,1,3,"));
+  // y goes to z.
+  EXPECT_THAT(Mistaken(BlunderKind::kFrameTurned, 90), HasSubstr("0,cup,20,60,1,-3,2,"));
 }
 
-TEST(Blunder, ShiftsAndCopiesRows) {
+TEST(Blunder, ShiftsSortsAndCopiesRows) {
   EXPECT_EQ(Mistaken(BlunderKind::kRowsShifted, 0, {1}), Rows("0,cup,20,60,1,2,3,0,0,-1,1,0,0,,300,0\n"
                                                               "1,jar,20,60,4,5,6,0,1,0,0,0,1,0,500,20000\n"));
+  EXPECT_EQ(Mistaken(BlunderKind::kColumnSorted, 0, {2}),
+            Rows("0,cup,20,60,1,2,3,0,0,-1,1,0,0,0,500,0\n1,jar,20,60,4,5,6,0,1,0,0,0,1,,300,20000\n"));
   EXPECT_EQ(Mistaken(BlunderKind::kCopies, 0.5, {2}),
             Rows(std::string(kFirst) + kSecond + "2,jar,20,60,4,5,6,0,1,0,0,0,1,,300,0\n" +
                  "3,jar,20,60,4,5,6,0,1,0,0,0,1,,300,0\n"));

@@ -11,11 +11,11 @@
 namespace touchstone::hidden {
 
 enum class CauseKind {
-  kSessionWave,      // mm, per finger; at: period in s, phase in rad
-  kWarmUp,           // mm, per finger; at: time constant in s
-  kMidSession,       // mm, per finger; at: when it begins, s
-  kIncidenceWave,    // mm; at: rad per rad of incidence, from so many degrees on
-  kFingerCoupling,   // mm per mm that a neighbour has been pressed already
+  kSessionWave,     // mm, per finger; at: period in s, phase in rad
+  kWarmUp,          // mm, per finger; at: time constant in s
+  kMidSession,      // mm, per finger; at: when it begins, s
+  kIncidenceWave,   // mm; at: rad per rad of incidence, from so many degrees on
+  kFingerCoupling,  // mm for an inner finger per mm that its left neighbour travels farther than its right one
   kSlipOnOneObject,  // mm per tan(incidence); at: the object
   kPushOnOneObject,  // mm for every finger but the first; at: the object
   kRemounted,        // mm along each axis, anew for every object and round; at: deg about z
@@ -37,7 +37,7 @@ struct TouchState {
   double session_time_s = 0;
   double tan_incidence = 0;
   bool first = false;        // touches before all others
-  double neighbours_mm = 0;  // sum over neighbours of how far each is pressed when this finger arrives
+  double neighbours_mm = 0;  // travel of the left neighbour less that of the right one; 0 without both
 };
 
 // Travel that the cause adds, mm; 0 for causes of the pose and of the noise.

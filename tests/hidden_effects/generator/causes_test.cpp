@@ -74,10 +74,8 @@ TEST(HiddenCause, AWaveInIncidenceBeginsAtItsAngle) {
   ExpectAdded(Added({CauseKind::kIncidenceWave, 0.3, {40, 25}, {}}), 0, 0, 0);
 }
 
-TEST(HiddenCause, AFingerYieldsToTheNeighboursThatArePressed) {
-  // Each finger comes 30 tan(lean) mm after the one below it; the middle one's other neighbour comes later.
-  const double step = 30 * std::tan(kLean);
-  ExpectAdded(Added({CauseKind::kFingerCoupling, 0.02, {}, {}}), 0, 0.02 * step, 0.02 * step);
+TEST(HiddenCause, AnInnerFingerIsDraggedByTheDifferenceOfItsNeighbours) {
+  ExpectAdded(Added({CauseKind::kFingerCoupling, 0.02, {}, {}}), 0, -0.02 * 60 * std::tan(kLean), 0);
 }
 
 TEST(HiddenCause, OneObjectAloneSlipsOrIsPushed) {

@@ -156,9 +156,8 @@ std::vector<double> Rig::AddedTravelMm(const std::vector<Landing>& landings, int
     for (const Unlisted& unlisted : scenario_.unlisted)
       added[i] += unlisted.k_mm * FindUnlisted(unlisted.name).travel(state, unlisted.second);
     TouchState touch{command.object, i, session_time_s, landing.tangent, i == first, 0};
-    for (const int other : {i - 1, i + 1})
-      if (other >= 0 && other < fingers && landings[other].hit)
-        touch.neighbours_mm += std::max(0.0, landing.travel_mm - landings[other].travel_mm);
+    if (i > 0 && i + 1 < fingers && landings[i - 1].hit && landings[i + 1].hit)
+      touch.neighbours_mm = landings[i - 1].travel_mm - landings[i + 1].travel_mm;
     for (const Cause& cause : scenario_.causes) added[i] += TravelMm(cause, touch);
   }
   return added;
