@@ -29,6 +29,10 @@ struct PublicSet {
   bool must_be_right;  // else honest is enough
 };
 
+void PrintTo(const PublicSet& set, std::ostream* out) {
+  *out << set.file;
+}
+
 Scenario PublicCause(Cause cause) {
   Scenario truth;
   truth.causes = {std::move(cause)};
