@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <map>
 #include <stdexcept>
 
 #include "tests/hidden_effects/generator/rig.h"
+#include "tests/hidden_effects/generator/set_files.h"
 
 namespace touchstone::hidden {
 namespace {
@@ -60,23 +59,16 @@ Command DrawCommand(const Scenario& scenario, int object, int face, std::mt19937
   throw std::runtime_error("no pose found where all fingers hit " + solid.name());
 }
 
-// The plan: everything that does not depend on the hidden effects.
-struct Protocol {
-  std::vector<Command> commands;
-  std::vector<int> round;
-  std::vector<double> session_time_s, speed_mm_s, temperature;
-};
-
 // The course of a session: pauses between touches, and the room's temperature.
 class Course {
  public:
   explicit Course(uint64_t seed) : clock_(Stream(seed, "clock")), room_(Stream(seed, "room")) {
     phase_ = std::uniform_real_distribution<double>(0, 2 * M_PI)(room_);
   }
-  void Touch(const Command& command, int round, double speed_mm_s, Protocol* out) {
+  void Touch(Command command, int round, double speed_mm_s, Protocol* out) {
+    command.round = round;
     now_s_ += std::uniform_real_distribution<double>(6.3, 11.7)(clock_);
     out->commands.push_back(command);
-    out->round.push_back(round);
     out->session_time_s.push_back(now_s_);
     out->speed_mm_s.push_back(command.speed_mm_s > 0 ? command.speed_mm_s : speed_mm_s);
     const double degrees = 23 + 2 * std::sin(2 * M_PI * now_s_ / 3000 + phase_) + 0.2 * draught_(room_);
@@ -107,78 +99,6 @@ Protocol DrawProtocol(const Scenario& scenario, uint64_t seed) {
   return out;
 }
 
-std::string Number(double value) {
-  char text[32];
-  snprintf(text, sizeof text, "%.10g", value);
-  return text;
-}
-
-std::string FingerColumn(int finger, int fingers) {
-  return fingers == 3 ? std::string(1, "lmr"[finger]) : std::to_string(finger);
-}
-
-std::string Csv(const Scenario& scenario, const Protocol& protocol, const std::vector<double>& reported_us) {
-  const int fingers = scenario.fingers;
-  std::string csv;
-  if (scenario.with_poses) {
-    csv = "touch,object,round,face,session_time_s,speed_mm_s,standoff_mm";
-    for (const char* vector : {"target_%c_mm", "approach_%c", "lateral_%c"})
-      for (const char axis : {'x', 'y', 'z'}) {
-        char name[32];
-        snprintf(name, sizeof name, vector, axis);
-        csv += std::string(",") + name;
-      }
-    if (scenario.with_temperature) csv += ",cov_temperature";
-  } else {
-    csv = "object";
-  }
-  for (int i = 0; i < fingers; ++i) csv += ",t_" + FingerColumn(i, fingers) + "_us";
-  csv += '\n';
-  for (size_t k = 0; k < protocol.commands.size(); ++k) {
-    const Command& command = protocol.commands[k];
-    const std::string& object = scenario.objects[command.object]->name();
-    if (scenario.with_poses) {
-      csv += std::to_string(k) + ',' + object + ',' + std::to_string(protocol.round[k]) + ',' +
-             std::to_string(command.face) + ',' + Number(protocol.session_time_s[k]) + ',' +
-             Number(protocol.speed_mm_s[k]) + ',' +
-             Number(command.standoff_mm > 0 ? command.standoff_mm : scenario.standoff_mm);
-      for (const Vec* vector : {&command.target_mm, &command.approach, &command.lateral})
-        for (int axis = 0; axis < 3; ++axis) csv += ',' + Number((*vector)[axis]);
-      if (scenario.with_temperature) csv += ',' + Number(protocol.temperature[k]);
-    } else {
-      csv += object;
-    }
-    // Relative to the first that reports, whole microseconds.
-    double first_us = 1e300;
-    for (int i = 0; i < fingers; ++i)
-      if (reported_us[k * fingers + i] < first_us) first_us = reported_us[k * fingers + i];
-    for (int i = 0; i < fingers; ++i) {
-      const double time_us = reported_us[k * fingers + i];
-      csv += ',';
-      if (time_us == time_us) csv += std::to_string(std::llround(time_us - first_us));
-    }
-    csv += '\n';
-  }
-  return csv;
-}
-
-std::string NominalYaml(const Scenario& scenario) {
-  static const std::map<std::string, std::vector<const char*>> kNames = {
-      {"tip_radius", {"radius_mm"}},       {"oblique_slip", {"travel_mm"}}, {"object_push", {"shift_mm"}},
-      {"finger_spacing", {"delta_mm"}},    {"tool_tilt", {"angle_deg"}},    {"tool_yaw", {"angle_deg"}},
-      {"return_hysteresis", {"fraction"}}, {"speed_error", {"relative"}},   {"gravity_sag", {"drop_mm"}},
-      {"object_scale", {"relative"}}};
-  std::string yaml =
-      "touchstone: model/1\nname: nominal\nend_effector: {fingers: " + std::to_string(scenario.fingers) +
-      ", spacing_mm: " + Number(scenario.spacing_mm) + "}\n";
-  if (scenario.noise_in_model || !scenario.in_model.empty()) yaml += "effects:\n";
-  for (const Hidden& hidden : scenario.in_model)
-    yaml += "  - " + hidden.effect + ": {" + kNames.at(hidden.effect)[0] + ": " + Number(hidden.values[0]) +
-            "}\n";
-  if (scenario.noise_in_model) yaml += "  - gaussian_noise: {sigma_us: " + Number(scenario.sigma_us) + "}\n";
-  return yaml;
-}
-
 // Times without noise; tangents for the noise that grows with the incidence.
 void Play(const Scenario& scenario, const Protocol& protocol, uint64_t seed, std::vector<double>* exact_us,
           std::vector<double>* tangents) {
@@ -192,8 +112,8 @@ void Play(const Scenario& scenario, const Protocol& protocol, uint64_t seed, std
 }
 
 // Noise, polling, outliers, losses.
-std::vector<double> Report(const Scenario& scenario, uint64_t seed, const std::vector<double>& exact_us,
-                           const std::vector<double>& tangents) {
+std::vector<double> Report(const Scenario& scenario, uint64_t seed, const Protocol& protocol,
+                           const std::vector<double>& exact_us, const std::vector<double>& tangents) {
   Rig rig(scenario, seed);
   auto scatter = Stream(seed, "noise"), ticks = Stream(seed, "ticks"), losses = Stream(seed, "loss"),
        wild = Stream(seed, "wild");
@@ -202,14 +122,22 @@ std::vector<double> Report(const Scenario& scenario, uint64_t seed, const std::v
   const double degrees = rig.Value("heavy_tail_noise", 0, 1000);
   const double slope = rig.Value("incidence_noise"), interval_us = rig.Value("poll_interval");
   const double lost = 1 - (1 - rig.Value("missed_contact")) * (1 - scenario.missing_share);
+  std::vector<double> remembered_us(exact_us.size(), 0);
+  std::vector<Cause> causes = scenario.causes;
+  if (const double sigma_us = rig.Value("correlated_noise"); sigma_us > 0)
+    causes.push_back({CauseKind::kNoiseWithMemory, sigma_us, {rig.Value("correlated_noise", 1)}, {}});
+  for (const Cause& cause : causes) {
+    const auto added_us = AddedNoiseUs(cause, seed, protocol.session_time_s, scenario.fingers);
+    for (size_t k = 0; k < added_us.size(); ++k) remembered_us[k] += added_us[k];
+  }
   std::vector<double> out(exact_us.size());
   double phase_us = 0;
   for (size_t k = 0; k < exact_us.size(); ++k) {
     double deviate = normal(scatter);
     if (degrees < 1000)
       deviate /= std::sqrt(std::gamma_distribution<double>(degrees / 2, 2 / degrees)(scatter));
-    double time_us =
-        exact_us[k] + scenario.sigma_us * (1 + slope * tangents[k]) * deviate * rig.clock_factor();
+    double time_us = exact_us[k] + remembered_us[k] +
+                     scenario.sigma_us * (1 + slope * tangents[k]) * deviate * rig.clock_factor();
     if (part(wild) < scenario.outlier_share)
       time_us += scenario.outlier_us * (0.3 + 0.7 * part(wild)) * (part(wild) < 0.5 ? -1 : 1);
     if (k % scenario.fingers == 0) phase_us = interval_us * part(ticks);
@@ -229,8 +157,9 @@ Set Played(const Scenario& scenario, const Protocol& protocol, uint64_t seed) {
   set.temperature = protocol.temperature;
   std::vector<double> tangents;
   Play(scenario, protocol, seed, &set.exact_time_us, &tangents);
-  set.reported_us = Report(scenario, seed, set.exact_time_us, tangents);
+  set.reported_us = Report(scenario, seed, protocol, set.exact_time_us, tangents);
   set.csv = Csv(scenario, protocol, set.reported_us);
+  for (const Blunder& blunder : scenario.blunders) set.csv = WithBlunder(set.csv, blunder);
   set.model_yaml = NominalYaml(scenario);
   return set;
 }
@@ -258,7 +187,7 @@ Set GenerateFor(const Scenario& scenario, const std::vector<Command>& commands, 
 }
 
 std::vector<double> ExactTimesUs(const Scenario& scenario, const Set& like, uint64_t seed) {
-  const Protocol protocol{like.commands, {}, like.session_time_s, like.speed_mm_s, like.temperature};
+  const Protocol protocol{like.commands, like.session_time_s, like.speed_mm_s, like.temperature};
   std::vector<double> exact_us;
   Play(scenario, protocol, seed, &exact_us, nullptr);
   return exact_us;

@@ -14,6 +14,7 @@ namespace touchstone::hidden {
 struct Command {
   int object = 0, face = 0;
   int pose = -1;  // equal numbers, equal commands; -1: alone
+  int round = 0;
   Eigen::Vector3d target_mm, approach, lateral;
   double standoff_mm = 0, speed_mm_s = 0;  // 0: the scenario's
 };

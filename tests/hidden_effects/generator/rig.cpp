@@ -29,10 +29,10 @@ constexpr Known kKnown[] = {
     {"object_push", 1, false},     {"oblique_slip", 1, false},      {"channel_latency", -1, false},
     {"thermal_drift", -1, false},  {"return_hysteresis", 1, false}, {"clock_skew", 1, false},
     {"poll_interval", 1, true},    {"gaussian_noise", 1, true},     {"incidence_noise", 1, true},
-    {"heavy_tail_noise", 1, true}, {"missed_contact", 1, true},
+    {"heavy_tail_noise", 1, true}, {"missed_contact", 1, true},     {"correlated_noise", 2, true},
 };
 
-const Known& Find(const std::string& effect) {
+const Known& FindKnown(const std::string& effect) {
   for (const Known& known : kKnown)
     if (effect == known.effect) return known;
   throw std::invalid_argument("no effect of the catalogue is called " + effect);
@@ -41,12 +41,12 @@ const Known& Find(const std::string& effect) {
 }  // namespace
 
 int ValueCount(const std::string& effect, int fingers) {
-  const int scalars = Find(effect).scalars;
+  const int scalars = FindKnown(effect).scalars;
   return scalars < 0 ? fingers : scalars;
 }
 
 bool IsNoise(const std::string& effect) {
-  return Find(effect).noise;
+  return FindKnown(effect).noise;
 }
 
 std::mt19937_64 Stream(uint64_t seed, const char* purpose) {
@@ -57,7 +57,7 @@ std::mt19937_64 Stream(uint64_t seed, const char* purpose) {
 }
 
 Rig::Rig(const Scenario& scenario, uint64_t seed)
-    : scenario_(scenario), bumps_(scenario.objects.size()), pressed_mm_(scenario.fingers, 0) {
+    : scenario_(scenario), seed_(seed), bumps_(scenario.objects.size()), pressed_mm_(scenario.fingers, 0) {
   for (const Hidden& hidden : scenario.hidden) {
     const size_t count = ValueCount(hidden.effect, scenario.fingers);
     if (hidden.values.size() != count &&
@@ -77,11 +77,21 @@ double Rig::Value(const std::string& effect, int index, double neutral) const {
   return found == values_.end() ? neutral : found->second[index];
 }
 
+const Cause* Rig::Find(CauseKind kind) const {
+  for (const Cause& cause : scenario_.causes)
+    if (cause.kind == kind) return &cause;
+  return nullptr;
+}
+
 std::vector<Rig::Landing> Rig::Land(const Command& command) const {
-  const Vec& a = command.approach;
+  Vec a = command.approach, across = command.lateral;
+  if (const Cause* error = Find(CauseKind::kPoseError); error != nullptr && command.pose >= 0) {
+    const Eigen::Matrix3d askew = TiltOf(*error, seed_, command.pose, a, across);
+    a = askew * a, across = askew * across;
+  }
   // The real row of fingers.
   const double yaw = Value("tool_yaw") * kRadians;
-  const Vec lateral = Eigen::AngleAxisd(yaw, a) * command.lateral;
+  const Vec lateral = Eigen::AngleAxisd(yaw, a) * across;
   const double spacing = scenario_.spacing_mm + Value("finger_spacing");
   // The real object is the mesh under v -> R (size v) + moved; lines get the inverse transform.
   const double size = 1 + Value("object_scale");
@@ -94,6 +104,11 @@ std::vector<Rig::Landing> Rig::Land(const Command& command) const {
   Eigen::Matrix3d back = Eigen::Matrix3d::Identity();
   if (turn.norm() > 0)
     back = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix().transpose();
+  if (const Cause* remounted = Find(CauseKind::kRemounted)) {
+    const Placement placement = PlacementOf(*remounted, seed_, command.object, command.round);
+    moved = placement.turned * moved + placement.moved_mm;
+    back = back * placement.turned.transpose();
+  }
 
   const double standoff = command.standoff_mm > 0 ? command.standoff_mm : scenario_.standoff_mm;
   std::vector<Landing> landings;
@@ -117,17 +132,41 @@ std::vector<Rig::Landing> Rig::Land(const Command& command) const {
   return landings;
 }
 
+std::vector<Rig::Landing> Rig::Landed(const Command& command) {
+  if (command.pose < 0) return Land(command);
+  const int round = Find(CauseKind::kRemounted) != nullptr ? command.round : 0;
+  std::vector<Landing>& known = landed_[{command.pose, round}];
+  if (known.empty()) known = Land(command);
+  return known;
+}
+
+std::vector<double> Rig::AddedTravelMm(const std::vector<Landing>& landings, int first,
+                                       const Command& command, double session_time_s,
+                                       double temperature) const {
+  const int fingers = scenario_.fingers;
+  std::vector<double> added(fingers, 0);
+  for (int i = 0; i < fingers; ++i) {
+    const Landing& landing = landings[i];
+    FingerState state;
+    state.finger = i - 0.5 * (fingers - 1);
+    state.travel_mm = landing.travel_mm, state.standoff_mm = scenario_.standoff_mm;
+    state.first_finger = first - 0.5 * (fingers - 1);
+    state.temperature = temperature;
+    state.approach = command.approach, state.lateral = command.lateral, state.contact_mm = landing.contact_mm;
+    for (const Unlisted& unlisted : scenario_.unlisted)
+      added[i] += unlisted.k_mm * FindUnlisted(unlisted.name).travel(state, unlisted.second);
+    TouchState touch{command.object, i, session_time_s, landing.tangent, i == first, 0};
+    if (i > 0 && i + 1 < fingers && landings[i - 1].hit && landings[i + 1].hit)
+      touch.neighbours_mm = landings[i - 1].travel_mm - landings[i + 1].travel_mm;
+    for (const Cause& cause : scenario_.causes) added[i] += TravelMm(cause, touch);
+  }
+  return added;
+}
+
 std::vector<Rig::Finger> Rig::Touch(const Command& command, double commanded_mm_s, double session_time_s,
                                     double temperature) {
   const int fingers = scenario_.fingers;
-  std::vector<Landing> landings;
-  if (command.pose < 0) {
-    landings = Land(command);
-  } else {
-    std::vector<Landing>& known = landed_[command.pose];
-    if (known.empty()) known = Land(command);
-    landings = known;
-  }
+  std::vector<Landing> landings = Landed(command);
   int first = -1;
   for (int i = 0; i < fingers; ++i)
     if (landings[i].hit && (first < 0 || landings[i].travel_mm < landings[first].travel_mm)) first = i;
@@ -135,21 +174,9 @@ std::vector<Rig::Finger> Rig::Touch(const Command& command, double commanded_mm_
   if (first < 0) return out;
 
   // Travel added to each finger by effects of the motion and the contact.
-  for (int i = 0; i < fingers; ++i) {
-    Landing& landing = landings[i];
-    double extra = i == first ? 0 : Value("object_push");
-    for (const Unlisted& unlisted : scenario_.unlisted) {
-      FingerState state;
-      state.finger = i - 0.5 * (fingers - 1);
-      state.travel_mm = landing.travel_mm, state.standoff_mm = scenario_.standoff_mm;
-      state.first_finger = first - 0.5 * (fingers - 1);
-      state.temperature = temperature;
-      state.approach = command.approach, state.lateral = command.lateral,
-      state.contact_mm = landing.contact_mm;
-      extra += unlisted.k_mm * FindUnlisted(unlisted.name).travel(state, unlisted.second);
-    }
-    landing.travel_mm += extra;
-  }
+  const std::vector<double> added = AddedTravelMm(landings, first, command, session_time_s, temperature);
+  for (int i = 0; i < fingers; ++i)
+    landings[i].travel_mm += added[i] + (i == first ? 0 : Value("object_push"));
 
   // The motion: speed, ramp from rest, and the brake of the first contact.
   const double speed = commanded_mm_s * (1 + Value("speed_error"));

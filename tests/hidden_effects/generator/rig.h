@@ -18,7 +18,7 @@ std::mt19937_64 Stream(uint64_t seed, const char* purpose);
 
 class Rig {
  public:
-  // `seed` draws the bumps.
+  // `seed` draws the bumps, and how objects and poses stand askew.
   Rig(const Scenario& scenario, uint64_t seed);
 
   struct Finger {
@@ -48,9 +48,18 @@ class Rig {
     Eigen::Vector3d contact_mm;
   };
   std::vector<Landing> Land(const Command& command) const;
-  std::map<int, std::vector<Landing>> landed_;  // by pose
+  // Of a pose that was met before, remembered.
+  std::vector<Landing> Landed(const Command& command);
+  // What the physics that no catalogue lists adds to each finger's travel, mm.
+  std::vector<double> AddedTravelMm(const std::vector<Landing>& landings, int first, const Command& command,
+                                    double session_time_s, double temperature) const;
+  const Cause* Find(CauseKind kind) const;
+
+  // By pose, and by round where objects are put down anew.
+  std::map<std::pair<int, int>, std::vector<Landing>> landed_;
 
   Scenario scenario_;
+  uint64_t seed_;
   std::map<std::string, std::vector<double>> values_;
   std::vector<Bumps> bumps_;        // one per object
   std::vector<double> pressed_mm_;  // by the previous touch, per finger

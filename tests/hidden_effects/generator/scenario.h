@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/hidden_effects/generator/blunders.h"
+#include "tests/hidden_effects/generator/causes.h"
 #include "tests/hidden_effects/generator/solid.h"
 
 namespace touchstone::hidden {
@@ -35,8 +37,11 @@ struct Scenario {
   double sigma_us = 5000;
   std::vector<Hidden> hidden;
   std::vector<Unlisted> unlisted;
+  std::vector<Cause> causes;
+  std::vector<Blunder> blunders;  // mistakes in the file, in this order
   std::vector<Hidden> in_model;   // what the nominal model file has besides the noise
   bool noise_in_model = true;     // whether the nominal model file has gaussian_noise
+  double model_sigma_us = 0;      // what the nominal model claims; 0: sigma_us
   double outlier_share = 0;       // of the fingers' times,
   double outlier_us = 100'000;    // off by up to this much
   double missing_share = 0;       // of the fingers' times

@@ -211,6 +211,7 @@ std::vector<Arm> MakeArms() {
        },
        {}},
   };
+  for (Arm& arm : OutsideArms()) arms.push_back(std::move(arm));
   return arms;
 }
 

@@ -18,7 +18,18 @@ enum class Kind {
   kNoPoses,            // only objects and times
   kWrongValue,         // a value of the model's own
   kNoiseMissing,       // an ideal model against measurements with noise
+  kCause,              // what the catalogue does not describe as it stands (generator/causes.h)
+  kBeyondBound,        // an effect of the catalogue, beyond the bounds of its value
+  kBadPrint,           // surface bumps that show
+  kOldValue,           // a value of the model's own, which a new effect could stand in for
+  kWrongNoise,         // noise in the model that the data do not have
+  kBlunder,            // a mistake in the file
+  kTooFew,             // fewer touches than a verdict needs
 };
+
+// Of the arms outside the catalogue. Weak: what a careful look at 960 touches can just see. Strong: nobody can
+// overlook it, so a verdict that nothing is missing is wrong.
+enum class Strength { kNone, kWeak, kRealistic, kStrong };
 
 struct Arm {
   std::string name;
@@ -27,11 +38,19 @@ struct Arm {
   std::function<Scenario(const TestObjects&, uint64_t seed)> draw;
   // Effects that may be named besides the truth: what lost contacts and outliers resemble.
   std::vector<std::string> tolerated;
+  Strength strength = Strength::kNone;
+  bool depends_on_time = false;  // the cause does, and nothing else tells it
+
+  // Whether the catalogue holds the truth as it stands, and the file is what it says.
+  bool listed() const { return strength == Strength::kNone && kind != Kind::kUnlisted; }
 };
 
-// In the order of the table.
+// In the order of the table: the catalogue's, then those of outside_arms.cpp.
 const std::vector<Arm>& Arms();
 const Arm* FindArm(const std::string& name);
+
+// Arms outside the catalogue, each weak, realistic and strong.
+std::vector<Arm> OutsideArms();
 
 enum class Seeds { kTuning, kHeldOut };
 

@@ -210,6 +210,14 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
       marks.push_back({"histograms agree", agree});
       break;
     }
+    case Kind::kCause:
+    case Kind::kBeyondBound:
+    case Kind::kBadPrint:
+    case Kind::kOldValue:
+    case Kind::kWrongNoise:
+    case Kind::kBlunder:
+    case Kind::kTooFew:
+      break;  // only the figures of figures.h
   }
   return marks;
 }
@@ -239,6 +247,9 @@ std::string TruthInWords(const Scenario& truth) {
   for (const Hidden& hidden : truth.hidden) add(hidden.effect, hidden.values);
   for (const Unlisted& unlisted : truth.unlisted)
     add("unlisted " + unlisted.name, {unlisted.k_mm, unlisted.second});
+  for (const Cause& cause : truth.causes) add(InWords(cause), {});
+  for (const Blunder& blunder : truth.blunders) add("mistake: " + InWords(blunder), {});
+  for (const Hidden& given : truth.in_model) add("in the model: " + given.effect, given.values);
   return words.empty() ? "nothing" : words;
 }
 
@@ -257,7 +268,7 @@ std::string ReportInWords(const v1::Report& report) {
       for (const std::string& name : step.equivalent()) words += " " + name;
       words += "]";
     }
-    words += " P=" + Number(step.probability());
+    words += " P=" + Number(step.probability()) + (step.words().empty() ? "" : " (" + step.words() + ")");
     add_values(step.parameters());
   }
   for (const v1::Refit& refit : report.refitted()) {
@@ -272,7 +283,11 @@ std::string ReportInWords(const v1::Report& report) {
         break;
     }
     words += " formula '" + report.unexplained().formula() + "'";
+    if (!report.unexplained().lookup_yaml().empty()) words += " with a lookup";
   }
+  for (const v1::DataProblem& problem : report.data_problems())
+    words += "; check data: " + problem.kind() + " " + problem.detail();
+  for (const std::string& effect : report.superfluous()) words += "; superfluous " + effect;
   words += "; rmse " + Number(report.initial().rmse_us()) + " -> " + Number(report.final().rmse_us()) +
            " floor " + Number(report.noise_floor_us()) + " us, p " + Number(report.final().lack_of_fit_p());
   return words;

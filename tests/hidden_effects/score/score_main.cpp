@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "tests/hidden_effects/score/figures_table.h"
 #include "tests/hidden_effects/score/next_touches.h"
 #include "tests/hidden_effects/score/trial.h"
 
@@ -13,11 +14,16 @@ int main(int argc, char** argv) {
   TrialOptions options;
   std::string seeds = "tuning", meshes = TOUCHSTONE_SHARED_MESHES;
   bool verbose = false, no_baselines = false;
+  bool only_listed = false, only_outside = false;
   int races = -1;
   CLI::App app{"Hides effects in measurement sets, diagnoses them, and prints how often that was right."};
   app.add_option("--seeds", seeds, "tuning or held-out")->check(CLI::IsMember({"tuning", "held-out"}));
   app.add_option("--share", options.share, "of the number of sets of every arm")->check(CLI::PositiveNumber);
   app.add_option("--arm", options.arms, "only this arm (may be repeated)");
+  app.add_option("--limit", options.limit_s, "seconds of CPU time after which a diagnosis is cancelled")
+      ->check(CLI::PositiveNumber);
+  app.add_flag("--listed", only_listed, "only arms that the catalogue lists");
+  app.add_flag("--outside", only_outside, "only the others");
   app.add_option("--threads", options.threads, "sets at once")->check(CLI::Range(1, 64));
   app.add_option("--meshes", meshes, "folder with lat00.off ...; missing ones are made");
   app.add_option("--dump", options.dump_folder, "write sets that were judged wrong there");
@@ -32,6 +38,8 @@ int main(int argc, char** argv) {
     for (const Arm& known : Arms()) fprintf(stderr, "  %s\n", known.name.c_str());
     return 2;
   }
+  for (const Arm& arm : Arms())
+    if ((only_listed && arm.listed()) || (only_outside && !arm.listed())) options.arms.push_back(arm.name);
   options.seeds = seeds == "held-out" ? Seeds::kHeldOut : Seeds::kTuning;
   options.baselines = !no_baselines;
   if (!options.dump_folder.empty()) std::filesystem::create_directories(options.dump_folder);
@@ -43,14 +51,15 @@ int main(int argc, char** argv) {
              outcome.arm->name.c_str(), static_cast<unsigned long long>(outcome.seed), outcome.seconds,
              TruthInWords(outcome.set.truth).c_str(), ReportInWords(outcome.report).c_str(),
              outcome.error.c_str());
-      for (const Mark& mark : outcome.marks)
-        printf("        %s: %s\n", mark.measure.c_str(), mark.yes ? "yes" : "no");
+      for (const std::vector<Mark>* marks : {&outcome.marks, &outcome.figures})
+        for (const Mark& mark : *marks)
+          printf("        %s: %s\n", mark.measure.c_str(), mark.yes ? "yes" : "no");
       fflush(stdout);
     } else if (done % 20 == 0 || done == of) {
       fprintf(stderr, "%d of %d sets\n", done, of);
     }
   });
-  printf("%s", Table(result.results).c_str());
+  printf("%s\n%s", Table(result.results).c_str(), FiguresTable(result).c_str());
   const auto& seconds = result.seconds;
   if (!seconds.empty())
     printf(

@@ -2,37 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/hidden_effects/score/trial.h"
-#include "touchstone_test_paths.h"
+#include "tests/hidden_effects/score/expect_always.h"
 
 namespace touchstone::hidden {
 namespace {
-
-const TestObjects& SharedTestObjects() {
-  static const auto* objects = new TestObjects(LoadTestObjects(TOUCHSTONE_SHARED_DATA "/measurements"));
-  return *objects;
-}
-
-// Runs the first `sets` sets of an arm; every answer to `measure` must be `wanted`, but for `exceptions`.
-void ExpectAlways(const char* arm_name, int sets, const char* measure, bool wanted, int exceptions = 0) {
-  const Arm* arm = FindArm(arm_name);
-  ASSERT_NE(arm, nullptr);
-  int asked = 0, otherwise = 0;
-  std::string wrong;
-  for (int k = 0; k < sets; ++k) {
-    const Outcome outcome = RunOne(*arm, SeedOf(Seeds::kTuning, *arm, k), SharedTestObjects(), false);
-    ASSERT_EQ(outcome.error, "");
-    for (const Mark& mark : outcome.marks) {
-      if (mark.measure != measure) continue;
-      ++asked;
-      if (mark.yes == wanted) continue;
-      ++otherwise;
-      wrong += "\n  hidden " + TruthInWords(outcome.set.truth) + "\n  said " + ReportInWords(outcome.report);
-    }
-  }
-  EXPECT_GT(asked, 0);
-  EXPECT_LE(otherwise, exceptions) << wrong;
-}
 
 TEST(HiddenEffects, NothingHiddenIsNamedNothing) {
   ExpectAlways("nothing", 4, "false claim", false);

@@ -1,6 +1,8 @@
 #include "tests/hidden_effects/score/strengths.h"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "tests/hidden_effects/generator/rig.h"
 #include "tests/hidden_effects/generator/unlisted.h"
@@ -11,6 +13,8 @@ namespace {
 using Random = std::mt19937_64;
 
 constexpr double kMinRealistic = 25;
+constexpr double kAsideMm = 0.3;
+const double kMinCosine = std::cos(15 * M_PI / 180);  // between the normals of one face
 
 double Between(double low, double high, Random& random) {
   return std::uniform_real_distribution<double>(low, high)(random);
@@ -87,7 +91,38 @@ Hidden Drawn(const std::string& effect, const Scenario& scenario, Random& random
   return pose;
 }
 
+// Whether every finger meets the same face when it moves aside.
+bool IsAwayFromEdges(const Scenario& scenario, const Command& command) {
+  const Solid& solid = *scenario.objects[command.object];
+  const Eigen::Vector3d across = command.approach.cross(command.lateral);
+  for (int i = 0; i < scenario.fingers; ++i) {
+    const double x = (i - 0.5 * (scenario.fingers - 1)) * scenario.spacing_mm;
+    const Eigen::Vector3d tip =
+        command.target_mm - command.approach * scenario.standoff_mm + command.lateral * x;
+    const Contact here = solid.FirstContact(tip, command.approach, 0);
+    for (const Eigen::Vector3d& aside :
+         {command.lateral, Eigen::Vector3d(-command.lateral), across, Eigen::Vector3d(-across)}) {
+      const Contact there = solid.FirstContact(tip + kAsideMm * aside, command.approach, 0);
+      if (!here.hit || !there.hit || here.outward.dot(there.outward) < kMinCosine) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
+
+std::vector<double> TimesAwayFromEdges(const Set& set) {
+  std::vector<double> out = set.exact_time_us;
+  const int fingers = set.truth.fingers;
+  std::map<int, bool> away;  // by pose
+  for (int k = 0; k < set.touches; ++k) {
+    const Command& command = set.commands[k];
+    const auto [known, is_new] = away.try_emplace(command.pose, true);
+    if (is_new) known->second = IsAwayFromEdges(set.truth, command);
+    if (!known->second) std::fill_n(out.begin() + static_cast<size_t>(k) * fingers, fingers, NAN);
+  }
+  return out;
+}
 
 const std::vector<std::string>& EffectsOfExpectation() {
   static const auto* names = new std::vector<std::string>{
@@ -120,11 +155,12 @@ Hidden WeakEffect(const std::string& effect, const Scenario& scenario, uint64_t 
   // One pose for all objects: a weak signal cannot determine thirty numbers.
   if (effect == "object_pose") whole.values.resize(6);
   const Set like = Generate(scenario, seed);
+  const std::vector<double> without_us = TimesAwayFromEdges(like);
   double low = std::log(1e-3), high = std::log(30.0);
   for (int step = 0; step < 14; ++step) {
     const double middle = 0.5 * (low + high);
     const Hidden tried = Scaled(whole, std::exp(middle));
-    (Signal(tried, scenario, like, like.exact_time_us, seed) < signal ? low : high) = middle;
+    (Signal(tried, scenario, like, without_us, seed) < signal ? low : high) = middle;
   }
   return Scaled(whole, std::exp(0.5 * (low + high)));
 }

@@ -17,7 +17,11 @@ const std::vector<std::string>& EffectsOfScatter();
 // 25 standard errors).
 Hidden RealisticEffect(const std::string& effect, const Scenario& scenario, uint64_t seed);
 
-// The same direction, as weak as this signal (in standard errors over the whole set), found by bisection.
+// The exact times of a set, NaN for touches with a finger that meets another face when it moves aside by 0.3 mm: there
+// a hair's breadth decides, and nobody can count on them.
+std::vector<double> TimesAwayFromEdges(const Set& set);
+
+// The same direction, as weak as this signal (in standard errors over the touches away from edges), found by bisection.
 Hidden WeakEffect(const std::string& effect, const Scenario& scenario, uint64_t seed, double signal);
 
 // An unlisted effect whose RMS over the set's residual degrees of freedom is this many sigmas.

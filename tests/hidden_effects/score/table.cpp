@@ -22,7 +22,7 @@ constexpr Row kRows[] = {
     {"bumps of 0.25 sigma", "false claim", Is::kAtMost, 0.03, 0},
     {"bumps of 0.5 sigma", "false claim", Is::kAtMost, 0.03, 0},
     {"one weak", "right first", Is::kAtLeast, 0.95, 0},
-    {"one weak", "truth named", Is::kAtLeast, 0.99, 0},
+    {"one weak", "truth named", Is::kAtLeast, 0.98, 0},
     {"one", "right first", Is::kAtLeast, 0.99, 0},
     {"one", "none added", Is::kReported, 0, 0},
     {"one", "rmse at the floor", Is::kAtLeast, 0.99, 0},

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "tests/hidden_effects/score/figures_table.h"
+
 namespace touchstone::hidden {
 namespace {
 
@@ -29,6 +31,33 @@ TEST(Table, SaysWhereATargetIsMissed) {
               testing::HasSubstr("| nothing | false claim | <= 1 | 400 | 2 | 0.867 - 3.9 | **miss** | 25 |"));
   EXPECT_THAT(table, testing::HasSubstr("| two | all found, none added | >= 90 | 100 | 95 |"));
   EXPECT_THAT(table, testing::HasSubstr("| pass |"));
+}
+
+TEST(FiguresTable, AddsUpArmsAndSaysWhereTargetsAreMissed) {
+  TrialResult result;
+  Rates& rates = result.results.diagnosis;
+  rates[{"nothing", "right"}] = rates[{"nothing", "honest"}] = {100, 100};
+  rates[{"nothing", "confidently wrong"}] = {0, 100};
+  rates[{"warm-up, weak", "right"}] = {5, 10};
+  rates[{"warm-up, weak", "honest"}] = {8, 10};
+  rates[{"warm-up, weak", "confidently wrong"}] = {2, 10};
+  rates[{"warm-up, strong", "right"}] = rates[{"warm-up, strong", "honest"}] = {10, 10};
+  rates[{"warm-up, strong", "confidently wrong"}] = {0, 10};
+  rates[{"warm-up, weak", "unexplained by time"}] = {0, 10};
+  rates[{"warm-up, strong", "unexplained by time"}] = {10, 10};
+  result.full_set_seconds = {1, 1.5, 30};
+  const std::string table = FiguresTable(result);
+  EXPECT_THAT(table, testing::HasSubstr(
+                         "| nothing | 100 | 100 (96.4 - 100) | 100 (96.4 - 100) | 0 (0 - 3.62) |  |  |"));
+  EXPECT_THAT(table, testing::HasSubstr("| warm-up, weak | 10 | 50 (18.7 - 81.3) | 80 (44.4 - 97.5) | 20 "
+                                        "(2.52 - 55.6) | **miss** |  |"));
+  EXPECT_THAT(table, testing::HasSubstr("| confidently wrong, everything | <= 0.5 | 120 | 1.67 "));
+  EXPECT_THAT(table, testing::HasSubstr("| confidently wrong, outside the catalogue | <= 2 | 20 | 10 "));
+  // The weak arm does not count.
+  EXPECT_THAT(table, testing::HasSubstr("with time first (not weak) | >= 90 | 10 | 100 "));
+  EXPECT_THAT(table, testing::HasSubstr("on 1 of 2 arms outside the catalogue: **miss**"));
+  EXPECT_THAT(table, testing::HasSubstr("1.5 s of one core in the median (target <= 2, pass), 30 s at worst "
+                                        "(target <= 20, **miss**)"));
 }
 
 }  // namespace

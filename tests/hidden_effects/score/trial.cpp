@@ -11,9 +11,12 @@
 #include <thread>
 
 #include "tests/hidden_effects/score/baselines.h"
+#include "tests/hidden_effects/score/verify.h"
 
 namespace touchstone::hidden {
 namespace {
+
+constexpr int kFullSet = 960;
 
 // CPU time of this thread, so that other work on the machine does not count.
 double ThreadSeconds() {
@@ -24,33 +27,10 @@ double ThreadSeconds() {
 
 // Measures that are wrong when they are true.
 bool IsBad(const std::string& measure) {
-  static const auto* bad =
-      new std::set<std::string>{"false claim", "wrong name instead", "names a culprit", "false detection"};
+  static const auto* bad = new std::set<std::string>{
+      "false claim",       "wrong name instead", "names a culprit",     "false detection",
+      "confidently wrong", "probability of 1",   "fall not found again"};
   return bad->count(measure) > 0;
-}
-
-// What the suggested formula leaves of the mean square misfit, on fresh touches without noise, as a share.
-double FormulaCutsTo(const Scenario& truth, uint64_t seed, const v1::Report& report,
-                     const TestObjects& objects) {
-  const std::string& formula = report.unexplained().formula_yaml();
-  if (formula.empty()) return NAN;
-  const Set fresh = Generate(truth, seed + 500'000);
-  std::string yaml = fresh.model_yaml;
-  // The suggestion is an item of the list of effects, with or without that list around it.
-  const size_t list = formula.find("effects:");
-  std::string item = list == std::string::npos ? formula : formula.substr(formula.find('\n', list) + 1);
-  std::string indented;
-  const std::string indent = item.compare(0, 2, "  ") == 0 ? "" : "  ";
-  for (size_t begin = 0; begin < item.size();) {
-    const size_t end = std::min(item.find('\n', begin), item.size());
-    if (end > begin) indented += indent + item.substr(begin, end - begin) + "\n";
-    begin = end + 1;
-  }
-  yaml += indented;
-  const auto before = ExactRmseUs(fresh, fresh.model_yaml, objects),
-             after = ExactRmseUs(fresh, yaml, objects);
-  if (!before.ok() || !after.ok()) return std::numeric_limits<double>::infinity();
-  return *after * *after / (*before * *before);
 }
 
 void WriteSet(const std::string& folder, const Outcome& outcome) {
@@ -72,9 +52,35 @@ void Count(const Arm& arm, const std::vector<Mark>& marks, Rates* rates) {
   }
 }
 
+void JudgeOutcome(const TestObjects& objects, Outcome* out) {
+  const Arm& arm = *out->arm;
+  const Scenario& truth = out->set.truth;
+  const v1::Unexplained& unexplained = out->report.unexplained();
+  Tried tried;
+  if (arm.kind == Kind::kUnlisted)
+    tried.formula_cuts_to = CutsTo(truth, out->seed, unexplained.formula_yaml(), objects);
+  if (IsACurve(arm, truth))
+    tried.lookup_cuts_to = CutsTo(truth, out->seed, unexplained.lookup_yaml(), objects);
+  if (ClaimsAFall(out->report))
+    tried.final_found_us = FinalRmseFoundAgainUs(out->set, out->report, objects)
+                               .value_or(std::numeric_limits<double>::infinity());
+  out->marks = Judge(arm, truth, out->report, tried.formula_cuts_to);
+  if (out->error.empty()) {
+    out->figures = JudgeFigures(arm, truth, out->report, out->marks, tried);
+    return;
+  }
+  // Without a report every question is answered wrongly, but nothing was claimed.
+  for (Mark& mark : out->marks) mark.yes = IsBad(mark.measure);
+  // A file that is refused, with the reason, misleads nobody.
+  const bool refused = arm.kind == Kind::kBlunder && !out->timed_out;
+  out->figures = {{"right", false}, {"honest", refused}, {"confidently wrong", false}};
+  if (arm.depends_on_time) out->figures.push_back({"unexplained by time", false});
+  if (IsACurve(arm, truth)) out->figures.push_back({"lookup halves the misfit", false});
+}
+
 }  // namespace
 
-Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines) {
+Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines, double limit_s) {
   Outcome out;
   out.arm = &arm;
   out.seed = seed;
@@ -82,19 +88,18 @@ Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool b
   const auto input = InputFor(out.set, objects);
   if (!input.ok()) return out.error = input.status().ToString(), out;
   const double start_s = ThreadSeconds();
-  const auto diagnosis = diagnosis::Diagnose(*input, {});
+  diagnosis::DiagnosisContext context;
+  context.progress = [&](const std::string&, double) { return ThreadSeconds() - start_s < limit_s; };
+  const auto diagnosis = diagnosis::Diagnose(*input, context);
   out.seconds = ThreadSeconds() - start_s;
-  if (diagnosis.ok())
+  if (diagnosis.ok()) {
     out.report = diagnosis::report::ToReport(*diagnosis);
-  else
+  } else {
     out.error = diagnosis.status().ToString();
-  // Without a report every question is answered wrongly.
-  double cuts_to = NAN;
-  if (arm.kind == Kind::kUnlisted) cuts_to = FormulaCutsTo(out.set.truth, seed, out.report, objects);
-  out.marks = Judge(arm, out.set.truth, out.report, cuts_to);
-  if (!out.error.empty())
-    for (Mark& mark : out.marks) mark.yes = IsBad(mark.measure);
-  if (baselines) {
+    out.timed_out = absl::IsCancelled(diagnosis.status());
+  }
+  JudgeOutcome(objects, &out);
+  if (baselines && arm.strength == Strength::kNone) {
     const auto others = RunBaselines(*input);
     if (others.ok() && arm.kind != Kind::kNoPoses) {
       out.bic = JudgeNames(arm, out.set.truth, others->bic);
@@ -109,6 +114,9 @@ bool AllRight(const Outcome& outcome) {
   if (!outcome.error.empty()) return false;
   for (const Mark& mark : outcome.marks)
     if (mark.yes == IsBad(mark.measure)) return false;
+  for (const Mark& mark : outcome.figures)
+    if ((mark.measure == "confidently wrong" && mark.yes) || (mark.measure == "right" && !mark.yes))
+      return false;
   return true;
 }
 
@@ -132,15 +140,19 @@ TrialResult RunTrial(const TrialOptions& options, const TestObjects& objects,
   const auto work = [&] {
     for (size_t t = next++; t < tasks.size(); t = next++) {
       const Arm& arm = *tasks[t].arm;
-      const Outcome outcome = RunOne(arm, SeedOf(options.seeds, arm, tasks[t].k), objects, options.baselines);
+      const Outcome outcome =
+          RunOne(arm, SeedOf(options.seeds, arm, tasks[t].k), objects, options.baselines, options.limit_s);
       const std::lock_guard<std::mutex> lock(mutex);
       Count(arm, outcome.marks, &result.results.diagnosis);
+      Count(arm, outcome.figures, &result.results.diagnosis);
       Count(arm, outcome.bic, &result.results.bic);
       Count(arm, outcome.rmse_drop, &result.results.rmse_drop);
       Count(arm, outcome.gp, &result.results.gp);
       ++result.sets;
       result.errors += !outcome.error.empty();
+      result.timed_out += outcome.timed_out;
       result.seconds.push_back(outcome.seconds);
+      if (outcome.set.touches == kFullSet) result.full_set_seconds.push_back(outcome.seconds);
       if (!options.dump_folder.empty() && !AllRight(outcome)) WriteSet(options.dump_folder, outcome);
       each(outcome, result.sets, static_cast<int>(tasks.size()));
     }
@@ -149,6 +161,7 @@ TrialResult RunTrial(const TrialOptions& options, const TestObjects& objects,
   for (int k = 0; k < options.threads; ++k) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
   std::sort(result.seconds.begin(), result.seconds.end());
+  std::sort(result.full_set_seconds.begin(), result.full_set_seconds.end());
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/figures.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/table.h"
 
@@ -17,6 +18,7 @@ struct TrialOptions {
   std::vector<std::string> arms;  // empty: all
   int threads = 2;
   bool baselines = true;
+  double limit_s = 60;      // of CPU time for each diagnosis, which is then cancelled
   std::string dump_folder;  // sets that were judged wrong are written there; empty: nowhere
 };
 
@@ -26,12 +28,14 @@ struct Outcome {
   uint64_t seed = 0;
   Set set;
   v1::Report report;
-  std::vector<Mark> marks, bic, rmse_drop, gp;
-  double seconds = 0;  // of Diagnose, CPU time
-  std::string error;   // why there is no report; empty: there is one
+  std::vector<Mark> marks, figures, bic, rmse_drop, gp;
+  double seconds = 0;      // of Diagnose, CPU time
+  bool timed_out = false;  // there is no report, since it took too long
+  std::string error;       // why there is no report; empty: there is one
 };
 
-Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines);
+Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool baselines,
+               double limit_s = 600);
 
 // Whether every answer about it was right.
 bool AllRight(const Outcome& outcome);
@@ -39,7 +43,9 @@ bool AllRight(const Outcome& outcome);
 struct TrialResult {
   Results results;
   int sets = 0, errors = 0;
-  std::vector<double> seconds;  // of every Diagnose, sorted
+  std::vector<double> seconds;           // of every Diagnose, sorted
+  std::vector<double> full_set_seconds;  // of those with 960 touches
+  int timed_out = 0;
 };
 
 // `each` is called after every set, from one thread at a time.

@@ -1,0 +1,24 @@
+// What a report claims, tried again: the final error by Compare with the saved model, what is suggested on fresh touches.
+#pragma once
+
+#include <string>
+
+#include "server/diagnosis/report/write_report.h"
+#include "tests/hidden_effects/score/test_objects.h"
+
+namespace touchstone::hidden {
+
+// What Compare finds with the report's improved model (the nominal one if there is none) on the same set, us. An error
+// if the saved model cannot be read or compared.
+absl::StatusOr<double> FinalRmseFoundAgainUs(const Set& set, const v1::Report& report,
+                                             const TestObjects& objects);
+
+// A whole effect, an item of the list with or without that list around it, added to a model file.
+std::string WithEffect(const std::string& model_yaml, const std::string& effect_yaml);
+
+// What the nominal model with this effect leaves of its mean square misfit, on fresh touches with the same physics
+// and without noise, as a share: infinite if it cannot be added, NaN if there is none.
+double CutsTo(const Scenario& truth, uint64_t seed, const std::string& effect_yaml,
+              const TestObjects& objects);
+
+}  // namespace touchstone::hidden
