@@ -31,7 +31,9 @@ std::vector<CurveCovariate> ListCurveCovariates(const touches::Observations& o,
   // Time first: where curves gain alike the list's order decides.
   if (set.has_session_time)
     list.push_back({"session_time_s", false, true, [&](int k, int) { return set.session_time_s[o.row[k]]; }});
-  else
+  // Across several sessions the time begins anew, and what goes on shows in the order of the touches.
+  const bool several_sessions = std::count(o.previous.begin(), o.previous.end(), -1) > 1;
+  if (!set.has_session_time || several_sessions)
     list.push_back({"touch", false, true, [](int k, int) { return double(k); }});
   list.push_back({"incidence_deg", true, false, [&d, at](int k, int i) {
                     return std::acos(std::clamp(d.cos_incidence[at(k, i)], 0.0, 1.0)) / kRadiansPerDegree;

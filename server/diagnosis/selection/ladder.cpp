@@ -187,8 +187,8 @@ class LadderBuilder {
     });
     const double gain_nats = selection_.surface_error.gain_nats;
     const bool misfit = ladder_.final.lack_of_fit_p < kMisfitP;
-    // Where a curve of one covariate takes part, bumps are no explanation of what is left.
-    return !had && !selection_.curve && selection_.fit.hypothesis != 0 &&
+    // Where a curve of one covariate or a wander takes part, bumps are no explanation of what is left.
+    return !had && !selection_.curve && !selection_.memory && selection_.fit.hypothesis != 0 &&
            (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
   }
 

@@ -12,9 +12,9 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kKnots = 40, kKnotsPerFinger = 20;  // of time 40 in either case
-constexpr double kTypicalCurveM = 0.3e-3;  // size that rigs show: scale of the prior
-constexpr int kBends = 8;                  // each a third of the last
-constexpr double kMinGainNats = 10;        // calibrated on sets without a hidden effect
+constexpr double kTypicalCurveM = 0.3e-3;         // size that rigs show: scale of the prior
+constexpr int kBends = 8;                         // each a third of the last
+constexpr double kMinGainNats = 10;               // calibrated on sets without a hidden effect
 constexpr double kMinHeldOutGain = 0.003;
 constexpr int kCurveFolds = 5, kStretches = 60;
 constexpr double kWorthAllNats = 2;
@@ -84,7 +84,8 @@ class CurveScorer {
       for (int i = 0; i < o_.fingers; ++i)
         if (const double value = covariate.value(k, i); std::isfinite(value)) values.push_back(value);
     if (values.empty()) return false;
-    curve->knots = PlaceKnots(std::move(values), covariate.of_time || !curve->per_finger ? kKnots : kKnotsPerFinger);
+    curve->knots =
+        PlaceKnots(std::move(values), covariate.of_time || !curve->per_finger ? kKnots : kKnotsPerFinger);
     const int knots = static_cast<int>(curve->knots.size()), lists = curve->per_finger ? o_.fingers : 1;
     if (knots < 2 || 3 * knots * lists > touches_.rows()) return false;
     basis_.resize(touches_.rows(), knots * lists);

@@ -77,6 +77,26 @@ double LogError(const Course& course, double ratio, double time_s, bool of_time)
   return curvature > 1e-3 ? 1 / std::sqrt(curvature) : 30;
 }
 
+// Touches begin to end as a course of their own.
+Course PartOf(const Course& course, int begin, int end) {
+  Course part;
+  part.channels = course.channels;
+  part.gap_s.assign(course.gap_s.begin() + begin, course.gap_s.begin() + end);
+  part.gap_s[0] = INFINITY;
+  part.value.assign(course.value.begin() + static_cast<long>(begin) * course.channels,
+                    course.value.begin() + static_cast<long>(end) * course.channels);
+  return part;
+}
+
+bool ShowsEverywhere(const Course& course, double ratio, double time_s) {
+  int quarters = 0;
+  for (int q = 0; q < 4; ++q) {
+    const Course part = PartOf(course, course.touches() * q / 4, course.touches() * (q + 1) / 4);
+    quarters += Likelihood(part, ratio, time_s).log_likelihood > Likelihood(part, 0, time_s).log_likelihood;
+  }
+  return quarters >= 3;
+}
+
 // One step of the fingers at the moment that fits best.
 double StepGain(const Course& course) {
   const int n = course.touches(), channels = course.channels;
@@ -138,6 +158,8 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   const double count = static_cast<double>(course.touches()) * course.channels;
   NoiseMemory found;
   found.gain_nats = best.log_likelihood - Likelihood(course, 0, time_s).log_likelihood - std::log(count);
+  found.log_likelihood = best.log_likelihood;
+  found.everywhere = ShowsEverywhere(course, ratio, time_s);
   found.step_gain_nats = StepGain(course);
   found.white_s = {best.white_s, best.white_s / std::sqrt(2 * count), 0};
   found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};

@@ -14,8 +14,10 @@ struct NoiseMemory {
   inference::NoiseEstimate sigma_s;  // of the wander
   inference::NoiseEstimate time_s;   // its correlation time
   inference::NoiseEstimate white_s;  // of the noise without memory beside it
-  double gain_nats = 0;              // log evidence over noise without memory (BIC)
-  double step_gain_nats = 0;         // the same of one step of the fingers at the best moment, and no wander
+  double log_likelihood = 0;
+  bool everywhere = false;    // the wander shows in three of four quarters of the session: it is no event
+  double gain_nats = 0;       // log evidence over noise without memory (BIC)
+  double step_gain_nats = 0;  // the same of one step of the fingers at the best moment, and no wander
 };
 
 // `residuals` [k * fingers + i]. Nothing without session times or with too few complete touches.

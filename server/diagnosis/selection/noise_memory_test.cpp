@@ -46,6 +46,7 @@ TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
   EXPECT_NEAR(found->sigma_s.value, 0.007, 4 * found->sigma_s.std_error);
   EXPECT_NEAR(std::log(found->time_s.value / 300), 0, 4 * found->time_s.std_error / found->time_s.value);
   EXPECT_NEAR(found->white_s.value, 0.005, 3e-4);
+  EXPECT_TRUE(found->everywhere);
   EXPECT_GT(found->gain_nats, found->step_gain_nats + 20);
 }
 
@@ -61,6 +62,12 @@ TEST(NoiseMemory, ASingleStepIsNoWander) {
                                 [](int k, int i, RandomStream*) { return i == 1 && k > 400 ? 0.0125 : 0.0; });
   const auto found = FindNoiseMemory(session.o, session.residuals);
   EXPECT_GT(found->step_gain_nats, found->gain_nats);
+}
+
+TEST(NoiseMemory, AnEventIsNoWander) {
+  const CourseOfSession session(
+      5, [](int k, int i, RandomStream*) { return i == 0 && k > 500 && k < 570 ? 0.012 : 0.0; });
+  EXPECT_FALSE(FindNoiseMemory(session.o, session.residuals)->everywhere);
 }
 
 }  // namespace

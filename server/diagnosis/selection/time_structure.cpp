@@ -11,9 +11,9 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kPermutations = 200;
+constexpr int kMaxPermutations = 200, kMinPermutations = 30;
+constexpr int kPermutedTouches = 4'000'000;  // of all permutations together: large sets need fewer
 constexpr int kMinNeighbours = 20;
-constexpr double kTimeP = 1e-4;
 constexpr double kNegligibleTime = 0.02;  // share of the floor
 
 // Residuals less the mean of their pose (touches with the same fingers), scaled to the variance of single ones.
@@ -123,7 +123,9 @@ TimeStructure FindTimeStructure(const touches::Observations& o, const std::vecto
   std::vector<std::vector<double>> by_finger(o.fingers);
   std::vector<double> totals;
   RandomStream random(0, RandomDomain::kDiagnosis, /*index=*/1);
-  for (int n = 0; n <= kPermutations; ++n) {
+  const int permutations =
+      std::clamp(kPermutedTouches / static_cast<int>(c.touch.size()), kMinPermutations, kMaxPermutations);
+  for (int n = 0; n <= permutations; ++n) {
     if (n > 0)
       for (const std::vector<int>& places : c.repeats)
         for (size_t j = places.size() - 1; j > 0; --j)
@@ -148,7 +150,7 @@ void AddTimeStructure(const touches::Observations& o, const std::vector<double>&
 }
 
 bool SharesTime(const NoiseFloor& floor) {
-  return floor.from_repeats && floor.time_structure_p < kTimeP &&
+  return floor.from_repeats && floor.time_structure_p < kTimeStructureP &&
          floor.sigma_without_time_s < (1 - kNegligibleTime) * floor.sigma_s;
 }
 
