@@ -22,8 +22,9 @@ SelectionResult ResultFor(const std::string& effect, const std::vector<std::stri
 
 TEST(CurveCompetition, ACurveTakesThePlaceOfNamesThatSayLess) {
   const SelectionResult result = ResultFor(
-      "lookup", {"name=warm", "adds=travel_mm", "covariate=session_time_s", "knots=0,400,800,1200,4000",
-                 "l=0,0.3,0.4,0.42,0.42", "m=0,0,0,0,0", "r=0,0,0,0,0"});
+      "lookup", {"name=warm", "adds=travel_mm", "covariate=session_time_s",
+                 "knots=0,300,600,900,1200,1500,1800,2100,2400,2700", "l=0,0.3,0,0.3,0,0.3,0,0.3,0,0.3",
+                 "m=0,0,0,0,0,0,0,0,0,0", "r=0,0,0,0,0,0,0,0,0,0"});
   ASSERT_TRUE(result.curve);
   EXPECT_EQ(result.curve->covariate, "session_time_s");
   ASSERT_GE(result.formula, 0);
