@@ -20,18 +20,6 @@ SelectionResult ResultFor(const std::string& effect, const std::vector<std::stri
   return *std::move(result);
 }
 
-TEST(CurveCompetition, ACurveTakesThePlaceOfNamesThatSayLess) {
-  const SelectionResult result = ResultFor(
-      "lookup", {"name=warm", "adds=travel_mm", "covariate=session_time_s",
-                 "knots=0,300,600,900,1200,1500,1800,2100,2400,2700", "l=0,0.3,0,0.3,0,0.3,0,0.3,0,0.3",
-                 "m=0,0,0,0,0,0,0,0,0,0", "r=0,0,0,0,0,0,0,0,0,0"});
-  ASSERT_TRUE(result.curve);
-  EXPECT_EQ(result.curve->covariate, "session_time_s");
-  ASSERT_GE(result.formula, 0);
-  EXPECT_NE(result.fit.model.base().effects[result.formula].effect->lookup, nullptr);
-  EXPECT_TRUE(result.steps.empty());
-}
-
 TEST(CurveCompetition, ADriftKeepsItsName) {
   const SelectionResult result = ResultFor("thermal_drift", {"rate_mm_per_h=0.5,0,-0.5"});
   EXPECT_FALSE(result.curve);
