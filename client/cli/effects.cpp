@@ -96,6 +96,21 @@ std::string FormulaHelp() {
       "    'expression=k * sin(2*pi*travel_mm/lead)' k=0.1 k_unit=mm lead=4 lead_unit=mm -o screw.yaml\n");
 }
 
+constexpr char kLookupHelp[] =
+    "\nA model file has it as\n\n"
+    "  - lookup:\n"
+    "      name: warm_up\n"
+    "      adds: time_us                  # or travel_mm\n"
+    "      covariate: session_time_s      # any variable of `touchstone effects formula`, or a cov_* column\n"
+    "      knots: [0, 300, 900]           # rising, in the covariate's unit\n"
+    "      values: {l: [0, 2100, 4000], m: [0, 0, 0], r: [0, -2100, -4000]}   # or one list for every "
+    "finger\n\n"
+    "Linear between knots, constant beyond. `touchstone diagnose` prints such a block where something "
+    "depends on a\n"
+    "covariate and has no name yet.\n\n"
+    "  touchstone model add nominal lookup name=warm_up adds=time_us covariate=session_time_s \\\n"
+    "    knots=0,300,900 l=0,2100,4000 m=0,0,0 r=0,-2100,-4000 -o warm.yaml\n";
+
 Json FormulaJson() {
   Json variables = Json::array();
   for (const effects::FormulaVariable& variable : effects::FormulaVariables())
@@ -139,6 +154,7 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
                     value, " -o better.yaml\n");
   }
   if (effect.name() == "formula") text += FormulaHelp();
+  if (effect.name() == "lookup") text += kLookupHelp;
   return cli.Print(text);
 }
 

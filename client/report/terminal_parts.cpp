@@ -158,6 +158,20 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   }
 }
 
+// A curve that has no name yet.
+void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
+  if (rest.lookup_yaml().empty()) return;
+  std::string text = "No name fits, but a curve does";
+  if (rest.heldout_gain() > 0)
+    absl::StrAppend(&text, ": it removes ", Share(rest.heldout_gain()),
+                    " of the excess error on unseen touches");
+  if (!rest.nearest_effect().empty())
+    absl::StrAppend(&text, "; it looks most like ", rest.nearest_effect(), " (cosine ",
+                    Fixed(rest.nearest_cosine(), 2), ")");
+  out->Paragraph(text + ". To add it, put this under effects in the model file:");
+  out->Verbatim(rest.lookup_yaml());
+}
+
 void AddUnexplained(const v1::Report& report, TextLayout* out) {
   const v1::Unexplained& rest = report.unexplained();
   if (rest.covariates().empty() && rest.formula().empty()) return;
@@ -170,7 +184,10 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
     }
     out->Paragraph(absl::StrCat("The rest depends on ", absl::StrJoin(names, ", "), "."));
   }
-  if (rest.formula().empty()) return;
+  if (rest.formula().empty()) {
+    AddLookup(rest, out);
+    return;
+  }
   std::string text = absl::StrCat("A suggestion, not a cause: ", rest.formula());
   if (rest.heldout_gain() > 0) {
     absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen touches");

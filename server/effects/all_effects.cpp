@@ -1,6 +1,7 @@
 #include "server/effects/all_effects.h"
 
 #include "server/effects/formula.h"
+#include "server/effects/lookup.h"
 
 // The built-in touch effects by stage, in the order in which a stage applies and the catalogue lists them:
 // one line each, the name of the function that its file exports. Registration by static objects is not used:
@@ -33,8 +34,10 @@
   EFFECT(IncidenceNoise)                 \
   EFFECT(HeavyTailNoise)                 \
   EFFECT(MissedContact)                  \
+  EFFECT(CorrelatedNoise)                \
   /* any stage */                        \
-  EFFECT(Formula)
+  EFFECT(Formula)                        \
+  EFFECT(Lookup)
 
 namespace touchstone::effects {
 
@@ -65,6 +68,11 @@ class BuiltInCatalogue : public model::EffectCatalogue {
   absl::StatusOr<std::shared_ptr<const model::Effect>> MakeFormula(
       const model::FormulaSpec& spec) const override {
     return MakeFormulaEffect(spec);
+  }
+
+  absl::StatusOr<std::shared_ptr<const model::Effect>> MakeLookup(
+      const model::LookupSpec& spec) const override {
+    return MakeLookupEffect(spec);
   }
 
  private:

@@ -26,7 +26,8 @@ std::set<std::string> FieldsOf(model::Stage stage) {
       return {"travel_m", "speed_factor", "acceleration_m_s2", "slowdown_fraction"};
     case model::Stage::kSensor:
       return {"reported_time_s",    "noise_sigma_s", "noise_growth",    "any_noise",
-              "degrees_of_freedom", "clock_factor",  "poll_interval_s", "missed_probability"};
+              "degrees_of_freedom", "clock_factor",  "poll_interval_s", "missed_probability",
+              "wander_sigma_s",     "wander_time_s"};
   }
   return {};
 }
@@ -52,7 +53,7 @@ FileValues TypicalValues(const model::Effect& effect, int fingers, double steps)
 class EffectContract : public testing::TestWithParam<std::shared_ptr<const model::Effect>> {
  protected:
   const model::Effect& effect() const { return *GetParam(); }
-  bool is_formula() const { return effect().name == "formula"; }
+  bool describes_only() const { return effect().name == "formula" || effect().name == "lookup"; }
 };
 
 TEST_P(EffectContract, HasTextsForPeople) {
@@ -96,7 +97,7 @@ TEST_P(EffectContract, ChangesNothingWithNeutralValues) {
 }
 
 TEST_P(EffectContract, ChangesItsOwnStageOnly) {
-  if (is_formula()) GTEST_SKIP() << "the catalogue's entry does nothing; formula_test.cpp has real ones";
+  if (describes_only()) GTEST_SKIP() << "the catalogue's entry does nothing; its own test has real ones";
   const TouchBatch before = TestBatch(20, 3, 7);
   TouchBatch after = before;
   ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &after);
@@ -162,12 +163,12 @@ TEST_P(EffectContract, StaysFiniteOverItsBoundsAndKeepsMisses) {
 
 // The fields that say how readings scatter, and none that say where they are expected.
 std::set<std::string> ScatterFields() {
-  return {"noise_sigma_s",      "noise_growth",    "any_noise",
-          "degrees_of_freedom", "poll_interval_s", "missed_probability"};
+  return {"noise_sigma_s",   "noise_growth",       "any_noise",      "degrees_of_freedom",
+          "poll_interval_s", "missed_probability", "wander_sigma_s", "wander_time_s"};
 }
 
 TEST_P(EffectContract, ChangesTheExpectationOrTheScatterAsItsRoleSays) {
-  if (is_formula()) GTEST_SKIP() << "the catalogue's entry does nothing";
+  if (describes_only()) GTEST_SKIP() << "the catalogue's entry does nothing";
   const TouchBatch before = TestBatch(20, 3, 7);
   TouchBatch after = before;
   ApplyEffect(effect(), TypicalValues(effect(), 3, 1), &after);
@@ -231,7 +232,8 @@ TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
   for (const auto& effect : Catalogue().All()) ++effects[effect->role];
   for (const model::EffectRole role :
        {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
-        model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError})
+        model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError,
+        model::EffectRole::kNoiseMemory})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
@@ -247,13 +249,13 @@ TEST(Catalogue, HasTheEffectsOfTheDesignInItsOrder) {
                                   "acceleration_ramp", "contact_slowdown", "object_push", "oblique_slip",
                                   "channel_latency", "thermal_drift", "return_hysteresis", "clock_skew",
                                   "poll_interval", "gaussian_noise", "incidence_noise", "heavy_tail_noise",
-                                  "missed_contact", "formula"));
+                                  "missed_contact", "correlated_noise", "formula", "lookup"));
 }
 
 TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {
   int previous = 0;
   for (const auto& effect : Catalogue().All()) {
-    if (effect->name == "formula") continue;
+    if (effect->parameters.empty()) continue;  // a formula, a lookup
     EXPECT_GE(static_cast<int>(effect->stage), previous) << effect->name;
     previous = static_cast<int>(effect->stage);
     EXPECT_EQ(effect->before_cast, effect->name == "tip_radius");

@@ -168,6 +168,8 @@ std::vector<std::string> ChangedFields(const TouchBatch& a, const TouchBatch& b)
   TOUCHSTONE_COMPARE(clock_factor)
   TOUCHSTONE_COMPARE(poll_interval_s)
   TOUCHSTONE_COMPARE(missed_probability)
+  TOUCHSTONE_COMPARE(wander_sigma_s)
+  TOUCHSTONE_COMPARE(wander_time_s)
 #undef TOUCHSTONE_COMPARE
   if (a.formula_error != b.formula_error) changed.push_back("formula_error");
   if (a.surface != b.surface) changed.push_back("surface");

@@ -55,6 +55,7 @@ void TouchBatch::Reset(int size, int fingers) {
   clock_factor = 1;
   poll_interval_s = 0;
   missed_probability = 0;
+  wander_sigma_s = wander_time_s = 0;
   formula_error.clear();
 }
 

@@ -56,6 +56,7 @@ enum class EffectRole {
   kNoiseTails,    // degrees of freedom of heavy tails
   kQuantisation,  // readings fall on ticks
   kDropout,       // readings are missing
+  kNoiseMemory,   // a wander in session time, each finger on its own
   kSmoothError,   // a smooth error of the surface, drawn anew for every object
 };
 
@@ -83,6 +84,18 @@ struct FormulaSpec {
   std::vector<double> values;  // in the unit of files, one per parameter
 };
 
+// What a lookup effect is made of, as the model file has it: a curve over one covariate, linear between its knots
+// and constant beyond them.
+struct LookupSpec {
+  std::string name;
+  bool adds_time = false;  // adds: time_us instead of travel_mm
+  Stage stage = Stage::kMotion;
+  std::string covariate;      // a variable of formulas or a cov_* column
+  std::vector<double> knots;  // rising, in the covariate's unit
+  std::vector<std::vector<double>>
+      values;  // mm or us at the knots: one list for every finger, or one per finger
+};
+
 struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
@@ -99,6 +112,7 @@ struct Effect {
   std::vector<ConfoundedEffect> confounded_with;  // each pair is declared by one of the two
   EffectNeeds needs;
   std::shared_ptr<const FormulaSpec> formula;  // set for formulas only
+  std::shared_ptr<const LookupSpec> lookup;    // set for lookups only
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, effects::TouchBatch& batch)> apply;
@@ -113,12 +127,14 @@ struct Effect {
 class EffectCatalogue {
  public:
   virtual ~EffectCatalogue() = default;
-  // By stage, in the order of application. The last, "formula", only describes: it has no parameters and changes
-  // nothing.
+  // By stage, in the order of application. The last two, "formula" and "lookup", only describe: they have no
+  // parameters and change nothing.
   virtual std::vector<std::shared_ptr<const Effect>> All() const = 0;
   virtual std::shared_ptr<const Effect> Find(const std::string& name) const = 0;  // null if unknown
   // Checks and compiles a formula; the error names the place in the expression.
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const = 0;
+  // Checks a curve; the error names the field.
+  virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec& spec) const = 0;
 };
 
 }  // namespace touchstone::model

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/text.h"
+#include "server/model/lookup_fields.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::model {
@@ -46,6 +47,7 @@ std::string Model::Hash() const {
         absl::StrAppend(&text, "bounds ", parameter.name, " ", UnitSymbol(parameter.unit), " ",
                         ShortestNumber(parameter.lower), " ", ShortestNumber(parameter.upper), "\n");
     }
+    if (effect.lookup) AppendText("lookup", LookupDefinition(*effect.lookup), &text);
     AppendValues(instance, instance.values, fingers, &text);
     for (const auto& [object, values] : instance.object_values) {
       AppendText("object", object, &text);

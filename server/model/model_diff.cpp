@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
@@ -29,6 +30,7 @@ std::string AllValues(const EffectInstance& instance, int fingers) {
   if (effect.formula)
     parts.push_back(absl::StrCat(effect.formula->adds_time ? "time_us" : "travel_mm",
                                  " += ", effect.formula->expression));
+  if (effect.lookup) parts.push_back(LookupInWords(*effect.lookup));
   for (size_t i = 0; i < effect.parameters.size(); ++i)
     parts.push_back(
         absl::StrCat(effect.parameters[i].name, " = ",
@@ -77,6 +79,9 @@ void CompareEffects(const EffectInstance& before, int fingers_before, const Effe
     // Values of other parameters cannot be set side by side.
     if (before.effect->ValueCount(fingers_before) != effect.ValueCount(fingers_after)) return;
   }
+  if (effect.lookup && LookupDefinition(*before.effect->lookup) != LookupDefinition(*effect.lookup))
+    lines->push_back(absl::StrCat(title, ": ", LookupInWords(*before.effect->lookup), " -> ",
+                                  LookupInWords(*effect.lookup), ", values changed"));
   if (before.per_object != after.per_object)
     lines->push_back(absl::StrCat(title, ": scope ", before.per_object ? "object -> rig" : "rig -> object"));
   CompareValues(title, "", effect, before.values, fingers_before, after.values, fingers_after, lines);

@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/formula_fields.h"
+#include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
@@ -94,6 +95,31 @@ absl::StatusOr<std::shared_ptr<const Effect>> FormulaFrom(const std::vector<Assi
   return catalogue.MakeFormula(spec);
 }
 
+// "knots=0,300", "values=0,0.1" for every finger, or "l=0,0.1", "m=...", "r=..." for each.
+absl::StatusOr<std::shared_ptr<const Effect>> LookupFrom(const std::vector<Assignment>& assignments,
+                                                         int fingers, const EffectCatalogue& catalogue) {
+  LookupFields fields;
+  for (const auto& [key, value] : assignments) {
+    if (key == "name")
+      fields.name = value;
+    else if (key == "adds")
+      fields.adds = value;
+    else if (key == "stage")
+      fields.stage = value;
+    else if (key == "covariate")
+      fields.covariate = value;
+    else {
+      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> numbers, Numbers("lookup." + key, value));
+      if (key == "knots")
+        fields.knots = std::move(numbers);
+      else
+        fields.values[key == "values" ? "" : key] = std::move(numbers);
+    }
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const LookupSpec spec, fields.ToSpec(fingers));
+  return catalogue.MakeLookup(spec);
+}
+
 }  // namespace
 
 absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_name,
@@ -110,6 +136,13 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
   const bool is_formula = effect_name == "formula";
   if (is_formula) {
     TOUCHSTONE_ASSIGN_OR_RETURN(added.effect, FormulaFrom(assignments, catalogue));
+  }
+  if (effect_name == "lookup") {
+    TOUCHSTONE_ASSIGN_OR_RETURN(added.effect, LookupFrom(assignments, model.fingers, catalogue));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckAddition(model, *added.effect));
+    Model result = model;
+    result.effects.push_back(std::move(added));
+    return result;
   }
   const Effect& effect = *added.effect;
   TOUCHSTONE_RETURN_IF_ERROR(CheckAddition(model, effect));

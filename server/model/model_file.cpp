@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/formula_fields.h"
+#include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/yaml_tree.h"
@@ -131,6 +132,8 @@ class ModelReader {
     EffectInstance instance;
     if (effect->name == "formula") {
       TOUCHSTONE_RETURN_IF_ERROR(ReadFormula(key, body, &instance));
+    } else if (effect->name == "lookup") {
+      TOUCHSTONE_RETURN_IF_ERROR(ReadLookup(key, body, &instance));
     } else {
       instance.effect = effect;
       instance.values = effect->NeutralValues(model_.fingers);
@@ -251,6 +254,49 @@ class ModelReader {
     for (size_t p = 0; p < spec->values.size(); ++p)
       instance->values.push_back(ToSi(spec->parameters[p].unit, spec->values[p]));
     return absl::OkStatus();
+  }
+
+  absl::Status ReadLookup(const YamlNode& key, const YamlNode& body, EffectInstance* instance) const {
+    TOUCHSTONE_RETURN_IF_ERROR(
+        CheckKeys(body, "lookup", {"name", "adds", "stage", "covariate", "knots", "values"}));
+    LookupFields fields;
+    const std::pair<const char*, std::string*> texts[] = {{"name", &fields.name},
+                                                          {"adds", &fields.adds},
+                                                          {"stage", &fields.stage},
+                                                          {"covariate", &fields.covariate}};
+    for (const auto& [name, text] : texts)
+      if (const YamlNode* node = body.Find(name)) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(*text, Text(*node, absl::StrCat("lookup.", name)));
+      }
+    const YamlNode *knots = body.Find("knots"), *values = body.Find("values");
+    if (knots != nullptr) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(fields.knots, Numbers(*knots, "lookup.knots"));
+    }
+    if (values != nullptr && values->kind == Kind::kMap) {
+      for (size_t k = 0; k < values->keys.size(); ++k) {
+        const std::string& finger = values->keys[k].text;
+        TOUCHSTONE_ASSIGN_OR_RETURN(fields.values[finger],
+                                    Numbers(values->items[k], absl::StrCat("lookup.values.", finger)));
+      }
+    } else if (values != nullptr) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(fields.values[""], Numbers(*values, "lookup.values"));
+    }
+    const absl::StatusOr<LookupSpec> spec = fields.ToSpec(model_.fingers);
+    if (!spec.ok()) return Error(key, spec.status().message());
+    absl::StatusOr<std::shared_ptr<const Effect>> effect = catalogue_.MakeLookup(*spec);
+    if (!effect.ok()) return Error(key, effect.status().message());
+    instance->effect = *std::move(effect);
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::vector<double>> Numbers(const YamlNode& node, absl::string_view what) const {
+    TOUCHSTONE_RETURN_IF_ERROR(Want(node, Kind::kSequence, what, "[0, 10, 20]"));
+    std::vector<double> numbers;
+    for (const YamlNode& item : node.items) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double number, Number(item, what));
+      numbers.push_back(number);
+    }
+    return numbers;
   }
 
   const std::string& origin_;

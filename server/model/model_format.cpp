@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "server/base/text.h"
+#include "server/model/finger_name.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 
@@ -80,6 +81,28 @@ void AppendFormula(const EffectInstance& instance, int fingers, std::string* tex
   AppendObjects(instance, fingers, text);
 }
 
+std::string NumberList(const std::vector<double>& numbers) {
+  return absl::StrCat(
+      "[", absl::StrJoin(numbers, ", ", [](std::string* out, double x) { *out += ShortestNumber(x); }), "]");
+}
+
+void AppendLookup(const LookupSpec& spec, std::string* text) {
+  absl::StrAppend(text, "  - lookup:\n      name: ", Scalar(spec.name),
+                  "\n      adds: ", spec.adds_time ? "time_us" : "travel_mm", "\n");
+  if (spec.stage != (spec.adds_time ? Stage::kSensor : Stage::kMotion))
+    absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
+  absl::StrAppend(text, "      covariate: ", Scalar(spec.covariate),
+                  "\n      knots: ", NumberList(spec.knots), "\n");
+  if (spec.values.size() == 1) {
+    absl::StrAppend(text, "      values: ", NumberList(spec.values[0]), "\n");
+    return;
+  }
+  absl::StrAppend(text, "      values:\n");
+  const int fingers = static_cast<int>(spec.values.size());
+  for (int i = 0; i < fingers; ++i)
+    absl::StrAppend(text, "        ", Scalar(FingerName(i, fingers)), ": ", NumberList(spec.values[i]), "\n");
+}
+
 }  // namespace
 
 std::string FormatModel(const Model& model) {
@@ -91,6 +114,10 @@ std::string FormatModel(const Model& model) {
     const Effect& effect = *instance.effect;
     if (effect.formula) {
       AppendFormula(instance, model.fingers, &text);
+      continue;
+    }
+    if (effect.lookup) {
+      AppendLookup(*effect.lookup, &text);
       continue;
     }
     std::vector<std::string> entries = Entries(effect, instance.values, model.fingers);

@@ -47,6 +47,9 @@ class TwoEffects : public EffectCatalogue {
   absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec&) const override {
     return absl::UnimplementedError("no formulas here");
   }
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec&) const override {
+    return absl::UnimplementedError("no lookups here");
+  }
 
  private:
   std::vector<std::shared_ptr<const Effect>> effects_;

@@ -124,7 +124,8 @@ absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name)
 }
 
 std::string EffectTitle(const Effect& effect) {
-  return effect.formula ? absl::StrCat("formula '", effect.formula->name, "'") : effect.name;
+  if (effect.formula) return absl::StrCat("formula '", effect.formula->name, "'");
+  return effect.lookup ? absl::StrCat("lookup '", effect.lookup->name, "'") : effect.name;
 }
 
 absl::Status CheckRig(int fingers, double spacing_mm) {
@@ -143,9 +144,10 @@ absl::Status CheckAddition(const Model& model, const Effect& effect) {
     return absl::InvalidArgumentError(absl::StrCat("a model has at most ", kMaxEffects, " effects"));
   for (const EffectInstance& present : model.effects)
     if (EffectTitle(*present.effect) == EffectTitle(effect))
-      return absl::AlreadyExistsError(
-          absl::StrCat(EffectTitle(effect), " is in the model already; ",
-                       effect.formula ? "give the formula another name" : "change its values in the file"));
+      return absl::AlreadyExistsError(absl::StrCat(
+          EffectTitle(effect), " is in the model already; ",
+          effect.formula || effect.lookup ? absl::StrCat("give the ", effect.name, " another name")
+                                          : "change its values in the file"));
   return absl::OkStatus();
 }
 

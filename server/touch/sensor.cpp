@@ -4,6 +4,7 @@
 
 #include "server/base/random.h"
 #include "server/base/units.h"
+#include "server/touch/gauss_markov.h"
 #include "server/touch/simulate.h"
 
 namespace touchstone::touch {
@@ -42,10 +43,21 @@ void AddNoise(effects::TouchBatch* batch, TouchWorkspace* workspace) {
   }
 }
 
+// Noise with memory: where in the session a touch is made decides, not its number.
+void AddWander(effects::TouchBatch* batch) {
+  for (int finger = 0; finger < batch->fingers(); ++finger)
+    for (int touch = 0; touch < batch->size(); ++touch)
+      batch->reported_time_s[batch->At(finger, touch)] +=
+          batch->wander_sigma_s *
+          GaussMarkov(batch->seed, finger,
+                      std::max(batch->session_time_s[touch], 0.0) / batch->wander_time_s);
+}
+
 }  // namespace
 
 void ReportTimes(effects::TouchBatch* batch, TouchWorkspace* workspace) {
   if (batch->any_noise) AddNoise(batch, workspace);
+  if (batch->wander_sigma_s > 0) AddWander(batch);
   if (batch->clock_factor != 1)
     for (double& time_s : batch->reported_time_s) time_s *= batch->clock_factor;
   if (batch->poll_interval_s > 0) {

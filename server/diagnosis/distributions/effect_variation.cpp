@@ -79,8 +79,10 @@ bool VisibleWithoutPoses(const model::Effect& effect, bool noise_is_known) {
   const bool noise = effect.role == model::EffectRole::kNoiseLevel ||
                      effect.role == model::EffectRole::kNoiseGrowth ||
                      effect.role == model::EffectRole::kNoiseTails;
-  if (effect.role == model::EffectRole::kDropout || (noise && noise_is_known)) return false;
-  return effect.name != "formula" && !effect.parameters.empty() && effect.needs.covariates.empty();
+  if (effect.role == model::EffectRole::kDropout || effect.role == model::EffectRole::kNoiseMemory ||
+      (noise && noise_is_known))
+    return false;
+  return !effect.parameters.empty() && effect.needs.covariates.empty();
 }
 
 std::vector<EffectDirection> DirectionsOf(const std::shared_ptr<const model::Effect>& effect, int fingers) {

@@ -34,6 +34,7 @@ std::vector<std::vector<double>> Directions(const model::ParameterInfo& paramete
 }  // namespace
 
 std::string NameOf(const model::Effect& effect) {
+  if (effect.lookup) return "lookup " + effect.lookup->name;
   return effect.formula ? "formula " + effect.formula->name : effect.name;
 }
 

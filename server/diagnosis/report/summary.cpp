@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "server/base/readable_time.h"
+#include "server/diagnosis/selection/time_structure.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -39,7 +40,23 @@ std::string HowWrong(const Diagnosis& diagnosis) {
       diagnosis.noise_floor->from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
 }
 
+// Repeats that have a course in time in common scatter by more than noise.
+std::string TimeInRepeats(const selection::NoiseFloor& floor) {
+  return absl::StrFormat(
+      "Repeats of a touch differ by %s, but touches made one after the other by %s only (z %.1f): something "
+      "changes "
+      "slowly through the session, and that is not noise.",
+      TimeInWords(floor.sigma_s), TimeInWords(floor.sigma_without_time_s), floor.time_structure_z);
+}
+
 std::string WhatRemains(const selection::UnexplainedRest& rest) {
+  if (rest.formula.empty() && !rest.lookup_yaml.empty() && !rest.covariates.empty())
+    return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
+                        rest.covariates[0].name, " along a curve that would leave ", TimeInWords(rest.rmse_s),
+                        ".");
+  if (rest.formula.empty() && !rest.covariates.empty())
+    return absl::StrCat("What remains depends on ", rest.covariates[0].name,
+                        "; no effect of the catalogue explains it.");
   if (rest.formula.empty())
     return "A structure remains that neither an effect of the catalogue nor a simple formula explains.";
   return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
@@ -93,6 +110,8 @@ std::string Summarize(const Diagnosis& diagnosis) {
       sentences.push_back("Nothing is missing that these data could show.");
       break;
     case selection::Verdict::kUnexplained:
+      if (diagnosis.noise_floor && selection::SharesTime(*diagnosis.noise_floor))
+        sentences.push_back(TimeInRepeats(*diagnosis.noise_floor));
       sentences.push_back(WhatRemains(*diagnosis.unexplained));
       break;
     case selection::Verdict::kMissingEffects:

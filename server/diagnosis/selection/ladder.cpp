@@ -6,6 +6,7 @@
 #include "server/base/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/time_structure.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
@@ -61,13 +62,16 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
     if (SurfaceErrorIsAStep()) AddSurfaceError();
+    if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     AddNoiseSteps(selection_.noise, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
-    const bool rest = StructureRemains();
+    const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           ladder_.unexplained,
           DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
+      if (TimeStructureRemains())
+        NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
     }
     ladder_.verdict = has_formula() || rest    ? Verdict::kUnexplained
                       : !ladder_.steps.empty() ? Verdict::kMissingEffects
@@ -98,6 +102,7 @@ class LadderBuilder {
       best = touches::Residuals(o, with);
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
+    AddTimeStructure(o, best, &ladder_.noise_floor);
     return absl::OkStatus();
   }
 
@@ -182,7 +187,8 @@ class LadderBuilder {
     });
     const double gain_nats = selection_.surface_error.gain_nats;
     const bool misfit = ladder_.final.lack_of_fit_p < kMisfitP;
-    return !had && selection_.fit.hypothesis != 0 &&
+    // Where a curve of one covariate or a wander takes part, bumps are no explanation of what is left.
+    return !had && !selection_.curve && !selection_.memory && selection_.fit.hypothesis != 0 &&
            (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
   }
 
@@ -228,6 +234,9 @@ class LadderBuilder {
            ladder_.final.rmse_s * kMicrosecondsPerSecond >
                (1 + kUnexplainedShare) * (ladder_.noise_floor.sigma_s * kMicrosecondsPerSecond);
   }
+
+  // Repeats that share a course in time are not noise.
+  bool TimeStructureRemains() const { return !selection_.memory && SharesTime(ladder_.noise_floor); }
 
   const Workspace& workspace_;
   const SelectionResult& selection_;

@@ -36,6 +36,9 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
 // noise floor and final errors, which noise does not change.
 void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder);
 
+// A wander of the fingers, as a step or a refit.
+void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
+
 // Every effect of the catalogue as the only step.
 absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,
                                                             const SelectionResult& selection);

@@ -34,7 +34,38 @@ class NoiseStepWriter {
       Add(effect, estimate, found.gain_nats);
   }
 
+  // The wander has two parameters; a model that has it keeps values that are not clearly others.
+  void WriteMemory(const NoiseMemory& memory) {
+    const auto effect = effects::FindByRole(model::EffectRole::kNoiseMemory);
+    const std::vector<inference::ParameterEstimate> estimates = {
+        Estimate(effect->parameters[0], memory.sigma_s), Estimate(effect->parameters[1], memory.time_s)};
+    for (model::EffectInstance& instance : ladder_.improved.effects) {
+      if (instance.effect->role != model::EffectRole::kNoiseMemory) continue;
+      RefitMemory(estimates, &instance);
+      return;
+    }
+    Add(effect, estimates[0], memory.gain_nats);
+    ladder_.steps.back().parameters = estimates;
+    ladder_.improved.effects.back().values[1] =
+        ToSi(effect->parameters[1].unit, RoundedTo(estimates[1].value, estimates[1].std_error));
+  }
+
  private:
+  void RefitMemory(std::vector<inference::ParameterEstimate> estimates, model::EffectInstance* present) {
+    bool other = false;
+    for (size_t p = 0; p < estimates.size(); ++p) {
+      const double before = FromSi(present->effect->parameters[p].unit, present->values[p]);
+      estimates[p].before = before;
+      other |= std::abs(estimates[p].value - before) > kSignificant * estimates[p].std_error;
+    }
+    if (!other) return;
+    for (size_t p = 0; p < estimates.size(); ++p)
+      present->values[p] =
+          ToSi(present->effect->parameters[p].unit, RoundedTo(estimates[p].value, estimates[p].std_error));
+    ladder_.refitted.push_back({present->effect->name, std::move(estimates)});
+    ladder_.changed = true;
+  }
+
   static inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter,
                                                const inference::NoiseEstimate& found) {
     inference::ParameterEstimate estimate;
@@ -83,6 +114,10 @@ class NoiseStepWriter {
 };
 
 }  // namespace
+
+void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder) {
+  NoiseStepWriter(ladder).WriteMemory(memory);
+}
 
 void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder) {
   NoiseStepWriter writer(ladder);

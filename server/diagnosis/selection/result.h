@@ -35,6 +35,11 @@ struct NoiseFloor {
   double lower_s = 0, upper_s = 0;  // 95 % interval; 0 if unknown
   double degrees_of_freedom = 0;
   bool from_repeats = false;  // false: an upper bound from the best model's residuals
+  // The same without what changes slowly through the session, from neighbours in time (von Neumann); 0 without
+  // repeats. Less than sigma_s where repeats share a course in time, which is not noise.
+  double sigma_without_time_s = 0;
+  double time_structure_z = 0;  // lag-1 autocorrelation of what repeats differ by, over its spread by chance
+  double time_structure_p = 1;
 };
 
 // New values of an effect that the model has.

@@ -7,6 +7,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
+#include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
@@ -115,7 +116,7 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
         result->without_formula,
         inference::FitModel(workspace.experiment, best.fit.model.Without(result->formula)));
   }
-  return absl::OkStatus();
+  return CompeteWithCurves(workspace, result);
 }
 
 absl::Status FindCompetingEffects(SelectionResult* result) {
@@ -146,6 +147,9 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
       step.competing.push_back(
           {competitor.name, competitor.per_object, evidence, equivalent, competitor.fit.model.base()});
     }
+    // A curve without a name may say the same as an effect of time.
+    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
+      all += std::exp(std::min(rival->second, 700.0));
     step.probability = std::min(1.0, equivalent_sum / all);
     result->steps.push_back(std::move(step));
   }
@@ -250,6 +254,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
                                 ReviseTouches(result.fit, result.noise, workspace, &weights));
     if (!revised) break;
   }
+  if (result.memory) result.noise.sigma_s = result.memory->white_s;
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
   if (result.formula >= 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(

@@ -2,7 +2,9 @@
 // have, the kind of noise, a surface error; and what else fits as well.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,8 @@
 
 #include "server/diagnosis/inference/noise_kinds.h"
 #include "server/diagnosis/selection/formula_terms.h"
+#include "server/diagnosis/selection/nameless_curve.h"
+#include "server/diagnosis/selection/noise_memory.h"
 #include "server/diagnosis/selection/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
@@ -44,11 +48,17 @@ struct SelectionResult {
   inference::Fit fit;                      // everything: effects, refits, formula
   inference::Fit without_formula;          // the same if there is no formula
   int initial_effects = 0;                 // effects below this index are the initial model's
-  int formula = -1;                        // index of the formula's effect in fit.model
+  int formula = -1;                        // index of the formula's or the curve's effect in fit.model
   FormulaTerm term;
-  std::vector<FormulaTerm> terms;  // scored on what the named effects leave; empty if there is no formula
+  std::vector<FormulaTerm> terms;      // scored on what the named effects leave; empty if there is no formula
+  std::vector<NamelessCurve> curves;   // over what the named effects leave, largest gain first
+  std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
+  // Log evidence of a curve in the place of a named effect of time, over the effect's own, nats.
+  std::map<std::string, double> curve_rivals;
   std::vector<SelectedStep> steps;
   inference::NoiseFindings noise;
+  std::optional<NoiseMemory>
+      memory;  // the wander that the residuals follow, where no curve describes them better
   SurfaceErrorFinding surface_error;
 };
 

@@ -43,7 +43,8 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit,
   std::vector<Extension> extensions;
   const model::Model& model = fit.model.base();
   for (int index = 0; index < initial_effects; ++index) {
-    if (fit.model.IsFree(index) || model.effects[index].effect->random()) continue;
+    const model::Effect& own = *model.effects[index].effect;
+    if (fit.model.IsFree(index) || own.random() || own.parameters.empty()) continue;
     Extension extension;
     extension.name = inference::NameOf(*model.effects[index].effect);
     extension.start = fit.model;
@@ -220,7 +221,8 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
 absl::StatusOr<bool> StepwiseSearch::SwapStep(Explanation* explanation) const {
   for (int index = explanation->initial_effects;
        index < static_cast<int>(explanation->fit.model.base().effects.size()); ++index) {
-    if (explanation->fit.model.base().effects[index].effect->formula != nullptr) continue;
+    const model::Effect& effect = *explanation->fit.model.base().effects[index].effect;
+    if (effect.formula != nullptr || effect.lookup != nullptr) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<CompetingFit> competing, CompetingFits(*explanation, index));
     if (competing.size() < 2 || competing[1].fit.log_evidence <= explanation->fit.log_evidence + 0.5)
       continue;

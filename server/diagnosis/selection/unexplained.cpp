@@ -9,6 +9,7 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone::diagnosis::selection {
@@ -30,7 +31,16 @@ double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const E
   return (s * s.colPivHouseholderQr().solve(c)).norm() / c.norm();
 }
 
-// "formula: ..." as it stands in a model file.
+// "- lookup: ..." as it stands in a model file.
+std::string EffectYaml(model::Model model, model::EffectInstance instance) {
+  model.effects = {std::move(instance)};
+  const std::string text = model::FormatModel(model);
+  const size_t at = text.find("effects:");
+  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
+  return line == std::string::npos ? text : text.substr(line + 1);
+}
+
+// The formula as it stands in a model file.
 std::string FormulaYaml(const inference::Fit& fit, int index) {
   model::Model only = fit.model.base();
   only.effects = {only.effects[index]};
@@ -40,10 +50,7 @@ std::string FormulaYaml(const inference::Fit& fit, int index) {
     const model::ParameterInfo& parameter = instance.effect->parameters[at_value];
     instance.values[at_value++] = ToSi(parameter.unit, RoundedTo(estimate.value, estimate.std_error));
   }
-  const std::string text = model::FormatModel(only);
-  const size_t at = text.find("effects:");
-  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
-  return line == std::string::npos ? text : text.substr(line + 1);
+  return EffectYaml(only, std::move(only.effects[0]));
 }
 
 // Each covariate by its best term, the number of terms paid for; those that chance hardly brings about, largest
@@ -88,6 +95,46 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
   return absl::OkStatus();
 }
 
+// What the curve in the model does; errors on unseen touches are refitted without parts of them.
+absl::Status DescribeCurve(const Workspace& workspace, const SelectionResult& selection, const Quality& final,
+                           double floor_s, UnexplainedRest* rest) {
+  const NamelessCurve& curve = *selection.curve;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
+                              workspace.predictor->Run(selection.fit.model.base(), false, false));
+  const touches::Observations& o = *workspace.observations;
+  rest->rmse_s = touches::Rmse(o, touches::Residuals(o, with));
+  const double in_sample = std::sqrt(selection.fit.columns.values.col(0).squaredNorm() /
+                                     std::max<double>(1, selection.fit.columns.values.rows()));
+  const double ratio = in_sample > 0 ? std::max(1.0, curve.heldout_with_s / in_sample) : 1;
+  rest->heldout_rmse_s = rest->rmse_s * ratio;
+  const double before = std::pow(final.rmse_s, 2) - floor_s * floor_s;
+  const double after = std::pow(rest->heldout_rmse_s, 2) - floor_s * floor_s;
+  rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+  return absl::OkStatus();
+}
+
+// Curves among the covariates: the one that explains the rest first, then those that gain most.
+void AddCurves(const SelectionResult& selection, std::vector<CovariateTest>* tests) {
+  for (const NamelessCurve& curve : selection.curves) {
+    if (!IsSignificant(curve)) continue;
+    const CovariateTest found = {curve.covariate, curve.p, curve.gain_nats};
+    const auto same = std::find_if(tests->begin(), tests->end(),
+                                   [&](const CovariateTest& test) { return test.name == found.name; });
+    if (same == tests->end())
+      tests->push_back(found);
+    else if (same->gain_nats < found.gain_nats)
+      *same = found;
+  }
+  std::stable_sort(tests->begin(), tests->end(),
+                   [](const CovariateTest& a, const CovariateTest& b) { return a.gain_nats > b.gain_nats; });
+  if (selection.curve) {
+    const std::string& first = selection.curve->covariate;
+    std::stable_partition(tests->begin(), tests->end(),
+                          [&](const CovariateTest& test) { return test.name == first; });
+  }
+  if (tests->size() > kMaxCovariates) tests->resize(kMaxCovariates);
+}
+
 // What of the catalogue looks most like the formula.
 absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult& selection,
                                UnexplainedRest* rest) {
@@ -130,7 +177,16 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
   const bool has_formula = selection.formula >= 0;
   UnexplainedRest rest;
   rest.covariates = TestCovariates(terms, has_formula ? selection.term.covariate : "");
+  AddCurves(selection, &rest.covariates);
+  if (selection.curve) {
+    const auto effect = MakeCurveEffect(*selection.curve);
+    if (effect.ok()) rest.lookup_yaml = EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
+  }
   if (!has_formula) return rest;
+  if (selection.fit.model.base().effects[selection.formula].effect->lookup != nullptr) {
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeCurve(workspace, selection, final, floor_s, &rest));
+    return rest;
+  }
   TOUCHSTONE_RETURN_IF_ERROR(DescribeFormula(workspace, selection, final, floor_s, &rest));
   TOUCHSTONE_RETURN_IF_ERROR(FindNearestEffect(workspace, selection, &rest));
   return rest;

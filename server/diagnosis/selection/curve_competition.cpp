@@ -1,0 +1,248 @@
+#include "server/diagnosis/selection/curve_competition.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/selection/time_structure.h"
+#include "server/effects/lookup.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr int kMaxCovariatesTried = 3;
+constexpr double kSimplerNats = 3;    // an effect must be worth this much beside a curve
+constexpr double kFormulaNats = 5;    // a formula this near says the same in fewer words
+constexpr double kMemoryNats = 10;    // a wander must be this much better than a curve and than one step
+constexpr double kOvertakenNats = 1;  // a curve alone that is this much better takes a named effect's place
+
+constexpr double kWorthUnderMemoryNats = 10;
+constexpr double kDroppedNats = 15;  // that it must be better by for each named effect it needs beside it
+
+// A fit of named effects, and a curve over it.
+struct WithCurve {
+  inference::Fit fit;
+  NamelessCurve curve;
+  double total() const { return fit.log_evidence + curve.gain_nats; }
+};
+
+// To a multiple of a power of ten; such a power is exact upwards only.
+double RoundedToDigits(double value, double unit) {
+  return unit >= 1 ? std::round(value / unit) * unit : std::round(value / unit) / std::round(1 / unit);
+}
+
+class Competition {
+ public:
+  Competition(const Workspace& workspace, SelectionResult* result)
+      : workspace_(workspace), result_(*result) {}
+
+  absl::Status Run() {
+    inference::Fit named = result_.without_formula;
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(named, ""));
+    TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named));
+    std::vector<WithCurve> found;
+    for (const NamelessCurve& curve : result_.curves) {
+      if (found.size() == kMaxCovariatesTried || !IsSignificant(curve)) break;
+      WithCurve with{named, curve};
+      TOUCHSTONE_RETURN_IF_ERROR(DropSuperfluous(&with));
+      found.push_back(std::move(with));
+    }
+    const auto best =
+        std::max_element(found.begin(), found.end(),
+                         [](const WithCurve& a, const WithCurve& b) { return a.total() < b.total(); });
+    if (best == found.end()) return LookForMemory(named);
+    if (result_.formula >= 0 && FormulaSaysTheSame(*best)) return DescribeBesideFormula();
+    if (best->curve.of_time) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool wanders, IsNoiseWithMemory(*best));
+      if (wanders) return absl::OkStatus();
+    }
+    return Adopt(*best);
+  }
+
+ private:
+  absl::StatusOr<std::vector<NamelessCurve>> CurvesOver(const inference::Fit& fit,
+                                                        const std::string& only) const {
+    if (workspace_.experiment.cancelled && workspace_.experiment.cancelled())
+      return absl::CancelledError("the diagnosis was cancelled");
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
+                                workspace_.searched_predictor->Run(fit.model.base(), true, true));
+    return ScoreCurves(workspace_.experiment, *workspace_.rows, fit, details, only);
+  }
+
+  // A curve of time (of the previous press, for effects of that) in the place of named effects: of all together, then
+  // of each. A constant per finger may be the mean of a course, a drift its trend.
+  absl::Status ReplaceOvertaken(inference::Fit* named) {
+    std::vector<int> steps;
+    for (int index = result_.initial_effects; index < static_cast<int>(named->model.base().effects.size());
+         ++index)
+      steps.push_back(index);
+    if (steps.size() > 1) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool replaced, Overtake(steps, named));
+      if (replaced) return absl::OkStatus();
+    }
+    for (auto index = steps.rbegin(); index != steps.rend(); ++index)
+      TOUCHSTONE_RETURN_IF_ERROR(Overtake({*index}, named).status());
+    return absl::OkStatus();
+  }
+
+  // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
+  absl::StatusOr<bool> Overtake(const std::vector<int>& steps, inference::Fit* named) {
+    inference::Parameterization rest = named->model;
+    std::string covariate = workspace_.input.set->has_session_time ? "session_time_s" : "touch";
+    std::vector<std::string> names;
+    for (auto index = steps.rbegin(); index != steps.rend(); ++index) {
+      const model::Effect& effect = *named->model.base().effects[*index].effect;
+      if (steps.size() == 1 && effect.needs.previous_press) covariate = "previous_press_mm";
+      names.push_back(inference::NameOf(effect));
+      rest = rest.Without(*index);
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
+                                inference::FitModel(workspace_.experiment, std::move(rest)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves, CurvesOver(without, covariate));
+    if (curves.empty() || !IsSignificant(curves[0])) return false;
+    const double ahead = without.log_evidence + curves[0].gain_nats - named->log_evidence;
+    for (const std::string& name : names) {
+      double& rival = result_.curve_rivals.emplace(name, ahead).first->second;
+      rival = std::max(rival, ahead);
+    }
+    if (ahead < kOvertakenNats) return false;
+    *named = std::move(without);
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
+    return true;
+  }
+
+  // Effects that the curve makes superfluous leave one by one, the most superfluous first.
+  absl::Status DropSuperfluous(WithCurve* with) const {
+    for (;;) {
+      WithCurve best = *with;
+      bool dropped = false;
+      for (int index = static_cast<int>(with->fit.model.base().effects.size()) - 1;
+           index >= result_.initial_effects; --index) {
+        WithCurve trial;
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            trial.fit, inference::FitModel(workspace_.experiment, with->fit.model.Without(index)));
+        TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves,
+                                    CurvesOver(trial.fit, with->curve.covariate));
+        if (curves.empty()) continue;
+        trial.curve = curves[0];
+        if (trial.total() < (dropped ? best.total() : with->total() - kSimplerNats)) continue;
+        best = std::move(trial);
+        dropped = true;
+      }
+      if (!dropped) return absl::OkStatus();
+      *with = std::move(best);
+    }
+  }
+
+  // A wander has no course that another session would repeat: it is noise, which a curve only traces.
+  absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace_.searched_predictor->Run(with.fit.model.base(), false, false));
+    const touches::Observations& o = *workspace_.searched;
+    std::optional<NoiseMemory> memory = FindNoiseMemory(o, touches::Residuals(o, prediction));
+    if (!memory || !memory->everywhere ||
+        memory->gain_nats < std::max(with.curve.gain_nats, memory->step_gain_nats) + kMemoryNats)
+      return false;
+    result_.fit = with.fit;
+    TOUCHSTONE_RETURN_IF_ERROR(DropWhatWandered(&*memory));
+    result_.memory = std::move(memory);
+    result_.without_formula = result_.fit;
+    result_.formula = -1;
+    return true;
+  }
+
+  // Effects that were found under noise without memory must be worth their values under a wander too.
+  absl::Status DropWhatWandered(NoiseMemory* memory) {
+    const touches::Observations& o = *workspace_.searched;
+    for (int index = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
+         index >= result_.initial_effects; --index) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          inference::Fit without,
+          inference::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                  workspace_.searched_predictor->Run(without.model.base(), false, false));
+      const std::optional<NoiseMemory> other = FindNoiseMemory(o, touches::Residuals(o, prediction));
+      if (!other || other->log_likelihood < memory->log_likelihood - kWorthUnderMemoryNats) continue;
+      result_.fit = std::move(without);
+      *memory = *other;
+    }
+    return absl::OkStatus();
+  }
+
+  // No curve says how, but repeats share a course in time.
+  absl::Status LookForMemory(const inference::Fit& named) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace_.searched_predictor->Run(named.model.base(), false, false));
+    const touches::Observations& o = *workspace_.searched;
+    if (result_.formula >= 0 ||
+        !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kTimeStructureP))
+      return absl::OkStatus();
+    return IsNoiseWithMemory({named, NamelessCurve()}).status();
+  }
+
+  // In fewer words, and without named effects that the curve does without.
+  bool FormulaSaysTheSame(const WithCurve& with) const {
+    const auto named = [&](const inference::Fit& fit) {
+      return static_cast<double>(fit.model.base().effects.size()) - result_.initial_effects;
+    };
+    const double dropped = named(result_.without_formula) - named(with.fit);
+    return result_.fit.log_evidence > with.total() - kFormulaNats + kDroppedNats * dropped;
+  }
+
+  // The formula stays; a curve of its covariate is given beside it.
+  absl::Status DescribeBesideFormula() {
+    for (const NamelessCurve& curve : result_.curves)
+      if (curve.covariate == result_.term.covariate) result_.curve = curve;
+    return absl::OkStatus();
+  }
+
+  absl::Status Adopt(const WithCurve& with) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(with.fit, ""));
+    result_.curve = with.curve;
+    if (with.curve.covariate == "touch") {
+      // Models know session times and not rows: without such times there is nothing to add.
+      result_.fit = result_.without_formula = with.fit;
+      result_.formula = -1;
+      return absl::OkStatus();
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effect, MakeCurveEffect(with.curve));
+    inference::Parameterization start = with.fit.model;
+    start.Add(effect, false);
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.fit, inference::FitModel(workspace_.experiment, std::move(start)));
+    result_.formula = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        result_.without_formula,
+        inference::FitModel(workspace_.experiment, result_.fit.model.Without(result_.formula)));
+    result_.term = FormulaTerm();
+    result_.term.covariate = with.curve.covariate;
+    return absl::OkStatus();
+  }
+
+  const Workspace& workspace_;
+  SelectionResult& result_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurveEffect(const NamelessCurve& curve) {
+  model::LookupSpec spec;
+  spec.name = "rest_" + curve.covariate;
+  spec.adds_time = curve.adds_time;
+  spec.stage = curve.adds_time ? model::Stage::kSensor : model::Stage::kMotion;
+  spec.covariate = curve.covariate;
+  const double range = curve.knots.back() - curve.knots.front();
+  const double knot_unit = std::pow(10.0, std::floor(std::log10(std::max(range, 1e-12))) - 5);
+  for (const double knot : curve.knots) spec.knots.push_back(RoundedToDigits(knot, knot_unit));
+  const double value_unit = curve.adds_time ? 0.1 : 1e-5;  // us; mm
+  for (const std::vector<double>& values : curve.values) {
+    spec.values.emplace_back();
+    for (const double value : values) spec.values.back().push_back(RoundedToDigits(value, value_unit));
+  }
+  return effects::MakeLookupEffect(spec);
+}
+
+absl::Status CompeteWithCurves(const Workspace& workspace, SelectionResult* result) {
+  return Competition(workspace, result).Run();
+}
+
+}  // namespace touchstone::diagnosis::selection

@@ -1,0 +1,38 @@
+#include "server/diagnosis/selection/curve_competition.h"
+
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/touches/simulated_test_set.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+// What the search says of a rig with this hidden.
+SelectionResult ResultFor(const std::string& effect, const std::vector<std::string>& values) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 6;
+  rig.hidden = {{effect, values}};
+  auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
+  EXPECT_TRUE(workspace.ok()) << workspace.status();
+  auto result = SelectExplanation(workspace->get());
+  EXPECT_TRUE(result.ok()) << result.status();
+  result->search.reset();  // it refers to the workspace
+  return *std::move(result);
+}
+
+TEST(CurveCompetition, ADriftKeepsItsName) {
+  const SelectionResult result = ResultFor("thermal_drift", {"rate_mm_per_h=0.5,0,-0.5"});
+  EXPECT_FALSE(result.curve);
+  ASSERT_EQ(result.steps.size(), 1u);
+  EXPECT_GT(result.steps[0].probability, 0.9);
+}
+
+TEST(CurveCompetition, AWanderIsNoiseWithMemory) {
+  const SelectionResult result = ResultFor("correlated_noise", {"sigma_us=6000", "time_s=200"});
+  ASSERT_TRUE(result.memory);
+  EXPECT_NEAR(result.memory->sigma_s.value, 0.006, 5 * result.memory->sigma_s.std_error);
+  EXPECT_TRUE(result.steps.empty());
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::selection

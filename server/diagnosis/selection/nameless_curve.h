@@ -1,0 +1,51 @@
+// Curves without a name: what the residuals follow of one covariate, whatever its shape. A curve is linear between
+// knots; its values have a prior that punishes bends (second differences) and absurd sizes, and the evidence,
+// averaged over how much it may bend, judges it as it judges effects:
+//   r = J theta + B c + (surface) + e,   c ~ N(0, (D'D / bend^2 + I / (knots size^2))^-1)
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/touches/touch_observation_model.h"
+
+namespace touchstone::diagnosis::selection {
+
+// Something that a curve may follow.
+struct CurveCovariate {
+  std::string name;      // as lookups and formulas name it; "touch" where the set has no session times
+  bool differs = false;  // from finger to finger within a touch: a curve that all share can be seen
+  bool of_time = false;  // the place in the session
+  std::function<double(int k, int finger)> value;
+};
+
+// Those that vary. `observations` and `details` (with curvature) must outlive the list.
+std::vector<CurveCovariate> ListCurveCovariates(const touches::Observations& observations,
+                                                const touches::Prediction& details);
+
+struct NamelessCurve {
+  std::string covariate;
+  bool of_time = false, per_finger = false, adds_time = false;
+  std::vector<double> knots;
+  std::vector<std::vector<double>> values;  // mm (us if adds_time) at the knots: one list, or one per finger
+  double gain_nats = 0;                     // log evidence over the fit without it
+  double p = 1;                             // bound on chance, paid for every curve that was tried
+  double effective_dof = 0;
+  // Root mean square of rows, s, fitted without a fifth of the poses (of the session's stretches, for time) and
+  // measured there: of the fit alone, and with the curve.
+  double heldout_without_s = 0, heldout_with_s = 0;
+};
+
+// Curves over `fit`, largest gain first: one per covariate, the better of shared and per finger. Held-out errors are
+// those of the best few only. `only`: of this covariate alone; empty: of all.
+std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
+                                       const touches::TouchObservationModel& touches,
+                                       const inference::Fit& fit, const touches::Prediction& details,
+                                       const std::string& only);
+
+// Whether chance hardly brings the curve about, and touches that it was not fitted to have less error with it.
+bool IsSignificant(const NamelessCurve& curve);
+
+}  // namespace touchstone::diagnosis::selection

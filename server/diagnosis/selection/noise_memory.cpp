@@ -1,0 +1,171 @@
+#include "server/diagnosis/selection/noise_memory.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr int kMinComplete = 60;
+
+// Orthonormal contrasts of complete touches: their channels wander independently of each other.
+struct Course {
+  int channels = 0;
+  std::vector<double> gap_s;  // since the touch before; infinite: a new session
+  std::vector<double> value;  // [touch * channels + channel]
+  int touches() const { return static_cast<int>(gap_s.size()); }
+};
+
+Course CourseOf(const touches::Observations& o, const std::vector<double>& residuals) {
+  Course course;
+  course.channels = o.fingers - 1;
+  double last_s = 0;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    const double* r = &residuals[static_cast<size_t>(k) * o.fingers];
+    if (std::any_of(r, r + o.fingers, [](double x) { return std::isnan(x); })) continue;
+    const double time_s = o.set->session_time_s[o.row[k]];
+    const bool begins = course.gap_s.empty() || time_s < last_s;
+    course.gap_s.push_back(begins ? INFINITY : time_s - last_s);
+    last_s = time_s;
+    double sum = 0;
+    for (int row = 1; row < o.fingers; ++row) {
+      sum += r[row - 1];
+      course.value.push_back((r[row] * row - sum) / std::sqrt(row * (row + 1.0)));
+    }
+  }
+  return course;
+}
+
+struct WanderLikelihood {
+  double log_likelihood = 0;
+  double white_s = 0;
+};
+
+// Variance ratio wander / white, and correlation time; the white noise is profiled.
+WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
+  const int n = course.touches(), channels = course.channels;
+  std::vector<double> mean(channels, 0.0);
+  double variance = ratio, squares = 0, logs = 0;
+  for (int k = 0; k < n; ++k) {
+    const double rho = std::exp(-course.gap_s[k] / time_s);
+    variance = rho * rho * variance + (1 - rho * rho) * ratio;
+    const double innovation = variance + 1, gain = variance / innovation;
+    for (int c = 0; c < channels; ++c) {
+      mean[c] *= rho;
+      const double apart = course.value[static_cast<size_t>(k) * channels + c] - mean[c];
+      squares += apart * apart / innovation;
+      mean[c] += gain * apart;
+    }
+    logs += channels * std::log(innovation);
+    variance *= 1 - gain;
+  }
+  const double count = static_cast<double>(n) * channels;
+  const double white2 = std::max(squares / count, 1e-30);
+  return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
+}
+
+// Standard error of the logarithm of one coordinate: curvature of the likelihood along it.
+double LogError(const Course& course, double ratio, double time_s, bool of_time) {
+  constexpr double kStep = 0.2;
+  const auto at = [&](double step) {
+    const double factor = std::exp(step);
+    return Likelihood(course, of_time ? ratio : ratio * factor, of_time ? time_s * factor : time_s)
+        .log_likelihood;
+  };
+  const double curvature = (2 * at(0) - at(kStep) - at(-kStep)) / (kStep * kStep);
+  return curvature > 1e-3 ? 1 / std::sqrt(curvature) : 30;
+}
+
+// Touches begin to end as a course of their own.
+Course PartOf(const Course& course, int begin, int end) {
+  Course part;
+  part.channels = course.channels;
+  part.gap_s.assign(course.gap_s.begin() + begin, course.gap_s.begin() + end);
+  part.gap_s[0] = INFINITY;
+  part.value.assign(course.value.begin() + static_cast<long>(begin) * course.channels,
+                    course.value.begin() + static_cast<long>(end) * course.channels);
+  return part;
+}
+
+bool ShowsEverywhere(const Course& course, double ratio, double time_s) {
+  int quarters = 0;
+  for (int q = 0; q < 4; ++q) {
+    const Course part = PartOf(course, course.touches() * q / 4, course.touches() * (q + 1) / 4);
+    quarters += Likelihood(part, ratio, time_s).log_likelihood > Likelihood(part, 0, time_s).log_likelihood;
+  }
+  return quarters >= 3;
+}
+
+// One step of the fingers at the moment that fits best.
+double StepGain(const Course& course) {
+  const int n = course.touches(), channels = course.channels;
+  std::vector<double> total(channels, 0.0), head(channels, 0.0);
+  double squares = 0;
+  for (int k = 0; k < n; ++k)
+    for (int c = 0; c < channels; ++c) {
+      const double x = course.value[static_cast<size_t>(k) * channels + c];
+      total[c] += x;
+      squares += x * x;
+    }
+  double best = 0;
+  for (int k = 0; k + 1 < n; ++k) {
+    double explained = 0;
+    for (int c = 0; c < channels; ++c) {
+      head[c] += course.value[static_cast<size_t>(k) * channels + c];
+      const double tail = total[c] - head[c];
+      explained += head[c] * head[c] / (k + 1) + tail * tail / (n - k - 1);
+    }
+    best = std::max(best, explained);
+  }
+  const double count = static_cast<double>(n) * channels;
+  return -0.5 * count * std::log(std::max(1 - best / squares, 1e-12)) - channels * std::log(count) -
+         std::log(n);
+}
+
+}  // namespace
+
+std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
+                                           const std::vector<double>& residuals) {
+  if (!o.set->has_session_time || o.fingers < 2) return std::nullopt;
+  const Course course = CourseOf(o, residuals);
+  if (course.touches() < kMinComplete) return std::nullopt;
+  double span_s = 0;
+  for (const double gap_s : course.gap_s)
+    if (std::isfinite(gap_s)) span_s += gap_s;
+  const double min_s = span_s / course.touches(), max_s = span_s / 2;
+  if (!(min_s > 0)) return std::nullopt;
+
+  // A coarse grid over both, then ever finer ones round the best.
+  double ratio = 1, time_s = std::sqrt(min_s * max_s), ratio_width = std::log(1e3),
+         time_width = 0.5 * std::log(max_s / min_s);
+  WanderLikelihood best = Likelihood(course, ratio, time_s);
+  for (int pass = 0; pass < 7; ++pass) {
+    const double ratio_centre = ratio, time_centre = time_s;
+    for (int a = -4; a <= 4; ++a)
+      for (int b = -4; b <= 4; ++b) {
+        const double r = ratio_centre * std::exp(ratio_width * a / 4);
+        const double t = std::clamp(time_centre * std::exp(time_width * b / 4), min_s, max_s);
+        const WanderLikelihood here = Likelihood(course, r, t);
+        if (here.log_likelihood <= best.log_likelihood) continue;
+        best = here;
+        ratio = r;
+        time_s = t;
+      }
+    ratio_width *= 0.4;
+    time_width *= 0.4;
+  }
+  const double count = static_cast<double>(course.touches()) * course.channels;
+  NoiseMemory found;
+  found.gain_nats = best.log_likelihood - Likelihood(course, 0, time_s).log_likelihood - std::log(count);
+  found.log_likelihood = best.log_likelihood;
+  found.everywhere = ShowsEverywhere(course, ratio, time_s);
+  found.step_gain_nats = StepGain(course);
+  found.white_s = {best.white_s, best.white_s / std::sqrt(2 * count), 0};
+  found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};
+  found.sigma_s.std_error = 0.5 * found.sigma_s.value * LogError(course, ratio, time_s, false);
+  found.time_s = {time_s, time_s * LogError(course, ratio, time_s, true), found.gain_nats};
+  return found;
+}
+
+}  // namespace touchstone::diagnosis::selection

@@ -1,0 +1,27 @@
+// Noise with memory: how much of what a model leaves is a Gauss-Markov wander of each finger in session time, beside
+// noise without memory. Maximum likelihood by a Kalman filter over the touches in the order of the session.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "server/diagnosis/inference/noise_kinds.h"
+#include "server/diagnosis/touches/observations.h"
+
+namespace touchstone::diagnosis::selection {
+
+struct NoiseMemory {
+  inference::NoiseEstimate sigma_s;  // of the wander
+  inference::NoiseEstimate time_s;   // its correlation time
+  inference::NoiseEstimate white_s;  // of the noise without memory beside it
+  double log_likelihood = 0;
+  bool everywhere = false;    // the wander shows in three of four quarters of the session: it is no event
+  double gain_nats = 0;       // log evidence over noise without memory (BIC)
+  double step_gain_nats = 0;  // the same of one step of the fingers at the best moment, and no wander
+};
+
+// `residuals` [k * fingers + i]. Nothing without session times or with too few complete touches.
+std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& observations,
+                                           const std::vector<double>& residuals);
+
+}  // namespace touchstone::diagnosis::selection

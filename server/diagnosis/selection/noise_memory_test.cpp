@@ -1,0 +1,74 @@
+#include "server/diagnosis/selection/noise_memory.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/base/random.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+// 960 touches ten seconds apart: noise of 5 ms, and on each finger a course of the session.
+struct CourseOfSession {
+  touches::Observations o;
+  std::vector<double> residuals;
+
+  template <typename CourseOf>
+  CourseOfSession(uint64_t seed, CourseOf course) {
+    auto set = std::make_shared<session::MeasurementSet>();
+    set->has_session_time = true;
+    o.fingers = 3;
+    RandomStream random(seed, RandomDomain::kTest);
+    for (int k = 0; k < 960; ++k) {
+      set->session_time_s.push_back(10.0 * k);
+      o.row.push_back(k);
+      o.used.push_back(1);
+      double r[3], mean = 0;
+      for (int i = 0; i < 3; ++i) r[i] = 0.005 * random.Normal() + course(k, i, &random);
+      for (const double value : r) mean += value / 3;
+      for (const double value : r) residuals.push_back(value - mean);
+    }
+    o.set = set;
+  }
+};
+
+TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
+  double state[3] = {0, 0, 0};
+  const CourseOfSession session(3, [&state](int, int i, RandomStream* random) {
+    const double rho = std::exp(-10.0 / 300);
+    state[i] = rho * state[i] + 0.007 * std::sqrt(1 - rho * rho) * random->Normal();
+    return state[i];
+  });
+  const auto found = FindNoiseMemory(session.o, session.residuals);
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->gain_nats, 100);
+  EXPECT_NEAR(found->sigma_s.value, 0.007, 4 * found->sigma_s.std_error);
+  EXPECT_NEAR(std::log(found->time_s.value / 300), 0, 4 * found->time_s.std_error / found->time_s.value);
+  EXPECT_NEAR(found->white_s.value, 0.005, 3e-4);
+  EXPECT_TRUE(found->everywhere);
+  EXPECT_GT(found->gain_nats, found->step_gain_nats + 20);
+}
+
+TEST(NoiseMemory, GainsNothingWithoutAWander) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
+    EXPECT_LT(FindNoiseMemory(session.o, session.residuals)->gain_nats, 2);
+  }
+}
+
+TEST(NoiseMemory, ASingleStepIsNoWander) {
+  const CourseOfSession session(4,
+                                [](int k, int i, RandomStream*) { return i == 1 && k > 400 ? 0.0125 : 0.0; });
+  const auto found = FindNoiseMemory(session.o, session.residuals);
+  EXPECT_GT(found->step_gain_nats, found->gain_nats);
+}
+
+TEST(NoiseMemory, AnEventIsNoWander) {
+  const CourseOfSession session(
+      5, [](int k, int i, RandomStream*) { return i == 0 && k > 500 && k < 570 ? 0.012 : 0.0; });
+  EXPECT_FALSE(FindNoiseMemory(session.o, session.residuals)->everywhere);
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::selection

@@ -1,0 +1,162 @@
+// Lookup: a curve over one covariate that adds travel_mm or time_us to each finger.
+//   added = v_n + (v_(n+1) - v_n) (x - x_n) / (x_(n+1) - x_n)  between the knots x_n and x_(n+1); constant beyond
+// Linear between knots, because a person can read it off the file, it never overshoots what was measured, and the
+// diagnosis fits values at knots: what it claims is exactly what is simulated.
+// A finger without contact gets nothing. A covariate that is not finite is an error of the whole batch.
+#include "server/effects/lookup.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/text.h"
+#include "server/effects/formula.h"
+
+namespace touchstone::effects {
+
+// The catalogue's entry, which only describes; MakeLookupEffect makes effects that act.
+model::Effect Lookup() {
+  model::Effect effect;
+  effect.name = "lookup";
+  effect.stage = model::Stage::kMotion;
+  effect.meaning =
+      "A curve of your own, or one that a diagnosis found: it adds travel_mm or time_us to each finger, by "
+      "the "
+      "value of one covariate. It needs a name, a covariate, knots and values.";
+  effect.signature =
+      "What the curve shows. The diagnosis gives one where no built-in effect explains what depends on a "
+      "covariate.";
+  effect.check_on_rig = "Change the covariate alone and hold the rest: the error follows the curve.";
+  effect.remedy = "Find the cause behind the curve; then give the cause a built-in effect, or remove it.";
+  effect.apply = [](absl::Span<const double>, TouchBatch&) {};
+  return effect;
+}
+
+double LookupValue(const model::LookupSpec& spec, int finger, double covariate) {
+  const std::vector<double>& values = spec.values[spec.values.size() > 1 ? finger : 0];
+  const auto above = std::upper_bound(spec.knots.begin(), spec.knots.end(), covariate);
+  if (above == spec.knots.begin()) return values.front();
+  if (above == spec.knots.end()) return values.back();
+  const size_t n = static_cast<size_t>(above - spec.knots.begin());
+  const double share = (covariate - spec.knots[n - 1]) / (spec.knots[n] - spec.knots[n - 1]);
+  return values[n - 1] + (values[n] - values[n - 1]) * share;
+}
+
+namespace {
+
+// Where the covariate of a lookup comes from.
+struct LookupInput {
+  model::LookupSpec spec;
+  double (*read)(const TouchBatch&, int, int) = nullptr;  // null: a cov_* column
+};
+
+std::vector<double>& LookupTarget(const model::LookupSpec& spec, TouchBatch& touches) {
+  if (spec.stage == model::Stage::kPose) return touches.travel_offset_m;
+  return spec.stage == model::Stage::kSensor ? touches.reported_time_s : touches.travel_m;
+}
+
+void ApplyLookup(const LookupInput& input, TouchBatch& touches) {
+  if (!touches.formula_error.empty()) return;
+  const model::LookupSpec& spec = input.spec;
+  const std::string title = absl::StrCat("lookup '", spec.name, "'");
+  if (spec.values.size() > 1 && static_cast<int>(spec.values.size()) != touches.fingers()) {
+    touches.formula_error = absl::StrCat(title, " has values for ", spec.values.size(),
+                                         " fingers and the rig ", touches.fingers());
+    return;
+  }
+  const double* column = nullptr;
+  if (input.read == nullptr) {
+    const auto found = touches.covariates.find(spec.covariate);
+    if (found == touches.covariates.end()) {
+      touches.formula_error =
+          absl::StrCat(title, " needs the column ", spec.covariate, ", which these touches do not have");
+      return;
+    }
+    column = found->second.data();
+  }
+  std::vector<double>& target = LookupTarget(spec, touches);
+  const bool needs_contact = spec.stage != model::Stage::kPose;
+  const double si_factor = spec.adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre;
+  for (int finger = 0; finger < touches.fingers(); ++finger) {
+    for (int touch = 0; touch < touches.size(); ++touch) {
+      const int entry = touches.At(finger, touch);
+      if (needs_contact && std::isnan(touches.travel_m[entry])) continue;
+      const double covariate = column != nullptr ? column[touch] : input.read(touches, finger, touch);
+      if (!std::isfinite(covariate)) {
+        touches.formula_error = absl::StrCat(title, ": ", spec.covariate, " is ", ShortestNumber(covariate),
+                                             " for touch ", touches.index[touch], ", finger ", finger);
+        return;
+      }
+      double added = LookupValue(spec, finger, covariate) * si_factor;
+      if (spec.stage == model::Stage::kSensor && !spec.adds_time) added *= touches.time_per_travel_s_m[entry];
+      target[entry] += added;
+    }
+  }
+}
+
+absl::Status CheckCurve(const model::LookupSpec& spec) {
+  const auto wrong = [](const auto&... parts) { return absl::InvalidArgumentError(absl::StrCat(parts...)); };
+  if (spec.name.empty() || spec.name.size() > 64) return wrong("a name has 1 to 64 characters");
+  if (spec.adds_time && spec.stage != model::Stage::kSensor)
+    return wrong("time_us can be added in the sensor stage only, not in the ", model::StageName(spec.stage),
+                 " stage; there add travel_mm");
+  if (spec.knots.size() < 2 || spec.knots.size() > kMaxLookupKnots)
+    return wrong("it has ", spec.knots.size(), " knots; it needs 2 to ", kMaxLookupKnots);
+  for (size_t n = 0; n < spec.knots.size(); ++n)
+    if (!std::isfinite(spec.knots[n]) || (n > 0 && !(spec.knots[n] > spec.knots[n - 1])))
+      return wrong("knots must rise; knot ", n + 1, " is ", ShortestNumber(spec.knots[n]));
+  if (spec.values.empty()) return wrong("it has no values");
+  for (const std::vector<double>& values : spec.values) {
+    if (values.size() != spec.knots.size())
+      return wrong("it has ", spec.knots.size(), " knots and ", values.size(),
+                   " values; each knot needs one");
+    for (const double value : values)
+      if (!std::isfinite(value)) return wrong("a value is ", ShortestNumber(value));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FindCovariate(LookupInput* input, model::EffectNeeds* needs) {
+  const std::string& name = input->spec.covariate;
+  std::vector<std::string> known;
+  for (const FormulaVariable& variable : FormulaVariables()) {
+    known.push_back(variable.name);
+    if (name != variable.name) continue;
+    if (variable.since > input->spec.stage)
+      return absl::InvalidArgumentError(absl::StrCat(
+          name, " is known from the ", model::StageName(variable.since),
+          " stage on, and this lookup acts in the ", model::StageName(input->spec.stage), " stage"));
+    input->read = variable.read;
+  }
+  if (input->read == nullptr && !(absl::StartsWith(name, "cov_") && name.size() > 4))
+    return absl::InvalidArgumentError(
+        absl::StrCat("unknown covariate '", name, "'", DidYouMean(name, known)));
+  if (input->read == nullptr) needs->covariates.push_back(name);
+  needs->curvature = name == "curvature_per_m";
+  needs->previous_press = name == "previous_press_mm";
+  needs->session_time = name == "session_time_s";
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const model::Effect>> MakeLookupEffect(const model::LookupSpec& spec) {
+  auto input = std::make_shared<LookupInput>();
+  input->spec = spec;
+  auto effect = std::make_shared<model::Effect>(Lookup());
+  absl::Status status = CheckCurve(spec);
+  if (status.ok()) status = FindCovariate(input.get(), &effect->needs);
+  if (!status.ok())
+    return absl::InvalidArgumentError(absl::StrCat("lookup '", spec.name, "': ", status.message()));
+  effect->stage = spec.stage;
+  effect->lookup = std::make_shared<const model::LookupSpec>(spec);
+  effect->meaning =
+      absl::StrCat("Adds ", spec.adds_time ? "time_us" : "travel_mm", " by a curve of ", spec.covariate, ".");
+  effect->apply = [input = std::shared_ptr<const LookupInput>(std::move(input))](
+                      absl::Span<const double>, TouchBatch& touches) { ApplyLookup(*input, touches); };
+  return std::shared_ptr<const model::Effect>(std::move(effect));
+}
+
+}  // namespace touchstone::effects
