@@ -114,7 +114,7 @@ TEST(TerminalReport, ShowsMistakesOfTheFileAndTheCommandInOnePiece) {
   const std::string text = TerminalReport(CheckDataReport(), 100, false);
   EXPECT_THAT(
       text,
-      HasSubstr("lateral vectors reversed (lateral -> -lateral). RMSE of the given model 866 -> 14.4 ms"));
+      HasSubstr("lateral vectors reversed (lateral -> -lateral). RMSE of the given model 866 -> 14 ms"));
   EXPECT_THAT(
       text,
       HasSubstr("touchstone session fix measurements/lab-2026-03.csv --reverse-lateral -o fixed.csv\n"));

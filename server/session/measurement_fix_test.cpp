@@ -12,7 +12,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const char kHeader[] =
+const char kMendedHeader[] =
     "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_"
     "z,"
     "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us,cov_note\n";
@@ -21,10 +21,10 @@ const char kHeader[] =
 std::string Mended(const std::string& rows, const std::function<void(MeasurementFix*)>& set) {
   MeasurementFix fix;
   set(&fix);
-  const auto text = FixMeasurementFile(absl::StrCat(kHeader, rows), "set.csv", fix);
+  const auto text = FixMeasurementFile(absl::StrCat(kMendedHeader, rows), "set.csv", fix);
   if (!text.ok()) return std::string(text.status().message());
-  EXPECT_EQ(text->substr(0, sizeof(kHeader) - 1), kHeader);
-  return text->substr(sizeof(kHeader) - 1);
+  EXPECT_EQ(text->substr(0, sizeof(kMendedHeader) - 1), kMendedHeader);
+  return text->substr(sizeof(kMendedHeader) - 1);
 }
 
 TEST(MeasurementFix, MovesTimesAndKeepsEveryOtherByte) {

@@ -133,9 +133,9 @@ std::vector<Case> Cases() {
       {"a row down", With([](auto* f) { f->shift_rows = 1; }), "row_shift", "-1 row", "--shift-rows=-1"},
       {"a row up", With([](auto* f) { f->shift_rows = -1; }), "row_shift", "+1 row", "--shift-rows=1"},
       {"20 mm lower", move({"lat00", "lat10", "lat20"}, 0.020), "object_origin", "z -20.0 mm",
-       "--move-object lat00=0,0,-2"},
-      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +15.",
-       "--move-object lat10=0,0,1"},
+       "--move-object lat00=0,0,-20 "},
+      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +15.0 mm",
+       "--move-object lat10=0,0,15 "},
   };
 }
 
@@ -152,7 +152,7 @@ TEST(DataProblems, EveryMistakeIsNamedBesidePhysicsThatIsMissing) {
       EXPECT_THAT(problem.detail, ::testing::HasSubstr(test.detail));
       EXPECT_THAT(problem.fix, ::testing::HasSubstr(test.fix));
       EXPECT_THAT(problem.fix, ::testing::StartsWith("touchstone session fix set.csv "));
-      EXPECT_LT(problem.rmse_after_s, 0.025);
+      EXPECT_LT(problem.rmse_after_s, 0.03);
     }
   }
 }
