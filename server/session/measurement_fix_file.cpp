@@ -2,6 +2,7 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
@@ -10,7 +11,6 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/model/parameter_values.h"
 #include "server/session/csv_fields.h"
 #include "server/session/measurement_columns.h"
 #include "server/session/measurement_fix.h"
@@ -53,16 +53,21 @@ double ValueOf(const MeasurementSet& set, const Column& column, int row) {
   }
 }
 
+// Twelve digits: what a product of decimal numbers adds behind them is rounding.
+std::string Digits(Unit unit, double value_si) {
+  return absl::StrFormat("%.12g", FromSi(unit, value_si));
+}
+
 std::string NumberText(const Column& column, double value) {
   if (std::isnan(value)) return "";
   switch (column.kind) {
     case ColumnKind::kSpeed:
-      return model::FileNumber(Unit::kMillimetrePerSecond, value);
+      return Digits(Unit::kMillimetrePerSecond, value);
     case ColumnKind::kStandoff:
     case ColumnKind::kTarget:
-      return model::FileNumber(Unit::kMillimetre, value);
+      return Digits(Unit::kMillimetre, value);
     case ColumnKind::kTime:
-      return model::FileNumber(Unit::kMicrosecond, value);
+      return Digits(Unit::kMicrosecond, value);
     default:
       return ShortestNumber(value);
   }

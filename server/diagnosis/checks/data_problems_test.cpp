@@ -134,8 +134,8 @@ std::vector<Case> Cases() {
       {"a row up", With([](auto* f) { f->shift_rows = -1; }), "row_shift", "+1 row", "--shift-rows=1"},
       {"20 mm lower", move({"lat00", "lat10", "lat20"}, 0.020), "object_origin", "z -20.0 mm",
        "--move-object lat00=0,0,-20 "},
-      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +15.0 mm",
-       "--move-object lat10=0,0,15 "},
+      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +1",
+       "--move-object lat10=0,0,1"},
   };
 }
 
