@@ -206,6 +206,7 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
     // So few touches say where to touch next, and no more.
     report::Diagnosis little = TooLittleDataReport(*workspace, touches_needed);
     little.next_touches = std::move(diagnosis.next_touches);
+    little.warnings = std::move(diagnosis.warnings);
     diagnosis = std::move(little);
   }
   diagnosis.duration_s = Now() - began;
