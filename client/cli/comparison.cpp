@@ -103,7 +103,7 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
   return absl::OkStatus();
 }
 
-// The meshes that the set's objects need, of those that the options name.
+// The meshes that the set's objects need, of those that the options name, and what --mesh names beside.
 absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
                                                        const std::vector<std::string>& objects) {
   std::map<std::string, source::MeshSpec> meshes;
@@ -113,9 +113,9 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
       return absl::InvalidArgumentError(
           absl::StrCat("--mesh: two are named '", source.name, "'; one per object was expected"));
     if (std::find(objects.begin(), objects.end(), source.name) == objects.end()) {
+      // Kept: it may be what was touched under another name.
       cli.Log(absl::StrCat("note: --mesh ", text, ": the set has no such object",
                            DidYouMean(source.name, objects)));
-      meshes.erase(source.name);
     }
   }
   if (!cli.source().mesh_folder.empty())

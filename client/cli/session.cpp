@@ -1,4 +1,4 @@
-// touchstone session create|list|show|export|import|delete: measured sets that a server keeps, or that
+// touchstone session create|list|show|export|import|fix|delete: measured sets that a server keeps, or that
 // a journal holds.
 #include <absl/strings/str_join.h>
 
@@ -10,6 +10,7 @@
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/journal_session.h"
+#include "client/cli/session_fix.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -328,6 +329,8 @@ void AddSession(Cli* cli) {
       ->required();
   in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
       ->type_name("NAME");
+
+  AddSessionFix(cli, group);
 
   CLI::App* remove = cli->AddCommand(
       group, "delete", "Deletes a session.",

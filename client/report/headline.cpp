@@ -51,6 +51,22 @@ std::string Unexplained(const v1::Report& report) {
                       ", and something more that no built-in effect explains.", on);
 }
 
+std::string CheckData(const v1::Report& report) {
+  if (report.data_problems().empty()) return "Check the data: the file has a mistake.";
+  const v1::DataProblem& problem = report.data_problems(0);
+  const std::string what = absl::StrCat("Check the data before the model: ", ProblemTitle(problem));
+  if (!(problem.rmse_after_us() > 0) || !(problem.rmse_after_us() < problem.rmse_before_us()))
+    return absl::StrCat(what, ".");
+  return absl::StrCat(what, "; mended, ", Falls(problem.rmse_before_us(), problem.rmse_after_us()), ".");
+}
+
+std::string TooLittle(const v1::Report& report) {
+  const std::string needed = absl::StrCat(Count(report.touches_needed()), " usable touches would do.");
+  if (report.touches() == 0) return absl::StrCat("No touch could be used, so nothing can be said; ", needed);
+  return absl::StrCat("Too little data for a verdict: ", Count(report.touches()),
+                      report.touches() == 1 ? " touch; " : " touches; ", needed);
+}
+
 }  // namespace
 
 std::string Headline(const v1::Report& report) {
@@ -81,6 +97,10 @@ std::string Headline(const v1::Report& report) {
     }
     case v1::Report::UNEXPLAINED:
       return Unexplained(report);
+    case v1::Report::CHECK_DATA:
+      return CheckData(report);
+    case v1::Report::TOO_LITTLE_DATA:
+      return TooLittle(report);
     default:
       return Compared(report);
   }

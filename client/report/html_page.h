@@ -45,7 +45,8 @@ std::string Legend(const std::vector<std::pair<std::string, std::string>>& keys)
 const char* HtmlStyle();   // the text of <style>
 const char* HtmlScript();  // the text of <script>
 
-std::string HtmlHead(const v1::Report& report);  // verdict, ladder, warnings
+std::string HtmlHead(const v1::Report& report);          // verdict, ladder, warnings
+std::string HtmlDataProblems(const v1::Report& report);  // mistakes of the file, and what mends them
 std::string HtmlWhatToDo(const v1::Report& report);
 std::string HtmlWhy(const v1::Report& report);
 std::string HtmlUnexplained(const v1::Report& report);

@@ -17,8 +17,9 @@ std::string HtmlReport(const v1::Report& report) {
       Escape(report.model_name().empty() ? "Touchstone report"
                                          : absl::StrCat("Touchstone report: ", report.model_name())),
       "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
-  for (const auto part : {HtmlHead, HtmlWhatToDo, HtmlDistributions, HtmlWhy, HtmlUnexplained, HtmlWhere,
-                          HtmlObjects, HtmlFit, HtmlNextTouches, HtmlData, HtmlMethods}) {
+  for (const auto part :
+       {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions, HtmlWhy, HtmlUnexplained, HtmlWhere,
+        HtmlObjects, HtmlFit, HtmlNextTouches, HtmlData, HtmlMethods}) {
     page += part(report);
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",

@@ -84,6 +84,14 @@ TEST(HtmlReport, HasEverySectionWhoseDataAreThere) {
   EXPECT_EQ(Occurrences(HtmlReport(WithoutPosesReport()), "<section id=\"distributions\""), 1);
 }
 
+TEST(HtmlReport, ShowsMistakesOfTheFileWithTheirEvidenceAndTheCommand) {
+  const std::string page = HtmlReport(CheckDataReport());
+  EXPECT_EQ(Occurrences(page, "<section id=\"check\""), 1);
+  EXPECT_EQ(Occurrences(page, "Check the data</span>"), 1);
+  EXPECT_EQ(Occurrences(page, "--reverse-lateral -o fixed.csv</pre>"), 1);
+  EXPECT_EQ(Occurrences(HtmlReport(AdequateReport()), "<section id=\"check\""), 0);
+}
+
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
   const std::string html = HtmlReport(v1::Report());
   EXPECT_EQ(Occurrences(html, "<section"), 0);

@@ -21,6 +21,10 @@ std::string Pill(const v1::Report& report) {
                           "</span>");
     case v1::Report::UNEXPLAINED:
       return "<span class=\"pill\">Unexplained</span>";
+    case v1::Report::CHECK_DATA:
+      return "<span class=\"pill\">Check the data</span>";
+    case v1::Report::TOO_LITTLE_DATA:
+      return "<span class=\"pill plain\">Too little data</span>";
     default:
       return "<span class=\"pill plain\">Comparison</span>";
   }

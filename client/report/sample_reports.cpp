@@ -236,6 +236,53 @@ v1::Report UnexplainedReport() {
   return report;
 }
 
+v1::Report CheckDataReport() {
+  v1::Report report = Base(865613, 5103);
+  report.set_verdict(v1::Report::CHECK_DATA);
+  report.clear_where();
+  v1::DataProblem* problem = report.add_data_problems();
+  problem->set_kind("lateral_reversed");
+  problem->set_detail("lateral -> -lateral");
+  problem->set_words(
+      "It looks as if the lateral vectors point from the last finger to the first. Mended, the model as it "
+      "is would be "
+      "off by 14.4 ms instead of 866 ms.");
+  problem->set_fix("touchstone session fix measurements/lab-2026-03.csv --reverse-lateral -o fixed.csv");
+  problem->set_rmse_before_us(865613);
+  problem->set_rmse_after_us(14433);
+  v1::DataProblem* other = report.add_data_problems();
+  other->set_kind("finger_order");
+  other->set_detail("l <-> r");
+  other->set_words(
+      "These data cannot tell it from another mistake: the time columns of the fingers l and r are "
+      "exchanged. Mended, "
+      "the model as it is would be off by 14.4 ms instead of 866 ms.");
+  other->set_fix("touchstone session fix measurements/lab-2026-03.csv --swap-fingers l,r -o fixed.csv");
+  other->set_rmse_before_us(865613);
+  other->set_rmse_after_us(14433);
+  return report;
+}
+
+v1::Report TooLittleDataReport() {
+  v1::Report report;
+  report.set_verdict(v1::Report::TOO_LITTLE_DATA);
+  report.set_touches(6);
+  report.set_touches_needed(16);
+  SetQuality(25400, 25400, 1, report.mutable_initial());
+  *report.mutable_final() = report.initial();
+  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
+  report.set_model_name("nominal");
+  report.set_summary("The model is off by 25.4 ms. That is too little for a verdict; 16 touches would do.");
+  v1::DataSummary& data = *report.mutable_data();
+  data.set_rows(6);
+  data.set_poses(6);
+  data.add_speeds_mm_s(20);
+  data.set_origin("measurements/first-six.csv");
+  data.add_objects("lat10");
+  report.add_warnings("Only 6 touches took part: weak effects stay unseen, and errors are rough.");
+  return report;
+}
+
 v1::Report CompareReport() {
   v1::Report report = Base(41000, 5003);
   AddSlice("incidence > 12 deg", 412, -9100, 0.71, "contact too early by 9.1 ms", &report);
@@ -278,6 +325,8 @@ std::vector<NamedReport> AllSampleReports() {
           {"wrong_values", WrongValuesReport()},
           {"adequate", AdequateReport()},
           {"unexplained", UnexplainedReport()},
+          {"check_data", CheckDataReport()},
+          {"too_little_data", TooLittleDataReport()},
           {"compare", CompareReport()},
           {"without_poses", WithoutPosesReport()},
           {"empty", v1::Report()}};

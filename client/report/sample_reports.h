@@ -13,6 +13,8 @@ v1::Report MissingEffectsReport();  // two steps, the first with an equivalent
 v1::Report WrongValuesReport();     // contact_slowdown and noise put right
 v1::Report AdequateReport();        // nothing to do, no repeats
 v1::Report UnexplainedReport();     // a formula suggested
+v1::Report CheckDataReport();       // two mistakes that cannot be told apart
+v1::Report TooLittleDataReport();   // six touches
 v1::Report CompareReport();         // no verdict
 v1::Report WithoutPosesReport();    // distributions only
 

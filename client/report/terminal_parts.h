@@ -7,6 +7,7 @@
 namespace touchstone::client {
 
 void AddDistributions(const v1::Report& report, TextLayout* out);  // sets without poses
+void AddDataProblems(const v1::Report& report, TextLayout* out);   // mistakes of the file
 void AddWhy(const v1::Report& report, TextLayout* out);
 void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);

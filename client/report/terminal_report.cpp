@@ -131,6 +131,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
   AddOpening(report, &out);
   AddHowWrong(report, &out);
+  AddDataProblems(report, &out);
   AddDistributions(report, &out);
   AddWhere(report, &out);
   AddWhy(report, &out);

@@ -110,6 +110,17 @@ TEST(TerminalReport, NamesWhatTheDataCannotTellApartAndWhatWouldDecide) {
   EXPECT_THAT(text, HasSubstr("channel_latency or finger_length: these data cannot tell them apart."));
 }
 
+TEST(TerminalReport, ShowsMistakesOfTheFileAndTheCommandInOnePiece) {
+  const std::string text = TerminalReport(CheckDataReport(), 100, false);
+  EXPECT_THAT(
+      text,
+      HasSubstr("lateral vectors reversed (lateral -> -lateral). RMSE of the given model 866 -> 14 ms"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("touchstone session fix measurements/lab-2026-03.csv --reverse-lateral -o fixed.csv\n"));
+  EXPECT_THAT(TerminalReport(TooLittleDataReport(), 100, false), HasSubstr("16 usable touches would do"));
+}
+
 TEST(TerminalReport, CallsTheFloorAnUpperBoundWithoutRepeats) {
   EXPECT_THAT(TerminalReport(AdequateReport(), 120, false),
               HasSubstr("Noise floor at most 5.10 ms (0.10 mm at 20 mm/s), an upper bound"));

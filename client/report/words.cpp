@@ -263,6 +263,8 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 }
 
 std::string SummaryToShow(const v1::Report& report) {
+  // Their own part says it at more length.
+  if (!report.data_problems().empty()) return "";
   return report.initial().rmse_us() > 0 ? "" : report.summary();
 }
 

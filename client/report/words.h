@@ -70,6 +70,9 @@ std::string ToDecide(const std::string& discriminating_measurement);
 // The report's own summary where its parts do not say the same at more length: without a ladder.
 std::string SummaryToShow(const v1::Report& report);
 
+// "columns of the fingers (l <-> m)": what kind of mistake a file has.
+std::string ProblemTitle(const v1::DataProblem& problem);
+
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 

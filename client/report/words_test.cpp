@@ -77,6 +77,12 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "No effect is missing, but the values of contact_slowdown are off: put right, the error falls "
             "from 9.10 ms to 815 us.");
   EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
+  EXPECT_EQ(Headline(CheckDataReport()),
+            "Check the data before the model: lateral vectors reversed (lateral -> -lateral); mended, the "
+            "error falls "
+            "from 866 ms to 14.4 ms.");
+  EXPECT_EQ(Headline(TooLittleDataReport()),
+            "Too little data for a verdict: 6 touches; 16 usable touches would do.");
   EXPECT_EQ(Headline(UnexplainedReport()),
             "The model is wrong in a way that no built-in effect explains. It depends on travel_mm.");
   EXPECT_EQ(Headline(CompareReport()), "The model is off by 41.0 ms, 8.2 times the noise floor.");

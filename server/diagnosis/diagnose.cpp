@@ -8,8 +8,10 @@
 #include <optional>
 
 #include "server/base/status.h"
+#include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/selection/ladder.h"
@@ -168,16 +170,23 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
   ProgressGate gate(context);
   DiagnosisContext gated = context;
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<selection::DataProblem> problems,
+                              checks::FindDataProblems(input, gated));
+  if (!problems.empty()) {
+    report::Diagnosis diagnosis = CheckDataReport(input, gated, std::move(problems));
+    diagnosis.duration_s = Now() - began;
+    return diagnosis;
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
                               selection::MakeWorkspace(input, gated));
   workspace->experiment.cancelled = [&gate] { return !gate.Continue(); };
   if (!gate.Enter("fitting", 0.1)) return absl::CancelledError(kCancelled);
   const touches::Observations& o = *workspace->observations;
-  if (std::none_of(o.used.begin(), o.used.end(), [](char used) { return used; })) {
-    report::Diagnosis diagnosis = Begin(*workspace);
-    diagnosis.warnings.clear();  // nothing was compared
-    diagnosis.verdict = selection::Verdict::kAdequate;
-    AddSentences(&diagnosis);
+  const int touches_needed = TouchesNeeded(o);
+  const bool none_used = std::none_of(o.used.begin(), o.used.end(), [](char used) { return used; });
+  if (touches_needed > 0 && (!always || none_used)) {
+    report::Diagnosis diagnosis = TooLittleDataReport(*workspace, touches_needed);
+    diagnosis.duration_s = Now() - began;
     return diagnosis;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::SelectionResult selection,
@@ -193,6 +202,13 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
       DescribeBoth(*workspace, before, ladder.prediction, ladder.residuals, ladder.noise_floor.sigma_s);
   AddSentences(&diagnosis);
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
+  if (touches_needed > 0) {
+    // So few touches say where to touch next, and no more.
+    report::Diagnosis little = TooLittleDataReport(*workspace, touches_needed);
+    little.next_touches = std::move(diagnosis.next_touches);
+    little.warnings = std::move(diagnosis.warnings);
+    diagnosis = std::move(little);
+  }
   diagnosis.duration_s = Now() - began;
   gate.Enter("done", 1);
   return diagnosis;

@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
@@ -33,6 +36,75 @@ TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
   EXPECT_NEAR(report.noise_floor->sigma_s, 2000e-6, 150e-6);
   EXPECT_GT(report.initial->lack_of_fit_p, 0.001);
   EXPECT_TRUE(report.improved_model_yaml.empty());
+}
+
+// The first rows of a set.
+DiagnosisInput FirstTouches(int count, const touches::HiddenRig& rig) {
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  std::vector<int> rows(count);
+  std::iota(rows.begin(), rows.end(), 0);
+  input.set = checks::PartOf(*input.set, rows, 0);
+  return input;
+}
+
+TEST(Diagnose, SaysThatAFewTouchesAreTooLittleAndHowManyWouldDo) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=3"}}};
+  for (const int count : {1, 6, 15}) {
+    const absl::StatusOr<report::Diagnosis> report = Diagnose(FirstTouches(count, rig), {});
+    ASSERT_TRUE(report.ok()) << report.status();
+    EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData) << count;
+    // 31 contrasts are 16 touches, and more where fingers stay silent.
+    EXPECT_GE(report->touches_needed, 16) << count;
+    EXPECT_LE(report->touches_needed, 20) << count;
+    EXPECT_TRUE(report->steps.empty());
+    EXPECT_TRUE(report->improved_model_yaml.empty());
+    EXPECT_THAT(report->summary, HasSubstr(" usable touches would do"));
+  }
+  const absl::StatusOr<report::Diagnosis> enough = Diagnose(FirstTouches(24, rig), {});
+  ASSERT_TRUE(enough.ok());
+  EXPECT_NE(enough->verdict, selection::Verdict::kTooLittleData);
+}
+
+TEST(Diagnose, NeverCallsAModelGoodThatNoTouchWasComparedWith) {
+  DiagnosisInput input = FirstTouches(30, {});
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  for (size_t i = 0; i < set->time_s.size(); ++i)
+    if (i % 3 != 0) set->time_s[i] = NAN;
+  input.set = set;
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData);
+  EXPECT_EQ(report->data.touches, 0);
+  EXPECT_EQ(report->touches_needed, 16);
+}
+
+TEST(Diagnose, ChecksTheFileBeforeThePhysics) {
+  DiagnosisInput input = touches::MakeTestInput({});
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  for (double& time_s : set->time_s) time_s *= 1e-3;  // which was an error before
+  input.set = set;
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->verdict, selection::Verdict::kCheckData);
+  ASSERT_FALSE(report->data_problems.empty());
+  EXPECT_EQ(report->data_problems[0].kind, "units_time");
+  EXPECT_TRUE(report->steps.empty());
+  EXPECT_FALSE(Compare(input, {}).ok());
+}
+
+TEST(Propose, StillProposesWhereThereIsTooLittleForAVerdict) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=3"}}};
+  const absl::StatusOr<report::Diagnosis> report = Propose(FirstTouches(8, rig), 4, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData);
+  // Touches, or the reason why there are none.
+  EXPECT_TRUE(!report->next_touches.empty() ||
+              std::any_of(report->warnings.begin(), report->warnings.end(), [](const std::string& warning) {
+                return warning.rfind("No touch would tell", 0) == 0;
+              }));
+  EXPECT_TRUE(report->steps.empty());
 }
 
 TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
@@ -197,12 +269,12 @@ TEST(Diagnose, RefusesAnObjectWithoutAMesh) {
   EXPECT_THAT(std::string(Diagnose(input, {}).status().message()), HasSubstr("--mesh lat10=FILE"));
 }
 
-TEST(Diagnose, RefusesTimesInTheWrongUnit) {
+TEST(Compare, RefusesTimesInTheWrongUnit) {
   DiagnosisInput input = touches::MakeTestInput({});
   auto set = std::make_shared<session::MeasurementSet>(*input.set);
   for (double& time_s : set->time_s) time_s *= 1e-3;
   input.set = set;
-  const absl::Status status = Diagnose(input, {}).status();
+  const absl::Status status = Compare(input, {}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()), HasSubstr("milliseconds"));
 }
@@ -231,7 +303,9 @@ TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
     input.set = set;
     const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict, selection::Verdict::kAdequate) << touches << ": " << report->summary;
+    EXPECT_EQ(report->verdict,
+              touches < 16 ? selection::Verdict::kTooLittleData : selection::Verdict::kAdequate)
+        << touches << ": " << report->summary;
     EXPECT_GE(report->warnings.size(), 1u);
   }
 }

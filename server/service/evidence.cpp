@@ -58,6 +58,9 @@ absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::M
   return surface;
 }
 
+// With the objects of a set at most so many others are looked at.
+constexpr size_t kMaxKnownSurfaces = 24;
+
 // One surface an object of the set; every object without one is named.
 absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resources,
                           diagnosis::DiagnosisInput* input) {
@@ -78,7 +81,16 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
       missing.push_back(name);
     }
   }
-  if (missing.empty()) return absl::OkStatus();
+  if (missing.empty()) {
+    // Other objects that are known: a mesh may have been taken for another's.
+    for (const auto& [name, file] : files)
+      if (input->surfaces.size() < kMaxKnownSurfaces && input->surfaces.count(name) == 0) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(input->surfaces[name], ReadSurface(*file));
+      }
+    for (const auto& [name, object] : resources.objects.all())
+      if (input->surfaces.size() < kMaxKnownSurfaces) input->surfaces.emplace(name, object.surface);
+    return absl::OkStatus();
+  }
 
   std::vector<std::string> known;
   for (const auto& [name, file] : files) known.push_back(name);

@@ -92,7 +92,10 @@ std::vector<std::string> DataWarnings(const touches::DataSummary& data) {
 }
 
 std::string Summarize(const Diagnosis& diagnosis) {
-  if (diagnosis.data.touches == 0) return kNoTouch;
+  if (diagnosis.data.touches == 0 && diagnosis.data_problems.empty()) {
+    if (diagnosis.touches_needed == 0) return kNoTouch;
+    return absl::StrCat(kNoTouch, " ", diagnosis.touches_needed, " usable touches would do.");
+  }
   std::vector<std::string> sentences = {HowWrong(diagnosis)};
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
     sentences.push_back(
@@ -124,8 +127,8 @@ std::string Summarize(const Diagnosis& diagnosis) {
             absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
       break;
     case selection::Verdict::kTooLittleData:
-      sentences.push_back(
-          absl::StrCat("That is too little for a verdict; ", diagnosis.touches_needed, " touches would do."));
+      sentences.push_back(absl::StrCat("That is too little for a verdict; ", diagnosis.touches_needed,
+                                       " usable touches would do."));
       break;
     case selection::Verdict::kNone:
       break;

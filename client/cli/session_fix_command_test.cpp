@@ -1,0 +1,80 @@
+// The circle of CHECK_DATA: the diagnosis names the command, the command mends the file, and the mended file is
+// diagnosed like any other. On the public sets with a blunder.
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/real_binary_test.h"
+#include "touchstone_test_paths.h"
+
+namespace touchstone::cli {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kMeasurements = std::string(TOUCHSTONE_SHARED_DATA) + "/measurements";
+
+class SessionFixCommand : public RealBinaryTest {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(kMeasurements + "/nominal.yaml"))
+      GTEST_SKIP() << kMeasurements << " is not there";
+  }
+
+  nlohmann::json Diagnose(const std::string& set) {
+    const Outcome outcome = Run({"diagnose", set, "--model", kMeasurements + "/nominal.yaml", "--mesh-dir",
+                                 kMeasurements, "--json", "-"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+};
+
+TEST_F(SessionFixCommand, MendsWhatTheDiagnosisFound) {
+  for (const std::string name : {"outside_fingers_permuted", "outside_objects_swapped"}) {
+    SCOPED_TRACE(name);
+    const nlohmann::json before = Diagnose(absl::StrCat(kMeasurements, "/", name, ".csv"));
+    ASSERT_EQ(before["verdict"], "CHECK_DATA");
+    ASSERT_EQ(before["data_problems"].size(), 1u);
+    EXPECT_TRUE(before["steps"].empty());
+    const std::vector<std::string> words =
+        absl::StrSplit(before["data_problems"][0]["fix"].get<std::string>(), ' ');
+    ASSERT_EQ(words[0], "touchstone");
+    std::vector<std::string> command(words.begin() + 1, words.end());
+    command.push_back("--force");
+    const Outcome mended = Run(command);
+    ASSERT_EQ(mended.exit_code, 0) << mended.err;
+    EXPECT_THAT(mended.err, HasSubstr("960 touches"));
+    const nlohmann::json after = Diagnose("fixed.csv");
+    EXPECT_EQ(after["verdict"], "MISSING_EFFECTS");
+    ASSERT_FALSE(after["steps"].empty());
+    EXPECT_EQ(after["steps"][0]["effect"], "tip_radius");
+    // The error that was promised is the one that is found.
+    EXPECT_NEAR(after["initial"]["rmse_us"].get<double>(),
+                before["data_problems"][0]["rmse_after_us"].get<double>(), 1);
+  }
+}
+
+TEST_F(SessionFixCommand, SaysWhatItCannotDo) {
+  const std::string set = kMeasurements + "/tip_radius.csv";
+  const auto error = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> command = {"session", "fix", set};
+    command.insert(command.end(), options.begin(), options.end());
+    command.insert(command.end(), {"-o", "fixed.csv"});
+    const Outcome outcome = Run(command);
+    EXPECT_EQ(outcome.exit_code, 2);
+    return outcome.err;
+  };
+  EXPECT_THAT(error({}), HasSubstr("nothing to mend was named"));
+  EXPECT_THAT(error({"--swap-fingers", "l,q"}), HasSubstr("a finger from l to r was expected"));
+  EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'"));
+  EXPECT_THAT(error({"--permute-axes=x,x,z"}), HasSubstr("--permute-axes"));
+  EXPECT_THAT(error({"--scale-speed", "1e9"}), HasSubstr("out of range"));
+}
+
+}  // namespace
+}  // namespace touchstone::cli

@@ -1,0 +1,29 @@
+// The kinds of mistakes that a measurement file may have, in words.
+#include <map>
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/words.h"
+
+namespace touchstone::client {
+
+std::string ProblemTitle(const v1::DataProblem& problem) {
+  static const std::map<std::string, const char*> kTitles = {
+      {"finger_order", "columns of the fingers exchanged"},
+      {"lateral_reversed", "lateral vectors reversed"},
+      {"approach_reversed", "approach vectors reversed"},
+      {"object_names", "names of objects exchanged"},
+      {"wrong_mesh", "an object's mesh is another's"},
+      {"frame", "another frame"},
+      {"units_time", "times in another unit"},
+      {"units_length", "lengths in another unit"},
+      {"speed_factor", "speeds off by a factor"},
+      {"row_shift", "times in the wrong rows"},
+      {"object_origin", "another origin of objects"},
+      {"duplicates", "rows copied under new numbers"}};
+  const auto title = kTitles.find(problem.kind());
+  return absl::StrCat(title == kTitles.end() ? problem.kind() : title->second,
+                      problem.detail().empty() ? "" : absl::StrCat(" (", problem.detail(), ")"));
+}
+
+}  // namespace touchstone::client

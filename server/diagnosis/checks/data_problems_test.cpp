@@ -1,0 +1,306 @@
+#include "server/diagnosis/checks/data_problems.h"
+
+#include <absl/strings/match.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "server/diagnosis/checks/sampled_set.h"
+#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/session/measurement_fix.h"
+
+namespace touchstone::diagnosis::checks {
+namespace {
+
+using session::MeasurementFix;
+using session::MeasurementSet;
+
+// Times as files have them: since the first finger's.
+DiagnosisInput MakeFile(const touches::HiddenRig& rig) {
+  DiagnosisInput input = MakeTestInput(rig);
+  auto set = std::make_shared<MeasurementSet>(*input.set);
+  for (int row = 0; row < set->size(); ++row) {
+    double* times_s = &set->time_s[row * 3];
+    double first_s = INFINITY;
+    for (int i = 0; i < 3; ++i)
+      if (times_s[i] < first_s) first_s = times_s[i];
+    for (int i = 0; i < 3; ++i) times_s[i] -= first_s;
+  }
+  input.set = set;
+  return input;
+}
+
+// A rig with physics that the model lacks: it must neither hide a mistake nor be one.
+touches::HiddenRig Rig(uint64_t seed = 1) {
+  touches::HiddenRig rig;
+  // The shapes look the same from several sides; an object that stands askew, as the model knows, does not.
+  rig.known = {{"object_pose", {"translation_mm=4,-3,2", "rotation_deg=20,-15,25"}}};
+  rig.hidden = rig.known;
+  rig.hidden.push_back({"tip_radius", {"radius_mm=0.5"}});
+  rig.hidden.push_back({"object_push", {"shift_mm=0.2"}});
+  rig.rounds = 2;
+  rig.sigma_us = 5000;
+  rig.seed = seed;
+  return rig;
+}
+
+DiagnosisInput Spoilt(DiagnosisInput input, const std::function<void(MeasurementSet*)>& spoil) {
+  auto set = std::make_shared<MeasurementSet>(*input.set);
+  spoil(set.get());
+  input.set = set;
+  return input;
+}
+
+DiagnosisInput Spoilt(const DiagnosisInput& input, const MeasurementFix& fix) {
+  return Spoilt(input, [&](MeasurementSet* set) { ASSERT_TRUE(session::ApplyFix(fix, set).ok()); });
+}
+
+std::vector<selection::DataProblem> ProblemsOf(const DiagnosisInput& input) {
+  const auto problems = FindDataProblems(input, {});
+  EXPECT_TRUE(problems.ok()) << problems.status();
+  return problems.ok() ? *problems : std::vector<selection::DataProblem>();
+}
+
+struct Case {
+  const char* name;
+  MeasurementFix spoil;
+  const char* kind;
+  const char* detail;
+  const char* fix;
+};
+
+MeasurementFix With(const std::function<void(MeasurementFix*)>& set) {
+  MeasurementFix fix;
+  set(&fix);
+  return fix;
+}
+
+std::vector<Case> Cases() {
+  const auto move = [](std::vector<std::string> objects, double z_m) {
+    return With([&](MeasurementFix* f) {
+      for (const std::string& object : objects)
+        f->move_objects_m.emplace_back(object, Eigen::Vector3d(0, 0, z_m));
+    });
+  };
+  return {
+      {"l and m", With([](auto* f) {
+         f->finger_order = {1, 0, 2};
+       }),
+       "finger_order", "l <-> m", "--swap-fingers l,m"},
+      {"turned fingers", With([](auto* f) {
+         f->finger_order = {2, 0, 1};
+       }),
+       "finger_order", "l, m, r hold m, r, l", "--finger-order m,r,l"},
+      {"lateral", With([](auto* f) { f->reverse_lateral = true; }), "lateral_reversed", "",
+       "--reverse-lateral"},
+      {"approach", With([](auto* f) { f->reverse_approach = true; }), "approach_reversed", "",
+       "--reverse-approach"},
+      {"names", With([](auto* f) {
+         f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
+       }),
+       "object_names", "lat10 <-> lat20", "--swap-objects lat10,lat20"},
+      {"turned names", With([](auto* f) {
+         f->rename_objects = {{"lat00", "lat10"}, {"lat10", "lat20"}, {"lat20", "lat00"}};
+       }),
+       "object_names", "", "--rename-object"},
+      {"turned frame", With([](auto* f) { f->axes = *session::ParseAxes("y,-x,z"); }), "frame",
+       "x,y,z -> -y,x,z", "--permute-axes=-y,x,z"},
+      {"y up", With([](auto* f) { f->axes = *session::ParseAxes("x,z,-y"); }), "frame", "x,y,z -> x,-z,y",
+       "--permute-axes=x,-z,y"},
+      {"mirrored", With([](auto* f) { f->axes = *session::ParseAxes("y,x,z"); }), "frame", "",
+       "--permute-axes="},
+      {"times in tenths", With([](auto* f) { f->scale_times = 0.1; }), "units_time", "times x 10",
+       "--scale-times 10"},
+      {"times in ms", With([](auto* f) { f->scale_times = 1e-3; }), "units_time", "times x 1000",
+       "--scale-times 1000"},
+      {"times in s", With([](auto* f) { f->scale_times = 1e-6; }), "units_time", "times x 1000000",
+       "--scale-times 1e+06"},
+      {"times in ns", With([](auto* f) { f->scale_times = 1e3; }), "units_time", "times x 1/1000",
+       "--scale-times 0.001"},
+      {"speed doubled", With([](auto* f) { f->scale_speed = 2; }), "speed_factor", "speed x 1/2",
+       "--scale-speed 0.5"},
+      {"speed in mm/min", With([](auto* f) { f->scale_speed = 60; }), "speed_factor", "speed x 1/60",
+       "--scale-speed"},
+      {"speed in m/s", With([](auto* f) { f->scale_speed = 1e-3; }), "speed_factor", "speed x 1000",
+       "--scale-speed 1000"},
+      {"targets in m", With([](auto* f) { f->scale_targets = f->scale_standoff = 1e-3; }), "units_length", "",
+       "--scale-"},
+      {"targets in inches", With([](auto* f) { f->scale_targets = 1 / 25.4; }), "units_length",
+       "targets x 25.4", "--scale-targets 25.4"},
+      {"a row down", With([](auto* f) { f->shift_rows = 1; }), "row_shift", "-1 row", "--shift-rows=-1"},
+      {"a row up", With([](auto* f) { f->shift_rows = -1; }), "row_shift", "+1 row", "--shift-rows=1"},
+      {"20 mm lower", move({"lat00", "lat10", "lat20"}, 0.020), "object_origin", "z -20.0 mm",
+       "--move-object lat00=0,0,-20 "},
+      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +1",
+       "--move-object lat10=0,0,1"},
+  };
+}
+
+TEST(DataProblems, EveryMistakeIsNamedBesidePhysicsThatIsMissing) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const DiagnosisInput right = MakeFile(Rig(seed));
+    for (const Case& test : Cases()) {
+      SCOPED_TRACE(testing::Message() << test.name << ", seed " << seed);
+      const auto problems = ProblemsOf(Spoilt(right, test.spoil));
+      EXPECT_FALSE(problems.empty());
+      if (problems.empty()) continue;
+      const selection::DataProblem& problem = problems.front();
+      EXPECT_EQ(problem.kind, test.kind) << problem.words;
+      EXPECT_THAT(problem.detail, ::testing::HasSubstr(test.detail));
+      EXPECT_THAT(problem.fix, ::testing::HasSubstr(test.fix));
+      EXPECT_THAT(problem.fix, ::testing::StartsWith("touchstone session fix set.csv "));
+      EXPECT_LT(problem.rmse_after_s, 0.03);
+    }
+  }
+}
+
+TEST(DataProblems, AMeshThatTheSetDoesNotNameIsFound) {
+  DiagnosisInput input = MakeFile(Rig());
+  input.surfaces["elsewhere"] = input.surfaces["lat10"];
+  input.surfaces["lat10"] = touches::TestSurface("lat05");
+  const auto problems = ProblemsOf(input);
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].kind, "wrong_mesh");
+  EXPECT_EQ(problems[0].detail, "lat10 is elsewhere");
+  EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--rename-object lat10=elsewhere"));
+}
+
+TEST(DataProblems, AnOriginAtTheFootOfTheObjectIsFound) {
+  const DiagnosisInput right = MakeFile(Rig());
+  const auto problems = ProblemsOf(Spoilt(right, [&](MeasurementSet* set) {
+    for (int row = 0; row < set->size(); ++row)
+      set->target_m[row].z() -= right.surfaces.at(set->objects[set->object[row]])->bounds().min_m.z();
+  }));
+  ASSERT_FALSE(problems.empty());
+  EXPECT_EQ(problems[0].kind, "object_origin");
+  EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--move-object lat10=0,0,"));
+}
+
+TEST(DataProblems, CopiesUnderNewNumbersAreCountedAndDropped) {
+  touches::HiddenRig rig = Rig();
+  rig.rounds = 1;
+  const DiagnosisInput right = MakeFile(rig);
+  EXPECT_TRUE(ProblemsOf(right).empty());
+  const auto problems = ProblemsOf(Spoilt(right, [](MeasurementSet* set) {
+    const MeasurementSet once = *set;
+    for (int row = 0; row < once.size(); ++row) {
+      set->touch.push_back(1000 + row);
+      set->object.push_back(once.object[row]);
+      set->target_m.push_back(once.target_m[row]);
+      set->approach.push_back(once.approach[row]);
+      set->lateral.push_back(once.lateral[row]);
+      set->standoff_m.push_back(once.standoff_m[row]);
+      set->speed_m_s.push_back(once.speed_m_s[row]);
+      set->session_time_s.push_back(5000 + once.session_time_s[row]);
+      set->line.push_back(once.line[row] + once.size());
+      for (int i = 0; i < 3; ++i) set->time_s.push_back(once.TimeS(row, i));
+    }
+  }));
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].kind, "duplicates");
+  EXPECT_EQ(problems[0].detail, "72 of 144 rows");
+  EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--drop-duplicates"));
+}
+
+TEST(DataProblems, EqualRepeatsOfAModelWithoutNoiseOrOfCoarseTicksAreNoCopies) {
+  touches::HiddenRig quiet = Rig();
+  quiet.known.clear();
+  quiet.hidden.clear();
+  quiet.sigma_us = 1e-9;  // as of a simulation: repeats agree
+  DiagnosisInput input = MakeFile(quiet);
+  input.model = std::make_shared<const model::Model>(model::NominalModel());
+  input = Spoilt(input, [](MeasurementSet* set) {
+    for (double& time_s : set->time_s) time_s = std::round(time_s * 1e6) * 1e-6;
+  });
+  EXPECT_TRUE(ProblemsOf(input).empty());
+  touches::HiddenRig ticks = Rig();
+  ticks.known.clear();
+  ticks.hidden = {{"poll_interval", {"interval_us=20000"}}};
+  EXPECT_TRUE(ProblemsOf(MakeFile(ticks)).empty());
+}
+
+TEST(DataProblems, AColumnThatWasSortedAloneIsTold) {
+  const auto problems = ProblemsOf(Spoilt(MakeFile(Rig()), [](MeasurementSet* set) {
+    std::vector<double> column;
+    for (int row = 0; row < set->size(); ++row) column.push_back(set->TimeS(row, 1));
+    std::sort(column.begin(), column.end());
+    for (int row = 0; row < set->size(); ++row) set->time_s[row * 3 + 1] = column[row];
+  }));
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].detail, "t_m_us is sorted");
+  EXPECT_TRUE(problems[0].fix.empty());
+}
+
+TEST(DataProblems, StrongPhysicsIsNoMistake) {
+  const std::vector<std::vector<std::pair<std::string, std::vector<std::string>>>> rigs = {
+      {},
+      {{"tip_radius", {"radius_mm=5"}}},
+      {{"oblique_slip", {"travel_mm=3"}}},
+      {{"object_push", {"shift_mm=5"}}},
+      {{"contact_slowdown", {"fraction=0.3"}}},
+      {{"contact_slowdown", {"fraction=0.45"}}},
+      {{"contact_slowdown", {"fraction=0.6"}}},
+      {{"speed_error", {"relative=0.4"}}},
+      {{"speed_error", {"relative=-0.45"}}},
+      {{"clock_skew", {"relative=0.1"}}},
+      {{"finger_length", {"offset_mm=3,-1,-2"}}},
+      {{"channel_latency", {"latency_us=50000,-20000,-30000"}}},
+      {{"tool_yaw", {"angle_deg=10"}}},
+      {{"tool_tilt", {"angle_deg=5"}}},
+      {{"finger_spacing", {"delta_mm=6"}}},
+      {{"gravity_sag", {"drop_mm=6"}}},
+      {{"object_scale", {"relative=0.1"}}},
+      {{"object_pose", {"translation_mm=6,-5,4", "rotation_deg=3,-2,8"}}},
+      {{"object_pose", {"rotation_deg=0,0,30"}}},
+      {{"return_hysteresis", {"fraction=0.6"}}},
+      {{"thermal_drift", {"rate_mm_per_h=2,-1,-1"}}},
+      {{"surface_error", {"rms_mm=1", "length_mm=20"}}},
+      {{"missed_contact", {"probability=0.3"}}, {"heavy_tail_noise", {"degrees_of_freedom=1.5"}}},
+      {{"tip_radius", {"radius_mm=3"}},
+       {"contact_slowdown", {"fraction=0.4"}},
+       {"tool_yaw", {"angle_deg=5"}}},
+  };
+  for (size_t r = 0; r < rigs.size(); ++r)
+    for (uint64_t seed = 1; seed <= 6; ++seed) {
+      touches::HiddenRig rig = Rig(10 * seed + r);
+      rig.known.clear();
+      rig.hidden = rigs[r];
+      rig.objects = {"lat00", "lat05", "lat10", "lat15", "lat20"};
+      if (seed % 2 == 0) rig.samples_per_face = 1, rig.rounds = 1;  // 30 touches
+      const auto problems = ProblemsOf(MakeFile(rig));
+      EXPECT_TRUE(problems.empty()) << (rigs[r].empty() ? "nothing" : rigs[r][0].first) << ", seed " << seed
+                                    << ": " << problems[0].kind << ", " << problems[0].words;
+    }
+}
+
+TEST(DataProblems, TooFewTouchesBlameNoFile) {
+  DiagnosisInput input = MakeFile(Rig());
+  input = Spoilt(input, [](MeasurementSet* set) {
+    *set = *PartOf(*set, {0, 10, 20, 30, 40, 50}, 0);
+    for (Eigen::Vector3d& lateral : set->lateral) lateral = -lateral;
+  });
+  EXPECT_TRUE(ProblemsOf(input).empty());
+}
+
+TEST(SampleRows, TakesEveryObjectItsPosesAndTheWholeSession) {
+  touches::HiddenRig rig = Rig();
+  rig.samples_per_face = 20;
+  rig.rounds = 3;
+  const DiagnosisInput input = MakeFile(rig);
+  const auto o = touches::MakeObservations(input);
+  ASSERT_TRUE(o.ok());
+  const std::vector<int> rows = SampleRows(*o);
+  EXPECT_NEAR(rows.size(), kSampled, 3);
+  EXPECT_EQ(rows, SampleRows(*o));
+  std::vector<int> of_object(3);
+  for (const int row : rows) ++of_object[input.set->object[row]];
+  for (const int count : of_object) EXPECT_NEAR(count, kSampled / 3, 1);
+  EXPECT_LT(rows.front(), 30);
+  EXPECT_GT(rows.back(), input.set->size() - 30);
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::checks

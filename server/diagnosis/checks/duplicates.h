@@ -1,0 +1,21 @@
+// Rows that repeat an earlier row digit for digit under another touch number.
+#pragma once
+
+#include "server/model/model.h"
+#include "server/session/measurement_set.h"
+
+namespace touchstone::diagnosis::checks {
+
+struct Duplicates {
+  int rows = 0;  // copies, each beyond the first of its kind
+  double expected =
+      0;  // pairs of repeats that agree by chance, given the scatter and the resolution of the times
+  int example = -1;  // row of the first copy
+};
+
+// No rig repeats a touch to the last digit; a clock of coarse ticks does. Zero rows unless there are far more copies
+// than chance gives, and enough to matter: copies taken for repeats make the noise floor too low and every misfit
+// that repeats too certain. A model without noise expects equal repeats, and then only equal session times count.
+Duplicates FindDuplicates(const session::MeasurementSet& set, const model::Model& model);
+
+}  // namespace touchstone::diagnosis::checks

@@ -1,0 +1,27 @@
+// The discrete mistakes that a measurement file may have, each with what mends it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/session/measurement_fix.h"
+
+namespace touchstone::diagnosis::checks {
+
+struct Mistake {
+  std::string kind, detail;  // of v1::DataProblem
+  std::string words;         // "columns l and m of the times are exchanged", to follow "It looks as if"
+  session::MeasurementFix fix;
+  std::vector<std::string> objects;  // that it concerns, by their names in the file; empty: all
+  bool free_size = false;            // a size was fitted, not only tried
+};
+
+// Mistakes that concern the whole file and need no look at the objects, likelier ones first: where two fit exactly as
+// well (lateral reversed, or outer fingers exchanged), the first is named first. `typical_speed_m_s` decides whether
+// times or speeds are the likelier ones to have another unit.
+std::vector<Mistake> MistakesOfFiles(int fingers, double typical_speed_m_s);
+
+// A factor as a person would write it: "1000", "1/60".
+std::string FactorInWords(double factor);
+
+}  // namespace touchstone::diagnosis::checks

@@ -1,0 +1,21 @@
+// Verdicts that are reached before any effect is fitted: a mistake in the file, or too few touches to say anything.
+#pragma once
+
+#include <vector>
+
+#include "server/diagnosis/report/diagnosis.h"
+#include "server/diagnosis/selection/workspace.h"
+
+namespace touchstone::diagnosis {
+
+// kCheckData: how wrong the model is on the file as it stands, and the mistakes; no step.
+report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
+                                  std::vector<selection::DataProblem> problems);
+
+// How many usable touches a verdict needs if there are too few of them; 0: there are enough.
+int TouchesNeeded(const touches::Observations& observations);
+
+// kTooLittleData: how wrong the model is as far as can be said.
+report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int touches_needed);
+
+}  // namespace touchstone::diagnosis
