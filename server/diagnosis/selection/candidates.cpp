@@ -63,7 +63,8 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
 }
 
 bool IsDeclaredConfounded(const model::Effect& one, const std::string& other) {
-  return !DeclaredBy(one.name, other).empty() || !DeclaredBy(other, one.name).empty();
+  const std::string name(absl::StripPrefix(other, kGivenPrefix));
+  return !DeclaredBy(one.name, name).empty() || !DeclaredBy(name, one.name).empty();
 }
 
 std::string DiscriminatingMeasurement(const std::vector<std::string>& names) {

@@ -24,7 +24,8 @@ constexpr double kLengthError = 0.4;        // relative, of a surface error's le
 constexpr double kElsewhereNats = 5;  // of what is no surface, for a rest that a lack of fit does not show
 constexpr double kZeroErrors = 2;     // standard errors of a value that may be zero
 constexpr double kZero = 1e-6;        // ... or this share of the typical size
-constexpr double kSameSurface = 1.5;  // ratio of two sizes of a surface error that may be the same
+constexpr double kSameSurface =
+    2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
 absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
