@@ -252,7 +252,7 @@ class LadderBuilder {
       return absl::OkStatus();
     }
     unplaced_ = gain_nats > kSurfaceNats &&
-                (misfit || std::max(support_.curve_nats, support_.finger_field_nats) > kElsewhereNats);
+                std::max(support_.curve_nats, support_.finger_field_nats) > kElsewhereNats;
     return absl::OkStatus();
   }
 

@@ -17,8 +17,8 @@ namespace {
 
 constexpr int kSurfaceFolds = 8;       // of poses
 constexpr int kKnotsPerCurve = 24;     // places that stand for a curve's range
-constexpr double kMinFieldNats = 3;    // of bumps over errors per pose
-constexpr double kMinShareErrors = 1;  // standard errors of the share of the excess that is predicted
+constexpr double kMinFieldNats = 1;    // of bumps over errors per pose
+constexpr double kMinShareErrors = 0;  // standard errors of the share of the excess that is predicted
 constexpr double kUsualMinMm = 0.05, kUsualMaxMm = 0.3;  // RMS that printing and milling leave
 constexpr double kApart = 100;                           // ranges between curves that share nothing
 constexpr double kMinSurfaceCosine = 0.1;                // as in the effect
