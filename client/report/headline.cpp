@@ -22,6 +22,11 @@ std::string Falls(double from_us, double to_us) {
   return absl::StrCat("the error falls from ", Time(from_us), " to ", Time(to_us));
 }
 
+// A step that says nothing of single touches (a surface error) leaves the error where it was.
+bool FallsAtAll(double from_us, double to_us) {
+  return Time(from_us) != Time(to_us) && to_us < from_us;
+}
+
 std::string Compared(const v1::Report& report) {
   if (report.has_distributions()) {
     const double p = report.distributions().p();
@@ -91,6 +96,8 @@ std::string Headline(const v1::Report& report) {
     case v1::Report::MISSING_EFFECTS: {
       const Floor floor = NoiseFloorOf(report);
       const bool reached = floor.sigma_us > 0 && to <= 1.05 * floor.sigma_us;
+      if (!FallsAtAll(from, to))
+        return absl::StrCat("The model lacks ", Steps(report), "; the error stays ", Time(to), ".");
       return absl::StrCat("The model lacks ", Steps(report), "; with ",
                           report.steps_size() > 1 ? "them " : "it ", Falls(from, to),
                           reached ? ", the noise floor." : ".");

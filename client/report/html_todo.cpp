@@ -49,6 +49,7 @@ std::string Definition(const char* term, const std::string& text) {
 std::string StepBody(const v1::Step& step) {
   std::string body;
   if (!step.meaning().empty()) absl::StrAppend(&body, "<p>", Typeset(step.meaning()), "</p>");
+  if (!step.words().empty()) absl::StrAppend(&body, "<p>", Typeset(step.words()), "</p>");
   if (!step.equivalent().empty()) {
     std::vector<std::string> equivalent = {step.effect()};
     equivalent.insert(equivalent.end(), step.equivalent().begin(), step.equivalent().end());

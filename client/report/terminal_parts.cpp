@@ -209,6 +209,7 @@ void AddWhatToDo(const v1::Report& report, TextLayout* out) {
   if (!summary.empty()) out->Paragraph(summary);
   for (const v1::Step& step : report.steps()) {
     std::string text = step.meaning();
+    if (!step.words().empty()) absl::StrAppend(&text, text.empty() ? "" : " ", step.words());
     if (!step.remedy().empty()) absl::StrAppend(&text, text.empty() ? "" : " ", step.remedy());
     if (!text.empty()) out->Paragraph(absl::StrCat(step.effect(), ": ", text));
     if (!step.check_on_rig().empty()) {

@@ -154,6 +154,7 @@ void AddLadder(const selection::Ladder& ladder, report::Diagnosis* diagnosis) {
   diagnosis->reducible_share = ReducibleShare(ladder.noise_floor, *diagnosis->initial);
   diagnosis->refitted = ladder.refitted;
   diagnosis->steps = ladder.steps;
+  diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
   diagnosis->candidates = ladder.candidates;
   diagnosis->unexplained = ladder.unexplained;
@@ -195,6 +196,8 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
   report::Diagnosis diagnosis = Begin(*workspace);
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
   diagnosis.initial = selection::QualityOf(*workspace, selection.initial_model, before);
+  TOUCHSTONE_RETURN_IF_ERROR(
+      selection::SetErrorsAsCompared(*workspace, *workspace->input.model, &*diagnosis.initial));
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   AddLadder(ladder, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);

@@ -359,5 +359,103 @@ TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
   EXPECT_EQ(report->data.fingers, 3);
 }
 
+double ComparedRmse(DiagnosisInput input, const model::Model& model) {
+  input.model = std::make_shared<const model::Model>(model);
+  const absl::StatusOr<report::Diagnosis> compared = Compare(input, {});
+  EXPECT_TRUE(compared.ok()) << compared.status();
+  return compared.ok() && compared->initial ? compared->initial->rmse_s : NAN;
+}
+
+// Every error of the ladder against what a comparison with that step's model finds.
+void ExpectErrorsAsCompared(const touches::HiddenRig& rig) {
+  const DiagnosisInput input = touches::MakeTestInput(rig);
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_NEAR(report->initial->rmse_s / ComparedRmse(input, *input.model), 1, 0.01);
+  for (const selection::LadderStep& step : report->steps) {
+    if (step.model.effects.empty()) continue;  // noise: it changes no expectation
+    EXPECT_NEAR(step.quality.rmse_s / ComparedRmse(input, step.model), 1, 0.01) << step.effect;
+  }
+  if (report->improved_model_yaml.empty()) return;
+  const absl::StatusOr<model::Model> better =
+      model::ParseModel(report->improved_model_yaml, "better", effects::Catalogue());
+  ASSERT_TRUE(better.ok()) << better.status();
+  EXPECT_NEAR(report->final->rmse_s / ComparedRmse(input, *better), 1, 0.01);
+}
+
+TEST(Diagnose, FindsTheErrorsThatAComparisonFinds) {
+  touches::HiddenRig rig;
+  ExpectErrorsAsCompared(rig);
+  rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}, {"object_push", {"shift_mm=0.4"}}};
+  ExpectErrorsAsCompared(rig);
+  rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}, {"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
+  ExpectErrorsAsCompared(rig);
+}
+
+TEST(Diagnose, ClaimsNoFallForASurfaceErrorThatNobodyKnows) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.hidden = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"surface_error"}) << report.summary;
+  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(report.steps[0].quality.rmse_s, report.initial->rmse_s);
+  EXPECT_EQ(report.final->rmse_s, report.initial->rmse_s);
+  EXPECT_THAT(report.steps[0].words, HasSubstr("at poses left out"));
+}
+
+TEST(Diagnose, ExplainsItsOwnModelWithASurfaceError) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.hidden = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
+  rig.known = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kAdequate) << report.summary;
+}
+
+TEST(Diagnose, DoesNotAssertAValueAtItsBound) {
+  touches::HiddenRig rig;
+  // As object_push, but more than its bound of 5 mm allows.
+  rig.hidden = {
+      {"formula",
+       {"name=push", "adds=travel_mm", "expression=k*(1-first)", "k=8", "k_unit=mm", "k_min=0", "k_max=10"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kUnexplained) << report.summary;
+  for (const selection::LadderStep& step : report.steps) {
+    EXPECT_LE(step.probability, 0.9) << step.effect;
+    EXPECT_NE(step.effect, "surface_error");
+  }
+}
+
+TEST(Diagnose, NamesTheOldValueBesideANewEffect) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"finger_length", {"offset_mm=0.3,0,-0.3"}}};
+  rig.known = {{"finger_length", {"offset_mm=0.01,0,-0.01"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  if (report.verdict == selection::Verdict::kWrongValues) return;  // the old value alone
+  ASSERT_GE(report.steps.size(), 1u) << report.summary;
+  EXPECT_THAT(report.steps[0].equivalent, Contains("given:finger_length")) << report.summary;
+}
+
+TEST(Diagnose, CallsAnEffectSuperfluousAndTakesItOut) {
+  touches::HiddenRig rig;
+  rig.known = {{"object_push", {"shift_mm=0.5"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_THAT(report.superfluous, Contains("object_push")) << report.summary;
+  EXPECT_TRUE(report.refitted.empty()) << report.summary;
+  EXPECT_THAT(report.improved_model_yaml, ::testing::Not(HasSubstr("object_push")));
+  EXPECT_NEAR(report.final->rmse_s, report.noise_floor->sigma_s, 0.1 * report.noise_floor->sigma_s);
+}
+
+TEST(Diagnose, IsNeverCertain) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  for (const selection::LadderStep& step : report.steps)
+    EXPECT_LE(step.probability, selection::kMaxProbability);
+  for (const selection::RankedCandidate& candidate : report.candidates)
+    EXPECT_LE(candidate.probability, selection::kMaxProbability);
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis

@@ -13,14 +13,6 @@ constexpr double kVisible = 10;  // squared scale over standard error from where
 constexpr double kPriorWidth = 10;  // of a value's prior (Cauchy) over the size that rigs show
 constexpr double kRidge = 1e-4;     // prior precision over 1 / scale^2: holds what nothing determines
 
-// Sum of logs, without overflow.
-double LogSum(const std::vector<double>& logs) {
-  const double max = *std::max_element(logs.begin(), logs.end());
-  double sum = 0;
-  for (const double value : logs) sum += std::exp(value - max);
-  return max + std::log(sum);
-}
-
 // The minimum of the quadratic form within bounds, by holding parameters that run out of them there.
 struct Minimum {
   Eigen::VectorXd step;
@@ -121,6 +113,15 @@ Eigen::MatrixXd CovarianceOf(const Eigen::MatrixXd& information, const std::vect
 }
 
 }  // namespace
+
+double LogSum(const std::vector<double>& logs) {
+  if (logs.empty()) return -INFINITY;
+  const double max = *std::max_element(logs.begin(), logs.end());
+  if (!std::isfinite(max)) return max;
+  double sum = 0;
+  for (const double value : logs) sum += std::exp(value - max);
+  return max + std::log(sum);
+}
 
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point) {
   double sum = 0;

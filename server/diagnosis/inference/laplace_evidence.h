@@ -33,6 +33,9 @@ LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
 // The Gram matrices of columns under every hypothesis.
 std::vector<Eigen::MatrixXd> Grams(const Likelihood& likelihood, const Likelihood::Columns& columns);
 
+// The log of the sum of exp(logs), however large or small they are; -inf for none.
+double LogSum(const std::vector<double>& logs);
+
 // What the prior says of values: Cauchy round what changes nothing, ten times as wide as rigs usually show.
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point);
 

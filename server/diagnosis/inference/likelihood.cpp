@@ -228,4 +228,36 @@ Eigen::VectorXd Likelihood::FieldMean(const Columns& r, int s) const {
   return mean;
 }
 
+Eigen::VectorXd Likelihood::FieldLeftOut(const Eigen::VectorXd& r, int s, const std::vector<int>& fold_of_row,
+                                         int folds) const {
+  Eigen::VectorXd expected = Eigen::VectorXd::Zero(rows());
+  const int l = hypotheses_[s].length_index;
+  if (l < 0) return expected;
+  const double precision = std::pow(hypotheses_[s].amplitude_over_sigma, -2);
+  for (size_t group = 0; group < bases_[l].directions.size(); ++group) {
+    const Eigen::MatrixXd& directions = bases_[l].directions[group];
+    const int first = group_rows_[group];
+    if (directions.cols() == 0) continue;
+    const Eigen::VectorXd all = directions.transpose() * r.segment(first, directions.rows());
+    const Eigen::VectorXd energies = directions.colwise().squaredNorm().transpose();
+    for (int fold = 0; fold < folds; ++fold) {
+      std::vector<int> members;
+      for (int row = 0; row < directions.rows(); ++row)
+        if (fold_of_row[first + row] == fold) members.push_back(row);
+      if (members.empty()) continue;
+      Eigen::MatrixXd left_out(members.size(), directions.cols());
+      Eigen::VectorXd values(members.size());
+      for (size_t m = 0; m < members.size(); ++m) {
+        left_out.row(static_cast<int>(m)) = directions.row(members[m]);
+        values[static_cast<int>(m)] = r[first + members[m]];
+      }
+      Eigen::MatrixXd rest = -left_out.transpose() * left_out;
+      rest.diagonal().array() += energies.array() + precision;
+      const Eigen::VectorXd field = left_out * rest.ldlt().solve(all - left_out.transpose() * values);
+      for (size_t m = 0; m < members.size(); ++m) expected[first + members[m]] = field[static_cast<int>(m)];
+    }
+  }
+  return expected;
+}
+
 }  // namespace touchstone::diagnosis::inference

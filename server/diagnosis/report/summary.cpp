@@ -57,6 +57,7 @@ std::string WhatRemains(const selection::UnexplainedRest& rest) {
   if (rest.formula.empty() && !rest.covariates.empty())
     return absl::StrCat("What remains depends on ", rest.covariates[0].name,
                         "; no effect of the catalogue explains it.");
+  if (rest.formula.empty() && !rest.words.empty()) return rest.words;
   if (rest.formula.empty())
     return "A structure remains that neither an effect of the catalogue nor a simple formula explains.";
   return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
@@ -100,6 +101,11 @@ std::string Summarize(const Diagnosis& diagnosis) {
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
     sentences.push_back(
         absl::StrCat("In the model ", refit.effect, " has another value: ", Values(refit.parameters), "."));
+  for (const std::string& effect : diagnosis.superfluous)
+    sentences.push_back(
+        absl::StrCat("The data do without ", effect,
+                     ": its value is zero as far as they can tell (`touchstone model remove MODEL ", effect,
+                     " -o NEW`)."));
   for (const selection::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
@@ -107,6 +113,7 @@ std::string Summarize(const Diagnosis& diagnosis) {
     if (!step.equivalent.empty())
       sentences.push_back(
           absl::StrCat("These data cannot tell them apart. ", step.discriminating_measurement));
+    if (!step.words.empty()) sentences.push_back(step.words);
   }
   switch (diagnosis.verdict) {
     case selection::Verdict::kAdequate:

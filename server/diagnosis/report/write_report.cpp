@@ -11,9 +11,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-// No more is supported by the calibration: of a thousand sets no fewer than one has a cause that nobody lists.
-constexpr double kMaxProbability = 0.999;
-
 v1::Report::Verdict ToMessage(selection::Verdict verdict) {
   switch (verdict) {
     case selection::Verdict::kNone:
@@ -85,7 +82,7 @@ void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message
 void WriteStep(const selection::LadderStep& step, v1::Step* message) {
   message->set_effect(step.effect);
   for (const std::string& name : step.equivalent) message->add_equivalent(name);
-  message->set_probability(std::min(step.probability, kMaxProbability));
+  message->set_probability(std::min(step.probability, selection::kMaxProbability));
   WriteParameters(step.parameters, message);
   message->set_rmse_us(Microseconds(step.quality.rmse_s));
   message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse_s));
@@ -102,7 +99,7 @@ void WriteStep(const selection::LadderStep& step, v1::Step* message) {
 void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
   message->set_effect(candidate.effect);
   WriteParameters(candidate.parameters, message);
-  message->set_probability(std::min(candidate.probability, kMaxProbability));
+  message->set_probability(std::min(candidate.probability, selection::kMaxProbability));
   message->set_rmse_us(Microseconds(candidate.rmse_s));
   message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse_s));
   message->set_gain_nats(candidate.gain_nats);

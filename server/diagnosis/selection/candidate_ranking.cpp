@@ -9,8 +9,7 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kMaxFitted = 8;         // candidates that are fitted in full
-constexpr double kMaxExponent = 600;  // of a candidate's odds
+constexpr int kMaxFitted = 8;  // candidates that are fitted in full
 
 // Whether every value of the effect ended at its neutral, usually a bound.
 bool ChangesNothing(const inference::Fit& fit, int index) {
@@ -19,10 +18,6 @@ bool ChangesNothing(const inference::Fit& fit, int index) {
     if (c.effect == index && std::abs(fit.point[i] - c.neutral) > 1e-9 * c.scale) return false;
   }
   return true;
-}
-
-double Odds(const RankedCandidate& candidate) {
-  return std::exp(std::min(candidate.gain_nats, kMaxExponent));
 }
 
 void DescribeFit(const inference::Experiment& experiment, const inference::Fit& fit,
@@ -51,7 +46,7 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
   std::stable_sort(extensions.begin(), extensions.end(),
                    [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<RankedCandidate> candidates;
-  double all = 1;  // nothing is missing: evidence 0
+  std::vector<double> all = {0};  // log evidence: nothing is missing
   int fitted = 0;
   for (const Extension& extension : extensions) {
     if (extension.candidate < 0) continue;
@@ -71,10 +66,12 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
     } else {
       candidate.note = CandidateNote::kLinearised;
     }
-    if (candidate.explains()) all += Odds(candidate);
+    if (candidate.explains()) all.push_back(candidate.gain_nats);
   }
   for (RankedCandidate& candidate : candidates)
-    if (candidate.explains()) candidate.probability = Odds(candidate) / all;
+    if (candidate.explains())
+      candidate.probability =
+          std::min(kMaxProbability, std::exp(candidate.gain_nats - inference::LogSum(all)));
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const RankedCandidate& a, const RankedCandidate& b) {
                      return a.explains() != b.explains() ? a.explains() : a.gain_nats > b.gain_nats;

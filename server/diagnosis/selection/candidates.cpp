@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 
@@ -61,7 +62,14 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
   return candidates;
 }
 
-std::string DiscriminatingMeasurement(const std::vector<std::string>& effects) {
+bool IsDeclaredConfounded(const model::Effect& one, const std::string& other) {
+  const std::string name(absl::StripPrefix(other, kGivenPrefix));
+  return !DeclaredBy(one.name, name).empty() || !DeclaredBy(name, one.name).empty();
+}
+
+std::string DiscriminatingMeasurement(const std::vector<std::string>& names) {
+  std::vector<std::string> effects;
+  for (const std::string& name : names) effects.emplace_back(absl::StripPrefix(name, kGivenPrefix));
   for (size_t i = 0; i < effects.size(); ++i)
     for (size_t j = i + 1; j < effects.size(); ++j)
       for (const std::string& text : {DeclaredBy(effects[i], effects[j]), DeclaredBy(effects[j], effects[i])})

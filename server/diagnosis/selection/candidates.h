@@ -22,6 +22,12 @@ struct Candidate {
 // object, and the user's own. `searched`: the touches of the search.
 std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches::Observations& searched);
 
+// Before the name of an effect that the model has, where another value of it competes with a new effect.
+inline constexpr char kGivenPrefix[] = "given:";
+
+// Whether either effect declares that the other may be taken for it.
+bool IsDeclaredConfounded(const model::Effect& one, const std::string& other);
+
 // The measurement or intervention that tells two or more effects apart, for people. Effects declare it
 // (Effect::confounded_with); of several pairs the one of the effects that are named first counts.
 std::string DiscriminatingMeasurement(const std::vector<std::string>& effects);

@@ -1,23 +1,32 @@
 #include "server/diagnosis/selection/ladder.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/doubts.h"
+#include "server/diagnosis/selection/surface_support.h"
 #include "server/diagnosis/selection/time_structure.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kSurfaceNats = 5;        // evidence that makes a surface error a step by itself
+constexpr double kSurfaceNats = 5;        // evidence that asks for a surface error by itself
 constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
 constexpr double kMisfitP = 1e-2;
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
 constexpr double kLengthError = 0.4;        // relative, of a surface error's length: the grid's spacing
+constexpr double kElsewhereNats = 5;  // of what is no surface, for a rest that a lack of fit does not show
+constexpr double kZeroErrors = 2;     // standard errors of a value that may be zero
+constexpr double kZero = 1e-6;        // ... or this share of the typical size
+constexpr double kSameSurface =
+    2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
 absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
@@ -60,18 +69,24 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
+    doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
-    if (SurfaceErrorIsAStep()) AddSurfaceError();
+    left_ = ladder_.final;
+    TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
+    TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     AddNoiseSteps(selection_.noise, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
-    const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains();
+    const bool rest =
+        StructureRemains() || selection_.curve || TimeStructureRemains() || unplaced_ || doubts_.any();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           ladder_.unexplained,
           DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
       if (TimeStructureRemains())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
+      ladder_.unexplained->words = WordsOfRest();
+      Doubt(ExplainedShare(), doubts_, &ladder_);
     }
     ladder_.verdict = has_formula() || rest    ? Verdict::kUnexplained
                       : !ladder_.steps.empty() ? Verdict::kMissingEffects
@@ -93,6 +108,7 @@ class LadderBuilder {
     ladder_.improved = whole;
     if (has_formula()) ladder_.improved.effects.erase(ladder_.improved.effects.begin() + selection_.formula);
     ladder_.changed = !selection_.steps.empty();
+    TOUCHSTONE_RETURN_IF_ERROR(RemoveSuperfluous());
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
     ladder_.residuals = touches::Residuals(o, ladder_.prediction);
     std::vector<double> best = ladder_.residuals;
@@ -106,11 +122,38 @@ class LadderBuilder {
     return absl::OkStatus();
   }
 
+  // Effects of the given model whose values, set free, are zero as far as the data can tell.
+  absl::Status RemoveSuperfluous() {
+    for (int index = static_cast<int>(workspace_.input.model->effects.size()) - 1; index >= 0; --index) {
+      if (!fit_.model.IsFree(index)) continue;
+      const model::Effect& effect = *fit_.model.base().effects[index].effect;
+      bool zero = true;
+      for (const inference::ParameterEstimate& e : fit_.model.Describe(index, fit_.point, fit_.covariance))
+        for (const model::ParameterInfo& parameter : effect.parameters)
+          if (parameter.name == e.name)
+            zero &=
+                !parameter.reciprocal && std::abs(e.value - parameter.neutral) <=
+                                             std::max(kZeroErrors * e.std_error, kZero * parameter.typical);
+      if (!zero) continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          const inference::Fit without,
+          inference::FitModel(workspace_.experiment, selection_.fit.model.Without(index)));
+      if (without.log_evidence < selection_.fit.log_evidence) continue;
+      superfluous_.push_back(index);
+      ladder_.superfluous.push_back(inference::NameOf(effect));
+      ladder_.improved.effects.erase(ladder_.improved.effects.begin() + index);
+      ladder_.values_wrong = true;
+      ladder_.changed = true;
+    }
+    return absl::OkStatus();
+  }
+
   void DescribeRefits() {
     const model::Model& before = *workspace_.input.model;
     const inference::Parameterization initial(before, workspace_.observations->objects);
     for (int index = 0; index < static_cast<int>(before.effects.size()); ++index) {
       if (!fit_.model.IsFree(index)) continue;
+      if (std::find(superfluous_.begin(), superfluous_.end(), index) != superfluous_.end()) continue;
       const std::vector<inference::ParameterEstimate> old =
           initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
       RefittedEffect refit;
@@ -168,6 +211,10 @@ class LadderBuilder {
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
         equivalent.push_back(other.name);
     step.equivalent.assign(equivalent.begin() + 1, equivalent.end());
+    for (const CompetingEffect& other : from.competing)
+      if (other.stopped)
+        step.words += absl::StrCat(step.words.empty() ? "" : " ", other.name,
+                                   " would do as well with a value beyond its bound.");
     if (!step.equivalent.empty()) {
       step.discriminating_measurement = DiscriminatingMeasurement(equivalent);
       ladder_.confounded.push_back({equivalent, step.discriminating_measurement});
@@ -175,21 +222,78 @@ class LadderBuilder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.predictor->Run(with_it.model.base(), false, false));
     step.quality = QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction));
+    step.model = with_it.model.base();
+    TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
   }
 
-  // Bumps of the surface may be the last step.
-  bool SurfaceErrorIsAStep() const {
-    const std::vector<model::EffectInstance>& effects = workspace_.input.model->effects;
-    const bool had = std::any_of(effects.begin(), effects.end(), [](const model::EffectInstance& e) {
-      return e.effect->role == model::EffectRole::kSmoothError;
-    });
+  const model::EffectInstance* GivenSurface() const {
+    for (const model::EffectInstance& e : workspace_.input.model->effects)
+      if (e.effect->role == model::EffectRole::kSmoothError) return &e;
+    return nullptr;
+  }
+
+  // Bumps of the surface may be the last step, where nothing else accounts for them.
+  absl::Status JudgeSurface() {
     const double gain_nats = selection_.surface_error.gain_nats;
-    const bool misfit = ladder_.final.lack_of_fit_p < kMisfitP;
+    const bool misfit = left_.lack_of_fit_p < kMisfitP;
+    const bool asked = selection_.fit.hypothesis != 0 &&
+                       (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
     // Where a curve of one covariate or a wander takes part, bumps are no explanation of what is left.
-    return !had && !selection_.curve && !selection_.memory && selection_.fit.hypothesis != 0 &&
-           (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
+    if (!asked || doubts_.any() || selection_.curve || selection_.memory) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(support_, FindSurfaceSupport(workspace_, selection_.fit));
+    const model::EffectInstance* given = GivenSurface();
+    const double rms_m = selection_.surface_error.rms_m;
+    if (given != nullptr && rms_m < kSameSurface * given->values[0]) {
+      // The model says that surfaces are as wrong as this.
+      left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
+      return absl::OkStatus();
+    }
+    if (support_.IsSurface()) {
+      left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
+      if (given == nullptr)
+        AddSurfaceError();
+      else
+        RefitSurfaceError();
+      return absl::OkStatus();
+    }
+    unplaced_ = gain_nats > kSurfaceNats &&
+                std::max(support_.curve_nats, support_.finger_field_nats) > kElsewhereNats;
+    return absl::OkStatus();
+  }
+
+  // Size and length, in the units of files. What the bounds of the effect cut off is cut off here too.
+  std::vector<inference::ParameterEstimate> DescribeSurface(const model::Effect& effect) const {
+    const SurfaceErrorFinding& found = selection_.surface_error;
+    const std::pair<double, double> values[] = {
+        {found.rms_m * kMillimetresPerMetre, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0))},
+        {found.length_m * kMillimetresPerMetre, kLengthError}};
+    std::vector<inference::ParameterEstimate> estimates;
+    for (const auto& [value, relative_error] : values) {
+      const model::ParameterInfo& parameter = effect.parameters[estimates.size()];
+      inference::ParameterEstimate estimate;
+      estimate.name = parameter.name;
+      estimate.unit = std::string(UnitSymbol(parameter.unit));
+      estimate.value = std::clamp(value, parameter.lower, parameter.upper);
+      estimate.std_error = value * relative_error;
+      estimate.lower = estimate.value * std::max(0.0, 1 - kNormalQuantile975 * relative_error);
+      estimate.upper = std::min(parameter.upper, estimate.value * (1 + kNormalQuantile975 * relative_error));
+      estimates.push_back(std::move(estimate));
+    }
+    return estimates;
+  }
+
+  static std::vector<double> SurfaceValues(const model::Effect& effect,
+                                           const std::vector<inference::ParameterEstimate>& estimates) {
+    std::vector<double> values;
+    for (const inference::ParameterEstimate& estimate : estimates) {
+      const model::ParameterInfo& parameter = effect.parameters[values.size()];
+      // Two per cent of the values stand for their error.
+      const double rounded = RoundedTo(estimate.value, 0.02 * estimate.value);
+      values.push_back(std::clamp(rounded, parameter.lower, parameter.upper) * kMetresPerMillimetre);
+    }
+    return values;
   }
 
   void AddSurfaceError() {
@@ -199,40 +303,55 @@ class LadderBuilder {
     step.effect = effect->name;
     step.scope = EffectScope::kObject;
     AddTexts(*effect, &step);
-    step.probability = 1 / (1 + std::exp(-found.gain_nats));
+    step.probability = ProbabilityOf(found.gain_nats);
     step.gain_nats = found.gain_nats;
     step.discriminating_measurement = DiscriminatingMeasurement({effect->name});
-    const double rms_mm = found.rms_m * kMillimetresPerMetre,
-                 length_mm = found.length_m * kMillimetresPerMetre;
-    const auto add = [&](const model::ParameterInfo& parameter, double value, double relative_error) {
-      inference::ParameterEstimate estimate;
-      estimate.name = parameter.name;
-      estimate.unit = std::string(UnitSymbol(parameter.unit));
-      estimate.value = value;
-      estimate.std_error = value * relative_error;
-      estimate.lower = value * std::max(0.0, 1 - kNormalQuantile975 * relative_error);
-      estimate.upper = value * (1 + kNormalQuantile975 * relative_error);
-      step.parameters.push_back(std::move(estimate));
-    };
-    add(effect->parameters[0], rms_mm, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0)));
-    add(effect->parameters[1], length_mm, kLengthError);
-    step.quality = QualityWithoutSurface(workspace_, selection_.fit);
-    if (!has_formula()) ladder_.final = step.quality;
-    ladder_.steps.push_back(std::move(step));
+    step.parameters = DescribeSurface(*effect);
+    step.words = support_.Words(ladder_.final.rmse_s);
+    // How the bumps lie is not known: the model with them expects what it did without.
+    step.quality = ladder_.final;
+    step.quality.lack_of_fit_p = left_.lack_of_fit_p;
+    if (!has_formula()) ladder_.final.lack_of_fit_p = left_.lack_of_fit_p;
     model::EffectInstance instance;
     instance.effect = effect;
     instance.per_object = true;
-    // Two per cent of the values stand for their error.
-    instance.values = {RoundedTo(rms_mm, found.rms_m * 20) * kMetresPerMillimetre,
-                       RoundedTo(length_mm, found.length_m * 20) * kMetresPerMillimetre};
+    instance.values = SurfaceValues(*effect, step.parameters);
     ladder_.improved.effects.push_back(std::move(instance));
+    step.model = ladder_.improved;
+    ladder_.steps.push_back(std::move(step));
     ladder_.changed = true;
   }
 
+  void RefitSurfaceError() {
+    for (model::EffectInstance& instance : ladder_.improved.effects) {
+      if (instance.effect->role != model::EffectRole::kSmoothError) continue;
+      RefittedEffect refit{instance.effect->name, DescribeSurface(*instance.effect)};
+      for (size_t p = 0; p < refit.parameters.size(); ++p)
+        refit.parameters[p].before = instance.values[p] * kMillimetresPerMetre;
+      instance.values = SurfaceValues(*instance.effect, refit.parameters);
+      instance.object_values.clear();
+      ladder_.refitted.push_back(std::move(refit));
+      ladder_.values_wrong = true;
+      ladder_.changed = true;
+    }
+  }
+
   bool StructureRemains() const {
-    return !has_formula() && ladder_.final.lack_of_fit_p < kUnexplainedP &&
-           ladder_.final.rmse_s * kMicrosecondsPerSecond >
-               (1 + kUnexplainedShare) * (ladder_.noise_floor.sigma_s * kMicrosecondsPerSecond);
+    // Under a wander repeats are alike by chance, and the test of their scatter does not hold.
+    return !has_formula() && !selection_.memory && left_.lack_of_fit_p < kUnexplainedP &&
+           left_.rmse_s > (1 + kUnexplainedShare) * ladder_.noise_floor.sigma_s;
+  }
+
+  std::string WordsOfRest() const { return unplaced_ ? support_.WordsOfRest() : doubts_.words; }
+
+  // Of the mean square error that is no noise, what the steps take away.
+  double ExplainedShare() const {
+    const double floor_s2 = ladder_.noise_floor.sigma_s * ladder_.noise_floor.sigma_s;
+    const touches::Observations& o = *workspace_.observations;
+    const double before_s2 =
+        std::pow(touches::Rmse(o, touches::Residuals(o, workspace_.nominal)), 2) - floor_s2;
+    const double after_s2 = left_.rmse_s * left_.rmse_s - floor_s2;
+    return before_s2 > 0 ? std::clamp(1 - after_s2 / before_s2, 0.0, 1.0) : 0;
   }
 
   // Repeats that share a course in time are not noise.
@@ -240,7 +359,12 @@ class LadderBuilder {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
-  inference::Fit fit_;  // on all touches
+  inference::Fit fit_;            // on all touches
+  Quality left_;                  // on the touches that the fits used: what the verdict is about
+  std::vector<int> superfluous_;  // effects of the given model
+  Doubts doubts_;
+  SurfaceSupport support_;
+  bool unplaced_ = false;  // a misfit repeats with the pose, but not with the place on the surface
   Ladder ladder_;
 };
 

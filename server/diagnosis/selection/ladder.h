@@ -15,8 +15,9 @@ struct Ladder {
   Verdict verdict = Verdict::kNone;
   NoiseFloor noise_floor;
   std::vector<RefittedEffect> refitted;
-  std::vector<LadderStep> steps;  // in the order in which they explain most
-  Quality final;                  // after all steps and refits
+  std::vector<LadderStep> steps;         // in the order in which they explain most
+  std::vector<std::string> superfluous;  // effects of the initial model that the data do without
+  Quality final;                         // after all steps and refits
   std::vector<ConfoundedEffects> confounded;
   std::vector<RankedCandidate> candidates;  // best first
   std::optional<UnexplainedRest> unexplained;

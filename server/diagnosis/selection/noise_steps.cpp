@@ -15,7 +15,6 @@ constexpr double kRelevant = 0.02;     // relative change, for a refit
 constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
 constexpr double kMinFloorUs = 2;      // of noise as a step: less is the rounding of the file
 constexpr double kCertainNats = 1e3;   // noise is there or not: any scatter beyond rounding proves it
-constexpr double kMaxLogOdds = 700;    // of a probability's odds
 
 class NoiseStepWriter {
  public:
@@ -79,12 +78,19 @@ class NoiseStepWriter {
     return estimate;
   }
 
+  // SI. Rounding must not push a value over its bound: no model file may hold it.
+  static double RoundedValue(const model::ParameterInfo& parameter,
+                             const inference::ParameterEstimate& estimate) {
+    const double rounded = RoundedTo(estimate.value, estimate.std_error);
+    return ToSi(parameter.unit, std::clamp(rounded, parameter.lower, parameter.upper));
+  }
+
   void Refit(inference::ParameterEstimate estimate, model::EffectInstance* present) {
     const Unit unit = present->effect->parameters[0].unit;
     const double before = FromSi(unit, present->values[0]), change = std::abs(estimate.value - before);
     if (change < kSignificant * estimate.std_error || change < kRelevant * estimate.value) return;
     estimate.before = before;
-    present->values[0] = ToSi(unit, RoundedTo(estimate.value, estimate.std_error));
+    present->values[0] = RoundedValue(present->effect->parameters[0], estimate);
     present->object_values.clear();
     ladder_.refitted.push_back({present->effect->name, {std::move(estimate)}});
     ladder_.changed = true;
@@ -98,14 +104,14 @@ class NoiseStepWriter {
     step.check_on_rig = effect->check_on_rig;
     step.remedy = effect->remedy;
     step.gain_nats = gain_nats;
-    step.probability = 1 / (1 + std::exp(-std::min(gain_nats, kMaxLogOdds)));
+    step.probability = ProbabilityOf(gain_nats);
     step.parameters = {estimate};
     step.quality = ladder_.final;  // noise changes no expectation: the errors stay
     ladder_.steps.push_back(std::move(step));
     model::EffectInstance instance;
     instance.effect = effect;
     instance.values = effect->NeutralValues(ladder_.improved.fingers);
-    instance.values[0] = ToSi(effect->parameters[0].unit, RoundedTo(estimate.value, estimate.std_error));
+    instance.values[0] = RoundedValue(effect->parameters[0], estimate);
     ladder_.improved.effects.push_back(std::move(instance));
     ladder_.changed = true;
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 
 namespace touchstone::diagnosis::selection {
@@ -51,6 +52,23 @@ Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
   quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
                                                                 : SmoothRemainderP(workspace, fit);
   return quality;
+}
+
+absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model) {
+  touches::Observations o = *workspace.observations;
+  o.used = workspace.comparable;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                              workspace.predictor->Run(model, false, false));
+  LeaveOutMissed(prediction, &o);
+  TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*workspace.predictor, model, &o).status());
+  return touches::Rmse(o, touches::Residuals(o, prediction));
+}
+
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
+  if (quality->rmse_s > 0) quality->heldout_rmse_s *= rmse_s / quality->rmse_s;
+  quality->rmse_s = rmse_s;
+  return absl::OkStatus();
 }
 
 Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit) {

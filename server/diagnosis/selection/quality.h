@@ -19,6 +19,12 @@ bool HasRepeats(const touches::SumOfSquares& error);
 Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
                   const std::vector<double>& residuals);
 
+// What a comparison of the set with `model` finds, s: the same touches, every one of them.
+absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
+
+// Sets the errors of `quality` to those of `model` as a comparison finds them; the held-out error keeps its ratio.
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality);
+
 // The same for what the fit's surface error leaves, on the touches of the search.
 Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/diagnosis/inference/parameter_estimate.h"
+#include "server/model/model.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -22,9 +23,13 @@ enum class Verdict {
 
 enum class EffectScope { kRig, kObject };
 
+// No probability of an explanation is above this: it is one among the causes that somebody has thought of, and the
+// true cause may be another.
+inline constexpr double kMaxProbability = 0.999;
+
 struct Quality {
-  double rmse_s = 0;          // sqrt(sum ||residual||^2 / sum (reporting fingers - 1))
-  double heldout_rmse_s = 0;  // the same on touches that the fit did not see
+  double rmse_s = 0;  // sqrt(sum ||residual||^2 / sum (reporting fingers - 1)), as a comparison finds it
+  double heldout_rmse_s = 0;  // the same on objects, else poses, that the fit did not see
   double lack_of_fit_p =
       0;  // 0 to 1; of at least this misfit beyond the repeats' scatter if nothing were missing
 };
@@ -57,9 +62,10 @@ struct LadderStep {
   double probability = 0;                  // with its equivalents, among all that could take its place
   double gain_nats = 0;                    // of log evidence, over the fit without it
   std::vector<inference::ParameterEstimate> parameters;
-  Quality quality;  // with this step, all earlier ones and refits, everything fitted anew
+  Quality quality;     // with this step, all earlier ones and refits, everything fitted anew
+  model::Model model;  // that has this quality
   std::string meaning, check_on_rig, remedy;  // for people, from the catalogue
-  std::string words;                          // where it acts, if not everywhere: "on lat10 only"
+  std::string words;  // where it acts, if not everywhere: "on lat10 only"; what limits the claim
 };
 
 enum class CandidateNote {
@@ -104,6 +110,8 @@ struct UnexplainedRest {
   double heldout_gain = 0;                // share of the held-out excess error that it removes, 0 to 1
   std::string nearest_effect;             // of the catalogue, and the cosine between the two
   double nearest_cosine = 0;
+  std::string
+      words;  // what is known of it beside: "repeats with the pose, but not with the place"; may be empty
   std::string lookup_yaml;  // a curve in place of a formula, as a whole effect for a model file; empty: none
 };
 

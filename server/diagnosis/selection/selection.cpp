@@ -1,6 +1,7 @@
 #include "server/diagnosis/selection/selection.h"
 
 #include <absl/strings/str_cat.h>
+#include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
@@ -17,6 +19,8 @@ constexpr int kTermsFitted = 3;
 constexpr int kMaxFormulaTerms = 2;
 constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // less is no difference
+constexpr double kAlike = 0.03;            // share of a response that another effect may leave out
+constexpr double kBoundTolerance = 1e-6;   // of the typical size
 
 std::string FormulaName(const FormulaTerm& term) {
   std::string name = "rest_" + term.covariate;
@@ -119,6 +123,24 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
   return CompeteWithCurves(workspace, result);
 }
 
+Eigen::MatrixXd ColumnsOf(const inference::Fit& fit, int effect) {
+  Eigen::MatrixXd columns(fit.columns.values.rows(), 0);
+  for (int i = 0; i < fit.model.size(); ++i) {
+    if (fit.model.parameters()[i].effect != effect) continue;
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
+    columns.rightCols(1) = fit.columns.values.col(1 + i);
+  }
+  return columns;
+}
+
+// Whether the other effect moves the rows as this one does, however far.
+bool ActsAlike(const inference::Fit& fit, int effect, const inference::Fit& other_fit, int other) {
+  const Eigen::MatrixXd own = ColumnsOf(fit, effect), span = ColumnsOf(other_fit, other);
+  if (own.cols() == 0 || span.cols() == 0 || own.rows() != span.rows()) return false;
+  const Eigen::MatrixXd outside = own - span * span.colPivHouseholderQr().solve(own);
+  return outside.norm() < kAlike * own.norm();
+}
+
 absl::Status FindCompetingEffects(SelectionResult* result) {
   Explanation whole{result->fit, result->initial_effects};
   const StepwiseSearch& search = *result->search;
@@ -132,31 +154,50 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<CompetingFit> competing,
                                 search.CompetingFits(whole, index));
     const std::string own = inference::NameOf(*result->fit.model.base().effects[index].effect);
-    double all = std::exp(-std::min(step.gain_nats, 700.0)), equivalent_sum = 0;
+    // Log evidence over the step's own: that nothing takes its place, what else could, what is equivalent.
+    std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
     for (const CompetingFit& competitor : competing) {
       const double evidence = competitor.fit.log_evidence - result->fit.log_evidence;
       const bool same = competitor.name == own;
-      // Equivalent: as probable, or as likely with no more parameters, whatever rigs usually show.
+      const bool declared =
+          IsDeclaredConfounded(*result->fit.model.base().effects[index].effect, competitor.name);
+      // Equivalent: as probable, or as likely with no more parameters, whatever rigs usually show; with more of them
+      // if it is known to hold this effect as a part; or stopped by its bound and nothing else.
+      const bool as_likely = competitor.fit.log_likelihood > result->fit.log_likelihood - kSameLikelihoodNats;
+      const int added = static_cast<int>(competitor.fit.model.base().effects.size()) - 1;
+      const bool stopped = declared && added >= result->initial_effects && IsAtBound(competitor.fit, added) &&
+                           !IsAtBound(result->fit, index) &&
+                           ActsAlike(result->fit, index, competitor.fit, added);
       const bool equivalent =
           evidence > -search.rules().equivalent_nats ||
-          (competitor.fit.log_likelihood > result->fit.log_likelihood - kSameLikelihoodNats &&
-           competitor.fit.model.size() <= result->fit.model.size());
-      all += std::exp(evidence);
-      if (same || equivalent) equivalent_sum += std::exp(evidence);
+          (as_likely && (declared || competitor.fit.model.size() <= result->fit.model.size())) || stopped;
+      all.push_back(evidence);
+      if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (same) continue;
-      step.competing.push_back(
-          {competitor.name, competitor.per_object, evidence, equivalent, competitor.fit.model.base()});
+      step.competing.push_back({competitor.name, competitor.per_object, evidence, equivalent, stopped,
+                                competitor.fit.model.base()});
     }
     // A curve without a name may say the same as an effect of time.
     if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
-      all += std::exp(std::min(rival->second, 700.0));
-    step.probability = std::min(1.0, equivalent_sum / all);
+      all.push_back(rival->second);
+    step.probability =
+        std::min(kMaxProbability, std::exp(inference::LogSum(same_or_equivalent) - inference::LogSum(all)));
     result->steps.push_back(std::move(step));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
+
+bool IsAtBound(const inference::Fit& fit, int index) {
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const inference::FreeParameter& p = fit.model.parameters()[i];
+    const double near = kBoundTolerance * p.scale;
+    if (p.effect != index || std::abs(fit.point[i] - p.neutral) <= near) continue;
+    if (fit.point[i] <= p.lower + near || fit.point[i] >= p.upper - near) return true;
+  }
+  return false;
+}
 
 std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const inference::Fit& fit) {
   const touches::Contrasts& contrasts = *workspace.contrasts;
@@ -177,6 +218,10 @@ std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const in
     }
   }
   return residuals;
+}
+
+double ProbabilityOf(double log_odds) {
+  return std::min(kMaxProbability, 1 / (1 + std::exp(-log_odds)));
 }
 
 double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit) {

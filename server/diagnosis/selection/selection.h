@@ -25,6 +25,7 @@ struct CompetingEffect {
   bool per_object = false;
   double relative_log_evidence = 0;  // nats, over the step's own
   bool equivalent = false;           // these data cannot tell it from the step
+  bool stopped = false;              // ... if its value could go beyond its bound
   model::Model model;                // the whole model with it
 };
 
@@ -61,6 +62,12 @@ struct SelectionResult {
       memory;  // the wander that the residuals follow, where no curve describes them better
   SurfaceErrorFinding surface_error;
 };
+
+// Whether a value of effect `index` ended at a bound that is not the value that changes nothing.
+bool IsAtBound(const inference::Fit& fit, int index);
+
+// From a log of odds, nats, never above kMaxProbability.
+double ProbabilityOf(double log_odds);
 
 // Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.
 absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace);

@@ -14,7 +14,9 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kNearPrediction = 40;  // nats: candidates this far behind the best prediction are not fitted
-constexpr double kVisible = 1e-9;       // s of change at the typical size
+constexpr double kPoorPrediction =
+    0.5;                           // ... or this share of the evidence behind the fit, for strong effects
+constexpr double kVisible = 1e-9;  // s of change at the typical size
 constexpr int kFormulaStarts = 8;
 
 // P(chi^2_q > x)
@@ -200,17 +202,27 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
   std::vector<CompetingFit> competing;
   competing.push_back(
       {inference::NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
+  // The linearised prediction is good to about a share of what there is to explain.
+  const double near =
+      std::max(kNearPrediction, kPoorPrediction * (explanation.fit.log_evidence - without.log_evidence));
   int fitted = 0;
   for (const Extension& extension : extensions) {
-    if (extension.candidate < 0 || !extension.visible || fitted >= rules_.max_refits) continue;
+    // A value of the model that is set free competes like any effect.
+    const bool given = extension.candidate < 0;
+    const bool per_object = !given && candidates_[extension.candidate].per_object;
+    if (!extension.visible) continue;
     if (extension.name == inference::NameOf(own) &&
-        candidates_[extension.candidate].per_object == explanation.fit.model.base().effects[index].per_object)
+        per_object == explanation.fit.model.base().effects[index].per_object)
       continue;
-    if (extension.log_evidence < explanation.fit.log_evidence - kNearPrediction) continue;
+    const bool likely =
+        fitted < rules_.max_refits && extension.log_evidence > explanation.fit.log_evidence - near;
+    // What is known to resemble this effect is tried whatever the prediction says.
+    if (!likely && !IsDeclaredConfounded(own, extension.name)) continue;
     progress_(absl::StrCat("trying ", extension.name, " instead of ", inference::NameOf(own)));
-    ++fitted;
+    fitted += likely;
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
-    competing.push_back({extension.name, candidates_[extension.candidate].per_object, std::move(fit)});
+    competing.push_back(
+        {given ? absl::StrCat(kGivenPrefix, extension.name) : extension.name, per_object, std::move(fit)});
   }
   std::sort(competing.begin() + 1, competing.end(), [](const CompetingFit& a, const CompetingFit& b) {
     return a.fit.log_evidence > b.fit.log_evidence;

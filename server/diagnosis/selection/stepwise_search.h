@@ -36,7 +36,7 @@ struct Extension {
 
 // One effect in the place of another, fitted.
 struct CompetingFit {
-  std::string name;
+  std::string name;  // "given:finger_length": another value of an effect that the model has
   bool per_object = false;
   inference::Fit fit;
 };
@@ -62,8 +62,9 @@ class StepwiseSearch {
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts.
   absl::StatusOr<std::vector<Extension>> Score(const inference::Fit& fit, int initial_effects) const;
 
-  // The fits in which other effects take the place of effect `index`, best first; the linearised prediction
-  // chooses which are fitted. The first is the fit itself.
+  // The fits in which other effects, or other values of the model's own, take the place of effect `index`, best first;
+  // the linearised prediction, and what effects declare of one another, choose which are fitted. The first is the fit
+  // itself.
   absl::StatusOr<std::vector<CompetingFit>> CompetingFits(const Explanation& explanation, int index) const;
 
   // The fit with the effect taken out (one of the initial model: held at its values there).

@@ -113,6 +113,16 @@ touches::Observations Thin(const touches::Observations& o, const std::vector<int
 
 }  // namespace
 
+void LeaveOutMissed(const touches::Prediction& prediction, touches::Observations* o) {
+  for (int k = 0; k < o->size(); ++k) {
+    int members = 0;
+    for (size_t e = static_cast<size_t>(k) * o->fingers; e < static_cast<size_t>(k + 1) * o->fingers; ++e)
+      members += !std::isnan(o->time_s[e]) && !std::isnan(prediction.time_s[e]);
+    if (members < 2)
+      touches::LeaveOut(o, k, "in the model fewer than two of the reporting fingers meet the object");
+  }
+}
+
 absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const model::Model& model,
                                   touches::Observations* o) {
   std::vector<std::vector<double>> travels;
@@ -261,18 +271,13 @@ absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& i
   workspace->observations = std::make_unique<touches::Observations>(std::move(observations));
   touches::Observations& o = *workspace->observations;
   workspace->predictor = std::make_unique<touches::Predictor>(o, context.pool);
+  workspace->comparable = o.used;
   if (context.progress && !context.progress("predicting", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->nominal, workspace->predictor->Run(*input.model, true, true));
   TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(o, workspace->nominal, &workspace->warnings));
   TOUCHSTONE_RETURN_IF_ERROR(CheckUnits(o, workspace->nominal));
-  for (int k = 0; k < o.size(); ++k) {
-    int members = 0;
-    for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
-      members += !std::isnan(o.time_s[e]) && !std::isnan(workspace->nominal.time_s[e]);
-    if (members < 2)
-      touches::LeaveOut(&o, k, "in the model fewer than two of the reporting fingers meet the object");
-  }
+  LeaveOutMissed(workspace->nominal, &o);
   TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*workspace->predictor, *input.model, &o).status());
   return workspace;
 }

@@ -24,6 +24,8 @@ struct Workspace {
   std::unique_ptr<touches::Predictor> predictor;
   touches::Prediction nominal;  // of the initial model, with details
   std::vector<std::string> warnings;
+  // Touches that a comparison uses, whatever the model, as long as it meets the object and no edge. [k]
+  std::vector<char> comparable;
 
   // What the search sees.
   std::unique_ptr<touches::Observations> searched;
@@ -42,6 +44,9 @@ absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& i
 
 // Chooses the touches of the search anew, after some were left out. `weights_by_row`: of the set's rows (empty: all 1).
 absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row);
+
+// Leaves out touches of which the model expects fewer than two of the reporting fingers to meet the object.
+void LeaveOutMissed(const touches::Prediction& prediction, touches::Observations* observations);
 
 // Where a small move of the tool makes a finger meet another part of the object, the time says more about the
 // edge than about the rig, and a fit would chase it. Leaves such touches out; returns how many are new.

@@ -1,0 +1,26 @@
+// What forbids to assert the steps of a ladder: values at their bounds, many effects of sizes that no rig shows, a rest
+// that nothing explains.
+#pragma once
+
+#include <string>
+
+#include "server/diagnosis/selection/ladder.h"
+
+namespace touchstone::diagnosis::selection {
+
+struct Doubts {
+  bool at_bound = false;      // a value is at the bound of its effect: the data ask for more
+  bool many_strange = false;  // more than three effects at once, none near the size that rigs show
+  std::string words;          // a sentence for people; empty if there is no doubt
+
+  bool any() const { return at_bound || many_strange; }
+};
+
+// Of the steps that the ladder has so far; those at a bound say so in their words.
+Doubts DoubtsOf(const inference::Fit& fit, const SelectionResult& selection, Ladder* ladder);
+
+// Where a rest remains unexplained the steps may be a part of something else: lowers their probabilities and says so.
+// `explained`: share of the mean square error beyond the noise that the steps take away.
+void Doubt(double explained, const Doubts& doubts, Ladder* ladder);
+
+}  // namespace touchstone::diagnosis::selection
