@@ -42,6 +42,20 @@ std::vector<double> RandomValues(const model::Effect& effect, int fingers, Rando
   return values;
 }
 
+std::shared_ptr<const model::Effect> RandomLookup(int fingers, RandomStream* random) {
+  model::LookupSpec spec;
+  spec.name = "warm_up";
+  spec.adds_time = random->Below(2) == 0;
+  if (spec.adds_time) spec.stage = model::Stage::kSensor;
+  spec.covariate = "session_time_s";
+  for (double knot = random->Uniform(-1, 1); spec.knots.size() < 5; knot += random->Uniform(0.1, 100))
+    spec.knots.push_back(knot);
+  spec.values.resize(random->Below(2) == 0 ? 1 : fingers);
+  for (std::vector<double>& values : spec.values)
+    for (size_t n = 0; n < spec.knots.size(); ++n) values.push_back(random->Uniform(-1, 1));
+  return *Catalogue().MakeLookup(spec);
+}
+
 model::Model RandomModel(uint64_t seed) {
   RandomStream random(seed, RandomDomain::kTest);
   model::Model model;
@@ -72,10 +86,12 @@ model::Model RandomModel(uint64_t seed) {
                                           : model::Stage::kContact;
       instance.effect = *Catalogue().MakeFormula(spec);
       instance.values = instance.effect->NeutralValues(model.fingers);
+    } else if (effect->name == "lookup") {
+      instance.effect = RandomLookup(model.fingers, &random);
     } else {
       instance.values = RandomValues(*effect, model.fingers, &random);
     }
-    instance.per_object = effect->always_per_object || random.Below(3) == 0;
+    instance.per_object = !instance.effect->lookup && (effect->always_per_object || random.Below(3) == 0);
     if (instance.per_object)
       for (uint64_t i = random.Below(3); i > 0; --i)
         instance.object_values[absl::StrCat("obj ", i)] =

@@ -126,7 +126,7 @@ TEST(Summarize, GivesTheMistakeAndTheCommandThatFixesIt) {
 TEST(Summarize, SaysHowManyTouchesAVerdictNeeds) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kTooLittleData);
   diagnosis.touches_needed = 60;
-  EXPECT_THAT(Summarize(diagnosis), HasSubstr("too little for a verdict; 60 touches would do"));
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("too little for a verdict; 60 usable touches would do"));
 }
 
 TEST(Summarize, OfNoTouchesSaysNothingOfTheModel) {

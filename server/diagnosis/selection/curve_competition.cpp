@@ -14,6 +14,7 @@ constexpr int kMaxCovariatesTried = 3;
 constexpr double kSimplerNats = 3;    // an effect must be worth this much beside a curve
 constexpr double kFormulaNats = 5;    // a formula this near says the same in fewer words
 constexpr double kMemoryNats = 10;    // a wander must be this much better than a curve and than one step
+constexpr double kRougherNats = 3;    // ... and than a course without corners
 constexpr double kOvertakenNats = 1;  // a curve alone that is this much better takes a named effect's place
 
 constexpr double kWorthUnderMemoryNats = 10;
@@ -141,7 +142,8 @@ class Competition {
     const touches::Observations& o = *workspace_.searched;
     std::optional<NoiseMemory> memory = FindNoiseMemory(o, touches::Residuals(o, prediction));
     if (!memory || !memory->everywhere ||
-        memory->gain_nats < std::max(with.curve.gain_nats, memory->step_gain_nats) + kMemoryNats)
+        memory->gain_nats < std::max(with.curve.gain_nats, memory->step_gain_nats) + kMemoryNats ||
+        memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
       return false;
     result_.fit = with.fit;
     TOUCHSTONE_RETURN_IF_ERROR(DropWhatWandered(&*memory));

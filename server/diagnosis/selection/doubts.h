@@ -11,9 +11,10 @@ namespace touchstone::diagnosis::selection {
 struct Doubts {
   bool at_bound = false;      // a value is at the bound of its effect: the data ask for more
   bool many_strange = false;  // more than three effects at once, none near the size that rigs show
+  bool remounted = false;     // the object lay elsewhere in every round: repeats differ by more than noise
   std::string words;          // a sentence for people; empty if there is no doubt
 
-  bool any() const { return at_bound || many_strange; }
+  bool any() const { return at_bound || many_strange || remounted; }
 };
 
 // Of the steps that the ladder has so far; those at a bound say so in their words.

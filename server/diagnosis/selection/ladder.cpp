@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/doubts.h"
+#include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_support.h"
 #include "server/diagnosis/selection/time_structure.h"
 #include "server/effects/all_effects.h"
@@ -70,12 +71,14 @@ class LadderBuilder {
     DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
+    QuestionRounds();
     ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
     left_ = ladder_.final;
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
-    AddNoiseSteps(selection_.noise, &ladder_);
+    // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
+    if (!doubts_.remounted) AddNoiseSteps(selection_.noise, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
     const bool rest =
         StructureRemains() || selection_.curve || TimeStructureRemains() || unplaced_ || doubts_.any();
@@ -85,6 +88,7 @@ class LadderBuilder {
           DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
       if (TimeStructureRemains())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
+      if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
       Doubt(ExplainedShare(), doubts_, &ladder_);
     }
@@ -336,6 +340,16 @@ class LadderBuilder {
     }
   }
 
+  // Whether repeats agree within rounds: a curve of time or a wander would look alike.
+  void QuestionRounds() {
+    if (selection_.curve || selection_.memory) return;
+    const double sigma_s = ladder_.noise_floor.sigma_s;
+    rounds_ = FindRoundStructure(*workspace_.observations, ladder_.prediction, ladder_.residuals);
+    if (!SharesRounds(rounds_, sigma_s)) return;
+    doubts_.remounted = true;
+    doubts_.words = RoundsInWords(rounds_, sigma_s);
+  }
+
   bool StructureRemains() const {
     // Under a wander repeats are alike by chance, and the test of their scatter does not hold.
     return !has_formula() && !selection_.memory && left_.lack_of_fit_p < kUnexplainedP &&
@@ -363,6 +377,7 @@ class LadderBuilder {
   Quality left_;                  // on the touches that the fits used: what the verdict is about
   std::vector<int> superfluous_;  // effects of the given model
   Doubts doubts_;
+  RoundStructure rounds_;
   SurfaceSupport support_;
   bool unplaced_ = false;  // a misfit repeats with the pose, but not with the place on the surface
   Ladder ladder_;

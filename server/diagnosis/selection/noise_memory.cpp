@@ -1,5 +1,7 @@
 #include "server/diagnosis/selection/noise_memory.h"
 
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 
@@ -65,6 +67,39 @@ WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
   return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
 }
 
+// The same of a course without corners: a Matern process of order 3/2, whose slope is continuous, as a Kalman filter over
+// value and slope (Hartikainen and Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process
+// regression models, 2010).
+WanderLikelihood SmoothLikelihood(const Course& course, double ratio, double time_s) {
+  const int n = course.touches(), channels = course.channels;
+  const double rate = std::sqrt(3.0) / time_s;
+  Eigen::Matrix2d stationary = Eigen::Matrix2d::Zero();
+  stationary.diagonal() << ratio, ratio * rate * rate;
+  Eigen::Matrix2Xd mean = Eigen::Matrix2Xd::Zero(2, channels);
+  Eigen::Matrix2d covariance = stationary;
+  double squares = 0, logs = 0;
+  for (int k = 0; k < n; ++k) {
+    const double gap_s = course.gap_s[k], decay = std::isfinite(gap_s) ? std::exp(-rate * gap_s) : 0;
+    Eigen::Matrix2d step = Eigen::Matrix2d::Zero();
+    if (decay > 0) step << 1 + rate * gap_s, gap_s, -rate * rate * gap_s, 1 - rate * gap_s;
+    step *= decay;
+    covariance = step * (covariance - stationary) * step.transpose() + stationary;
+    mean = step * mean;
+    const double innovation = covariance(0, 0) + 1;
+    const Eigen::Vector2d gain = covariance.col(0) / innovation;
+    for (int c = 0; c < channels; ++c) {
+      const double apart = course.value[static_cast<size_t>(k) * channels + c] - mean(0, c);
+      squares += apart * apart / innovation;
+      mean.col(c) += gain * apart;
+    }
+    logs += channels * std::log(innovation);
+    covariance -= gain * gain.transpose() * innovation;
+  }
+  const double count = static_cast<double>(n) * channels;
+  const double white2 = std::max(squares / count, 1e-30);
+  return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
+}
+
 // Standard error of the logarithm of one coordinate: curvature of the likelihood along it.
 double LogError(const Course& course, double ratio, double time_s, bool of_time) {
   constexpr double kStep = 0.2;
@@ -123,6 +158,33 @@ double StepGain(const Course& course) {
          std::log(n);
 }
 
+struct BestWander {
+  WanderLikelihood likelihood;
+  double ratio = 1, time_s = 0;
+};
+
+// The maximum of a likelihood: a coarse grid over ratio and time, then ever finer ones round the best.
+BestWander FindBest(WanderLikelihood (*likelihood)(const Course&, double, double), const Course& course,
+                    double min_s, double max_s) {
+  BestWander best;
+  best.time_s = std::sqrt(min_s * max_s);
+  best.likelihood = likelihood(course, best.ratio, best.time_s);
+  double ratio_width = std::log(1e3), time_width = 0.5 * std::log(max_s / min_s);
+  for (int pass = 0; pass < 7; ++pass) {
+    const double ratio_centre = best.ratio, time_centre = best.time_s;
+    for (int a = -4; a <= 4; ++a)
+      for (int b = -4; b <= 4; ++b) {
+        const double ratio = ratio_centre * std::exp(ratio_width * a / 4);
+        const double time_s = std::clamp(time_centre * std::exp(time_width * b / 4), min_s, max_s);
+        const WanderLikelihood here = likelihood(course, ratio, time_s);
+        if (here.log_likelihood > best.likelihood.log_likelihood) best = {here, ratio, time_s};
+      }
+    ratio_width *= 0.4;
+    time_width *= 0.4;
+  }
+  return best;
+}
+
 }  // namespace
 
 std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
@@ -136,31 +198,17 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   const double min_s = span_s / course.touches(), max_s = span_s / 2;
   if (!(min_s > 0)) return std::nullopt;
 
-  // A coarse grid over both, then ever finer ones round the best.
-  double ratio = 1, time_s = std::sqrt(min_s * max_s), ratio_width = std::log(1e3),
-         time_width = 0.5 * std::log(max_s / min_s);
-  WanderLikelihood best = Likelihood(course, ratio, time_s);
-  for (int pass = 0; pass < 7; ++pass) {
-    const double ratio_centre = ratio, time_centre = time_s;
-    for (int a = -4; a <= 4; ++a)
-      for (int b = -4; b <= 4; ++b) {
-        const double r = ratio_centre * std::exp(ratio_width * a / 4);
-        const double t = std::clamp(time_centre * std::exp(time_width * b / 4), min_s, max_s);
-        const WanderLikelihood here = Likelihood(course, r, t);
-        if (here.log_likelihood <= best.log_likelihood) continue;
-        best = here;
-        ratio = r;
-        time_s = t;
-      }
-    ratio_width *= 0.4;
-    time_width *= 0.4;
-  }
+  const BestWander wander = FindBest(Likelihood, course, min_s, max_s);
+  const WanderLikelihood& best = wander.likelihood;
+  const double ratio = wander.ratio, time_s = wander.time_s;
   const double count = static_cast<double>(course.touches()) * course.channels;
   NoiseMemory found;
   found.gain_nats = best.log_likelihood - Likelihood(course, 0, time_s).log_likelihood - std::log(count);
   found.log_likelihood = best.log_likelihood;
   found.everywhere = ShowsEverywhere(course, ratio, time_s);
   found.step_gain_nats = StepGain(course);
+  found.smooth_gain_nats = FindBest(SmoothLikelihood, course, min_s, max_s).likelihood.log_likelihood -
+                           Likelihood(course, 0, time_s).log_likelihood - std::log(count);
   found.white_s = {best.white_s, best.white_s / std::sqrt(2 * count), 0};
   found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};
   found.sigma_s.std_error = 0.5 * found.sigma_s.value * LogError(course, ratio, time_s, false);

@@ -18,6 +18,8 @@ struct NoiseMemory {
   bool everywhere = false;    // the wander shows in three of four quarters of the session: it is no event
   double gain_nats = 0;       // log evidence over noise without memory (BIC)
   double step_gain_nats = 0;  // the same of one step of the fingers at the best moment, and no wander
+  // The same of a course without corners, a Matern process of order 3/2: a period or a warm-up is one, a wander is not.
+  double smooth_gain_nats = 0;
 };
 
 // `residuals` [k * fingers + i]. Nothing without session times or with too few complete touches.

@@ -48,12 +48,28 @@ TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
   EXPECT_NEAR(found->white_s.value, 0.005, 3e-4);
   EXPECT_TRUE(found->everywhere);
   EXPECT_GT(found->gain_nats, found->step_gain_nats + 20);
+  EXPECT_GT(found->gain_nats, found->smooth_gain_nats + 3);
 }
 
 TEST(NoiseMemory, GainsNothingWithoutAWander) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
     const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
     EXPECT_LT(FindNoiseMemory(session.o, session.residuals)->gain_nats, 2);
+  }
+}
+
+TEST(NoiseMemory, APeriodAndAWarmUpAreSmootherThanAWander) {
+  for (const double amplitude_s : {0.006, 0.025}) {
+    const CourseOfSession period(6, [=](int k, int i, RandomStream*) {
+      return (i - 1) * amplitude_s * std::sin(2 * kPi * 10.0 * k / 1024);
+    });
+    const auto found = FindNoiseMemory(period.o, period.residuals);
+    EXPECT_GT(found->smooth_gain_nats, found->gain_nats) << amplitude_s;
+    const CourseOfSession warm_up(7, [=](int k, int i, RandomStream*) {
+      return i == 1 ? amplitude_s * std::exp(-10.0 * k / 1000) : 0;
+    });
+    const auto levelled = FindNoiseMemory(warm_up.o, warm_up.residuals);
+    EXPECT_GT(levelled->smooth_gain_nats, levelled->gain_nats - 3) << amplitude_s;
   }
 }
 

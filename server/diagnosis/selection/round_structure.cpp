@@ -1,0 +1,158 @@
+#include "server/diagnosis/selection/round_structure.h"
+
+#include <absl/strings/str_format.h>
+#include <Eigen/QR>
+#include <boost/math/distributions/fisher_f.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/readable_time.h"
+#include "server/base/units.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr int kMaxRounds = 40;
+constexpr int kPoseValues = 6;
+constexpr double kRoundP = 1e-6;
+constexpr double kNegligibleRounds = 0.05;  // share of the floor
+constexpr double kMinCosine = 0.1;          // beyond, a contact's place is no function of the pose
+constexpr double kMinRoundDegrees = 8;
+
+// The touches of one object with all their fingers, each with its pose and round.
+struct ObjectRounds {
+  std::vector<int> touch, pose, round;
+  int rounds = 0;
+};
+
+bool IsComplete(const touches::Observations& o, const touches::Prediction& d,
+                const std::vector<double>& residuals, int k) {
+  for (int i = 0; i < o.fingers; ++i) {
+    const size_t e = static_cast<size_t>(k) * o.fingers + i;
+    if (!std::isfinite(residuals[e]) || !d.contact_m[e].allFinite() || !d.normal[e].allFinite() ||
+        !std::isfinite(d.inverse_speed_s_per_m[e]) || !(d.cos_incidence[e] > kMinCosine))
+      return false;
+  }
+  return true;
+}
+
+std::vector<ObjectRounds> RoundsOf(const touches::Observations& o, const touches::Prediction& d,
+                                   const std::vector<double>& residuals) {
+  std::vector<ObjectRounds> objects(o.objects.size());
+  std::vector<std::map<int, int>> numbers(o.objects.size());
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k] || !IsComplete(o, d, residuals, k)) continue;
+    ObjectRounds& object = objects[o.object[k]];
+    std::map<int, int>& seen = numbers[o.object[k]];
+    object.touch.push_back(k);
+    object.pose.push_back(o.pose[k]);
+    object.round.push_back(seen.emplace(o.set->round[o.row[k]], static_cast<int>(seen.size())).first->second);
+    object.rounds = static_cast<int>(seen.size());
+  }
+  return objects;
+}
+
+// Change of the three fingers' times, less their mean, by a small motion of the object: a plane through the contact that
+// moves by m changes the travel by n.m / n.a. Columns: translation x, y, z, rotation about x, y, z.
+Eigen::MatrixXd PoseColumns(const touches::Observations& o, const touches::Prediction& d, int k) {
+  Eigen::MatrixXd columns(o.fingers, kPoseValues);
+  const Eigen::Vector3d& approach = o.set->approach[o.row[k]];
+  for (int i = 0; i < o.fingers; ++i) {
+    const size_t e = static_cast<size_t>(k) * o.fingers + i;
+    const Eigen::Vector3d per_metre = d.normal[e] / d.normal[e].dot(approach) * d.inverse_speed_s_per_m[e];
+    columns.row(i) << per_metre.transpose(), d.contact_m[e].cross(per_metre).transpose();
+  }
+  columns.rowwise() -= columns.colwise().mean().eval();
+  return columns;
+}
+
+// Takes the mean over the repeats of each pose from the rows of every touch; returns how many touches are repeats.
+int CentrePoses(const ObjectRounds& object, int fingers, Eigen::MatrixXd* rows) {
+  std::map<int, std::vector<int>> poses;
+  for (int t = 0; t < static_cast<int>(object.touch.size()); ++t) poses[object.pose[t]].push_back(t);
+  int repeats = 0;
+  for (const auto& [pose, members] : poses) {
+    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(fingers, rows->cols());
+    for (const int t : members) mean += rows->middleRows(t * fingers, fingers) / members.size();
+    for (const int t : members) rows->middleRows(t * fingers, fingers) -= mean;
+    repeats += static_cast<int>(members.size()) - 1;
+  }
+  return repeats;
+}
+
+struct Squares {
+  double all = 0, explained = 0, all_dof = 0, explained_dof = 0;
+  double translation_m2 = 0;
+  int translations = 0;
+};
+
+void AddObject(const touches::Observations& o, const touches::Prediction& d,
+               const std::vector<double>& residuals, const ObjectRounds& object, Squares* squares) {
+  const int n = static_cast<int>(object.touch.size()) * o.fingers, values = object.rounds * kPoseValues;
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n, 1 + values);
+  for (int t = 0; t < static_cast<int>(object.touch.size()); ++t) {
+    const int k = object.touch[t];
+    for (int i = 0; i < o.fingers; ++i)
+      rows(t * o.fingers + i, 0) = residuals[static_cast<size_t>(k) * o.fingers + i];
+    rows.block(t * o.fingers, 1 + object.round[t] * kPoseValues, o.fingers, kPoseValues) =
+        PoseColumns(o, d, k);
+  }
+  const int repeats = CentrePoses(object, o.fingers, &rows);
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(rows.rightCols(values));
+  const double dof = static_cast<double>(repeats) * (o.fingers - 1);
+  if (dof < static_cast<double>(solver.rank()) + kMinRoundDegrees) return;
+  const Eigen::VectorXd moved = solver.solve(rows.col(0));  // the least: about the mean of the rounds
+  squares->all += rows.col(0).squaredNorm();
+  squares->explained +=
+      rows.col(0).squaredNorm() - (rows.col(0) - rows.rightCols(values) * moved).squaredNorm();
+  squares->all_dof += dof;
+  squares->explained_dof += static_cast<double>(solver.rank());
+  for (int round = 0; round < object.rounds; ++round)
+    squares->translation_m2 += moved.segment<3>(round * kPoseValues).squaredNorm();
+  squares->translations += 3 * object.rounds;
+}
+
+}  // namespace
+
+RoundStructure FindRoundStructure(const touches::Observations& o, const touches::Prediction& d,
+                                  const std::vector<double>& residuals) {
+  RoundStructure found;
+  const bool has_details = d.contact_m.size() == residuals.size() && d.normal.size() == residuals.size() &&
+                           d.inverse_speed_s_per_m.size() == residuals.size() &&
+                           d.cos_incidence.size() == residuals.size();
+  if (o.fingers < 2 || !has_details || o.set->round.empty()) return found;
+  Squares squares;
+  for (const ObjectRounds& object : RoundsOf(o, d, residuals))
+    if (object.rounds >= 2 && object.rounds <= kMaxRounds) AddObject(o, d, residuals, object, &squares);
+  const double rest_dof = squares.all_dof - squares.explained_dof;
+  const double rest = squares.all - squares.explained;
+  if (!(squares.explained_dof > 0) || !(rest_dof > 0) || !(rest > 0)) return found;
+  found.sigma_s = std::sqrt(rest / rest_dof);
+  found.translation_m = std::sqrt(squares.translation_m2 / squares.translations);
+  found.gain_nats = 0.5 * squares.all_dof * std::log(squares.all / rest) -
+                    0.5 * squares.explained_dof * std::log(squares.all_dof);
+  const double f = std::max(squares.explained / squares.explained_dof / (rest / rest_dof), 0.0);
+  found.p =
+      boost::math::cdf(boost::math::complement(boost::math::fisher_f(squares.explained_dof, rest_dof), f));
+  return found;
+}
+
+bool SharesRounds(const RoundStructure& rounds, double sigma_s) {
+  return rounds.p < kRoundP && rounds.sigma_s < (1 - kNegligibleRounds) * sigma_s;
+}
+
+std::string RoundsInWords(const RoundStructure& rounds, double sigma_s) {
+  return absl::StrFormat(
+      "In every round the object lay elsewhere, by about %.2g mm: repeats differ by %s, but only by %s once "
+      "each round has "
+      "a pose of the object of its own. Fix the object, or register it anew after each round.",
+      rounds.translation_m * kMillimetresPerMetre, TimeInWords(sigma_s), TimeInWords(rounds.sigma_s));
+}
+
+void NameRoundFirst(const RoundStructure& rounds, UnexplainedRest* rest) {
+  rest->covariates.insert(rest->covariates.begin(), {"round", rounds.p, rounds.gain_nats});
+}
+
+}  // namespace touchstone::diagnosis::selection
