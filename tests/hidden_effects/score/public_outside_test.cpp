@@ -59,7 +59,7 @@ std::vector<PublicSet> PublicOutsideSets() {
       {"incidence_wave", "incidence wave, realistic",
        PublicCause({CauseKind::kIncidenceWave, 0.3, {40, 20}, {}}), false},
       {"one_object", "slip on one object, realistic",
-       PublicCause({CauseKind::kSlipOnOneObject, 0.5, {0}, {}}), true},
+       PublicCause({CauseKind::kSlipOnOneObject, 0.5, {0}, {}}), false},
       {"remounted", "remounted each round, strong", PublicCause({CauseKind::kRemounted, 0.4, {1}, {}}),
        false},
       {"beyond_bound", "beyond its bound, realistic", PublicEffect({"object_push", {8}}, {}), false},
