@@ -1,4 +1,4 @@
-// touchstone model new|show|add|diff: model files. A file is never changed; every change is a new one.
+// touchstone model new|show|add|remove|diff: model files. A file is never changed; every change is a new one.
 #include <filesystem>
 
 #include "client/cli/common.h"
@@ -79,11 +79,8 @@ absl::Status RunShow(const Cli& cli, const ModelOptions& options) {
   return cli.Print(absl::StrCat("# hash ", model.Hash(), "\n", model::FormatModel(model)));
 }
 
-absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      model::Model after,
-      model::AddEffect(before, options.effect, options.assignments, effects::Catalogue()));
+absl::Status SaveChanged(const Cli& cli, const model::Model& before, model::Model after,
+                         const ModelOptions& options) {
   // A new model under the old one's name would be refused by a server that knows the old one.
   const std::string stem = std::filesystem::path(options.output).stem().string();
   if (!stem.empty() && !IsStandardOutput(options.output)) after.name = stem;
@@ -93,6 +90,20 @@ absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
   if (!cli.output().json)
     for (const std::string& line : model::DiffModels(before, after)) cli.Log("  " + line);
   return absl::OkStatus();
+}
+
+absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      model::Model after,
+      model::AddEffect(before, options.effect, options.assignments, effects::Catalogue()));
+  return SaveChanged(cli, before, std::move(after), options);
+}
+
+absl::Status RunRemove(const Cli& cli, const ModelOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model after, model::RemoveEffect(before, options.effect));
+  return SaveChanged(cli, before, std::move(after), options);
 }
 
 absl::Status RunDiff(const Cli& cli, const ModelOptions& options) {
@@ -160,6 +171,19 @@ void AddModel(Cli* cli) {
       ->type_name("");
   add_output(add);
   cli->AddSourceOptions(add);
+
+  CLI::App* remove =
+      cli->AddCommand(group, "remove", "Writes a new model without one effect; the old one stays as it is.",
+                      "touchstone model remove tips.yaml tip_radius -o points.yaml",
+                      [cli, options] { return RunRemove(*cli, *options); });
+  cli->AddInput(remove, remove->add_option("MODEL", options->model, "A model file, a name or a hash")
+                            ->type_name("")
+                            ->required());
+  remove->add_option("EFFECT", options->effect, "An effect of the model; a formula or lookup by its own name")
+      ->type_name("")
+      ->required();
+  add_output(remove);
+  cli->AddSourceOptions(remove);
 
   CLI::App* diff = cli->AddCommand(group, "diff", "Says in words what differs between two models.",
                                    "touchstone model diff nominal.yaml tips.yaml\n"

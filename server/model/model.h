@@ -52,6 +52,9 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
                                 const std::vector<std::string>& assignments,
                                 const EffectCatalogue& catalogue);
 
+// `name` is a built-in effect's, or a formula's or lookup's own. NOT_FOUND names what the model has. Returns a new model.
+absl::StatusOr<Model> RemoveEffect(const Model& model, const std::string& name);
+
 // What changed from `before` to `after`, a line each, in words and units; empty if the hashes are equal.
 std::vector<std::string> DiffModels(const Model& before, const Model& after);
 

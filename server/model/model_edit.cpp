@@ -1,6 +1,7 @@
 // Adds an effect to a model from "parameter=value" texts, as the command line gives them.
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
 
@@ -179,6 +180,25 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
   Model result = model;
   result.effects.push_back(std::move(added));
   return result;
+}
+
+absl::StatusOr<Model> RemoveEffect(const Model& model, const std::string& name) {
+  std::vector<std::string> known;
+  for (size_t index = 0; index < model.effects.size(); ++index) {
+    const Effect& effect = *model.effects[index].effect;
+    const std::string own = effect.formula  ? effect.formula->name
+                            : effect.lookup ? effect.lookup->name
+                                            : effect.name;
+    known.push_back(own);
+    if (own != name) continue;
+    Model result = model;
+    result.effects.erase(result.effects.begin() + static_cast<long>(index));
+    return result;
+  }
+  return absl::NotFoundError(
+      known.empty()
+          ? absl::StrCat("the model has no effect '", name, "', and no other")
+          : absl::StrCat("the model has no effect '", name, "'; it has ", absl::StrJoin(known, ", ")));
 }
 
 }  // namespace touchstone::model

@@ -191,6 +191,18 @@ TEST(FileNumber, PrintsWhatAPersonWouldHaveWritten) {
   EXPECT_EQ(FileNumber(Unit::kNone, 0.1 + 0.2), "0.30000000000000004");
 }
 
+TEST(RemoveEffect, TakesOneEffectOutAndLeavesTheOldModelAlone) {
+  const Model added = *AddEffect(NominalModel(), "tip_radius", {"radius_mm=1"}, kCatalogue);
+  const auto removed = RemoveEffect(added, "tip_radius");
+  ASSERT_TRUE(removed.ok()) << removed.status();
+  EXPECT_EQ(removed->Hash(), NominalModel().Hash());
+  EXPECT_EQ(added.effects.size(), 1u);
+  EXPECT_EQ(RemoveEffect(added, "tip").status().message(),
+            "the model has no effect 'tip'; it has tip_radius");
+  EXPECT_EQ(RemoveEffect(*removed, "tip_radius").status().message(),
+            "the model has no effect 'tip_radius', and no other");
+}
+
 TEST(AddEffect, ChecksLikeAFileAndLeavesTheOldModelAlone) {
   const Model before = NominalModel();
   const auto error = [&](const std::string& effect, const std::vector<std::string>& texts) {

@@ -40,7 +40,9 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
     with_square("approach_" + letter, false, [&, axis](int k, int) { return set.approach[o.row[k]][axis]; });
     with_square("lateral_" + letter, false, [&, axis](int k, int) { return set.lateral[o.row[k]][axis]; });
     with_square("normal_" + letter, true, [&d, at, axis](int k, int i) { return d.normal[at(k, i)][axis]; });
-    const TermValue contact_mm = [&d, at, axis](int k, int i) { return d.contact_m[at(k, i)][axis] * 1e3; };
+    const TermValue contact_mm = [&d, at, axis](int k, int i) {
+      return d.contact_m[at(k, i)][axis] * kMillimetresPerMetre;
+    };
     with_square("contact_" + letter + "_mm", true, contact_mm);
   }
 
@@ -48,9 +50,9 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
   double mean_mm = 0;
   int counted = 0;
   for (const double travel : d.travel_m)
-    if (!std::isnan(travel)) mean_mm += travel * 1e3, ++counted;
+    if (!std::isnan(travel)) mean_mm += travel * kMillimetresPerMetre, ++counted;
   mean_mm = std::round(mean_mm / std::max(counted, 1));
-  const TermValue travel_mm = [&d, at](int k, int i) { return d.travel_m[at(k, i)] * 1e3; };
+  const TermValue travel_mm = [&d, at](int k, int i) { return d.travel_m[at(k, i)] * kMillimetresPerMetre; };
   add("travel_mm", "travel_mm", true, kSimpleNats, travel_mm);
   add("travel_mm", absl::StrCat("(travel_mm - ", ShortestNumber(mean_mm), ")^2"), true, kCurvedNats,
       [travel_mm, mean_mm](int k, int i) { return std::pow(travel_mm(k, i) - mean_mm, 2); });
@@ -79,13 +81,13 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
   add("first_finger", "first_finger", false, kSimpleNats,
       [&d, middle](int k, int) { return d.first_finger[k] - middle; });
   with_square("previous_press_mm", true,
-              [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * 1e3; });
+              [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * kMillimetresPerMetre; });
   const auto varies = [&](const std::vector<double>& column) {
     return !column.empty() &&
            *std::max_element(column.begin(), column.end()) > *std::min_element(column.begin(), column.end());
   };
   if (varies(set.speed_m_s)) {
-    const TermValue speed_mm_s = [&](int k, int) { return set.speed_m_s[o.row[k]] * 1e3; };
+    const TermValue speed_mm_s = [&](int k, int) { return set.speed_m_s[o.row[k]] * kMillimetresPerMetre; };
     with_square("speed_mm_s", false, speed_mm_s);
     add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats,
         [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });

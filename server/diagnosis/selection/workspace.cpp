@@ -8,6 +8,7 @@
 #include <map>
 
 #include "server/base/status.h"
+#include "server/base/units.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -41,14 +42,14 @@ absl::Status CheckMeshes(const touches::Observations& o, const touches::Predicti
   for (size_t object = 0; object < o.objects.size(); ++object) {
     if (touches[object] == 0 || missed[object] <= kWarnMissed * touches[object]) continue;
     const geometry::Bounds& bounds = o.surfaces[object]->bounds();
-    const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * 1e3;
+    const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * kMillimetresPerMetre;
     const std::string text = absl::StrFormat(
         "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
         "far behind the target. The mesh "
         "measures "
         "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
-        off_m[object] * 1e3);
+        off_m[object] * kMillimetresPerMetre);
     if (missed[object] > kMaxMissed * touches[object])
       return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
                                                      ". Is it this object's mesh, in mm, with z up? (--mesh ",
@@ -79,12 +80,13 @@ absl::Status CheckUnits(const touches::Observations& o, const touches::Predictio
   };
   const double m = median(&measured), p = median(&predicted);
   if (!(m > 0 && p > 0) || (m < kUnitFactor * p && p < kUnitFactor * m)) return absl::OkStatus();
-  const double speed_mm_s = o.set->speed_m_s[0] * 1e3;
+  const double speed_mm_s = o.set->speed_m_s[0] * kMillimetresPerMetre;
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g "
       "us: no "
       "effect makes a factor of %.3g. t_*_us are microseconds, speed_mm_s is mm/s; does the file have %s?",
-      o.set->origin, m * 1e6, speed_mm_s, p * 1e6, m > p ? m / p : p / m,
+      o.set->origin, m * kMicrosecondsPerSecond, speed_mm_s, p * kMicrosecondsPerSecond,
+      m > p ? m / p : p / m,
       m < p ? "milliseconds (multiply by 1000) or seconds" : "nanoseconds, or speeds in m/s"));
 }
 
