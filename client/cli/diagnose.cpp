@@ -2,7 +2,9 @@
 #include <filesystem>
 
 #include "client/cli/comparison.h"
+#include "client/source/lab_units.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -12,7 +14,22 @@ namespace {
 struct DiagnoseOptions : ComparisonOptions {
   std::string save_model;
   std::string keep_as;
+  bool with_formula = false;
 };
+
+// The formula of what no built-in effect explains, or the curve, as effects of this model. Empty: there is none.
+absl::StatusOr<std::vector<model::EffectInstance>> SuggestedEffects(const model::Model& model,
+                                                                    const v1::Unexplained& rest) {
+  const std::string& yaml = rest.formula_yaml().empty() ? rest.lookup_yaml() : rest.formula_yaml();
+  if (yaml.empty()) return std::vector<model::EffectInstance>();
+  const std::string file =
+      absl::StrCat("touchstone: model/1\nname: suggested\nend_effector: {fingers: ", model.fingers,
+                   ", spacing_mm: ", ShortestNumber(client::LabNumber(Unit::kMillimetre, model.spacing_m)),
+                   "}\neffects:\n", yaml);
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model suggested,
+                              model::ParseModel(file, "the suggested effect", effects::Catalogue()));
+  return std::move(suggested.effects);
+}
 
 // The improved model under the file's name, or the model itself where nothing had to change.
 absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1::Report& report,
@@ -29,6 +46,13 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
                               model::ParseModel(yaml, "the improved model", effects::Catalogue()));
+  bool suggested = false;
+  if (options.with_formula) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effects, SuggestedEffects(model, report.unexplained()));
+    suggested = !effects.empty();
+    model.effects.insert(model.effects.end(), effects.begin(), effects.end());
+    if (!suggested) cli.Log("--with-formula: this report suggests no formula and no curve");
+  }
   // A new model under the old one's name would be refused by a server that knows the old one.
   const model::Model as_it_was = model;
   model.name = std::filesystem::path(options.save_model).stem().string();
@@ -37,8 +61,9 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.save_model, model::FormatModel(model)));
   const std::string hash = model.Hash().substr(0, 12);
   cli.LogWritten(options.save_model,
-                 changed ? absl::StrCat(" (", model.name, ", hash ", hash, ")")
-                         : absl::StrCat(": the same model, nothing had to change (hash ", hash, ")"));
+                 changed || suggested
+                     ? absl::StrCat(" (", model.name, ", hash ", hash, ")")
+                     : absl::StrCat(": the same model, nothing had to change (hash ", hash, ")"));
   return absl::OkStatus();
 }
 
@@ -48,6 +73,9 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   if (!options.keep_as.empty() && cli.source().servers.empty())
     return absl::InvalidArgumentError(
         "--keep-as: a server keeps models; give --server, or --save-model for a file");
+  if (options.with_formula && options.save_model.empty())
+    return absl::InvalidArgumentError(
+        "--with-formula: it says what --save-model writes; give --save-model FILE");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::DiagnoseRequest request;
   *request.mutable_evidence() = comparison->evidence();
@@ -74,11 +102,16 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --html report.html "
       "--json report.json\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
+      "--with-formula\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
   cli->AddOutput(command, "--save-model", &options->save_model, "Write the improved model to this file");
+  command->add_flag("--with-formula", options->with_formula,
+                    "With --save-model: add the suggested formula, or the curve, of what no built-in effect "
+                    "explains");
   command
       ->add_option("--keep-as", options->keep_as,
                    "With --server: keep the improved model there under this name, served at once")

@@ -168,8 +168,7 @@ void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
   if (!rest.nearest_effect().empty())
     absl::StrAppend(&text, "; it looks most like ", rest.nearest_effect(), " (cosine ",
                     Fixed(rest.nearest_cosine(), 2), ")");
-  out->Paragraph(text + ". To add it, put this under effects in the model file:");
-  out->Verbatim(rest.lookup_yaml());
+  out->Paragraph(text + ". --save-model FILE --with-formula writes the model with it.");
 }
 
 void AddUnexplained(const v1::Report& report, TextLayout* out) {

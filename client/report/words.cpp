@@ -229,9 +229,10 @@ std::vector<Rung> Ladder(const v1::Report& report) {
     add(Rung::kStep, absl::StrCat("+ ", StepName(step)), step.rmse_us(), step.heldout_rmse_us(),
         step.lack_of_fit_p());
   }
-  if (!report.unexplained().formula().empty() && report.unexplained().rmse_us() > 0) {
-    add(Rung::kSuggestion, "+ suggested formula", report.unexplained().rmse_us(),
-        report.unexplained().heldout_rmse_us(), kUnknown);
+  const v1::Unexplained& rest = report.unexplained();
+  if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && rest.rmse_us() > 0) {
+    add(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula",
+        report.unexplained().rmse_us(), report.unexplained().heldout_rmse_us(), kUnknown);
   }
   const Floor floor = NoiseFloorOf(report);
   if (floor.sigma_us > 0) {
