@@ -72,7 +72,8 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     QuestionRounds();
-    ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
+    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.final,
+                                QualityOf(workspace_, selection_.without_formula, ladder_.residuals));
     left_ = ladder_.final;
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
@@ -225,7 +226,9 @@ class LadderBuilder {
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.predictor->Run(with_it.model.base(), false, false));
-    step.quality = QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        step.quality,
+        QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction)));
     step.model = with_it.model.base();
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));

@@ -86,7 +86,8 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
   rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                               workspace.predictor->Run(fit.model.base(), false, false));
-  const Quality quality = QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality,
+                              QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with)));
   rest->rmse_s = quality.rmse_s;
   rest->heldout_rmse_s = quality.heldout_rmse_s;
   const double before = std::pow(final.heldout_rmse_s, 2) - floor_s * floor_s;
