@@ -128,7 +128,7 @@ double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eige
   for (size_t i = 0; i < parameters.size(); ++i) {
     const double x =
         (point[static_cast<int>(i)] - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
-    sum -= std::log1p(x * x);
+    sum += parameters[i].log_prior - std::log1p(x * x);
   }
   return sum;
 }
@@ -151,6 +151,7 @@ LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
   std::vector<double> log_likelihoods, log_evidences;
   for (int s = 0; s < static_cast<int>(grams.size()); ++s) {
     const Eigen::MatrixXd& gram = grams[s];
+    if (gram.size() == 0) continue;
     const double sigma0 = likelihood.Sigma(gram(members[0], members[0]), 0);
     const Minimum m = Minimise(gram, members, parameters, point, sigma0 * sigma0);
     const double sigma = likelihood.Sigma(m.q, static_cast<int>(m.free.size()));

@@ -23,7 +23,10 @@ std::vector<double> RampStarts(const touches::Observations& o) {
 
 Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user,
                         const touches::Observations& searched) {
-  Candidate candidate{std::move(effect), per_object, of_user, {}};
+  Candidate candidate;
+  candidate.effect = std::move(effect);
+  candidate.per_object = per_object;
+  candidate.of_user = of_user;
   const std::vector<model::ParameterInfo>& parameters = candidate.effect->parameters;
   if (!parameters.empty() && parameters.back().reciprocal && searched.size() > 0)
     candidate.further_starts = RampStarts(searched);
@@ -55,6 +58,11 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
     if (input.set->objects.size() > 1 && effect->often_per_object)
       candidates.push_back(MakeCandidate(effect, true, false, searched));
+    if (searched.objects.size() < 2 || effect->always_per_object) continue;
+    for (const std::string& object : searched.objects) {
+      candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.back().object = object;
+    }
   }
   for (const auto& effect : input.also)
     if (!has(inference::NameOf(*effect)) && !effect->random())

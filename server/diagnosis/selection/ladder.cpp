@@ -1,6 +1,7 @@
 #include "server/diagnosis/selection/ladder.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <cmath>
@@ -210,6 +211,7 @@ class LadderBuilder {
     step.probability = from.probability;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
+    step.words = WhereInWords(index, from);
     std::vector<std::string> equivalent = {step.effect};
     for (const CompetingEffect& other : from.competing)
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
@@ -230,6 +232,21 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
+  }
+
+  // "on lat10 only", where the effect acts on one object; whether it may act on others instead.
+  std::string WhereInWords(int index, const SelectedStep& from) const {
+    const std::string object = fit_.model.OnlyObject(index);
+    const std::string own = inference::NameOf(*fit_.model.base().effects[index].effect);
+    std::vector<std::string> elsewhere;
+    for (const CompetingEffect& other : from.competing)
+      if (other.name == own && other.object != object && other.equivalent)
+        elsewhere.push_back(other.object.empty() ? "everywhere" : absl::StrCat("on ", other.object, " only"));
+    std::string words = object.empty() ? "" : absl::StrCat("on ", object, " only");
+    if (!elsewhere.empty())
+      absl::StrAppend(&words, words.empty() ? "everywhere" : "", ", or ", absl::StrJoin(elsewhere, ", or "),
+                      ": these data cannot tell");
+    return words;
   }
 
   const model::EffectInstance* GivenSurface() const {
