@@ -11,10 +11,7 @@ namespace {
 constexpr int kFolds = 5;  // of blocks
 
 // The rows of each part that is left out.
-std::vector<std::vector<int>> FoldsOf(const ObservationModel& observations, const Parameterization& model) {
-  const bool own_values = std::any_of(model.parameters().begin(), model.parameters().end(),
-                                      [](const FreeParameter& c) { return !c.object.empty(); });
-  const bool by_group = observations.groups().size() >= 3 && !own_values;
+std::vector<std::vector<int>> FoldsOf(const ObservationModel& observations, bool by_group) {
   std::vector<std::vector<int>> folds(by_group ? observations.groups().size() : kFolds);
   for (int row = 0; row < observations.rows(); ++row)
     folds[by_group ? observations.GroupOfRow(row) : observations.BlockOfRow(row) % kFolds].push_back(row);
@@ -55,9 +52,7 @@ Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& inner, const Eigen::VectorXd&
   return step;
 }
 
-}  // namespace
-
-double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+double HeldOutIn(const std::vector<std::vector<int>>& folds, const Fit& fit) {
   const Eigen::MatrixXd& columns = fit.columns.values;
   const int n = static_cast<int>(columns.rows()), p = fit.model.size();
   if (n == 0) return 0;
@@ -73,7 +68,7 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     all(i, i) += variance / (scale * scale);  // what the other rows leave open stays where it is
   }
   double sum = 0;
-  for (const std::vector<int>& fold : FoldsOf(*experiment.observations, fit.model)) {
+  for (const std::vector<int>& fold : folds) {
     if (fold.empty()) continue;
     Eigen::MatrixXd jf(fold.size(), p);
     Eigen::VectorXd rf(fold.size());
@@ -82,6 +77,19 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     sum += (rf - jf * step).squaredNorm();
   }
   return std::sqrt(sum / n);
+}
+
+}  // namespace
+
+double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+  const bool own_values = std::any_of(fit.model.parameters().begin(), fit.model.parameters().end(),
+                                      [](const FreeParameter& c) { return !c.object.empty(); });
+  const bool by_group = experiment.observations->groups().size() >= 3 && !own_values;
+  return HeldOutIn(FoldsOf(*experiment.observations, by_group), fit);
+}
+
+double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit) {
+  return HeldOutIn(FoldsOf(*experiment.observations, false), fit);
 }
 
 }  // namespace touchstone::diagnosis::inference

@@ -9,5 +9,7 @@ namespace touchstone::diagnosis::inference {
 // groups are fewer than three or have values of their own. The other rows' columns give the values (one linear step
 // from the fit).
 double HeldOutRmse(const Experiment& experiment, const Fit& fit);
+// By block in any case, so that fits with and without values of single groups compare.
+double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit);
 
 }  // namespace touchstone::diagnosis::inference

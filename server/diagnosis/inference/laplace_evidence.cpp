@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kVisible = 10;  // squared scale over standard error from where a direction counts as visible
 constexpr double kPriorWidth = 10;  // of a value's prior (Cauchy) over the size that rigs show
+constexpr double kUnusualNats = 7;  // that a value beyond what rigs show costs: one rig in a thousand
 constexpr double kRidge = 1e-4;     // prior precision over 1 / scale^2: holds what nothing determines
 
 // The minimum of the quadratic form within bounds, by holding parameters that run out of them there.
@@ -126,8 +127,9 @@ double LogSum(const std::vector<double>& logs) {
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point) {
   double sum = 0;
   for (size_t i = 0; i < parameters.size(); ++i) {
-    const double x =
-        (point[static_cast<int>(i)] - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
+    const double value = point[static_cast<int>(i)];
+    if (value < parameters[i].usual_lower || value > parameters[i].usual_upper) sum -= kUnusualNats;
+    const double x = (value - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
     sum += parameters[i].log_prior - std::log1p(x * x);
   }
   return sum;

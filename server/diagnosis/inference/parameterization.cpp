@@ -77,6 +77,8 @@ void Parameterization::Free(int index, bool refit) {
       c.upper = parameter.upper * si;
       c.neutral = parameter.sum_zero ? 0 : parameter.neutral * si;
       if (parameter.sum_zero) c.lower = std::min(c.lower, -c.upper);
+      c.usual_lower = parameter.usual_lower * si;
+      c.usual_upper = parameter.usual_upper * si;
       if (parameter.reciprocal) {
         c.reciprocal = true;
         c.neutral = 0;

@@ -10,7 +10,7 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kMaxFitted = 8;       // candidates that are fitted in full
-constexpr int kMaxFittedOnOne = 3;  // ... of those that act on one object only
+constexpr int kMaxFittedOnOne = 3;  // ... of those that do not act on all objects alike
 
 // Whether every value of the effect ended at its neutral, usually a bound.
 bool ChangesNothing(const inference::Fit& fit, int index) {
@@ -50,8 +50,8 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
   std::vector<double> all = {0};  // log evidence: nothing is missing
   int fitted = 0, fitted_on_one = 0;
   for (const Extension& extension : extensions) {
-    // On one object only the likely ones: each effect has as many such candidates as there are objects.
-    const bool one = !extension.object.empty();
+    // Of those that do not act on all objects alike only the likely ones: there are many.
+    const bool one = extension.rare;
     if (extension.candidate < 0 || (one && (fitted_on_one == kMaxFittedOnOne || !extension.visible)))
       continue;
     RankedCandidate& candidate = candidates.emplace_back();

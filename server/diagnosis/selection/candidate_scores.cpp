@@ -1,5 +1,6 @@
 // What each candidate would explain, from inner products alone. An effect that acts on one object only is found by giving
-// it to one object at a time: its columns are those of the effect on all objects, in the rows of one.
+// it to one object at a time: its columns are those of the effect on all objects, in the rows of one. So are those of an
+// effect that differs from object to object.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,8 +12,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kVisible = 1e-9;   // s of change at the typical size
-constexpr int kMaxExactOnOne = 12;  // effects on one object that are scored under every hypothesis
+constexpr double kVisible = 1e-9;      // s of change at the typical size
+constexpr size_t kMaxExactOnOne = 12;  // effects by object that are scored under every hypothesis
 
 // Inner products of the residual, the fit's own columns and those of the extensions, by hypothesis and object.
 class ScoringGrams {
@@ -30,21 +31,29 @@ class ScoringGrams {
     ParallelFor(experiment.pool, static_cast<int>(total_.size()), 4, sum);
   }
 
-  const std::vector<Eigen::MatrixXd>& total() const { return total_; }
+  size_t hypotheses() const { return total_.size(); }
 
-  // Of `members`, under hypothesis s; from member `first_on_one` on they have rows of one group only (-1: of all).
-  Eigen::MatrixXd Of(const std::vector<int>& members, int first_on_one, int group, int s) const {
+  // A column with the rows of one group only (-1: of all).
+  struct Member {
+    int column = 0, group = -1;
+  };
+
+  Eigen::MatrixXd Of(const std::vector<Member>& members, int s) const {
     const int size = static_cast<int>(members.size());
     Eigen::MatrixXd gram(size, size);
     for (int a = 0; a < size; ++a)
-      for (int b = 0; b < size; ++b) {
-        const bool on_one = std::max(a, b) >= first_on_one;
-        gram(a, b) = (on_one ? by_group_[s][group] : total_[s])(members[a], members[b]);
-      }
+      for (int b = 0; b <= a; ++b) gram(a, b) = gram(b, a) = Product(members[a], members[b], s);
     return gram;
   }
 
  private:
+  double Product(const Member& a, const Member& b, int s) const {
+    const int group = std::max(a.group, b.group);
+    if (group < 0) return total_[s](a.column, b.column);
+    if (a.group >= 0 && b.group >= 0 && a.group != b.group) return 0;
+    return by_group_[s][group](a.column, b.column);
+  }
+
   std::vector<Eigen::MatrixXd> total_;                  // [s]
   std::vector<std::vector<Eigen::MatrixXd>> by_group_;  // [s][group]
 };
@@ -65,53 +74,77 @@ class Scorer {
     std::vector<int> all(likelihood.hypotheses().size()), few = {0};
     std::iota(all.begin(), all.end(), 0);
     if (fit_.hypothesis != 0) few.push_back(fit_.hypothesis);
-    std::vector<int> on_one, exact;
+    std::vector<int> screened, exact;
     for (int m = 0; m < static_cast<int>(extensions_.size()); ++m)
-      (extensions_[m].object.empty() ? exact : on_one).push_back(m);
-    Evaluate(grams, on_one, few);
-    std::sort(on_one.begin(), on_one.end(),
+      (SharesColumns(extensions_[m]) ? screened : exact).push_back(m);
+    Evaluate(grams, screened, few);
+    std::sort(screened.begin(), screened.end(),
               [&](int a, int b) { return extensions_[a].log_evidence > extensions_[b].log_evidence; });
-    if (on_one.size() > kMaxExactOnOne) on_one.resize(kMaxExactOnOne);
-    exact.insert(exact.end(), on_one.begin(), on_one.end());
+    if (screened.size() > kMaxExactOnOne) screened.resize(kMaxExactOnOne);
+    exact.insert(exact.end(), screened.begin(), screened.end());
     Evaluate(grams, exact, all);
     return absl::OkStatus();
   }
 
  private:
-  // The columns of every extension; those on one object share the columns of the effect on all.
+  // Whether the columns are those of the same effect on all objects, object by object.
+  bool SharesColumns(const Extension& extension) const {
+    return extension.candidate >= 0 && extension.start.size() > own_ &&
+           !extension.start.parameters().back().object.empty();
+  }
+
+  // The columns of every extension.
   absl::Status Differentiate() {
-    std::map<std::string, size_t> first_of_effect;
-    const std::vector<std::string>& groups = experiment_.observations->groups();
+    std::map<std::string, int> first_of_effect;
     wide_.resize(fit_.columns.values.rows(), 0);
     for (Extension& extension : extensions_) {
-      const int group =
-          static_cast<int>(std::find(groups.begin(), groups.end(), extension.object) - groups.begin());
-      group_.push_back(extension.object.empty() ? -1 : group);
-      if (group_.back() >= 0) {
+      if (SharesColumns(extension)) {
         first_column_.push_back(first_of_effect.at(extension.name));
       } else {
         TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
                                     inference::Derivatives(experiment_, extension.start,
                                                            extension.start.Start(), fit_.predicted, own_));
-        first_column_.push_back(wide_.cols());
-        first_of_effect.emplace(extension.name, wide_.cols());
-        wide_.conservativeResize(Eigen::NoChange, wide_.cols() + columns.cols());
+        const int first = static_cast<int>(wide_.cols());
+        first_column_.push_back(first);
+        if (extension.candidate >= 0) first_of_effect.emplace(extension.name, first);
+        wide_.conservativeResize(Eigen::NoChange, first + columns.cols());
         wide_.rightCols(columns.cols()) = columns;
       }
-      extension.visible = IsVisible(extension, first_column_.back(), group_.back());
+      extension.visible = IsVisible(extension, MembersOf(extension, first_column_.back()));
     }
     return absl::OkStatus();
   }
 
-  bool IsVisible(const Extension& extension, size_t first, int group) const {
-    const int begin = group < 0 ? 0 : experiment_.observations->FirstRowOfGroup(group);
-    const int rows = group < 0 ? static_cast<int>(wide_.rows())
-                               : experiment_.observations->FirstRowOfGroup(group + 1) - begin;
+  // The residual, the fit's own columns and those of the extension, among the fit's and wide_ together.
+  std::vector<ScoringGrams::Member> MembersOf(const Extension& extension, int first) const {
+    const std::vector<inference::FreeParameter>& parameters = extension.start.parameters();
+    const std::vector<std::string>& groups = experiment_.observations->groups();
+    std::vector<ScoringGrams::Member> members;
+    for (int i = 0; i <= own_; ++i) members.push_back({i, -1});
+    for (int i = own_; i < extension.start.size(); ++i) {
+      if (!SharesColumns(extension)) {
+        members.push_back({1 + first + i, -1});
+        continue;
+      }
+      const int group =
+          static_cast<int>(std::find(groups.begin(), groups.end(), parameters[i].object) - groups.begin());
+      members.push_back({1 + own_ + first + parameters[i].shape - parameters[own_].shape, group});
+    }
+    return members;
+  }
+
+  bool IsVisible(const Extension& extension, const std::vector<ScoringGrams::Member>& members) const {
     bool visible = false;
-    for (int i = own_; i < extension.start.size(); ++i)
-      visible |= wide_.col(static_cast<int>(first) + i - own_).segment(begin, rows).norm() *
+    for (int i = own_; i < extension.start.size(); ++i) {
+      const ScoringGrams::Member& member = members[1 + i];
+      const int group = member.group;
+      const int begin = group < 0 ? 0 : experiment_.observations->FirstRowOfGroup(group);
+      const int end =
+          group < 0 ? static_cast<int>(wide_.rows()) : experiment_.observations->FirstRowOfGroup(group + 1);
+      visible |= wide_.col(member.column - 1 - own_).segment(begin, end - begin).norm() *
                      extension.start.parameters()[i].scale >
-                 kVisible * std::sqrt(static_cast<double>(rows));
+                 kVisible * std::sqrt(static_cast<double>(end - begin));
+    }
     return visible;
   }
 
@@ -120,25 +153,14 @@ class Scorer {
     const auto evaluate = [&](int begin, int end) {
       for (int at = begin; at < end; ++at) {
         Extension& extension = extensions_[which[at]];
-        const int group = group_[which[at]], size = extension.start.size();
-        std::vector<int> members(size + 1);
-        for (int i = 0; i <= size; ++i)
-          members[i] = i <= own_ ? i : static_cast<int>(first_column_[which[at]]) + i;
-        const inference::Likelihood& likelihood = *experiment_.likelihood;
-        if (group < 0) {
-          extension.log_evidence =
-              inference::ComputeLaplaceEvidence(likelihood, grams.total(), members,
-                                                extension.start.parameters(), extension.start.Start())
-                  .log_evidence;
-          continue;
-        }
-        std::vector<int> in_order(size + 1);
+        const std::vector<ScoringGrams::Member> members = MembersOf(extension, first_column_[which[at]]);
+        std::vector<int> in_order(members.size());
         std::iota(in_order.begin(), in_order.end(), 0);
-        std::vector<Eigen::MatrixXd> parts(grams.total().size());
-        for (const int s : hypotheses) parts[s] = grams.Of(members, own_ + 1, group, s);
+        std::vector<Eigen::MatrixXd> parts(grams.hypotheses());
+        for (const int s : hypotheses) parts[s] = grams.Of(members, s);
         extension.log_evidence =
-            inference::ComputeLaplaceEvidence(likelihood, parts, in_order, extension.start.parameters(),
-                                              extension.start.Start())
+            inference::ComputeLaplaceEvidence(*experiment_.likelihood, parts, in_order,
+                                              extension.start.parameters(), extension.start.Start())
                 .log_evidence;
       }
     };
@@ -150,8 +172,7 @@ class Scorer {
   const int own_;
   std::vector<Extension>& extensions_;
   Eigen::MatrixXd wide_;
-  std::vector<size_t> first_column_;  // of wide_, per extension
-  std::vector<int> group_;            // per extension; -1: all
+  std::vector<int> first_column_;  // of wide_, per extension
 };
 
 }  // namespace
@@ -179,6 +200,7 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit,
     extension.candidate = c;
     extension.name = name;
     extension.object = candidates_[c].object;
+    extension.rare = candidates_[c].rare;
     extension.start = fit.model;
     if (extension.object.empty())
       extension.start.Add(candidates_[c].effect, candidates_[c].per_object);

@@ -56,12 +56,13 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
     if (describes_only || effect->random() || has(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
-    if (input.set->objects.size() > 1 && effect->often_per_object)
-      candidates.push_back(MakeCandidate(effect, true, false, searched));
     if (searched.objects.size() < 2 || effect->always_per_object) continue;
+    candidates.push_back(MakeCandidate(effect, true, false, searched));
+    candidates.back().rare = !effect->often_per_object;
     for (const std::string& object : searched.objects) {
       candidates.push_back(MakeCandidate(effect, true, false, searched));
       candidates.back().object = object;
+      candidates.back().rare = true;
     }
   }
   for (const auto& effect : input.also)

@@ -71,6 +71,7 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
+    DoubtUnusualValues(fit_, selection_, &ladder_);
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     QuestionRounds();
     ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
@@ -234,19 +235,22 @@ class LadderBuilder {
     return absl::OkStatus();
   }
 
-  // "on lat10 only", where the effect acts on one object; whether it may act on others instead.
+  // "Acts on lat10 only.", where the effect does not act on all objects alike.
   std::string WhereInWords(int index, const SelectedStep& from) const {
-    const std::string object = fit_.model.OnlyObject(index);
-    const std::string own = inference::NameOf(*fit_.model.base().effects[index].effect);
-    std::vector<std::string> elsewhere;
+    const model::EffectInstance& instance = fit_.model.base().effects[index];
+    const std::string object = fit_.model.OnlyObject(index), own = inference::NameOf(*instance.effect);
+    const auto where = [](const std::string& only, bool per_object) {
+      return !only.empty() ? absl::StrCat("on ", only, " only")
+             : per_object  ? std::string("on each object in its own measure")
+                           : std::string("on all objects alike");
+    };
+    std::vector<std::string> places = {where(object, instance.per_object)};
     for (const CompetingEffect& other : from.competing)
       if (other.name == own && other.object != object && other.equivalent)
-        elsewhere.push_back(other.object.empty() ? "everywhere" : absl::StrCat("on ", other.object, " only"));
-    std::string words = object.empty() ? "" : absl::StrCat("on ", object, " only");
-    if (!elsewhere.empty())
-      absl::StrAppend(&words, words.empty() ? "everywhere" : "", ", or ", absl::StrJoin(elsewhere, ", or "),
-                      ": these data cannot tell");
-    return words;
+        places.push_back(where(other.object, other.per_object));
+    if (places.size() == 1 && !instance.per_object) return "";
+    return absl::StrCat("Acts ", absl::StrJoin(places, ", or "),
+                        places.size() > 1 ? ": these data cannot tell." : ".");
   }
 
   const model::EffectInstance* GivenSurface() const {

@@ -10,6 +10,7 @@
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
@@ -301,7 +302,13 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (!revised) break;
   }
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
+  TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool dropped, DropImprobable(*workspace, &result));
+  if (dropped) {
+    result.steps.clear();
+    TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  }
   if (result.formula >= 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const touches::Prediction details,

@@ -18,6 +18,10 @@ constexpr double kPoorPrediction =
     0.5;  // ... or this share of the evidence behind the fit, for strong effects
 constexpr int kFormulaStarts = 8;
 
+std::string InWords(const Extension& extension) {
+  return extension.object.empty() ? extension.name : absl::StrCat(extension.name, " on ", extension.object);
+}
+
 // P(chi^2_q > x)
 double ChiSquaredTail(double x, int q) {
   if (x <= 0 || q <= 0) return 1;
@@ -27,14 +31,14 @@ double ChiSquaredTail(double x, int q) {
 }  // namespace
 
 bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions,
-                             double family_wise_p) const {
+                             bool rare) const {
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1))
     return false;
-  if (after.log_evidence - before.log_evidence < rules_.enter_nats) return false;
+  if (after.log_evidence - before.log_evidence < EnterNats(rare)) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
-  if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > family_wise_p) return false;
+  if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
   return inference::HeldOutRmse(experiment_, after) <
          (1 - rules_.min_relative_cv_gain) * inference::HeldOutRmse(experiment_, before);
 }
@@ -81,28 +85,27 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   absl::StatusOr<inference::Fit> best = absl::NotFoundError("");
-  bool best_on_one = false;
-  int fitted = 0, fitted_on_one = 0;
-  size_t on_one = 0;
-  for (const Extension& extension : extensions) on_one += !extension.object.empty();
+  bool best_is_rare = false;
+  int fitted = 0, fitted_rare = 0;
+  size_t rare = 0;
+  for (const Extension& extension : extensions) rare += extension.rare;
   for (const Extension& extension : extensions) {
-    const bool one = !extension.object.empty();
     const bool unreached = !extension.visible && extension.start.parameters().back().reciprocal;
     const bool user = extension.candidate >= 0 && candidates_[extension.candidate].of_user;
     const bool near = extension.visible &&
-                      (one ? fitted_on_one < rules_.max_object_refits : fitted < rules_.max_refits) &&
+                      (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
                       extension.log_evidence > extensions[0].log_evidence - kNearPrediction &&
                       extension.log_evidence > explanation->fit.log_evidence;
-    if (!near && (one || (!unreached && !user))) continue;
-    progress_(absl::StrCat("fitting ", extension.name, one ? " on " : "", extension.object));
-    (one ? fitted_on_one : fitted) += near;
+    if (!near && (extension.rare || (!unreached && !user))) continue;
+    progress_(absl::StrCat("fitting ", InWords(extension)));
+    (extension.rare ? fitted_rare : fitted) += near;
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
     if (best.ok() && fit.log_evidence <= best->log_evidence) continue;
     best = std::move(fit);
-    best_on_one = one;
+    best_is_rare = extension.rare;
   }
-  if (!best.ok() || !Accepts(explanation->fit, *best, best_on_one ? on_one : extensions.size() - on_one,
-                             best_on_one ? rules_.family_wise_object_p : rules_.family_wise_p))
+  if (!best.ok() ||
+      !Accepts(explanation->fit, *best, best_is_rare ? rare : extensions.size() - rare, best_is_rare))
     return false;
   explanation->fit = *std::move(best);
   return true;
@@ -118,7 +121,10 @@ absl::StatusOr<bool> StepwiseSearch::RemoveStep(Explanation* explanation) const 
   for (int index = static_cast<int>(explanation->fit.model.base().effects.size()) - 1;
        index >= explanation->initial_effects; --index) {
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, WithoutEffect(*explanation, index));
-    if (explanation->fit.log_evidence - fit.log_evidence >= rules_.enter_nats) continue;
+    const model::EffectInstance& instance = explanation->fit.model.base().effects[index];
+    const bool rare = !explanation->fit.model.OnlyObject(index).empty() ||
+                      (instance.per_object && !instance.effect->often_per_object);
+    if (explanation->fit.log_evidence - fit.log_evidence >= EnterNats(rare)) continue;
     explanation->fit = std::move(fit);
     return true;
   }
@@ -129,6 +135,7 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
                                                                         int index) const {
   const model::Effect& own = *explanation.fit.model.base().effects[index].effect;
   const std::string own_object = explanation.fit.model.OnlyObject(index);
+  const bool own_per_object = explanation.fit.model.base().effects[index].per_object;
   // The other effects stay where they are: what takes this one's place finds them so.
   TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without,
                               inference::FitModel(experiment_, explanation.fit.model.Without(index), 0));
@@ -136,28 +143,28 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<CompetingFit> competing;
-  competing.push_back({inference::NameOf(own), explanation.fit.model.base().effects[index].per_object,
-                       own_object, explanation.fit});
+  competing.push_back({inference::NameOf(own), own_per_object, own_object, explanation.fit});
   // The linearised prediction is good to about a share of what there is to explain.
   const double near =
       std::max(kNearPrediction, kPoorPrediction * (explanation.fit.log_evidence - without.log_evidence));
-  int fitted = 0, fitted_on_one = 0;
+  int fitted = 0, fitted_rare = 0;
   for (const Extension& extension : extensions) {
     // A value of the model that is set free competes like any effect.
     const bool given = extension.candidate < 0;
     const bool per_object = !given && candidates_[extension.candidate].per_object;
     if (!extension.visible) continue;
     if (extension.name == inference::NameOf(own) && extension.object == own_object &&
-        per_object == explanation.fit.model.base().effects[index].per_object)
+        per_object == own_per_object)
       continue;
-    const bool one = !extension.object.empty();
-    const bool likely = (one ? fitted_on_one < rules_.max_object_refits : fitted < rules_.max_refits) &&
-                        extension.log_evidence > explanation.fit.log_evidence - near;
+    const bool likely =
+        (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
+        extension.log_evidence > explanation.fit.log_evidence - near;
     // What is known to resemble this effect, and acts where it does, is tried whatever the prediction says.
-    if (!likely && !(extension.object == own_object && IsDeclaredConfounded(own, extension.name))) continue;
-    progress_(absl::StrCat("trying ", extension.name, one ? " on " : "", extension.object, " instead of ",
-                           inference::NameOf(own)));
-    (one ? fitted_on_one : fitted) += likely;
+    const bool alike =
+        given || (extension.object == own_object && (!extension.rare || per_object == own_per_object));
+    if (!likely && !(alike && IsDeclaredConfounded(own, extension.name))) continue;
+    progress_(absl::StrCat("trying ", InWords(extension), " instead of ", inference::NameOf(own)));
+    (extension.rare ? fitted_rare : fitted) += likely;
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
     competing.push_back({given ? absl::StrCat(kGivenPrefix, extension.name) : extension.name, per_object,
                          extension.object, std::move(fit)});
@@ -174,7 +181,9 @@ absl::StatusOr<bool> StepwiseSearch::SwapStep(Explanation* explanation) const {
     const model::Effect& effect = *explanation->fit.model.base().effects[index].effect;
     if (effect.formula != nullptr || effect.lookup != nullptr) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<CompetingFit> competing, CompetingFits(*explanation, index));
-    if (competing.size() < 2 || competing[1].fit.log_evidence <= explanation->fit.log_evidence + 0.5)
+    if (competing.size() < 2) continue;
+    const bool larger = competing[1].fit.model.size() > explanation->fit.model.size();
+    if (competing[1].fit.log_evidence <= explanation->fit.log_evidence + (larger ? rules_.swap_nats : 0.5))
       continue;
     explanation->fit = std::move(competing[1].fit);
     return true;
