@@ -1,7 +1,6 @@
 #include "server/diagnosis/selection/ladder.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_support.h"
 #include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/where_in_words.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
@@ -212,14 +212,15 @@ class LadderBuilder {
     step.probability = from.probability;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
-    step.words = WhereInWords(index, from);
+    step.words = WhereInWords(fit_, from);
     std::vector<std::string> equivalent = {step.effect};
     for (const CompetingEffect& other : from.competing)
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
         equivalent.push_back(other.name);
     step.equivalent.assign(equivalent.begin() + 1, equivalent.end());
     for (const CompetingEffect& other : from.competing)
-      if (other.stopped)
+      if (other.stopped && other.per_object == instance.per_object &&
+          other.object == fit_.model.OnlyObject(index))
         step.words += absl::StrCat(step.words.empty() ? "" : " ", other.name,
                                    " would do as well with a value beyond its bound.");
     if (!step.equivalent.empty()) {
@@ -233,24 +234,6 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
-  }
-
-  // "Acts on lat10 only.", where the effect does not act on all objects alike.
-  std::string WhereInWords(int index, const SelectedStep& from) const {
-    const model::EffectInstance& instance = fit_.model.base().effects[index];
-    const std::string object = fit_.model.OnlyObject(index), own = inference::NameOf(*instance.effect);
-    const auto where = [](const std::string& only, bool per_object) {
-      return !only.empty() ? absl::StrCat("on ", only, " only")
-             : per_object  ? std::string("on each object in its own measure")
-                           : std::string("on all objects alike");
-    };
-    std::vector<std::string> places = {where(object, instance.per_object)};
-    for (const CompetingEffect& other : from.competing)
-      if (other.name == own && other.object != object && other.equivalent)
-        places.push_back(where(other.object, other.per_object));
-    if (places.size() == 1 && !instance.per_object) return "";
-    return absl::StrCat("Acts ", absl::StrJoin(places, ", or "),
-                        places.size() > 1 ? ": these data cannot tell." : ".");
   }
 
   const model::EffectInstance* GivenSurface() const {

@@ -17,7 +17,7 @@ namespace touchstone::diagnosis::selection {
 struct SearchRules {
   double enter_nats = 4.5;              // gain in log evidence that a step needs
   double family_wise_p = 2e-3;          // of the likelihood ratio, over all extensions of the rig
-  double enter_rare_nats = 10;          // ... that an effect needs which does not act on all objects alike
+  double enter_rare_nats = 9;           // ... that an effect needs which does not act on all objects alike
   double swap_nats = 4;                 // that a swap to an effect of more values needs
   double min_relative_cv_gain = 0.003;  // share by which the held-out error must fall
   double equivalent_nats = 3;           // explanations as near as this are named together
