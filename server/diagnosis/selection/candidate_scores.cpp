@@ -15,47 +15,37 @@ namespace {
 constexpr double kVisible = 1e-9;      // s of change at the typical size
 constexpr size_t kMaxExactOnOne = 12;  // effects by object that are scored under every hypothesis
 
-// Inner products of the residual, the fit's own columns and those of the extensions, by hypothesis and object.
-class ScoringGrams {
+// Inner products of the residual, the fit's own columns and those of the extensions, under one hypothesis.
+class ScoringGram {
  public:
-  ScoringGrams(const inference::Experiment& experiment, const inference::Likelihood::Columns& columns)
-      : total_(experiment.likelihood->hypotheses().size()), by_group_(total_.size()) {
-    const inference::Likelihood& likelihood = *experiment.likelihood;
-    const std::vector<Eigen::MatrixXd> inner = likelihood.InnerByGroup(columns);
-    const auto sum = [&](int begin, int end) {
-      for (int s = begin; s < end; ++s) {
-        by_group_[s] = likelihood.GramByGroup(columns, inner, s);
-        total_[s] = std::accumulate(by_group_[s].begin() + 1, by_group_[s].end(), by_group_[s][0]);
-      }
-    };
-    ParallelFor(experiment.pool, static_cast<int>(total_.size()), 4, sum);
-  }
-
-  size_t hypotheses() const { return total_.size(); }
-
   // A column with the rows of one group only (-1: of all).
   struct Member {
     int column = 0, group = -1;
   };
 
-  Eigen::MatrixXd Of(const std::vector<Member>& members, int s) const {
+  explicit ScoringGram(std::vector<Eigen::MatrixXd> by_group) : by_group_(std::move(by_group)) {
+    total_ = by_group_[0];
+    for (size_t group = 1; group < by_group_.size(); ++group) total_ += by_group_[group];
+  }
+
+  Eigen::MatrixXd Of(const std::vector<Member>& members) const {
     const int size = static_cast<int>(members.size());
     Eigen::MatrixXd gram(size, size);
     for (int a = 0; a < size; ++a)
-      for (int b = 0; b <= a; ++b) gram(a, b) = gram(b, a) = Product(members[a], members[b], s);
+      for (int b = 0; b <= a; ++b) gram(a, b) = gram(b, a) = Product(members[a], members[b]);
     return gram;
   }
 
  private:
-  double Product(const Member& a, const Member& b, int s) const {
+  double Product(const Member& a, const Member& b) const {
     const int group = std::max(a.group, b.group);
-    if (group < 0) return total_[s](a.column, b.column);
+    if (group < 0) return total_(a.column, b.column);
     if (a.group >= 0 && b.group >= 0 && a.group != b.group) return 0;
-    return by_group_[s][group](a.column, b.column);
+    return by_group_[group](a.column, b.column);
   }
 
-  std::vector<Eigen::MatrixXd> total_;                  // [s]
-  std::vector<std::vector<Eigen::MatrixXd>> by_group_;  // [s][group]
+  Eigen::MatrixXd total_;
+  std::vector<Eigen::MatrixXd> by_group_;
 };
 
 // One round of scores.
@@ -67,22 +57,21 @@ class Scorer {
 
   absl::Status Run() {
     TOUCHSTONE_RETURN_IF_ERROR(Differentiate());
-    const inference::Likelihood& likelihood = *experiment_.likelihood;
-    const ScoringGrams grams(experiment_,
-                             inference::Likelihood::Join(fit_.columns, likelihood.Prepare(wide_)));
+    columns_ = inference::Likelihood::Join(fit_.columns, experiment_.likelihood->Prepare(wide_));
+    inner_ = experiment_.likelihood->InnerByGroup(columns_);
     // Under two hypotheses first: bumps or none change little of the order.
-    std::vector<int> all(likelihood.hypotheses().size()), few = {0};
+    std::vector<int> all(experiment_.likelihood->hypotheses().size()), few = {0};
     std::iota(all.begin(), all.end(), 0);
     if (fit_.hypothesis != 0) few.push_back(fit_.hypothesis);
     std::vector<int> screened, exact;
     for (int m = 0; m < static_cast<int>(extensions_.size()); ++m)
       (SharesColumns(extensions_[m]) ? screened : exact).push_back(m);
-    Evaluate(grams, screened, few);
+    Evaluate(screened, few);
     std::sort(screened.begin(), screened.end(),
               [&](int a, int b) { return extensions_[a].log_evidence > extensions_[b].log_evidence; });
     if (screened.size() > kMaxExactOnOne) screened.resize(kMaxExactOnOne);
     exact.insert(exact.end(), screened.begin(), screened.end());
-    Evaluate(grams, exact, all);
+    Evaluate(exact, all);
     return absl::OkStatus();
   }
 
@@ -116,10 +105,10 @@ class Scorer {
   }
 
   // The residual, the fit's own columns and those of the extension, among the fit's and wide_ together.
-  std::vector<ScoringGrams::Member> MembersOf(const Extension& extension, int first) const {
+  std::vector<ScoringGram::Member> MembersOf(const Extension& extension, int first) const {
     const std::vector<inference::FreeParameter>& parameters = extension.start.parameters();
     const std::vector<std::string>& groups = experiment_.observations->groups();
-    std::vector<ScoringGrams::Member> members;
+    std::vector<ScoringGram::Member> members;
     for (int i = 0; i <= own_; ++i) members.push_back({i, -1});
     for (int i = own_; i < extension.start.size(); ++i) {
       if (!SharesColumns(extension)) {
@@ -133,10 +122,10 @@ class Scorer {
     return members;
   }
 
-  bool IsVisible(const Extension& extension, const std::vector<ScoringGrams::Member>& members) const {
+  bool IsVisible(const Extension& extension, const std::vector<ScoringGram::Member>& members) const {
     bool visible = false;
     for (int i = own_; i < extension.start.size(); ++i) {
-      const ScoringGrams::Member& member = members[1 + i];
+      const ScoringGram::Member& member = members[1 + i];
       const int group = member.group;
       const int begin = group < 0 ? 0 : experiment_.observations->FirstRowOfGroup(group);
       const int end =
@@ -148,19 +137,28 @@ class Scorer {
     return visible;
   }
 
-  void Evaluate(const ScoringGrams& grams, const std::vector<int>& which,
-                const std::vector<int>& hypotheses) {
+  // The evidence of these extensions, averaged over the hypotheses.
+  void Evaluate(const std::vector<int>& which, const std::vector<int>& hypotheses) {
+    const inference::Likelihood& likelihood = *experiment_.likelihood;
+    std::vector<std::vector<ScoringGram::Member>> members;
+    for (const int m : which) members.push_back(MembersOf(extensions_[m], first_column_[m]));
+    std::vector<std::vector<Eigen::MatrixXd>> grams(
+        which.size(), std::vector<Eigen::MatrixXd>(likelihood.hypotheses().size()));
+    const auto gram = [&](int begin, int end) {
+      for (int h = begin; h < end; ++h) {
+        const ScoringGram all(likelihood.GramByGroup(columns_, inner_, hypotheses[h]));
+        for (size_t at = 0; at < which.size(); ++at) grams[at][hypotheses[h]] = all.Of(members[at]);
+      }
+    };
+    ParallelFor(experiment_.pool, static_cast<int>(hypotheses.size()), 4, gram);
     const auto evaluate = [&](int begin, int end) {
       for (int at = begin; at < end; ++at) {
         Extension& extension = extensions_[which[at]];
-        const std::vector<ScoringGrams::Member> members = MembersOf(extension, first_column_[which[at]]);
-        std::vector<int> in_order(members.size());
+        std::vector<int> in_order(members[at].size());
         std::iota(in_order.begin(), in_order.end(), 0);
-        std::vector<Eigen::MatrixXd> parts(grams.hypotheses());
-        for (const int s : hypotheses) parts[s] = grams.Of(members, s);
         extension.log_evidence =
-            inference::ComputeLaplaceEvidence(*experiment_.likelihood, parts, in_order,
-                                              extension.start.parameters(), extension.start.Start())
+            inference::ComputeLaplaceEvidence(likelihood, grams[at], in_order, extension.start.parameters(),
+                                              extension.start.Start())
                 .log_evidence;
       }
     };
@@ -172,7 +170,9 @@ class Scorer {
   const int own_;
   std::vector<Extension>& extensions_;
   Eigen::MatrixXd wide_;
-  std::vector<int> first_column_;  // of wide_, per extension
+  std::vector<int> first_column_;           // of wide_, per extension
+  inference::Likelihood::Columns columns_;  // of the fit, then wide_
+  std::vector<Eigen::MatrixXd> inner_;      // of columns_, by group
 };
 
 }  // namespace

@@ -12,6 +12,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
+constexpr size_t kMaxObjectsVaried = 12;  // with a value each, of effects that seldom differ between objects
+
 // A ramp that ends before the first contact leaves no trace. These end a little before and after the usual travel;
 // the free parameter is 1 / acceleration.
 std::vector<double> RampStarts(const touches::Observations& o) {
@@ -57,8 +59,10 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
     if (effect->needs.session_time && !input.set->has_session_time) continue;
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
     if (searched.objects.size() < 2 || effect->always_per_object) continue;
-    candidates.push_back(MakeCandidate(effect, true, false, searched));
-    candidates.back().rare = !effect->often_per_object;
+    if (effect->often_per_object || searched.objects.size() <= kMaxObjectsVaried) {
+      candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.back().rare = !effect->often_per_object;
+    }
     for (const std::string& object : searched.objects) {
       candidates.push_back(MakeCandidate(effect, true, false, searched));
       candidates.back().object = object;
