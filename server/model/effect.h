@@ -79,22 +79,22 @@ struct EffectNeeds {
   std::vector<std::string> covariates = {};  // cov_* columns
 };
 
-// What a formula effect is made of, as the model file has it.
-struct FormulaSpec {
+// What formulas and lookups have in common, as the model file has it: they add something to each finger.
+struct UserTerm {
   std::string name;
   bool adds_time = false;  // adds: time_us instead of travel_mm
   Stage stage = Stage::kMotion;
+};
+
+// What a formula effect is made of.
+struct FormulaSpec : UserTerm {
   std::string expression;  // in the units of files
   std::vector<ParameterInfo> parameters;
   std::vector<double> values;  // in the unit of files, one per parameter
 };
 
-// What a lookup effect is made of, as the model file has it: a curve over one covariate, linear between its knots
-// and constant beyond them.
-struct LookupSpec {
-  std::string name;
-  bool adds_time = false;  // adds: time_us instead of travel_mm
-  Stage stage = Stage::kMotion;
+// What a lookup effect is made of: a curve over one covariate, linear between its knots and constant beyond them.
+struct LookupSpec : UserTerm {
   std::string covariate;      // a variable of formulas or a cov_* column
   std::vector<double> knots;  // rising, in the covariate's unit
   std::vector<std::vector<double>>

@@ -64,10 +64,14 @@ absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::
   return touches::Rmse(o, touches::Residuals(o, prediction));
 }
 
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
+void SetError(double rmse_s, Quality* quality) {
   if (quality->rmse_s > 0) quality->heldout_rmse_s *= rmse_s / quality->rmse_s;
   quality->rmse_s = rmse_s;
+}
+
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
+  SetError(rmse_s, quality);
   return absl::OkStatus();
 }
 

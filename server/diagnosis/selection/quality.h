@@ -22,7 +22,10 @@ Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
-// Sets the errors of `quality` to those of `model` as a comparison finds them; the held-out error keeps its ratio.
+// Another error, s, of the same fit; the held-out error keeps its ratio to it.
+void SetError(double rmse_s, Quality* quality);
+
+// Sets the errors of `quality` to those of `model` as a comparison finds them.
 absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality);
 
 // The same for what the fit's surface error leaves, on the touches of the search.
