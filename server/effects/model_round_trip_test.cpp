@@ -166,6 +166,31 @@ effects:
               testing::ElementsAre(0, 0, 0.001, 0, 0, testing::DoubleNear(0.0349066, 1e-6)));
 }
 
+TEST(ModelFile, HoldsAnyEffectOnOneObjectOnly) {
+  for (const auto& effect : Catalogue().All()) {
+    if (effect->parameters.empty()) continue;
+    model::Model model = model::NominalModel();
+    model::EffectInstance instance{effect, true, effect->NeutralValues(model.fingers), {}};
+    std::vector<double> values = instance.values;
+    for (size_t p = 0, at = 0; p < effect->parameters.size();
+         at += effect->parameters[p++].Count(model.fingers)) {
+      const model::ParameterInfo& parameter = effect->parameters[p];
+      values[at] =
+          ToSi(parameter.unit, parameter.neutral == parameter.upper ? parameter.typical
+                                                                    : parameter.neutral + parameter.typical);
+      if (parameter.sum_zero) values[at + 1] = -values[at];
+    }
+    instance.object_values["lat10"] = values;
+    model.effects = {instance};
+    const absl::StatusOr<model::Model> again =
+        model::ParseModel(model::FormatModel(model), "one object", Catalogue());
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->Hash(), model.Hash()) << effect->name;
+    EXPECT_EQ(again->effects[0].ValuesFor("lat00")[0], instance.values[0]) << effect->name;
+    EXPECT_NE(again->effects[0].ValuesFor("lat10")[0], instance.values[0]) << effect->name;
+  }
+}
+
 TEST(AddEffect, BuildsFormulasFromTheCommandLine) {
   const absl::StatusOr<model::Model> model = model::AddEffect(
       model::NominalModel(), "formula",

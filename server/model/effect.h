@@ -3,6 +3,7 @@
 // read the same rows. This header is the interface; the physics stands in effects/, one file per effect.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -34,10 +35,14 @@ struct ParameterInfo {
   std::string name;  // ends in the unit's suffix: "shift_mm"
   Unit unit = Unit::kNone;
   Arity arity = Arity::kScalar;
-  double lower = 0;       // inclusive
-  double upper = 0;       // inclusive
-  double neutral = 0;     // the default: the value that changes nothing
-  double typical = 0;     // the size that rigs show; the scale of the prior: neutral +- typical
+  double lower = 0;    // inclusive
+  double upper = 0;    // inclusive
+  double neutral = 0;  // the default: the value that changes nothing
+  double typical = 0;  // the size that rigs show; the scale of the prior: neutral +- typical
+  // What rigs show, within the bounds: a value beyond it is simulated, but a diagnosis that finds one asks for a look at
+  // the set-up.
+  double usual_lower = -INFINITY;
+  double usual_upper = INFINITY;
   bool sum_zero = false;  // per finger: only differences between fingers can be seen, so the values sum to 0
   bool reciprocal = false;  // the response is smooth in 1 / value: a fit moves that, and "none" is infinity
   std::string meaning;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSigma = 0.005;   // of the rows
 constexpr double kColumn = 50;     // size of a column, per m or rad
-constexpr double kPushM = 0.8e-3;  // within the bounds of object_push, 0 to 5 mm
+constexpr double kPushM = 0.8e-3;  // within the bounds of object_push, 0 to 50 mm
 
 class FitTest : public ::testing::Test {
  protected:

@@ -144,9 +144,8 @@ Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& inner, const Eigen::VectorXd&
   return step;
 }
 
-}  // namespace
-
-double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+// One linear step from the whole fit for each part that is left out.
+double LinearHeldOut(const Folds& folds, const Fit& fit) {
   const Eigen::MatrixXd& columns = fit.columns.values;
   const int n = static_cast<int>(columns.rows()), p = fit.model.size();
   if (n == 0) return 0;
@@ -162,8 +161,6 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     all(i, i) += variance / (scale * scale);  // what the other rows leave open stays where it is
   }
   double sum = 0;
-  Folds folds = GroupFolds(*experiment.observations, fit.model);
-  if (folds.empty()) folds = BlockFolds(*experiment.observations);
   for (const std::vector<int>& fold : folds) {
     if (fold.empty()) continue;
     Eigen::MatrixXd jf(fold.size(), p);
@@ -173,6 +170,17 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     sum += (rf - jf * step).squaredNorm();
   }
   return std::sqrt(sum / n);
+}
+
+}  // namespace
+
+double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+  const Folds folds = GroupFolds(*experiment.observations, fit.model);
+  return LinearHeldOut(folds.empty() ? BlockFolds(*experiment.observations) : folds, fit);
+}
+
+double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit) {
+  return LinearHeldOut(BlockFolds(*experiment.observations), fit);
 }
 
 absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit) {

@@ -10,6 +10,8 @@ namespace touchstone::diagnosis::inference {
 // groups are fewer than three or have values of their own. The other rows' columns give the values (one linear step
 // from the fit).
 double HeldOutRmse(const Experiment& experiment, const Fit& fit);
+// By block in any case, so that fits with and without values of single groups compare.
+double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit);
 
 // The same with every value fitted anew, by the simulator and not by a linear step, to what is left: without a group,
 // without a fifth of the blocks, without a fifth of the time. Of the three the largest, since a model must hold on

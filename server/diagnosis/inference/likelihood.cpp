@@ -185,6 +185,33 @@ Eigen::MatrixXd Likelihood::Gram(const Columns& columns, int s) const {
   return gram;
 }
 
+std::vector<Eigen::MatrixXd> Likelihood::InnerByGroup(const Columns& columns) const {
+  std::vector<Eigen::MatrixXd> inner;
+  for (size_t group = 0; group + 1 < group_rows_.size(); ++group) {
+    const auto rows =
+        columns.values.middleRows(group_rows_[group], group_rows_[group + 1] - group_rows_[group]);
+    inner.push_back(rows.transpose() * rows);
+  }
+  return inner;
+}
+
+std::vector<Eigen::MatrixXd> Likelihood::GramByGroup(const Columns& columns,
+                                                     const std::vector<Eigen::MatrixXd>& inner, int s) const {
+  std::vector<Eigen::MatrixXd> grams = inner;
+  const int l = hypotheses_[s].length_index;
+  if (l < 0) return grams;
+  const Eigen::VectorXd shrinkage = Shrinkage(s);
+  int next = 0;
+  for (size_t group = 0; group < grams.size(); ++group) {
+    const int size = static_cast<int>(bases_[l].directions[group].cols());
+    const auto projected = columns.projected[l].middleRows(next, size);
+    grams[group].noalias() -=
+        projected.transpose() * (shrinkage.segment(next, size).asDiagonal() * projected);
+    next += size;
+  }
+  return grams;
+}
+
 Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
   Eigen::VectorXd norms = columns.values.colwise().squaredNorm().transpose();
   const int l = hypotheses_[s].length_index;

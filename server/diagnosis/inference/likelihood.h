@@ -52,6 +52,11 @@ class Likelihood {
 
   // X' V^-1 X under hypothesis s, sigma = 1.
   Eigen::MatrixXd Gram(const Columns& columns, int s) const;
+  // The part of each group in Gram: groups share no error, so the parts sum to it. `inner`: of InnerByGroup.
+  std::vector<Eigen::MatrixXd> GramByGroup(const Columns& columns, const std::vector<Eigen::MatrixXd>& inner,
+                                           int s) const;
+  // X' X of each group's rows.
+  std::vector<Eigen::MatrixXd> InnerByGroup(const Columns& columns) const;
   // a' V^-1 B, every column of b, and diag(B' V^-1 B).
   Eigen::MatrixXd Cross(const Columns& a, const Columns& b, int s) const;
   Eigen::VectorXd Norms(const Columns& columns, int s) const;

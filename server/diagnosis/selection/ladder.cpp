@@ -12,6 +12,7 @@
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_support.h"
 #include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/where_in_words.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
@@ -70,6 +71,7 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
+    DoubtUnusualValues(fit_, selection_, &ladder_);
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     QuestionRounds();
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.final,
@@ -211,13 +213,15 @@ class LadderBuilder {
     step.probability = from.probability;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
+    step.words = WhereInWords(fit_, from);
     std::vector<std::string> equivalent = {step.effect};
     for (const CompetingEffect& other : from.competing)
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
         equivalent.push_back(other.name);
     step.equivalent.assign(equivalent.begin() + 1, equivalent.end());
     for (const CompetingEffect& other : from.competing)
-      if (other.stopped)
+      if (other.stopped && other.per_object == instance.per_object &&
+          other.object == fit_.model.OnlyObject(index))
         step.words += absl::StrCat(step.words.empty() ? "" : " ", other.name,
                                    " would do as well with a value beyond its bound.");
     if (!step.equivalent.empty()) {

@@ -10,6 +10,7 @@
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
@@ -154,11 +155,12 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<CompetingFit> competing,
                                 search.CompetingFits(whole, index));
     const std::string own = inference::NameOf(*result->fit.model.base().effects[index].effect);
+    const std::string own_object = result->fit.model.OnlyObject(index);
     // Log evidence over the step's own: that nothing takes its place, what else could, what is equivalent.
     std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
     for (const CompetingFit& competitor : competing) {
       const double evidence = competitor.fit.log_evidence - result->fit.log_evidence;
-      const bool same = competitor.name == own;
+      const bool same = competitor.name == own && competitor.object == own_object;
       const bool declared =
           IsDeclaredConfounded(*result->fit.model.base().effects[index].effect, competitor.name);
       // Equivalent: as probable, or as likely with no more parameters, whatever rigs usually show; with more of them
@@ -174,8 +176,8 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
       all.push_back(evidence);
       if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (same) continue;
-      step.competing.push_back({competitor.name, competitor.per_object, evidence, equivalent, stopped,
-                                competitor.fit.model.base()});
+      step.competing.push_back({competitor.name, competitor.per_object, competitor.object, evidence,
+                                equivalent, stopped, competitor.fit.model.base()});
     }
     // A curve without a name may say the same as an effect of time.
     if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
@@ -300,7 +302,13 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (!revised) break;
   }
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
+  TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool dropped, DropImprobable(*workspace, &result));
+  if (dropped) {
+    result.steps.clear();
+    TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  }
   if (result.formula >= 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const touches::Prediction details,

@@ -23,6 +23,7 @@ namespace touchstone::diagnosis::selection {
 struct CompetingEffect {
   std::string name;
   bool per_object = false;
+  std::string object;                // the only one on which it acts; empty: on all
   double relative_log_evidence = 0;  // nats, over the step's own
   bool equivalent = false;           // these data cannot tell it from the step
   bool stopped = false;              // ... if its value could go beyond its bound

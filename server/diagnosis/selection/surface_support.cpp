@@ -20,6 +20,7 @@ constexpr int kKnotsPerCurve = 24;     // places that stand for a curve's range
 constexpr double kMinFieldNats = 1;    // of bumps over errors per pose
 constexpr double kMinShareErrors = 0;  // standard errors of the share of the excess that is predicted
 constexpr double kUsualMinMm = 0.05, kUsualMaxMm = 0.3;  // RMS that printing and milling leave
+constexpr double kMaxMm = 1;                             // ... beyond which it is another object
 constexpr double kApart = 100;                           // ranges between curves that share nothing
 constexpr double kMinSurfaceCosine = 0.1;                // as in the effect
 
@@ -247,8 +248,8 @@ void PredictPoses(const PoseEvidence& evidence, const inference::Likelihood& lik
 }  // namespace
 
 bool SurfaceSupport::IsSurface() const {
-  return field_nats > kMinFieldNats && !shortest && curve_nats < field_nats &&
-         finger_field_nats < field_nats && share > kMinShareErrors * share_error;
+  return rms_m * kMillimetresPerMetre <= kMaxMm && field_nats > kMinFieldNats && !shortest &&
+         curve_nats < field_nats && finger_field_nats < field_nats && share > kMinShareErrors * share_error;
 }
 
 std::string SurfaceSupport::Words(double rmse_s) const {

@@ -151,7 +151,7 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
                               selection.search->Score(without, selection.initial_effects));
   for (const Extension& extension : extensions) {
-    if (extension.candidate < 0 || !extension.visible) continue;
+    if (extension.candidate < 0 || !extension.visible || !extension.object.empty()) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
                                 inference::Derivatives(workspace.experiment, extension.start,
                                                        extension.start.Start(), without.predicted, own));
