@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include <nlohmann/json.hpp>
 
@@ -85,6 +86,23 @@ TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
   }
 }
 
+// A mesh that lies in the folder, although the set does not name it, may be what was touched.
+TEST_F(AdviceCommand, AMeshOfTheFolderThatTheSetDoesNotNameIsTried) {
+  std::filesystem::create_directory(Path("meshes"));
+  for (const char* object : {"lat00", "lat05", "lat10", "lat20"})
+    std::filesystem::copy(kMeasurements + "/" + object + ".off", Path("meshes"));
+  std::filesystem::copy(kMeasurements + "/lat05.off", Path("meshes/lat15.off"));  // a mistake
+  std::filesystem::copy(kMeasurements + "/lat15.off", Path("meshes/elsewhere.off"));
+  std::ofstream(Path("meshes/broken.off")) << "OFF\n3 1";
+  const Outcome outcome = Run({"diagnose", kMeasurements + "/tip_radius.csv", "--model",
+                               kMeasurements + "/nominal.yaml", "--mesh-dir", "meshes", "--json", "-"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = nlohmann::json::parse(outcome.out, nullptr, false);
+  EXPECT_EQ(report["verdict"], "CHECK_DATA");
+  EXPECT_EQ(report["data_problems"][0]["kind"], "wrong_mesh");
+  EXPECT_EQ(report["data_problems"][0]["detail"], "lat15 is elsewhere");
+}
+
 TEST_F(AdviceCommand, SaysWhatItCannotDo) {
   const std::string set = kMeasurements + "/tip_radius.csv";
   const auto error = [&](const std::vector<std::string>& options) {
@@ -100,6 +118,8 @@ TEST_F(AdviceCommand, SaysWhatItCannotDo) {
   EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'"));
   EXPECT_THAT(error({"--permute-axes=x,x,z"}), HasSubstr("--permute-axes"));
   EXPECT_THAT(error({"--scale-speed", "1e9"}), HasSubstr("out of range"));
+  EXPECT_THAT(error({"--touches", "9-3", "--swap-fingers", "l,m"}), HasSubstr("the first and the last"));
+  EXPECT_THAT(error({"--touches", "5000", "--swap-fingers", "l,m"}), HasSubstr("has none of these touches"));
 }
 
 }  // namespace

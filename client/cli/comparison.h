@@ -20,6 +20,7 @@ struct ComparisonOptions {
   uint64_t seed = 0;
   std::string html;
   std::string json;
+  bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
   // What goes to standard output takes the place of the report in words.
   bool ReportOnStdout() const { return IsStandardOutput(json) || IsStandardOutput(html); }
@@ -34,8 +35,8 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 // A source and what to ask it.
 class Comparison {
  public:
-  // Reads what is here and connects. Only meshes that the set names are read; a server is sent those
-  // that it lacks.
+  // Reads what is here and connects. Only meshes that the set names are read, and those that `further_meshes` asks
+  // for; a server is sent those that it lacks.
   static absl::StatusOr<std::unique_ptr<Comparison>> Open(const Cli& cli, const ComparisonOptions& options);
   // A set that was sent ahead is deleted again.
   ~Comparison();

@@ -18,7 +18,7 @@ namespace {
 
 struct FixOptions {
   std::string file, output;
-  std::string swap_fingers, finger_order, swap_objects, axes;
+  std::string touches, swap_fingers, finger_order, swap_objects, axes;
   std::vector<std::string> rename_objects, move_objects;
   double scale_times = 1, scale_lengths = 1, scale_targets = 1, scale_standoff = 1, scale_speed = 1;
   int shift_rows = 0;
@@ -84,8 +84,23 @@ absl::Status ReadObjects(const FixOptions& options, session::MeasurementFix* fix
   return absl::OkStatus();
 }
 
+absl::Status ReadTouchRanges(const FixOptions& options, session::MeasurementFix* fix) {
+  if (options.touches.empty()) return absl::OkStatus();
+  for (const std::string& text : std::vector<std::string>(absl::StrSplit(options.touches, ','))) {
+    const std::vector<std::string> ends = absl::StrSplit(text, '-');
+    uint64_t first = 0, last = 0;
+    if (ends.size() > 2 || !absl::SimpleAtoi(ends.front(), &first) || !absl::SimpleAtoi(ends.back(), &last) ||
+        last < first)
+      return Expected("--touches", text,
+                      "a touch's number, or the first and the last of several (48-95), was");
+    fix->touches.emplace_back(first, last);
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int fingers) {
   session::MeasurementFix fix;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadTouchRanges(options, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadFingers(options, fingers, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &fix));
   fix.drop_duplicates = options.drop_duplicates;
@@ -140,6 +155,7 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
                       "that do not change keep their digits; several options are done in the order in which "
                       "they stand below.",
                       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
+                      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
                       "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
                       "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
                       "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
@@ -149,6 +165,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   cli->AddInput(
       command,
       command->add_option("FILE", options->file, "The measurement file (CSV)")->type_name("")->required());
+  command
+      ->add_option("--touches", options->touches,
+                   "Fix these touches alone, by their numbers. Default: all of the file")
+      ->type_name("A-B,...");
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command

@@ -18,6 +18,9 @@ namespace touchstone::session {
 
 // What is wrong with a file, said as what it should have been. Done in the order of the fields.
 struct MeasurementFix {
+  // Only these touches are wrong, by their numbers, first and last; empty: all of the file. The other rows stay as
+  // they are, and no time moves between them and these.
+  std::vector<std::pair<uint64_t, uint64_t>> touches;
   bool drop_duplicates = false;  // rows whose touch and times all repeat an earlier row's, digit for digit
   int shift_rows = 0;  // the times of row k belong to row k + shift_rows; rows that get none are dropped
   std::vector<int>

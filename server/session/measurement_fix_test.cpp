@@ -51,6 +51,57 @@ TEST(MeasurementFix, TurnsVectorsWithTheirDigits) {
             "0,cup,20,60,-2.0,1.50,-3,0,0.60,-0.80,-1.0,0,0,5,0,7,\n");
 }
 
+TEST(MeasurementFix, FixesTheTouchesThatAreNamedAndNoOther) {
+  const auto row = [](int touch, const std::string& object, const std::string& times) {
+    return absl::StrCat(touch, ",", object, ",20,60,1,2,3,0,0,-1,1,0,0,", times, ",\n");
+  };
+  const std::string rows =
+      row(3, "cup", "5,0,7.0") + row(4, "cup", "6,0,8") + row(5, "jug", "0,1,9") + row(9, "cup", "2,3,0");
+  EXPECT_EQ(
+      Mended(rows,
+             [](auto* f) {
+               f->touches = {{4, 5}};
+               f->finger_order = {1, 0, 2};
+             }),
+      row(3, "cup", "5,0,7.0") + row(4, "cup", "0,6,8") + row(5, "jug", "1,0,9") + row(9, "cup", "2,3,0"));
+  EXPECT_EQ(
+      Mended(rows,
+             [](auto* f) {
+               f->touches = {{3, 3}, {9, 9}};
+               f->rename_objects = {{"cup", "jug"}};
+             }),
+      row(3, "jug", "5,0,7.0") + row(4, "cup", "6,0,8") + row(5, "jug", "0,1,9") + row(9, "jug", "2,3,0"));
+  // The last of them gets no times, and none come from or go to the others.
+  EXPECT_EQ(Mended(rows,
+                   [](auto* f) {
+                     f->touches = {{4, 9}};
+                     f->shift_rows = -1;
+                   }),
+            row(3, "cup", "5,0,7.0") + row(4, "cup", "0,1,9") + row(5, "jug", "2,3,0"));
+  EXPECT_THAT(Mended(rows,
+                     [](auto* f) {
+                       f->touches = {{6, 8}};
+                       f->scale_times = 10;
+                     }),
+              HasSubstr("has none of these touches"));
+}
+
+TEST(MeasurementFix, AnObjectThatNoRowHasAnyMoreIsGone) {
+  const auto text = FixMeasurementFile(
+      absl::StrCat(kMendedHeader,
+                   "3,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n4,jug,20,60,1,2,3,0,0,-1,1,0,0,6,0,8,\n"),
+      "set.csv", {});
+  ASSERT_TRUE(text.ok());
+  MeasurementSet set = *ParseMeasurementSet(*text, "set.csv");
+  MeasurementFix fix;
+  fix.touches = {{3, 3}};
+  fix.rename_objects = {{"cup", "jug"}};
+  ASSERT_TRUE(ApplyFix(fix, &set).ok());
+  EXPECT_THAT(set.objects, ElementsAre("jug"));
+  EXPECT_THAT(set.object, ElementsAre(0, 0));
+  EXPECT_EQ(FixOptions(fix, 3), "--touches 3 --rename-object cup=jug");
+}
+
 TEST(MeasurementFix, RenamesObjectsAtOnceSoThatTwoCanSwap) {
   const std::string rows =
       "0,\"a,b\",20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,8,\n";
