@@ -22,6 +22,7 @@ constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // less is no difference
 constexpr double kAlike = 0.03;            // share of a response that another effect may leave out
 constexpr double kBoundTolerance = 1e-6;   // of the typical size
+constexpr double kWorthSayingNats = 5;     // a curve that is not farther behind is named beside the effect
 
 std::string FormulaName(const FormulaTerm& term) {
   std::string name = "rest_" + term.covariate;
@@ -180,8 +181,10 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
                                 equivalent, stopped, competitor.fit.model.base()});
     }
     // A curve without a name may say the same as an effect of time.
-    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
-      all.push_back(rival->second);
+    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end()) {
+      all.push_back(rival->second.ahead_nats);
+      if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
+    }
     step.probability =
         std::min(kMaxProbability, std::exp(inference::LogSum(same_or_equivalent) - inference::LogSum(all)));
     result->steps.push_back(std::move(step));
