@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
@@ -262,8 +263,11 @@ absl::StatusOr<inference::NoiseFindings> NoiseOf(const Workspace& workspace, con
   }
   const double surface_dof =
       workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
+  inference::DeclaredNoise declared = DeclaredNoiseOf(*workspace.input.model);
+  // Tails may stand for the outliers that were left out.
+  if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
   return inference::FindNoise(touches::MakeNoiseSample(o, residuals, tangents, expected),
-                              fit.model.size() + surface_dof);
+                              fit.model.size() + surface_dof, declared);
 }
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
