@@ -129,7 +129,7 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
   return RmseOf(mended, pool);
 }
 
-// The command that mends the file. The server may not know the file's name.
+// The command that fixes the file. The server may not know the file's name.
 std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
                      set.origin.find_first_of(" '\"$\\`;&|<>()*?!") == std::string::npos;
@@ -147,7 +147,7 @@ selection::DataProblem ToProblem(const Mistake& mistake, bool alternative, const
   problem.rmse_after_s = RmseAfter(input, mistake.fix, pool);
   problem.words =
       absl::StrCat(alternative ? "These data cannot tell it from another mistake: " : "It looks as if ",
-                   mistake.words, ". Mended, the model as it is would be off by ",
+                   mistake.words, ". With that fixed, the model as it is would be off by ",
                    TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(before_s), ".");
   return problem;
 }
