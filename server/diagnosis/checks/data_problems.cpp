@@ -52,7 +52,7 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
   return RmseOf(mended, pool);
 }
 
-// The command that mends the file. The server may not know the file's name.
+// The command that fixes the file. The server may not know the file's name.
 std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
                      set.origin.find_first_of(" '\"$\\`;&|<>()*?!") == std::string::npos;
@@ -113,7 +113,7 @@ class ProblemList {
     if (!in_part) {
       problem.fix = FixCommand(fix, *input_.set);
       problem.rmse_after_s = RmseAfter(input_, fix, pool_);
-      absl::StrAppend(&problem.words, " Mended, the model as it is would be off by ",
+      absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
                       TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
     }
     problems_.push_back(std::move(problem));

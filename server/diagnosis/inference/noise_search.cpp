@@ -191,8 +191,7 @@ NoiseSearch::Description NoiseSearch::WithKinds(Description from) const {
 
 bool NoiseSearch::TailsLookHeavy(const NoiseModel& model) const {
   return Kurtosis(sample_.groups, model) > kKurtosisSigmas &&
-         (sample_.repeats.size() < kMinRepeats ||
-          Kurtosis(sample_.repeats, model) > kRepeatsKurtosisSigmas);
+         (sample_.repeats.size() < kMinRepeats || Kurtosis(sample_.repeats, model) > kRepeatsKurtosisSigmas);
 }
 
 NoiseSearch::Description NoiseSearch::FitStudent(const Description& from) const {
@@ -239,7 +238,8 @@ NoiseSearch::Description NoiseSearch::WithTails(const Description& from) const {
 // Log likelihood on the part, less what the parameters must earn.
 double NoiseSearch::Score(const Description& description) const {
   NoiseModel model = description.model;
-  double score = description.gaussian() ? ProfileSigma(part_, &model) : description.log_likelihood - kEnterNats;
+  double score =
+      description.gaussian() ? ProfileSigma(part_, &model) : description.log_likelihood - kEnterNats;
   for (const Kind kind : {kGrowth, kLength, kChannels})
     if (description.has[kind]) score -= Threshold(kind);
   return score;

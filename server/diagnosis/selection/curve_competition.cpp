@@ -96,7 +96,8 @@ class Competition {
 
   static std::string RivalInWords(const NamelessCurve& curve) {
     return absl::StrCat("A course in time would say nearly the same: ",
-                        curve.words.empty() ? absl::StrCat("a curve of ", curve.covariate) : curve.words, ".");
+                        curve.words.empty() ? absl::StrCat("a curve of ", curve.covariate) : curve.words,
+                        ".");
   }
 
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.

@@ -115,10 +115,9 @@ class CurveScorer {
 
   // The errors on what is left out, without a surface: what holds elsewhere must not need one.
   void HoldOut(NamelessCurve* curve) const {
-    curve->heldout_without_s = HeldOutBeside(experiment_, touches_, fit_, Eigen::MatrixXd(), Eigen::MatrixXd(),
-                                             curve->of_time);
-    curve->heldout_with_s =
-        HeldOutBeside(experiment_, touches_, fit_, basis_, precision_, curve->of_time);
+    curve->heldout_without_s =
+        HeldOutBeside(experiment_, touches_, fit_, Eigen::MatrixXd(), Eigen::MatrixXd(), curve->of_time);
+    curve->heldout_with_s = HeldOutBeside(experiment_, touches_, fit_, basis_, precision_, curve->of_time);
   }
 
  private:

@@ -62,8 +62,7 @@ class NoiseStepWriter {
     std::vector<double> values;
     for (const inference::NoiseEstimate& finger : found) {
       estimates.push_back(Estimate(parameter, finger));
-      estimates.back().entry =
-          model::FingerName(static_cast<int>(values.size()), ladder_.improved.fingers);
+      estimates.back().entry = model::FingerName(static_cast<int>(values.size()), ladder_.improved.fingers);
       values.push_back(RoundedValue(parameter, estimates.back()));
     }
     for (model::EffectInstance& instance : ladder_.improved.effects) {

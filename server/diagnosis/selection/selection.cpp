@@ -186,8 +186,7 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
       all.push_back(rival->second.ahead_nats);
       if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
     }
-    step.probability =
-        std::min(kMaxProbability, std::exp(inference::LogSum(same_or_equivalent) - inference::LogSum(all)));
+    step.probability = ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     result->steps.push_back(std::move(step));
   }
   return absl::OkStatus();
@@ -226,8 +225,12 @@ std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const in
   return residuals;
 }
 
+double ProbabilityOfShare(double log_share) {
+  return std::min(kMaxProbability, std::exp(log_share));
+}
+
 double ProbabilityOf(double log_odds) {
-  return std::min(kMaxProbability, 1 / (1 + std::exp(-log_odds)));
+  return ProbabilityOfShare(-std::log1p(std::exp(-log_odds)));
 }
 
 double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit) {

@@ -73,7 +73,10 @@ struct SelectionResult {
 // Whether a value of effect `index` ended at a bound that is not the value that changes nothing.
 bool IsAtBound(const inference::Fit& fit, int index);
 
-// From a log of odds, nats, never above kMaxProbability.
+// Of an explanation whose evidence has this share, as a logarithm, of the evidence of all: the one place that keeps
+// probabilities at or below kMaxProbability.
+double ProbabilityOfShare(double log_share);
+// The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);
 
 // Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.

@@ -20,8 +20,8 @@ namespace {
 
 constexpr int kSlots = 48;  // of the session, with as many touches each: where courses may begin and end
 constexpr int kMinTouchesPerSlot = 3;
-constexpr int kFineSlots = 12;                            // in place of each slot round the best step's beginning
-constexpr int kWarmUps = 8;                               // time constants, from the first to the second share of the session
+constexpr int kFineSlots = 12;  // in place of each slot round the best step's beginning
+constexpr int kWarmUps = 8;     // time constants, from the first to the second share of the session
 constexpr double kShortestWarmUp = 0.015, kLongestWarmUp = 0.5;
 constexpr int kWarmUpKnots = 16;
 constexpr double kVisibleShare = 1e-6;  // of a column's square that the fit's own columns leave
@@ -115,8 +115,7 @@ class CourseScorer {
     for (const int begin : begins) {
       bool near = begin == 0;
       for (const int edge : {course.begin, course.end})
-        if (edge > 0 && edge < slots_)
-          near |= begin >= begins_[edge - 1] && begin <= begins_[edge + 1];
+        if (edge > 0 && edge < slots_) near |= begin >= begins_[edge - 1] && begin <= begins_[edge + 1];
       if (near) kept.push_back(begin);
     }
     Divide(std::move(kept));
@@ -293,8 +292,7 @@ class CourseScorer {
     for (int i = 0; i < slots_; ++i) {
       of.b += weights[i] * form.b.segment(i * f, f);
       of.plain += weights[i] * weights[i] * form.plain.segment(i * f, f).sum();
-      for (int j = 0; j < slots_; ++j)
-        of.a += weights[i] * weights[j] * form.a.block(i * f, j * f, f, f);
+      for (int j = 0; j < slots_; ++j) of.a += weights[i] * weights[j] * form.a.block(i * f, j * f, f, f);
     }
     return of;
   }

@@ -18,8 +18,8 @@ std::vector<NamelessCurve> CoursesOfRig(const std::vector<std::string>& lookup, 
   EXPECT_TRUE(workspace.ok()) << workspace.status();
   EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
   const Workspace& w = **workspace;
-  const auto fit = inference::FitModel(w.experiment,
-                                       inference::Parameterization(*w.input.model, w.searched->objects));
+  const auto fit =
+      inference::FitModel(w.experiment, inference::Parameterization(*w.input.model, w.searched->objects));
   EXPECT_TRUE(fit.ok());
   const auto details = w.searched_predictor->Run(fit->model.base(), true, true);
   const std::vector<CurveCovariate> covariates = ListCurveCovariates(*w.searched, *details);
@@ -34,8 +34,8 @@ const NamelessCurve& Best(const std::vector<NamelessCurve>& curves) {
 }
 
 TEST(TimeCourse, AStepIsFoundWithItsTouchAndItsFinger) {
-  const auto curves = CoursesOfRig({"name=step", "adds=travel_mm", "covariate=session_time_s", "knots=1499,1500",
-                                    "l=0,0.2", "m=0,0", "r=0,0"});
+  const auto curves = CoursesOfRig({"name=step", "adds=travel_mm", "covariate=session_time_s",
+                                    "knots=1499,1500", "l=0,0.2", "m=0,0", "r=0,0"});
   ASSERT_FALSE(curves.empty());
   const NamelessCurve& step = Best(curves);
   EXPECT_TRUE(IsSignificant(step));
@@ -58,9 +58,10 @@ TEST(TimeCourse, AStretchEndsAgain) {
 }
 
 TEST(TimeCourse, AWarmUpLevelsOff) {
-  const auto curves = CoursesOfRig({"name=warm_up", "adds=travel_mm", "covariate=session_time_s",
-                                    "knots=0,100,200,300,400,600,900,1200", "l=0,0,0,0,0,0,0,0", "m=0,0,0,0,0,0,0,0",
-                                    "r=0,-0.0885,-0.1580,-0.2110,-0.2544,-0.3106,-0.3525,-0.3754"});
+  const auto curves =
+      CoursesOfRig({"name=warm_up", "adds=travel_mm", "covariate=session_time_s",
+                    "knots=0,100,200,300,400,600,900,1200", "l=0,0,0,0,0,0,0,0", "m=0,0,0,0,0,0,0,0",
+                    "r=0,-0.0885,-0.1580,-0.2110,-0.2544,-0.3106,-0.3525,-0.3754"});
   ASSERT_FALSE(curves.empty());
   const NamelessCurve& warm_up = Best(curves);
   EXPECT_GT(warm_up.knots.size(), 8u);
