@@ -197,7 +197,7 @@ absl::Status Resolve(const model::FormulaSpec& spec, CompiledFormula* formula, m
     }
     needs->curvature |= name.name == "curvature_per_m";
     needs->previous_press |= name.name == "previous_press_mm";
-    needs->session_time |= name.name == "session_time_s";
+    needs->session_time |= name.name == "session_time_s" || name.name == "pause_s";
     formula->inputs.push_back(std::move(input));
   }
   for (size_t p = 0; p < used.size(); ++p)

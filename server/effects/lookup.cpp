@@ -136,7 +136,7 @@ absl::Status FindCovariate(LookupInput* input, model::EffectNeeds* needs) {
   if (input->read == nullptr) needs->covariates.push_back(name);
   needs->curvature = name == "curvature_per_m";
   needs->previous_press = name == "previous_press_mm";
-  needs->session_time = name == "session_time_s";
+  needs->session_time = name == "session_time_s" || name == "pause_s";
   return absl::OkStatus();
 }
 

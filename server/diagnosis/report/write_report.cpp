@@ -123,6 +123,7 @@ void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* m
   message->set_nearest_effect(rest.nearest_effect);
   message->set_nearest_cosine(rest.nearest_cosine);
   message->set_lookup_yaml(rest.lookup_yaml);
+  message->set_words(rest.words);
 }
 
 void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {

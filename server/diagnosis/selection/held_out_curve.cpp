@@ -22,8 +22,8 @@ int FoldOf(const inference::Experiment& experiment, const touches::TouchObservat
 }  // namespace
 
 double HeldOutBeside(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-                     const inference::Fit& fit, const Eigen::MatrixXd& basis, const Eigen::MatrixXd& precision,
-                     bool of_time) {
+                     const inference::Fit& fit, const Eigen::MatrixXd& basis,
+                     const Eigen::MatrixXd& precision, bool of_time) {
   const int p = fit.model.size(), m = static_cast<int>(basis.cols()), n = touches.rows();
   Eigen::MatrixXd x(n, p + m);
   x.leftCols(p) = fit.columns.values.middleCols(1, p);

@@ -12,7 +12,7 @@ namespace touchstone::diagnosis::selection {
 // there, without a surface: what holds elsewhere must not need one. `basis`: further columns, may be empty; `precision`:
 // of their values' prior, over the variance of the noise.
 double HeldOutBeside(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-                     const inference::Fit& fit, const Eigen::MatrixXd& basis, const Eigen::MatrixXd& precision,
-                     bool of_time);
+                     const inference::Fit& fit, const Eigen::MatrixXd& basis,
+                     const Eigen::MatrixXd& precision, bool of_time);
 
 }  // namespace touchstone::diagnosis::selection
