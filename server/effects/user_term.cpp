@@ -35,7 +35,7 @@ absl::StatusOr<const FormulaVariable*> FindInput(absl::string_view kind, const m
 void AddNeedsOf(const std::string& name, model::EffectNeeds* needs) {
   needs->curvature |= name == "curvature_per_m";
   needs->previous_press |= name == "previous_press_mm";
-  needs->session_time |= name == "session_time_s";
+  needs->session_time |= name == "session_time_s" || name == "pause_s";
   if (absl::StartsWith(name, "cov_")) needs->covariates.push_back(name);
 }
 

@@ -139,6 +139,7 @@ void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* m
   message->set_nearest_formula(rest.nearest_formula);
   message->set_nearest_formula_share(rest.nearest_formula_share);
   if (rest.lookup != nullptr) WriteCurve(*rest.lookup->lookup, message->mutable_curve());
+  message->set_words(rest.words);
 }
 
 void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {

@@ -95,6 +95,9 @@ std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observation
   if (set.has_session_time)
     add("session_time_s", "session time", "s",
         [&set, &row](int k, int) { return set.session_time_s[row[k]]; });
+  if (set.has_session_time)
+    add("pause_s", "pause since the touch before", "s",
+        [&observations](int k, int) { return touches::PauseS(observations, k); });
   for (const auto& [name, values] : set.covariates) {
     const std::vector<double>& column = values;
     list.push_back({name, name, "", {}, [&column, &row](int k, int) { return column[row[k]]; }});

@@ -26,8 +26,10 @@ constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest wi
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
 constexpr double kLengthError = 0.4;        // relative, of a surface error's length: the grid's spacing
 constexpr double kElsewhereNats = 5;  // of what is no surface, for a rest that a lack of fit does not show
-constexpr double kZeroErrors = 2;     // standard errors of a value that may be zero
-constexpr double kZero = 1e-6;        // ... or this share of the typical size
+constexpr double kRoundsPossibleP =
+    1e-3;                          // of agreement within rounds, for a doubt of what scatter looks like
+constexpr double kZeroErrors = 2;  // standard errors of a value that may be zero
+constexpr double kZero = 1e-6;     // ... or this share of the typical size
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
@@ -82,15 +84,22 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
-    if (!doubts_.remounted) AddNoiseSteps(selection_.noise, &ladder_);
+    const size_t steps = ladder_.steps.size();
+    if (!doubts_.remounted && !selection_.partial) AddNoiseSteps(selection_.noise, &ladder_);
+    if (rounds_.p < kRoundsPossibleP)
+      for (size_t j = steps; j < ladder_.steps.size(); ++j) {
+        ladder_.steps[j].probability = std::min(ladder_.steps[j].probability, 0.5);
+        ladder_.steps[j].words =
+            "Repeats agree within rounds: an object put down anew each round would look alike.";
+      }
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
-    const bool rest =
-        StructureRemains() || selection_.curve || TimeStructureRemains() || unplaced_ || doubts_.any();
+    const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
+                      selection_.partial || unplaced_ || doubts_.any();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           ladder_.unexplained,
           DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
-      if (TimeStructureRemains())
+      if (TimeStructureRemains() || Walks())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
@@ -254,7 +263,8 @@ class LadderBuilder {
     const bool asked = selection_.fit.hypothesis != 0 &&
                        (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
     // Where a curve of one covariate or a wander takes part, bumps are no explanation of what is left.
-    if (!asked || doubts_.any() || selection_.curve || selection_.memory) return absl::OkStatus();
+    if (!asked || doubts_.any() || selection_.curve || selection_.memory || selection_.partial)
+      return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(support_, FindSurfaceSupport(workspace_, selection_.fit));
     const model::EffectInstance* given = GivenSurface();
     const double rms_m = selection_.surface_error.rms_m;
@@ -351,7 +361,7 @@ class LadderBuilder {
 
   // Whether repeats agree within rounds: a curve of time or a wander would look alike.
   void QuestionRounds() {
-    if (selection_.curve || selection_.memory) return;
+    if (selection_.curve || selection_.memory || selection_.partial) return;
     const double sigma_s = ladder_.noise_floor.sigma_s;
     rounds_ = FindRoundStructure(*workspace_.observations, ladder_.prediction, ladder_.residuals);
     if (!SharesRounds(rounds_, sigma_s)) return;
@@ -365,7 +375,21 @@ class LadderBuilder {
            left_.rmse_s > (1 + kUnexplainedShare) * ladder_.noise_floor.sigma_s;
   }
 
+  // A wander of which the session does not show that it comes back is no noise of a known memory.
+  bool Walks() const {
+    const auto& given = workspace_.input.model->effects;
+    return selection_.memory && !Forgets(*selection_.memory) &&
+           std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
+             return instance.effect->role == model::EffectRole::kNoiseMemory;
+           });
+  }
+
   std::string WordsOfRest() const {
+    if (selection_.partial) return selection_.partial->words;
+    if (Walks())
+      return "The fingers wander through the whole session, and nothing shows that they come back: a walk, "
+             "or noise "
+             "whose memory is as long as the session. Find what moves, or make a longer session.";
     const std::string words = unplaced_ ? support_.WordsOfRest() : doubts_.words;
     if (!selection_.curve || selection_.curve->words.empty()) return words;
     std::string course = absl::StrCat(selection_.curve->words, ".");

@@ -262,12 +262,16 @@ std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
         competing.push_back(curve.gain_nats);
         if (best.covariate.empty() || curve.gain_nats > best.gain_nats) best = std::move(curve);
       }
+    TimeCourses courses;
     if (covariate.of_time && (only.empty() || covariate.name == only))
-      for (NamelessCurve& course : ScoreTimeCourses(experiment, touches, fit, details, covariate)) {
-        ++tried;
-        competing.push_back(course.gain_nats);
-        if (best.covariate.empty() || course.gain_nats > best.gain_nats) best = std::move(course);
-      }
+      courses = ScoreTimeCourses(experiment, touches, fit, details, covariate);
+    for (NamelessCurve& course : courses.curves) {
+      ++tried;
+      competing.push_back(course.gain_nats);
+      if (best.covariate.empty() || course.gain_nats > best.gain_nats) best = std::move(course);
+    }
+    best.one_finger_constant_nats = courses.one_finger_constant_nats;
+    best.one_finger_line_nats = courses.one_finger_line_nats;
     best.any_gain_nats = inference::LogSum(competing) - std::log(std::max<double>(1, competing.size()));
     if (!best.covariate.empty()) curves.push_back(std::move(best));
   }

@@ -14,6 +14,7 @@
 #include "server/diagnosis/selection/formula_terms.h"
 #include "server/diagnosis/selection/nameless_curve.h"
 #include "server/diagnosis/selection/noise_memory.h"
+#include "server/diagnosis/selection/partial_offset.h"
 #include "server/diagnosis/selection/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
@@ -67,6 +68,7 @@ struct SelectionResult {
   inference::NoiseFindings noise;
   std::optional<NoiseMemory>
       memory;  // the wander that the residuals follow, where no curve describes them better
+  std::optional<PartialOffset> partial;  // that a part of the touches has: no effect is named in its place
   SurfaceErrorFinding surface_error;
 };
 

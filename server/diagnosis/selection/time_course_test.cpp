@@ -1,6 +1,12 @@
 #include "server/diagnosis/selection/time_course.h"
 
+#include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
 
 #include "server/diagnosis/selection/selection.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
@@ -24,7 +30,7 @@ std::vector<NamelessCurve> CoursesOfRig(const std::vector<std::string>& lookup, 
   const auto details = w.searched_predictor->Run(fit->model.base(), true, true);
   const std::vector<CurveCovariate> covariates = ListCurveCovariates(*w.searched, *details);
   EXPECT_EQ(covariates[0].name, "session_time_s");
-  return ScoreTimeCourses(w.experiment, *w.rows, *fit, *details, covariates[0]);
+  return ScoreTimeCourses(w.experiment, *w.rows, *fit, *details, covariates[0]).curves;
 }
 
 const NamelessCurve& Best(const std::vector<NamelessCurve>& curves) {
@@ -67,6 +73,21 @@ TEST(TimeCourse, AWarmUpLevelsOff) {
   EXPECT_GT(warm_up.knots.size(), 8u);
   EXPECT_NEAR(warm_up.values[2].back() - warm_up.values[0].back(), -0.4, 0.06);
   EXPECT_NE(warm_up.words.find("time constant"), std::string::npos) << warm_up.words;
+}
+
+TEST(TimeCourse, AWaveHasItsPeriod) {
+  std::string knots = "knots=0", values = "m=0", none = "=0";
+  for (int k = 1; k <= 160; ++k) {
+    absl::StrAppend(&knots, ",", 20 * k);
+    absl::StrAppend(&values, ",", 0.15 * std::sin(2 * kPi * 20 * k / 470));
+    none += ",0";
+  }
+  const auto curves = CoursesOfRig(
+      {"name=wave", "adds=travel_mm", "covariate=session_time_s", knots, "l" + none, values, "r" + none});
+  ASSERT_FALSE(curves.empty());
+  const NamelessCurve& wave = Best(curves);
+  EXPECT_GT(wave.knots.size(), 20u);
+  EXPECT_NE(wave.words.find("waves with a period of 47"), std::string::npos) << wave.words;
 }
 
 TEST(TimeCourse, NothingHiddenHasNone) {

@@ -69,6 +69,7 @@ void Predictor::Fill(const Block& block, const touch::TouchSimulator& simulator,
     const touch::TouchPose pose = {set.target_m[row], set.approach[row], set.lateral[row],
                                    set.standoff_m[row]};
     touch::SetTouch(pose, set.speed_m_s[row], set.session_time_s[row], row, t, batch);
+    batch->pause_s[t] = PauseS(observations_, block.touches[t]);
   }
   for (const std::string& name : simulator.needed_covariates()) {
     const auto found = set.covariates.find(name);
