@@ -88,10 +88,14 @@ model::Model RandomModel(uint64_t seed) {
       instance.values = instance.effect->NeutralValues(model.fingers);
     } else if (effect->name == "lookup") {
       instance.effect = RandomLookup(model.fingers, &random);
+    } else if (effect->name == "surface_map") {
+      instance.effect = *Catalogue().MakeSurfaceMap(
+          {"map.csv", {{"obj 1", {20, 0.1, {{{random.Uniform(-9, 9), 2, 3}, random.Uniform(-1, 1), 0.1}}}}}});
     } else {
       instance.values = RandomValues(*effect, model.fingers, &random);
     }
-    instance.per_object = !instance.effect->lookup && (effect->always_per_object || random.Below(3) == 0);
+    instance.per_object = !instance.effect->lookup && !instance.effect->surface_map &&
+                          (effect->always_per_object || random.Below(3) == 0);
     if (instance.per_object)
       for (uint64_t i = random.Below(3); i > 0; --i)
         instance.object_values[absl::StrCat("obj ", i)] =

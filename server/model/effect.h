@@ -3,6 +3,7 @@
 // read the same rows. This header is the interface; the physics stands in effects/, one file per effect.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -103,6 +104,24 @@ struct LookupSpec : UserTerm {
       values;  // mm or us at the knots: one list for every finger, or one per finger
 };
 
+// How one object's surface departs from its mesh, in the units of the map's file (surface_map.md).
+struct SurfaceMapPoint {
+  std::array<double, 3> position_mm{};  // in the frame of the mesh file
+  double departure_mm = 0;              // along the outward normal
+  double std_dev_mm = 0;
+};
+struct SurfaceMapObject {
+  double length_mm = 0,
+         rms_mm = 0;  // of the departures: correlation length, size before anything is measured
+  std::vector<SurfaceMapPoint> points;
+};
+
+// What a surface map is made of.
+struct SurfaceMapSpec {
+  std::string file;                                 // as the model file names it
+  std::map<std::string, SurfaceMapObject> objects;  // by name
+};
+
 struct Effect {
   std::string name;
   Stage stage = Stage::kPose;
@@ -118,8 +137,9 @@ struct Effect {
   std::vector<ParameterInfo> parameters;
   std::vector<ConfoundedEffect> confounded_with;  // each pair is declared by one of the two
   EffectNeeds needs;
-  std::shared_ptr<const FormulaSpec> formula;  // set for formulas only
-  std::shared_ptr<const LookupSpec> lookup;    // set for lookups only
+  std::shared_ptr<const FormulaSpec> formula;         // set for formulas only
+  std::shared_ptr<const LookupSpec> lookup;           // set for lookups only
+  std::shared_ptr<const SurfaceMapSpec> surface_map;  // set for surface maps only
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, effects::TouchBatch& batch)> apply;
@@ -134,14 +154,16 @@ struct Effect {
 class EffectCatalogue {
  public:
   virtual ~EffectCatalogue() = default;
-  // By stage, in the order of application. The last two, "formula" and "lookup", only describe: they have no
-  // parameters and change nothing.
+  // By stage, in the order of application. "surface_map" and the last two, "formula" and "lookup", only describe:
+  // they have no parameters and change nothing.
   virtual std::vector<std::shared_ptr<const Effect>> All() const = 0;
   virtual std::shared_ptr<const Effect> Find(const std::string& name) const = 0;  // null if unknown
   // Checks and compiles a formula; the error names the place in the expression.
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const = 0;
   // Checks a curve; the error names the field.
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec& spec) const = 0;
+  // Makes a map of departures that were read from its file act.
+  virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeSurfaceMap(const SurfaceMapSpec& spec) const = 0;
 };
 
 }  // namespace touchstone::model

@@ -170,8 +170,13 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
     if (const absl::Status status = ModelStore::CheckName(name); !status.ok())
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   v1::Report report;
-  absl::Status status =
-      RunAndSend(context, request->evidence(), touchstone::diagnosis::Diagnose, resources_, writer, &report);
+  const Work work = [with_surface_map = request->with_surface_map()](const diagnosis::DiagnosisInput& input,
+                                                                     const diagnosis::DiagnosisContext& how) {
+    diagnosis::DiagnosisInput asked = input;
+    asked.with_surface_map = with_surface_map;
+    return touchstone::diagnosis::Diagnose(asked, how);
+  };
+  absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
   if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);
   return ToGrpc(status);

@@ -69,9 +69,10 @@ class Likelihood {
 
   // What the field explains of residual r under hypothesis s (posterior mean), rows.
   Eigen::VectorXd FieldMean(const Columns& r, int s) const;
-  // What the field expects of each row of `r` from the rows of its group in other folds. `fold_of_row`: 0 .. folds-1.
-  Eigen::VectorXd FieldLeftOut(const Eigen::VectorXd& r, int s, const std::vector<int>& fold_of_row,
-                               int folds) const;
+  // What the field expects of each row of `columns` from the rows of its group in other folds. `fold_of_row`:
+  // 0 .. folds-1. `grams`, if given: X' V^-1 X of the rows outside each fold, sigma = 1.
+  Eigen::MatrixXd FieldLeftOut(const Eigen::MatrixXd& columns, int s, const std::vector<int>& fold_of_row,
+                               int folds, std::vector<Eigen::MatrixXd>* grams = nullptr) const;
 
  private:
   struct Basis {                              // of one length

@@ -6,15 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/normal.h"
 #include "server/base/status.h"
-#include "server/base/units.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/round_structure.h"
-#include "server/diagnosis/selection/surface_support.h"
+#include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
 #include "server/diagnosis/selection/where_in_words.h"
-#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -24,8 +21,6 @@ constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says 
 constexpr double kMisfitP = 1e-2;
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
-constexpr double kLengthError = 0.4;        // relative, of a surface error's length: the grid's spacing
-constexpr double kElsewhereNats = 5;  // of what is no surface, for a rest that a lack of fit does not show
 constexpr double kRoundsPossibleP =
     1e-3;                          // of agreement within rounds, for a doubt of what scatter looks like
 constexpr double kZeroErrors = 2;  // standard errors of a value that may be zero
@@ -59,11 +54,15 @@ inference::Parameterization Only(const inference::Parameterization& model, int i
   return part;
 }
 
+}  // namespace
+
 void AddTexts(const model::Effect& effect, LadderStep* step) {
   step->meaning = effect.meaning;
   step->check_on_rig = effect.check_on_rig;
   step->remedy = effect.remedy;
 }
+
+namespace {
 
 class LadderBuilder {
  public:
@@ -275,88 +274,14 @@ class LadderBuilder {
     }
     if (support_.IsSurface()) {
       left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
-      if (given == nullptr)
-        AddSurfaceError();
-      else
-        RefitSurfaceError();
-      return absl::OkStatus();
+      if (given != nullptr) {
+        RefitSurfaceError(selection_.surface_error, &ladder_);
+        return absl::OkStatus();
+      }
+      return AddSurfaceStep(workspace_, selection_, support_, left_.lack_of_fit_p, &ladder_);
     }
-    unplaced_ = gain_nats > kSurfaceNats &&
-                std::max(support_.curve_nats, support_.finger_field_nats) > kElsewhereNats;
+    unplaced_ = gain_nats > kSurfaceNats && support_.IsElsewhere();
     return absl::OkStatus();
-  }
-
-  // Size and length, in the units of files. What the bounds of the effect cut off is cut off here too.
-  std::vector<inference::ParameterEstimate> DescribeSurface(const model::Effect& effect) const {
-    const SurfaceErrorFinding& found = selection_.surface_error;
-    const std::pair<double, double> values[] = {
-        {found.rms_m * kMillimetresPerMetre, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0))},
-        {found.length_m * kMillimetresPerMetre, kLengthError}};
-    std::vector<inference::ParameterEstimate> estimates;
-    for (const auto& [value, relative_error] : values) {
-      const model::ParameterInfo& parameter = effect.parameters[estimates.size()];
-      inference::ParameterEstimate estimate;
-      estimate.name = parameter.name;
-      estimate.unit = std::string(UnitSymbol(parameter.unit));
-      estimate.value = std::clamp(value, parameter.lower, parameter.upper);
-      estimate.std_error = value * relative_error;
-      estimate.lower = estimate.value * std::max(0.0, 1 - kNormalQuantile975 * relative_error);
-      estimate.upper = std::min(parameter.upper, estimate.value * (1 + kNormalQuantile975 * relative_error));
-      estimates.push_back(std::move(estimate));
-    }
-    return estimates;
-  }
-
-  static std::vector<double> SurfaceValues(const model::Effect& effect,
-                                           const std::vector<inference::ParameterEstimate>& estimates) {
-    std::vector<double> values;
-    for (const inference::ParameterEstimate& estimate : estimates) {
-      const model::ParameterInfo& parameter = effect.parameters[values.size()];
-      // Two per cent of the values stand for their error.
-      const double rounded = RoundedTo(estimate.value, 0.02 * estimate.value);
-      values.push_back(std::clamp(rounded, parameter.lower, parameter.upper) * kMetresPerMillimetre);
-    }
-    return values;
-  }
-
-  void AddSurfaceError() {
-    const SurfaceErrorFinding& found = selection_.surface_error;
-    const auto effect = effects::FindByRole(model::EffectRole::kSmoothError);
-    LadderStep step;
-    step.effect = effect->name;
-    step.scope = EffectScope::kObject;
-    AddTexts(*effect, &step);
-    step.probability = ProbabilityOf(found.gain_nats);
-    step.gain_nats = found.gain_nats;
-    step.discriminating_measurement = DiscriminatingMeasurement({effect->name});
-    step.parameters = DescribeSurface(*effect);
-    step.words = support_.Words(ladder_.final.rmse_s);
-    // How the bumps lie is not known: the model with them expects what it did without.
-    step.quality = ladder_.final;
-    step.quality.lack_of_fit_p = left_.lack_of_fit_p;
-    if (!has_formula()) ladder_.final.lack_of_fit_p = left_.lack_of_fit_p;
-    model::EffectInstance instance;
-    instance.effect = effect;
-    instance.per_object = true;
-    instance.values = SurfaceValues(*effect, step.parameters);
-    ladder_.improved.effects.push_back(std::move(instance));
-    step.model = ladder_.improved;
-    ladder_.steps.push_back(std::move(step));
-    ladder_.changed = true;
-  }
-
-  void RefitSurfaceError() {
-    for (model::EffectInstance& instance : ladder_.improved.effects) {
-      if (instance.effect->role != model::EffectRole::kSmoothError) continue;
-      RefittedEffect refit{instance.effect->name, DescribeSurface(*instance.effect)};
-      for (size_t p = 0; p < refit.parameters.size(); ++p)
-        refit.parameters[p].before = instance.values[p] * kMillimetresPerMetre;
-      instance.values = SurfaceValues(*instance.effect, refit.parameters);
-      instance.object_values.clear();
-      ladder_.refitted.push_back(std::move(refit));
-      ladder_.values_wrong = true;
-      ladder_.changed = true;
-    }
   }
 
   // Whether repeats agree within rounds: a curve of time or a wander would look alike.
