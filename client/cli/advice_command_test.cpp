@@ -1,4 +1,4 @@
-// What a diagnosis advises is done by a command and found again, on the public sets: a mistake in the file is mended, a
+// What a diagnosis advises is done by a command and found again, on the public sets: a mistake in the file is fixed, a
 // curve without a name is added.
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include <nlohmann/json.hpp>
 
@@ -72,9 +73,9 @@ TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
     ASSERT_EQ(words[0], "touchstone");
     std::vector<std::string> command(words.begin() + 1, words.end());
     command.push_back("--force");
-    const Outcome mended = Run(command);
-    ASSERT_EQ(mended.exit_code, 0) << mended.err;
-    EXPECT_THAT(mended.err, HasSubstr("960 touches"));
+    const Outcome repaired = Run(command);
+    ASSERT_EQ(repaired.exit_code, 0) << repaired.err;
+    EXPECT_THAT(repaired.err, HasSubstr("960 touches"));
     const nlohmann::json after = Diagnose("fixed.csv");
     EXPECT_EQ(after["verdict"], "MISSING_EFFECTS");
     ASSERT_FALSE(after["steps"].empty());
@@ -83,6 +84,23 @@ TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
     EXPECT_NEAR(after["initial"]["rmse_us"].get<double>(),
                 before["data_problems"][0]["rmse_after_us"].get<double>(), 1);
   }
+}
+
+// A mesh that lies in the folder, although the set does not name it, may be what was touched.
+TEST_F(AdviceCommand, AMeshOfTheFolderThatTheSetDoesNotNameIsTried) {
+  std::filesystem::create_directory(Path("meshes"));
+  for (const char* object : {"lat00", "lat05", "lat10", "lat20"})
+    std::filesystem::copy(kMeasurements + "/" + object + ".off", Path("meshes"));
+  std::filesystem::copy(kMeasurements + "/lat05.off", Path("meshes/lat15.off"));  // a mistake
+  std::filesystem::copy(kMeasurements + "/lat15.off", Path("meshes/elsewhere.off"));
+  std::ofstream(Path("meshes/broken.off")) << "OFF\n3 1";
+  const Outcome outcome = Run({"diagnose", kMeasurements + "/tip_radius.csv", "--model",
+                               kMeasurements + "/nominal.yaml", "--mesh-dir", "meshes", "--json", "-"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = nlohmann::json::parse(outcome.out, nullptr, false);
+  EXPECT_EQ(report["verdict"], "CHECK_DATA");
+  EXPECT_EQ(report["data_problems"][0]["kind"], "wrong_mesh");
+  EXPECT_EQ(report["data_problems"][0]["detail"], "lat15 is elsewhere");
 }
 
 TEST_F(AdviceCommand, SaysWhatItCannotDo) {
@@ -95,11 +113,15 @@ TEST_F(AdviceCommand, SaysWhatItCannotDo) {
     EXPECT_EQ(outcome.exit_code, 2);
     return outcome.err;
   };
-  EXPECT_THAT(error({}), HasSubstr("nothing to mend was named"));
+  EXPECT_THAT(error({}), HasSubstr("nothing to fix was named"));
   EXPECT_THAT(error({"--swap-fingers", "l,q"}), HasSubstr("a finger from l to r was expected"));
-  EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'"));
+  EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'; known: lat00, lat05"));
+  EXPECT_THAT(error({"--scale-times", "0"}), HasSubstr("--scale-times: '0': a factor above 0 was expected"));
+  EXPECT_THAT(error({"--scale-lengths", "-1"}), HasSubstr("--scale-lengths: '-1': a factor above 0"));
   EXPECT_THAT(error({"--permute-axes=x,x,z"}), HasSubstr("--permute-axes"));
   EXPECT_THAT(error({"--scale-speed", "1e9"}), HasSubstr("out of range"));
+  EXPECT_THAT(error({"--touches", "9-3", "--swap-fingers", "l,m"}), HasSubstr("the first and the last"));
+  EXPECT_THAT(error({"--touches", "5000", "--swap-fingers", "l,m"}), HasSubstr("has none of these touches"));
 }
 
 }  // namespace

@@ -34,6 +34,9 @@ namespace fs = std::filesystem;
 constexpr uint64_t kMaxTermsBytes = 1 << 20;
 constexpr size_t kMaxInline = 16 << 20;  // a larger set is sent in pieces, as a session
 constexpr size_t kPiece = 1 << 20;
+// Of a folder with many meshes, those that the set does not name: so many are tried as what was touched.
+constexpr size_t kMaxFurtherMeshes = 12;
+constexpr uint64_t kMaxFurtherBytes = 32 << 20;
 constexpr int kWidthOfNoTerminal = 110;
 constexpr int kMinWidth = 60, kMaxWidth = 160;
 
@@ -64,21 +67,51 @@ absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
   return set;
 }
 
-// The mesh files of these objects in --mesh-dir; other files there are left alone.
+// Meshes that the set does not name, as far as they can be read: nobody asked for them, so none stops the command.
+void AddFurtherMeshes(const Cli& cli, const std::map<std::string, std::string>& paths,
+                      std::map<std::string, source::MeshSpec>* meshes) {
+  size_t taken = 0;
+  uint64_t bytes = 0;
+  std::vector<std::string> left_out;
+  for (const auto& [name, path] : paths) {
+    if (meshes->count(name) > 0) continue;
+    std::error_code error;
+    const uint64_t size = fs::file_size(path, error);
+    if (error || taken == kMaxFurtherMeshes || bytes + size > kMaxFurtherBytes) {
+      left_out.push_back(name);
+      continue;
+    }
+    if (!geometry::ReadMeshFile(path).ok()) continue;
+    bytes += size, ++taken;
+    source::MeshSpec source;
+    source.name = name;
+    source.path = path;
+    meshes->emplace(name, source);
+  }
+  if (!left_out.empty())
+    cli.Detail(absl::StrCat("--mesh-dir: ", left_out.size(), " further meshes (", left_out[0],
+                            left_out.size() > 1 ? ", ..." : "",
+                            ") are not tried as the mesh of another object; --mesh NAME=FILE adds one"));
+}
+
+// The mesh files of these objects in --mesh-dir. Other files there are left alone, or, with `further`, taken as far as
+// the bounds allow.
 absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
-                               const std::vector<std::string>& objects,
+                               const std::vector<std::string>& objects, bool further,
                                std::map<std::string, source::MeshSpec>* meshes) {
   const std::vector<std::string> formats = geometry::MeshFormatNames();
-  std::map<std::string, std::string> paths;
+  std::map<std::string, std::string> paths, others;
   std::set<std::string> twice;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().stem().string();
     const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
-    if (extension.empty() ||
-        std::find(formats.begin(), formats.end(), extension.substr(1)) == formats.end() ||
-        std::find(objects.begin(), objects.end(), name) == objects.end())
+    if (extension.empty() || std::find(formats.begin(), formats.end(), extension.substr(1)) == formats.end())
       continue;
+    if (std::find(objects.begin(), objects.end(), name) == objects.end()) {
+      others.emplace(name, entry.path().string());
+      continue;
+    }
     const auto [other, is_new] = paths.emplace(name, entry.path().string());
     if (is_new || meshes->count(name) > 0) continue;
     // The same object in two formats: the format that MeshFormatNames names first, and a note to the user.
@@ -100,12 +133,14 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
     source.path = path;
     meshes->emplace(name, source);  // --mesh comes first
   }
+  if (further) AddFurtherMeshes(cli, others, meshes);
   return absl::OkStatus();
 }
 
 // The meshes that the set's objects need, of those that the options name, and what --mesh names beside.
 absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
-                                                       const std::vector<std::string>& objects) {
+                                                       const std::vector<std::string>& objects,
+                                                       bool further) {
   std::map<std::string, source::MeshSpec> meshes;
   for (const std::string& text : cli.source().meshes) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const source::MeshSpec source, service::ParseMeshSpec(text));
@@ -119,7 +154,7 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
     }
   }
   if (!cli.source().mesh_folder.empty())
-    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, &meshes));
+    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, further, &meshes));
   std::vector<source::MeshSpec> list;
   for (const auto& [name, source] : meshes) list.push_back(source);
   return list;
@@ -206,7 +241,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                     session::ParseMeasurementSet(set.csv, evidence.origin()));
         objects = read.objects;
       }
-      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects));
+      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
     }
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(comparison->connection_,
@@ -221,10 +256,12 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
       return absl::NotFoundError(
           absl::StrCat("SET: ", options.set, " is no file, and at the server ", session.status().message()));
     TOUCHSTONE_RETURN_IF_ERROR(session.status());
-    TOUCHSTONE_ASSIGN_OR_RETURN(meshes,
-                                MeshesOf(cli, {session->objects().begin(), session->objects().end()}));
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, {session->objects().begin(), session->objects().end()},
+                                                 options.further_meshes));
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
+  if (!set.csv.empty()) comparison->set_sha256_ = Sha256Hex(set.csv);
+  comparison->meshes_ = std::move(meshes);
   if (!set.session.empty()) return comparison;
   if (set.measured.has_value()) {
     *evidence.mutable_set() = service::ToProto(*set.measured);

@@ -10,6 +10,7 @@
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/provenance.h"
 
 namespace touchstone::cli {
 
@@ -20,6 +21,7 @@ struct ComparisonOptions {
   uint64_t seed = 0;
   std::string html;
   std::string json;
+  bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
   // What goes to standard output takes the place of the report in words.
   bool ReportOnStdout() const { return IsStandardOutput(json) || IsStandardOutput(html); }
@@ -34,8 +36,8 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 // A source and what to ask it.
 class Comparison {
  public:
-  // Reads what is here and connects. Only meshes that the set names are read; a server is sent those
-  // that it lacks.
+  // Reads what is here and connects. Only meshes that the set names are read, and those that `further_meshes` asks
+  // for; a server is sent those that it lacks.
   static absl::StatusOr<std::unique_ptr<Comparison>> Open(const Cli& cli, const ComparisonOptions& options);
   // A set that was sent ahead is deleted again.
   ~Comparison();
@@ -43,7 +45,7 @@ class Comparison {
   client::Connection& connection() { return *connection_; }
   const v1::Evidence& evidence() const { return evidence_; }
 
-  // Runs the call that `start` makes; shows progress; returns the report. Ctrl-C cancels it.
+  // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it.
   template <typename Response, typename Start>
   absl::StatusOr<v1::Report> Run(const Start& start) const;
 
@@ -55,7 +57,9 @@ class Comparison {
   const Cli& cli_;
   std::unique_ptr<client::Connection> connection_;
   v1::Evidence evidence_;
-  std::string sent_ahead_;  // the session's name
+  std::string sent_ahead_;                // the session's name
+  std::string set_sha256_;                // of the set's file; empty: it is none here
+  std::vector<source::MeshSpec> meshes_;  // files that were read
 };
 
 // The report as JSON and as HTML, as the options ask.
@@ -82,6 +86,7 @@ absl::StatusOr<v1::Report> Comparison::Run(const Start& start) const {
   const absl::Status status = client::FromGrpc(reader->Finish());
   if (!status.ok()) return status;
   if (!reported) return absl::InternalError("the source ended without a report");
+  AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &report);
   return report;
 }
 

@@ -94,6 +94,7 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
 
 void AddDiagnose(Cli* cli) {
   auto options = std::make_shared<DiagnoseOptions>();
+  options->further_meshes = true;  // one of them may be what was touched
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
       "Says how wrong a model is against measured touches, where, why, and what to add, until "

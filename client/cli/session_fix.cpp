@@ -18,7 +18,7 @@ namespace {
 
 struct FixOptions {
   std::string file, output;
-  std::string swap_fingers, finger_order, swap_objects, axes;
+  std::string touches, swap_fingers, finger_order, swap_objects, axes;
   std::vector<std::string> rename_objects, move_objects;
   double scale_times = 1, scale_lengths = 1, scale_targets = 1, scale_standoff = 1, scale_speed = 1;
   int shift_rows = 0;
@@ -84,8 +84,35 @@ absl::Status ReadObjects(const FixOptions& options, session::MeasurementFix* fix
   return absl::OkStatus();
 }
 
+absl::Status ReadTouchRanges(const FixOptions& options, session::MeasurementFix* fix) {
+  if (options.touches.empty()) return absl::OkStatus();
+  for (const std::string& text : std::vector<std::string>(absl::StrSplit(options.touches, ','))) {
+    const std::vector<std::string> ends = absl::StrSplit(text, '-');
+    uint64_t first = 0, last = 0;
+    if (ends.size() > 2 || !absl::SimpleAtoi(ends.front(), &first) || !absl::SimpleAtoi(ends.back(), &last) ||
+        last < first)
+      return Expected("--touches", text,
+                      "a touch's number, or the first and the last of several (48-95), was");
+    fix->touches.emplace_back(first, last);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckFactors(const FixOptions& options) {
+  for (const auto& [option, factor] : {std::pair<const char*, double>{"--scale-times", options.scale_times},
+                                       {"--scale-lengths", options.scale_lengths},
+                                       {"--scale-targets", options.scale_targets},
+                                       {"--scale-standoff", options.scale_standoff},
+                                       {"--scale-speed", options.scale_speed}})
+    if (!(factor > 0 && std::isfinite(factor)))
+      return Expected(option, ShortestNumber(factor), "a factor above 0 was");
+  return absl::OkStatus();
+}
+
 absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int fingers) {
   session::MeasurementFix fix;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadTouchRanges(options, &fix));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckFactors(options));
   TOUCHSTONE_RETURN_IF_ERROR(ReadFingers(options, fingers, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &fix));
   fix.drop_duplicates = options.drop_duplicates;
@@ -104,7 +131,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   fix.reverse_approach = options.reverse_approach;
   if (fix.empty())
     return absl::InvalidArgumentError(
-        "nothing to mend was named; touchstone diagnose names the options where it finds a mistake");
+        "nothing to fix was named; touchstone diagnose names the options where it finds a mistake");
   return fix;
 }
 
@@ -118,7 +145,7 @@ absl::Status RunFix(const Cli& cli, const FixOptions& options) {
   const absl::StatusOr<session::MeasurementSet> after = session::ParseMeasurementSet(fixed, options.output);
   if (!after.ok())
     return absl::InvalidArgumentError(
-        absl::StrCat("mended like this it is no measurement file: ", after.status().message()));
+        absl::StrCat("fixed like this it is no measurement file: ", after.status().message()));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, fixed));
   const int dropped = before.size() - after->size();
   // The format has no place for remarks, so the log is where the change is told.
@@ -135,11 +162,12 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<FixOptions>();
   CLI::App* command =
       cli->AddCommand(group, "fix",
-                      "Mends a discrete mistake of a measurement file, as touchstone diagnose names it "
+                      "Fixes a discrete mistake of a measurement file, as touchstone diagnose names it "
                       "(verdict CHECK_DATA). Numbers "
                       "that do not change keep their digits; several options are done in the order in which "
                       "they stand below.",
                       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
+                      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
                       "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
                       "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
                       "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
@@ -149,6 +177,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   cli->AddInput(
       command,
       command->add_option("FILE", options->file, "The measurement file (CSV)")->type_name("")->required());
+  command
+      ->add_option("--touches", options->touches,
+                   "Fix these touches alone, by their numbers. Default: all of the file")
+      ->type_name("A-B,...");
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command

@@ -185,7 +185,8 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
-  diagnosis.initial = selection::QualityOf(*workspace, selection.initial_model, before);
+  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.initial,
+                              selection::QualityOf(*workspace, selection.initial_model, before));
   selection::SetError(compared_s, &*diagnosis.initial);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   AddLadder(ladder, &diagnosis);

@@ -35,6 +35,8 @@
   EFFECT(HeavyTailNoise)                 \
   EFFECT(MissedContact)                  \
   EFFECT(CorrelatedNoise)                \
+  EFFECT(PositionNoise)                  \
+  EFFECT(FingerNoise)                    \
   /* any stage */                        \
   EFFECT(Formula)                        \
   EFFECT(Lookup)

@@ -233,7 +233,8 @@ TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
   for (const model::EffectRole role :
        {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
         model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError,
-        model::EffectRole::kNoiseMemory})
+        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength,
+        model::EffectRole::kNoiseByFinger})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
@@ -249,7 +250,8 @@ TEST(Catalogue, HasTheEffectsOfTheDesignInItsOrder) {
                                   "acceleration_ramp", "contact_slowdown", "object_push", "oblique_slip",
                                   "channel_latency", "thermal_drift", "return_hysteresis", "clock_skew",
                                   "poll_interval", "gaussian_noise", "incidence_noise", "heavy_tail_noise",
-                                  "missed_contact", "correlated_noise", "formula", "lookup"));
+                                  "missed_contact", "correlated_noise", "position_noise", "finger_noise",
+                                  "formula", "lookup"));
 }
 
 TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {

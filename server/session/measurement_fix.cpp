@@ -38,14 +38,13 @@ absl::Status Refused(const MeasurementSet& set, absl::string_view what) {
 
 absl::Status CheckObject(const MeasurementSet& set, const std::string& name) {
   if (std::find(set.objects.begin(), set.objects.end(), name) != set.objects.end()) return absl::OkStatus();
-  return Refused(set, absl::StrCat("has no object '", name, "'; it has ", absl::StrJoin(set.objects, ", "),
-                                   DidYouMean(name, set.objects)));
+  return Refused(set, absl::StrCat("has no object '", name, "'", DidYouMean(name, set.objects)));
 }
 
 absl::Status CheckFix(const MeasurementFix& fix, const MeasurementSet& set) {
   const bool moves = fix.axes || fix.reverse_approach || fix.reverse_lateral || !fix.move_objects_m.empty() ||
                      fix.scale_targets != 1 || fix.scale_standoff != 1 || fix.scale_speed != 1;
-  if (moves && !set.has_poses) return Refused(set, "has no poses, so none can be mended");
+  if (moves && !set.has_poses) return Refused(set, "has no poses, so none can be fixed");
   for (const double factor : {fix.scale_times, fix.scale_targets, fix.scale_standoff, fix.scale_speed})
     if (!(factor > 0 && std::isfinite(factor)))
       return Refused(set, absl::StrCat("a factor above 0 was expected, not ", ShortestNumber(factor)));
@@ -161,6 +160,65 @@ void MovePoses(const MeasurementFix& fix, MeasurementSet* set) {
   }
 }
 
+// Rows whose touches the fix concerns.
+std::vector<int> RowsOfTouches(const MeasurementFix& fix, const MeasurementSet& set) {
+  std::vector<int> rows;
+  for (int row = 0; row < set.size(); ++row)
+    if (std::any_of(fix.touches.begin(), fix.touches.end(), [&](const auto& range) {
+          return set.touch[row] >= range.first && set.touch[row] <= range.second;
+        }))
+      rows.push_back(row);
+  return rows;
+}
+
+// Names in the order in which the rows have them first, as in a file; those that no row has any more are gone.
+void NumberObjects(const std::vector<std::string>& name_of_row, MeasurementSet* set) {
+  set->objects.clear();
+  for (int row = 0; row < set->size(); ++row) {
+    const auto found = std::find(set->objects.begin(), set->objects.end(), name_of_row[row]);
+    set->object[row] = static_cast<int>(found - set->objects.begin());
+    if (found == set->objects.end()) set->objects.push_back(name_of_row[row]);
+  }
+}
+
+// A part of the file is fixed like a file of its own.
+absl::StatusOr<std::vector<int>> ApplyToTouches(const MeasurementFix& fix, MeasurementSet* set) {
+  const std::vector<int> rows = RowsOfTouches(fix, *set);
+  if (rows.empty()) return Refused(*set, "has none of these touches");
+  MeasurementFix rest = fix;
+  rest.touches.clear();
+  MeasurementSet part = *set;
+  KeepRows(rows, &part);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> left_of_part, ApplyFix(rest, &part));
+
+  std::vector<char> kept(set->size(), 1);
+  for (const int row : rows) kept[row] = 0;
+  std::vector<std::string> names;
+  for (const int object : set->object) names.push_back(set->objects[object]);
+  for (size_t j = 0; j < left_of_part.size(); ++j) {
+    const int row = rows[left_of_part[j]];
+    kept[row] = 1;
+    names[row] = part.objects[part.object[j]];
+    std::copy_n(&part.time_s[j * set->fingers], set->fingers,
+                &set->time_s[static_cast<size_t>(row) * set->fingers]);
+    if (!set->has_poses) continue;
+    set->target_m[row] = part.target_m[j];
+    set->approach[row] = part.approach[j];
+    set->lateral[row] = part.lateral[j];
+    set->standoff_m[row] = part.standoff_m[j];
+    set->speed_m_s[row] = part.speed_m_s[j];
+  }
+  std::vector<int> left;
+  for (int row = 0; row < static_cast<int>(kept.size()); ++row)
+    if (kept[row]) left.push_back(row);
+  if (left.size() < kept.size()) {
+    KeepRows(left, set);
+    Keep(left, 1, &names);
+  }
+  NumberObjects(names, set);
+  return left;
+}
+
 }  // namespace
 
 bool MeasurementFix::empty() const {
@@ -170,6 +228,7 @@ bool MeasurementFix::empty() const {
 }
 
 absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, MeasurementSet* set) {
+  if (!fix.touches.empty()) return ApplyToTouches(fix, set);
   TOUCHSTONE_RETURN_IF_ERROR(CheckFix(fix, *set));
   std::vector<int> left(set->size());
   std::iota(left.begin(), left.end(), 0);
@@ -191,6 +250,12 @@ absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, Measurement
 std::string FixOptions(const MeasurementFix& fix, int fingers) {
   std::vector<std::string> options;
   const auto name = [fingers](int finger) { return model::FingerName(finger, fingers); };
+  if (!fix.touches.empty()) {
+    std::vector<std::string> ranges;
+    for (const auto& [first, last] : fix.touches)
+      ranges.push_back(first == last ? absl::StrCat(first) : absl::StrCat(first, "-", last));
+    options.push_back("--touches " + absl::StrJoin(ranges, ","));
+  }
   if (fix.drop_duplicates) options.push_back("--drop-duplicates");
   if (fix.shift_rows != 0) options.push_back(absl::StrCat("--shift-rows=", fix.shift_rows));
   if (!fix.finger_order.empty()) {

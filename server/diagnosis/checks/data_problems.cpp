@@ -3,6 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +11,16 @@
 
 #include "server/base/readable_time.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/checks/duplicates.h"
+#include "server/diagnosis/checks/mesh_units.h"
 #include "server/diagnosis/checks/object_mistakes.h"
+#include "server/diagnosis/checks/part_mistakes.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/sorted_column.h"
-#include "server/diagnosis/checks/trial.h"
+#include "server/diagnosis/checks/tried.h"
+#include "server/diagnosis/checks/two_mistakes.h"
 #include "server/diagnosis/selection/workspace.h"
 #include "server/model/finger_name.h"
 
@@ -23,89 +28,7 @@ namespace touchstone::diagnosis::checks {
 namespace {
 
 constexpr int kMinTouches = 12;
-constexpr double kMinMisfitM = 0.5e-3;
-constexpr double kScaleTolerance = 0.02;    // physics that is missing biases the factor by about a hundredth
-constexpr double kFarScaleTolerance = 0.2;  // of factors of ten on, which no physics comes near
-constexpr double kTie = 1.1;                // errors within this factor are the same
-constexpr double kClear = 1.5;              // the next other kind is worse by this, unless kSure
-constexpr double kSure = 0.05;              // ratio of errors
-constexpr double kSortedMisfit = 0.3;       // relative, from which a sorted column is one
-constexpr size_t kMaxNamed = 3;
-
-struct Tried {
-  Mistake mistake;
-  TrialResult after;
-  double relative = 0;  // of the whole file
-};
-
-bool ScaleIsRight(const Mistake& mistake, const TrialResult& after) {
-  const double factor = mistake.fix.scale_times * mistake.fix.scale_speed;
-  if (factor == 1) return true;
-  const bool far = factor > 9 || factor < 1 / 9.0;
-  return std::abs(after.scale - 1) <= (far ? kFarScaleTolerance : kScaleTolerance) + 3 * after.scale_error;
-}
-
-// A fix that changes the scale of times or speeds cannot be judged by lengths, which it changes too.
-bool ChangesScale(const Mistake& mistake) {
-  return mistake.fix.scale_times != 1 || mistake.fix.scale_speed != 1;
-}
-
-double RatioOf(const Tried& tried, const TrialResult& before) {
-  const std::vector<std::string>& names = tried.mistake.objects;
-  const double was = std::min(before.Relative(names), kMaxBefore);
-  return was > 0 ? tried.after.Relative(names) / was : 1;
-}
-
-bool Claimable(const Tried& tried, const TrialResult& before) {
-  const std::vector<std::string>& names = tried.mistake.objects;
-  if (!(RatioOf(tried, before) <= kMaxRatio) || !(tried.after.Relative(names) <= kMaxRelative)) return false;
-  if (!ScaleIsRight(tried.mistake, tried.after)) return false;
-  return ChangesScale(tried.mistake) || before.ErrorM(names) >= kMinMisfitM;
-}
-
-// The best mistakes that may be claimed: all that fit alike. `tried` in the order of likelihood.
-std::vector<Tried> Convincing(std::vector<Tried> tried, const TrialResult& before) {
-  const auto least = std::min_element(tried.begin(), tried.end(),
-                                      [](const Tried& a, const Tried& b) { return a.relative < b.relative; });
-  if (least == tried.end() || !Claimable(*least, before)) return {};
-  std::vector<Tried> best;
-  double next = INFINITY;
-  const auto same_kind = [&](const Tried& one) {
-    return std::any_of(best.begin(), best.end(),
-                       [&](const Tried& other) { return other.mistake.kind == one.mistake.kind; });
-  };
-  for (const Tried& one : tried)
-    if (one.relative <= kTie * least->relative && Claimable(one, before)) best.push_back(one);
-  for (const Tried& one : tried)
-    if (one.relative > kTie * least->relative && !same_kind(one)) next = std::min(next, one.relative);
-  if (RatioOf(*least, before) > kSure && next < kClear * least->relative) return {};
-  // Of one kind one is enough, the simplest; and a tie with a fitted size is no tie.
-  std::vector<Tried> named;
-  for (const Tried& one : best) {
-    const bool again = std::any_of(named.begin(), named.end(), [&](const Tried& other) {
-      return other.mistake.kind == one.mistake.kind;
-    });
-    if (!again && named.size() < kMaxNamed && !(one.mistake.free_size && !named.empty()))
-      named.push_back(one);
-  }
-  return named;
-}
-
-std::vector<Tried> TryAll(const Trial& trial, const std::vector<Mistake>& mistakes, ThreadPool* pool) {
-  std::vector<std::optional<Tried>> results(mistakes.size());
-  ParallelFor(pool, static_cast<int>(mistakes.size()), 4, [&](int begin, int end) {
-    for (int m = begin; m < end; ++m) {
-      absl::StatusOr<TrialResult> after = trial.Run(mistakes[m].fix);
-      if (!after.ok()) continue;
-      const double relative = after->Relative({});
-      results[m] = Tried{mistakes[m], *std::move(after), relative};
-    }
-  });
-  std::vector<Tried> tried;
-  for (std::optional<Tried>& result : results)
-    if (result && !result->after.objects.empty()) tried.push_back(*std::move(result));
-  return tried;
-}
+constexpr double kSortedMisfit = 0.15;  // relative, over all touches, from which a sorted column is one
 
 // What `compare` finds for this input; where it refuses, the error over all touches that can be compared.
 double RmseOf(const DiagnosisInput& input, ThreadPool* pool) {
@@ -129,7 +52,7 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
   return RmseOf(mended, pool);
 }
 
-// The command that mends the file. The server may not know the file's name.
+// The command that fixes the file. The server may not know the file's name.
 std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
                      set.origin.find_first_of(" '\"$\\`;&|<>()*?!") == std::string::npos;
@@ -137,85 +60,167 @@ std::string FixCommand(const session::MeasurementFix& fix, const session::Measur
                       session::FixOptions(fix, set.fingers), " -o fixed.csv");
 }
 
-selection::DataProblem ToProblem(const Mistake& mistake, bool alternative, const DiagnosisInput& input,
-                                 double before_s, ThreadPool* pool) {
-  selection::DataProblem problem;
-  problem.kind = mistake.kind;
-  problem.detail = mistake.detail;
-  problem.fix = FixCommand(mistake.fix, *input.set);
-  problem.rmse_before_s = before_s;
-  problem.rmse_after_s = RmseAfter(input, mistake.fix, pool);
-  problem.words =
-      absl::StrCat(alternative ? "These data cannot tell it from another mistake: " : "It looks as if ",
-                   mistake.words, ". Mended, the model as it is would be off by ",
-                   TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(before_s), ".");
-  return problem;
+// Problems are rare, and so is the error of the whole file as it stands: computed where one is told.
+class ProblemList {
+ public:
+  ProblemList(const DiagnosisInput& input, ThreadPool* pool) : input_(input), pool_(pool) {}
+
+  // Mistakes that fit alike: one of them was made.
+  void AddAlternatives(const std::vector<Mistake>& mistakes) {
+    for (const Mistake& mistake : mistakes) {
+      const bool first = &mistake == &mistakes.front();
+      Add(mistake, mistake.fix,
+          absl::StrCat(first ? "It looks as if " : "These data cannot tell it from another mistake: ",
+                       mistake.words));
+    }
+  }
+  // Both were made.
+  void AddBoth(const Mistake& one, const Mistake& other) {
+    const session::MeasurementFix both = Together(one.fix, other.fix);
+    Add(one, both, absl::StrCat("It looks as if there are two mistakes: ", one.words, "; and ", other.words));
+    Add(other, both, absl::StrCat("It is the second of two mistakes: ", other.words));
+  }
+  void AddMeshUnit(const MeshUnit& wrong);
+  void AddDuplicates(const touches::Observations& o);
+  void AddSortedColumn(const TrialResult& before);
+
+  std::vector<selection::DataProblem> Take() { return std::move(problems_); }
+
+ private:
+  // Two fixes that have no field in common.
+  static session::MeasurementFix Together(const session::MeasurementFix& one,
+                                          const session::MeasurementFix& other) {
+    session::MeasurementFix both = other;
+    if (!one.finger_order.empty()) both.finger_order = one.finger_order;
+    both.scale_times *= one.scale_times;
+    both.reverse_approach ^= one.reverse_approach;
+    both.reverse_lateral ^= one.reverse_lateral;
+    return both;
+  }
+  double BeforeS() {
+    if (!before_s_) before_s_ = RmseOf(input_, pool_);
+    return *before_s_;
+  }
+  void Add(const Mistake& mistake, const session::MeasurementFix& fix, const std::string& sentence) {
+    selection::DataProblem problem;
+    problem.kind = mistake.kind;
+    problem.detail = mistake.detail;
+    problem.rmse_before_s = BeforeS();
+    problem.rmse_after_s = NAN;
+    problem.words = sentence + ".";
+    // Touches too scattered to be listed in a command.
+    const bool in_part = mistake.part && fix.touches.empty();
+    if (!in_part) {
+      problem.fix = FixCommand(fix, *input_.set);
+      problem.rmse_after_s = RmseAfter(input_, fix, pool_);
+      absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
+                      TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
+    }
+    problems_.push_back(std::move(problem));
+  }
+
+  const DiagnosisInput& input_;
+  ThreadPool* pool_;
+  std::optional<double> before_s_;
+  std::vector<selection::DataProblem> problems_;
+};
+
+// The file is right here, so no command fixes it: the option that names the mesh does.
+void ProblemList::AddMeshUnit(const MeshUnit& wrong) {
+  const std::string meshes = absl::StrJoin(wrong.objects, ", "), factor = FactorInWords(wrong.factor);
+  const std::string option = wrong.unit.empty() ? absl::StrCat("scale=", ShortestNumber(wrong.factor))
+                                                : absl::StrCat("unit=", wrong.unit);
+  const double after_s = RmseOf(wrong.fixed, pool_);
+  problems_.push_back(
+      {"units_length", absl::StrCat("mesh of ", meshes, " x ", factor),
+       absl::StrCat("It looks as if the mesh of ", meshes, " is in another unit: ", factor,
+                    " times as large it fits the touches. Name it as --mesh ", wrong.objects[0], "=FILE,",
+                    option, ". Then the model as it is would be off by ", TimeInWords(after_s),
+                    " instead of ", TimeInWords(BeforeS()), "."),
+       "", BeforeS(), after_s});
 }
 
-void AddDuplicates(const DiagnosisInput& input, double before_s, ThreadPool* pool,
-                   std::vector<selection::DataProblem>* problems) {
-  const session::MeasurementSet& set = *input.set;
-  const Duplicates duplicates = FindDuplicates(set, *input.model);
+void ProblemList::AddDuplicates(const touches::Observations& o) {
+  const session::MeasurementSet& set = *input_.set;
+  const Duplicates duplicates = FindDuplicates(o, *input_.model);
   if (duplicates.rows == 0) return;
   session::MeasurementFix fix;
   fix.drop_duplicates = true;
-  problems->push_back(
+  problems_.push_back(
       {"duplicates", absl::StrCat(duplicates.rows, " of ", set.size(), " rows"),
        absl::StrFormat(
            "%d of %d rows repeat an earlier touch to the last digit under another number (the first is "
            "touch %d); no rig repeats like that. Taken for repeats they make the noise look smaller and "
            "everything else too certain.",
            duplicates.rows, set.size(), set.touch[duplicates.example]),
-       FixCommand(fix, set), before_s, RmseAfter(input, fix, pool)});
+       FixCommand(fix, set), BeforeS(), RmseAfter(input_, fix, pool_)});
 }
 
-void AddSortedColumn(const DiagnosisInput& input, const TrialResult& before, double before_s,
-                     std::vector<selection::DataProblem>* problems) {
-  if (before.Relative({}) < kSortedMisfit) return;
-  const int finger = SortedColumn(input);
+void ProblemList::AddSortedColumn(const TrialResult& before) {
+  // Not the robust error: a column of many zeros is right in most rows, sorted or not.
+  double error_s2 = 0, spread_s2 = 0;
+  for (const std::optional<TouchError>& touch : before.touches)
+    if (touch) error_s2 += touch->error_s2, spread_s2 += touch->spread_s2;
+  if (error_s2 < kSortedMisfit * kSortedMisfit * spread_s2) return;
+  const int finger = SortedColumn(input_);
   if (finger < 0) return;
-  const std::string column = absl::StrCat("t_", model::FingerName(finger, input.set->fingers), "_us");
-  problems->push_back(
+  const std::string column = absl::StrCat("t_", model::FingerName(finger, input_.set->fingers), "_us");
+  problems_.push_back(
       {"row_shift", column + " is sorted",
        absl::StrCat("The column ", column,
                     " is sorted from the first row to the last, although the "
                     "model expects it to go up and down: it was sorted without the other columns, and "
                     "each of its times belongs to another touch. Take the file as it was before."),
-       "", before_s, NAN});
+       "", BeforeS(), NAN});
+}
+
+std::vector<Mistake> MistakesOf(const std::vector<Tried>& tried) {
+  std::vector<Mistake> mistakes;
+  for (const Tried& one : tried) mistakes.push_back(one.mistake);
+  return mistakes;
 }
 
 }  // namespace
 
 absl::StatusOr<std::vector<selection::DataProblem>> FindDataProblems(const DiagnosisInput& input,
                                                                      const DiagnosisContext& context) {
-  std::vector<selection::DataProblem> problems;
+  const std::vector<selection::DataProblem> none;
   const absl::StatusOr<touches::Observations> o = touches::MakeObservations(input);
-  if (!o.ok() || !input.set->has_poses) return problems;
+  if (!o.ok() || !input.set->has_poses) return none;
   const Trial trial(input, SampleRows(*o));
-  if (static_cast<int>(trial.rows().size()) < kMinTouches) return problems;
+  if (static_cast<int>(trial.rows().size()) < kMinTouches) return none;
   if (context.progress && !context.progress("checking the data", 0.01))
     return absl::CancelledError("the diagnosis was cancelled");
   const absl::StatusOr<TrialResult> before = trial.Run({});
-  if (!before.ok() || before->objects.empty()) return problems;
+  if (!before.ok() || before->objects.empty()) return none;
 
-  std::vector<Mistake> mistakes = MisnamedObjects(trial, *before);
-  for (Mistake& mistake : MistakesOfFiles(input.set->fingers, before->speed_m_s))
-    mistakes.push_back(std::move(mistake));
-  for (Mistake& mistake : OriginsOfBoundingBox(trial)) mistakes.push_back(std::move(mistake));
-  std::vector<Tried> tried = TryAll(trial, mistakes, context.pool);
-  // A height to be fitted is looked for only where no discrete mistake explains the misfit.
-  std::vector<Tried> best = Convincing(tried, *before);
-  if (best.empty() && before->ErrorM({}) >= kMinMisfitM) {
+  std::vector<Tried> tried = TryAll(trial, AllMistakes(trial, *before), context.pool);
+  std::vector<Mistake> best = MistakesOf(Convincing(tried, *before));
+  // What takes more trials is looked for only where no single mistake of the whole file explains the misfit: a part
+  // of the file, a mesh in another unit, a height to be fitted, two mistakes at once.
+  if (best.empty()) best = PartMistakes(trial, *before, tried);
+  std::optional<MeshUnit> mesh_unit;
+  if (best.empty()) mesh_unit = WrongMeshUnit(trial, *before);
+  if (best.empty() && !mesh_unit && before->ErrorM({}) >= kMinMisfitM) {
     for (Tried& one : TryAll(trial, OffsetOrigins(trial, *before), context.pool))
       tried.push_back(std::move(one));
-    best = Convincing(tried, *before);
+    best = MistakesOf(Convincing(tried, *before));
   }
-  const double before_s = RmseOf(input, context.pool);
-  for (const Tried& one : best)
-    problems.push_back(ToProblem(one.mistake, !problems.empty(), input, before_s, context.pool));
-  if (best.empty()) AddSortedColumn(input, *before, before_s, &problems);
-  AddDuplicates(input, before_s, context.pool, &problems);
-  return problems;
+  ProblemList problems(input, context.pool);
+  problems.AddAlternatives(best);
+  if (mesh_unit) {
+    problems.AddMeshUnit(*mesh_unit);
+  } else if (best.empty()) {
+    if (context.progress && !context.progress("checking the data", 0.02))
+      return absl::CancelledError("the diagnosis was cancelled");
+    const std::vector<Mistake> two = TwoMistakes(input, trial.rows(), *before, context.pool);
+    if (two.size() == 2)
+      problems.AddBoth(two[0], two[1]);
+    else
+      problems.AddSortedColumn(*before);
+  }
+  problems.AddDuplicates(*o);
+  return problems.Take();
 }
 
 }  // namespace touchstone::diagnosis::checks

@@ -25,11 +25,6 @@
 
 namespace touchstone::diagnosis::checks {
 
-inline constexpr double kMaxRatio = 0.2;
-inline constexpr double kMaxRelative = 0.25;
-inline constexpr double kMaxBefore =
-    2;  // what nonsense leaves, relative to the data: uncorrelated sqrt(2), reversed 2
-
 // The mistakes that explain the misfit, most telling first; empty: none does, or there are too few touches to say.
 // Never fails because of the data: what contradicts itself is left to the diagnosis that follows. CANCELLED as there.
 absl::StatusOr<std::vector<selection::DataProblem>> FindDataProblems(const DiagnosisInput& input,

@@ -1,10 +1,7 @@
 #include "server/diagnosis/checks/duplicates.h"
 
-#include <absl/container/flat_hash_map.h>
-
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <vector>
 
 namespace touchstone::diagnosis::checks {
@@ -15,10 +12,6 @@ constexpr int kMinCopies = 3;
 constexpr double kOverChance = 10;
 constexpr double kMinFreedom = 20;  // of the scatter among repeats that differ
 constexpr double kFinestTickS = 1e-8;
-
-void Append(const double* values, int count, std::string* key) {
-  key->append(reinterpret_cast<const char*>(values), count * sizeof(double));
-}
 
 // The smallest step between times of the file.
 double ResolutionS(const session::MeasurementSet& set) {
@@ -48,22 +41,19 @@ struct Pose {
 
 }  // namespace
 
-Duplicates FindDuplicates(const session::MeasurementSet& set, const model::Model& model) {
+Duplicates FindDuplicates(const touches::Observations& o, const model::Model& model) {
+  const session::MeasurementSet& set = *o.set;
   Duplicates found;
-  if (!set.has_poses) return found;
-  absl::flat_hash_map<std::string, Pose> poses;
+  std::vector<Pose> poses(o.poses);
+  std::vector<int> pose_of_row(set.size(), -1);
+  for (int k = 0; k < o.size() && set.has_poses; ++k) pose_of_row[o.row[k]] = o.pose[k];
   bool equal_session_times = set.has_session_time;
   for (int row = 0; row < set.size(); ++row) {
     const double* times_s = &set.time_s[static_cast<size_t>(row) * set.fingers];
     const auto reported =
         std::count_if(times_s, times_s + set.fingers, [](double t) { return !std::isnan(t); });
-    if (reported < 2) continue;
-    std::string key(reinterpret_cast<const char*>(&set.object[row]), sizeof(int));
-    for (const auto* column : {&set.target_m, &set.approach, &set.lateral})
-      Append((*column)[row].data(), 3, &key);
-    Append(&set.standoff_m[row], 1, &key);
-    Append(&set.speed_m_s[row], 1, &key);
-    Pose& pose = poses[key];
+    if (reported < 2 || pose_of_row[row] < 0) continue;
+    Pose& pose = poses[pose_of_row[row]];
     ++pose.rows;
     const auto same = std::find_if(pose.first.begin(), pose.first.end(), [&](int other) {
       for (int i = 0; i < set.fingers; ++i)
@@ -83,7 +73,7 @@ Duplicates FindDuplicates(const session::MeasurementSet& set, const model::Model
   if (found.rows < std::max<double>(kMinCopies, kMinShare * set.size())) return {};
 
   double squares = 0, freedom = 0, pairs = 0;
-  for (const auto& [key, pose] : poses) {
+  for (const Pose& pose : poses) {
     pairs += 0.5 * pose.rows * (pose.rows - 1);
     if (pose.first.size() < 2) continue;
     for (int i = 1; i < set.fingers; ++i) {

@@ -1,8 +1,8 @@
 // Rows that repeat an earlier row digit for digit under another touch number.
 #pragma once
 
+#include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
-#include "server/session/measurement_set.h"
 
 namespace touchstone::diagnosis::checks {
 
@@ -16,6 +16,6 @@ struct Duplicates {
 // No rig repeats a touch to the last digit; a clock of coarse ticks does. Zero rows unless there are far more copies
 // than chance gives, and enough to matter: copies taken for repeats make the noise floor too low and every misfit
 // that repeats too certain. A model without noise expects equal repeats, and then only equal session times count.
-Duplicates FindDuplicates(const session::MeasurementSet& set, const model::Model& model);
+Duplicates FindDuplicates(const touches::Observations& observations, const model::Model& model);
 
 }  // namespace touchstone::diagnosis::checks

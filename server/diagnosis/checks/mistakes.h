@@ -1,4 +1,4 @@
-// The discrete mistakes that a measurement file may have, each with what mends it.
+// The discrete mistakes that a measurement file may have, each with what fixes it.
 #pragma once
 
 #include <string>
@@ -14,6 +14,7 @@ struct Mistake {
   session::MeasurementFix fix;
   std::vector<std::string> objects;  // that it concerns, by their names in the file; empty: all
   bool free_size = false;            // a size was fitted, not only tried
+  bool part = false;  // it concerns only some touches; fix.touches, unless they are too scattered
 };
 
 // Mistakes that concern the whole file and need no look at the objects, likelier ones first: where two fit exactly as

@@ -7,7 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/diagnosis/checks/data_problems.h"
+#include "server/base/units.h"
+#include "server/diagnosis/checks/tried.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
@@ -37,8 +38,9 @@ bool Explains(const TrialResult& before, const TrialResult& after, const std::st
 // Physics that is missing biases a fitted offset by some tenths of a millimetre, and whoever mounts an object too low
 // does so by a round length: whole millimetres where they are near.
 double Rounded(double offset_m) {
-  const double whole_m = std::round(offset_m * 1e3) * 1e-3;
-  return std::abs(offset_m - whole_m) < kNearWholeM ? whole_m : std::round(offset_m * 1e4) * 1e-4;
+  const auto to_multiple = [offset_m](double step_m) { return std::round(offset_m / step_m) * step_m; };
+  const double whole_m = to_multiple(kMetresPerMillimetre);
+  return std::abs(offset_m - whole_m) < kNearWholeM ? whole_m : to_multiple(kFinestM);
 }
 
 // The offset along z of each object that leaves least, coarse to fine, all objects at once.
@@ -175,9 +177,9 @@ std::vector<Mistake> OffsetOrigins(const Trial& trial, const TrialResult& before
   for (auto& [object, moved_m] : mistake.fix.move_objects_m) {
     if (alike) moved_m.z() = mean_m;
     moved_m.z() = Rounded(moved_m.z());
-    texts.push_back(absl::StrFormat("%s %+.1f mm", object, moved_m.z() * 1e3));
+    texts.push_back(absl::StrFormat("%s %+.1f mm", object, moved_m.z() * kMillimetresPerMetre));
   }
-  const std::string common = absl::StrFormat("%+.1f mm", mean_m * 1e3);
+  const std::string common = absl::StrFormat("%+.1f mm", mean_m * kMillimetresPerMetre);
   const bool every = mistake.objects.size() == objects.size();
   mistake.detail =
       alike && every ? absl::StrCat("z ", common) : absl::StrCat("z: ", absl::StrJoin(texts, ", "));
@@ -185,7 +187,7 @@ std::vector<Mistake> OffsetOrigins(const Trial& trial, const TrialResult& before
       alike ? absl::StrFormat(
                   "%s stood %.1f mm %s than the file says",
                   every && objects.size() > 1 ? "every object" : absl::StrJoin(mistake.objects, ", "),
-                  std::abs(mean_m) * 1e3, mean_m < 0 ? "lower" : "higher")
+                  std::abs(mean_m) * kMillimetresPerMetre, mean_m < 0 ? "lower" : "higher")
             : absl::StrCat("objects stood at another height than the file says (", mistake.detail, ")");
   return {mistake};
 }

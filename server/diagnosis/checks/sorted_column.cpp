@@ -8,7 +8,7 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
-constexpr int kMinDistinct = 20;
+constexpr int kMinDistinct = 10;  // steps that all go one way: by chance once in a thousand times at the most
 constexpr double kMinUpAndDown =
     0.15;  // share of the rows that go against the column's direction in the model
 

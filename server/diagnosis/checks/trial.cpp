@@ -12,13 +12,7 @@ namespace {
 
 constexpr double kCounted = 0.7;  // share of the touches
 
-// Of one touch, per contrast. A finger that reported and that the model lets miss: nothing is explained.
-struct TouchError {
-  int object = 0;
-  double error_s2 = 0, spread_s2 = 0;
-  double product_s2 = 0, predicted_s2 = 0;  // <predicted, measured>, <predicted, predicted>
-};
-
+// A finger that reported and that the model lets miss: nothing is explained.
 bool ErrorOf(const touches::Observations& o, const touches::Prediction& predicted, int k, TouchError* error) {
   double measured_sum = 0, predicted_sum = 0;
   int reported = 0;
@@ -43,7 +37,6 @@ bool ErrorOf(const touches::Observations& o, const touches::Prediction& predicte
   }
   // No better than no prediction at all, however close the fingers came to each other.
   if (misses) error->error_s2 = 4 * error->spread_s2;
-  error->object = o.object[k];
   return true;
 }
 
@@ -86,6 +79,15 @@ double TrialResult::ErrorM(const std::vector<std::string>& names) const {
   return count > 0 ? std::sqrt(error / count) * speed_m_s : 0;
 }
 
+ObjectError RobustError(std::vector<TouchError> touches) {
+  if (touches.empty()) return {};
+  ObjectError total;
+  total.touches = static_cast<int>(touches.size());
+  total.spread_s2 = MeanOfBest(&touches, &TouchError::spread_s2);
+  total.error_s2 = MeanOfBest(&touches, &TouchError::error_s2);
+  return total;
+}
+
 Trial::Trial(const DiagnosisInput& input, std::vector<int> rows) : input_(input), rows_(std::move(rows)) {}
 
 absl::StatusOr<TrialResult> Trial::Run(const session::MeasurementFix& fix) const {
@@ -103,9 +105,13 @@ absl::StatusOr<TrialResult> Trial::Run(const session::MeasurementFix& fix) const
   result.speed_m_s = Median(set->speed_m_s);
   // By the objects of the file, whatever the fix calls them.
   std::vector<std::vector<TouchError>> of_object(input_.set->objects.size());
+  result.touches.resize(rows_.size());
   for (int k = 0; k < o.size(); ++k) {
     TouchError error;
-    if (ErrorOf(o, predicted, k, &error)) of_object[input_.set->object[rows_[o.row[k]]]].push_back(error);
+    if (!ErrorOf(o, predicted, k, &error)) continue;
+    error.object = input_.set->object[rows_[o.row[k]]];
+    of_object[error.object].push_back(error);
+    result.touches[o.row[k]] = error;
   }
   double product = 0, square = 0, error_s2 = 0, contrasts = 0;
   for (size_t object = 0; object < of_object.size(); ++object) {

@@ -7,6 +7,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,8 +25,16 @@ struct ObjectError {
   double spread_s2 = 0;  // of the measured differences themselves, the same way
 };
 
+// Of one touch, per contrast.
+struct TouchError {
+  int object = 0;  // of the file
+  double error_s2 = 0, spread_s2 = 0;
+  double product_s2 = 0, predicted_s2 = 0;  // <predicted, measured>, <predicted, predicted>
+};
+
 struct TrialResult {
-  std::map<std::string, ObjectError> objects;  // by the names of the file as it is
+  std::vector<std::optional<TouchError>> touches;  // of Trial::rows(); none: nothing to compare
+  std::map<std::string, ObjectError> objects;      // by the names of the file as it is
   // <predicted, measured> / <predicted, predicted> over the touches that count: 1 if the scale is right.
   double scale = 1, scale_error = 0;
   double speed_m_s = 0;  // median
@@ -36,12 +45,15 @@ struct TrialResult {
   double ErrorM(const std::vector<std::string>& names) const;
 };
 
+// Over the touches that count of those given: the mean error and spread, s^2.
+ObjectError RobustError(std::vector<TouchError> touches);
+
 class Trial {
  public:
   // `rows`: of the input's set. `input` must outlive it.
   Trial(const DiagnosisInput& input, std::vector<int> rows);
 
-  // Fails where the mended set contradicts the model; that mistake is out then.
+  // Fails where the fixed set contradicts the model; that mistake is out then.
   absl::StatusOr<TrialResult> Run(const session::MeasurementFix& fix) const;
 
   const DiagnosisInput& input() const { return input_; }

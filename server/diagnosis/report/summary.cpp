@@ -52,7 +52,7 @@ std::string WhatRemains(const selection::UnexplainedRest& rest) {
   if (rest.formula.empty() && !rest.lookup_yaml.empty() && !rest.covariates.empty())
     return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
                         rest.covariates[0].name, " along a curve that would leave ", TimeInWords(rest.rmse_s),
-                        ".");
+                        ".", rest.words.empty() ? "" : " ", rest.words);
   if (rest.formula.empty() && !rest.covariates.empty())
     return absl::StrCat("What remains depends on ", rest.covariates[0].name,
                         "; no effect of the catalogue explains it.");

@@ -74,9 +74,9 @@ std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observation
       });
   if (fingers > 1 && prediction.first_finger.size() == size_t(observations.size())) {
     add("first", "first finger", "", [&prediction](int k, int i) {
-      return prediction.first_finger[k] < 0 ? NAN : double(prediction.first_finger[k] != i);
+      return prediction.first_finger[k] < 0 ? NAN : double(prediction.first_finger[k] == i);
     });
-    list.back().labels = {"first finger", "later finger"};
+    list.back().labels = {"later finger", "first finger"};  // 1 for the first, as in formulas
   }
 
   // What was commanded.

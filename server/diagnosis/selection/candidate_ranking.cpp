@@ -74,8 +74,7 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
   }
   for (RankedCandidate& candidate : candidates)
     if (candidate.explains())
-      candidate.probability =
-          std::min(kMaxProbability, std::exp(candidate.gain_nats - inference::LogSum(all)));
+      candidate.probability = ProbabilityOfShare(candidate.gain_nats - inference::LogSum(all));
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const RankedCandidate& a, const RankedCandidate& b) {
                      return a.explains() != b.explains() ? a.explains() : a.gain_nats > b.gain_nats;

@@ -1,5 +1,7 @@
 #include "server/diagnosis/selection/curve_competition.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -86,6 +88,18 @@ class Competition {
     return absl::OkStatus();
   }
 
+  void NoteRival(const std::string& name, double ahead_nats, const NamelessCurve& curve) {
+    const auto [rival, is_new] = result_.curve_rivals.try_emplace(name);
+    if (!is_new && rival->second.ahead_nats >= ahead_nats) return;
+    rival->second = {ahead_nats, RivalInWords(curve)};
+  }
+
+  static std::string RivalInWords(const NamelessCurve& curve) {
+    return absl::StrCat("A course in time would say nearly the same: ",
+                        curve.words.empty() ? absl::StrCat("a curve of ", curve.covariate) : curve.words,
+                        ".");
+  }
+
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
   absl::StatusOr<bool> Overtake(const std::vector<int>& steps, inference::Fit* named) {
     inference::Parameterization rest = named->model;
@@ -100,13 +114,10 @@ class Competition {
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
                                 inference::FitModel(workspace_.experiment, std::move(rest)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves, CurvesOver(without, covariate));
-    if (curves.empty() || !IsSignificant(curves[0])) return false;
-    const double ahead = without.log_evidence + curves[0].gain_nats - named->log_evidence;
-    for (const std::string& name : names) {
-      double& rival = result_.curve_rivals.emplace(name, ahead).first->second;
-      rival = std::max(rival, ahead);
-    }
-    if (ahead < kOvertakenNats) return false;
+    if (curves.empty()) return false;
+    const double behind = without.log_evidence - named->log_evidence;
+    for (const std::string& name : names) NoteRival(name, behind + curves[0].any_gain_nats, curves[0]);
+    if (!IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
     return true;

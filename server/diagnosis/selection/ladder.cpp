@@ -1,5 +1,6 @@
 #include "server/diagnosis/selection/ladder.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -74,7 +75,8 @@ class LadderBuilder {
     DoubtUnusualValues(fit_, selection_, &ladder_);
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     QuestionRounds();
-    ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
+    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.final,
+                                QualityOf(workspace_, selection_.without_formula, ladder_.residuals));
     left_ = ladder_.final;
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
@@ -210,6 +212,7 @@ class LadderBuilder {
     step.scope = instance.per_object ? EffectScope::kObject : EffectScope::kRig;
     AddTexts(*instance.effect, &step);
     step.probability = from.probability;
+    step.words = from.words;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
     step.words = WhereInWords(fit_, from);
@@ -229,7 +232,9 @@ class LadderBuilder {
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.predictor->Run(with_it.model.base(), false, false));
-    step.quality = QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        step.quality,
+        QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction)));
     step.model = with_it.model.base();
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
@@ -360,7 +365,13 @@ class LadderBuilder {
            left_.rmse_s > (1 + kUnexplainedShare) * ladder_.noise_floor.sigma_s;
   }
 
-  std::string WordsOfRest() const { return unplaced_ ? support_.WordsOfRest() : doubts_.words; }
+  std::string WordsOfRest() const {
+    const std::string words = unplaced_ ? support_.WordsOfRest() : doubts_.words;
+    if (!selection_.curve || selection_.curve->words.empty()) return words;
+    std::string course = absl::StrCat(selection_.curve->words, ".");
+    course[0] = absl::ascii_toupper(course[0]);
+    return words.empty() ? course : absl::StrCat(course, " ", words);
+  }
 
   // Of the mean square error that is no noise, what the steps take away.
   double ExplainedShare() const {

@@ -36,6 +36,10 @@ struct NamelessCurve {
   // Root mean square of rows, s, fitted without a fifth of the poses (of the session's stretches, for time) and
   // measured there: of the fit alone, and with the curve.
   double heldout_without_s = 0, heldout_with_s = 0;
+  double any_gain_nats =
+      0;  // the same as gain_nats of any curve over this covariate, each as probable as the others
+  std::string
+      words;  // what a simple course is: "from touch 480 on finger l travels 0.25 mm farther"; else empty
 };
 
 // Curves over `fit`, largest gain first: one per covariate, the better of shared and per finger. Held-out errors are

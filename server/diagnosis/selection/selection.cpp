@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
@@ -22,6 +23,7 @@ constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // less is no difference
 constexpr double kAlike = 0.03;            // share of a response that another effect may leave out
 constexpr double kBoundTolerance = 1e-6;   // of the typical size
+constexpr double kWorthSayingNats = 5;     // a curve that is not farther behind is named beside the effect
 
 std::string FormulaName(const FormulaTerm& term) {
   std::string name = "rest_" + term.covariate;
@@ -180,10 +182,11 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
                                 equivalent, stopped, competitor.fit.model.base()});
     }
     // A curve without a name may say the same as an effect of time.
-    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
-      all.push_back(rival->second);
-    step.probability =
-        std::min(kMaxProbability, std::exp(inference::LogSum(same_or_equivalent) - inference::LogSum(all)));
+    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end()) {
+      all.push_back(rival->second.ahead_nats);
+      if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
+    }
+    step.probability = ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     result->steps.push_back(std::move(step));
   }
   return absl::OkStatus();
@@ -222,8 +225,12 @@ std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const in
   return residuals;
 }
 
+double ProbabilityOfShare(double log_share) {
+  return std::min(kMaxProbability, std::exp(log_share));
+}
+
 double ProbabilityOf(double log_odds) {
-  return std::min(kMaxProbability, 1 / (1 + std::exp(-log_odds)));
+  return ProbabilityOfShare(-std::log1p(std::exp(-log_odds)));
 }
 
 double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit) {
@@ -259,8 +266,11 @@ absl::StatusOr<inference::NoiseFindings> NoiseOf(const Workspace& workspace, con
   }
   const double surface_dof =
       workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
+  inference::DeclaredNoise declared = DeclaredNoiseOf(*workspace.input.model);
+  // Tails may stand for the outliers that were left out.
+  if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
   return inference::FindNoise(touches::MakeNoiseSample(o, residuals, tangents, expected),
-                              fit.model.size() + surface_dof);
+                              fit.model.size() + surface_dof, declared);
 }
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or

@@ -30,11 +30,18 @@ struct CompetingEffect {
   model::Model model;                // the whole model with it
 };
 
+// A curve of time in the place of a named effect.
+struct CurveRival {
+  double ahead_nats = 0;  // log evidence over the effect's own
+  std::string words;      // a sentence that says what it is
+};
+
 struct SelectedStep {
   int effect = 0;                          // index in the fit's model
   double gain_nats = 0;                    // over the fit without it
   double probability = 0;                  // with its equivalents, among all that could take its place
   std::vector<CompetingEffect> competing;  // best first
+  std::string words;                       // a curve that says nearly the same; empty: none does
 };
 
 // A smooth error of the surfaces, in the final fit.
@@ -55,8 +62,7 @@ struct SelectionResult {
   std::vector<FormulaTerm> terms;      // scored on what the named effects leave; empty if there is no formula
   std::vector<NamelessCurve> curves;   // over what the named effects leave, largest gain first
   std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
-  // Log evidence of a curve in the place of a named effect of time, over the effect's own, nats.
-  std::map<std::string, double> curve_rivals;
+  std::map<std::string, CurveRival> curve_rivals;  // by the effect whose place they would take
   std::vector<SelectedStep> steps;
   inference::NoiseFindings noise;
   std::optional<NoiseMemory>
@@ -67,7 +73,10 @@ struct SelectionResult {
 // Whether a value of effect `index` ended at a bound that is not the value that changes nothing.
 bool IsAtBound(const inference::Fit& fit, int index);
 
-// From a log of odds, nats, never above kMaxProbability.
+// Of an explanation whose evidence has this share, as a logarithm, of the evidence of all: the one place that keeps
+// probabilities at or below kMaxProbability.
+double ProbabilityOfShare(double log_share);
+// The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);
 
 // Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.

@@ -36,6 +36,30 @@ TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
   EXPECT_NEAR(result.noise.sigma_s.value, rig.sigma_us * 1e-6, 0.1 * rig.sigma_us * 1e-6);
 }
 
+// More touches than the search takes in: what fewer of them show must not be lost.
+TEST(SelectExplanation, FindsADriftInAnyNumberOfRepeats) {
+  double std_error = INFINITY;
+  for (const int rounds : {14, 50}) {  // 1,008 and 3,600 touches
+    SCOPED_TRACE(rounds);
+    touches::HiddenRig rig;
+    rig.sigma_us = 5000;
+    rig.rounds = rounds;
+    rig.hidden = {{"thermal_drift", {"rate_mm_per_h=0.04,-0.02,-0.02"}}};
+    const Selected selected = SelectFor(touches::MakeTestInput(rig));
+    EXPECT_EQ(selected.workspace->thinned, rounds == 50);
+    ASSERT_EQ(selected.result.steps.size(), 1u);
+    const inference::Fit& fit = selected.result.fit;
+    const int step = selected.result.steps[0].effect;
+    EXPECT_EQ(fit.model.base().effects[step].effect->name, "thermal_drift");
+    EXPECT_FALSE(selected.result.curve.has_value());
+    EXPECT_LT(selected.result.formula, 0);
+    // 3.6 times as long a session, 2.4 times as many touches in the search: 5.5 times as sure.
+    const auto estimates = fit.model.Describe(step, fit.point, fit.covariance);
+    EXPECT_LT(estimates[0].std_error, std_error / 4);
+    std_error = estimates[0].std_error;
+  }
+}
+
 TEST(SelectExplanation, NamesACompetingEffectThatTheseDataCannotTellFromTheStep) {
   touches::HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "server/base/status.h"
 #include "server/base/units.h"
@@ -19,8 +20,8 @@ constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther 
 constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
 constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
 constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
-constexpr int kRepeatsSearched = 4;
-constexpr double kFloorM = 0.3e-6;  // what mesh files and CSV numbers are rounded to, about
+constexpr int kMinRepeats = 4;         // of a pose that is searched: its scatter tells noise from misfit
+constexpr double kFloorM = 0.3e-6;     // what mesh files and CSV numbers are rounded to, about
 
 // A mesh that most touches miss is not the mesh that was touched.
 absl::Status CheckMeshes(const touches::Observations& o, const touches::Prediction& nominal,
@@ -185,26 +186,45 @@ touches::SumOfSquares PureErrorOf(const touches::Observations& o, const std::vec
 
 namespace {
 
-// Up to four touches per pose, of poses spread evenly over the set. [k]
+// How many repeats of one pose the search may see, so that all poses together stay within kMaxSearched; never fewer
+// than kMinRepeats. `usable`: touches per pose.
+int MaxRepeats(const std::vector<int>& usable) {
+  int repeats = kMinRepeats;
+  const auto total = [&](int limit) {
+    return std::accumulate(usable.begin(), usable.end(), int64_t{0},
+                           [limit](int64_t sum, int count) { return sum + std::min(count, limit); });
+  };
+  const int most = usable.empty() ? 0 : *std::max_element(usable.begin(), usable.end());
+  while (repeats < most && total(repeats + 1) <= kMaxSearched) ++repeats;
+  return repeats;
+}
+
+// Repeats of every pose if so many fit, else of poses spread evenly over the set. Of each pose they are spread evenly
+// over its repeats: what the first hours do not show, drift for one, the whole session does. [k]
 std::vector<char> ChooseTouches(const touches::Observations& o) {
   std::vector<int> usable(o.poses, 0);
   for (int k = 0; k < o.size(); ++k) usable[o.pose[k]] += o.used[k];
+  const int max_repeats = MaxRepeats(usable);
   int total = 0;
-  for (int& count : usable) count = std::min(count, kRepeatsSearched), total += count;
+  for (const int count : usable) total += std::min(count, max_repeats);
   const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
-  std::vector<int> quota(o.poses, 0);
+  std::vector<int> quota(o.poses, 0), seen(o.poses, 0);
   double credit = 0;
   for (int pose = 0; pose < o.poses; ++pose) {
-    credit += usable[pose];
-    if (usable[pose] == 0 || credit < stride * usable[pose]) continue;
-    credit -= stride * usable[pose];
-    quota[pose] = usable[pose];
+    const int wanted = std::min(usable[pose], max_repeats);
+    credit += wanted;
+    if (wanted == 0 || credit < stride * wanted) continue;
+    credit -= stride * wanted;
+    quota[pose] = wanted;
   }
   std::vector<char> chosen(o.size(), 0);
   for (int k = 0; k < o.size(); ++k) {
-    if (!o.used[k] || quota[o.pose[k]] == 0) continue;
-    --quota[o.pose[k]];
-    chosen[k] = 1;
+    const int pose = o.pose[k];
+    if (!o.used[k] || quota[pose] == 0) continue;
+    // The repeat in the middle of each of `quota` equal parts. Poses with as many repeats have the same rounds chosen.
+    const int64_t repeat = seen[pose]++, count = usable[pose];
+    const auto middles_before = [&](int64_t at) { return (2 * at * quota[pose] + count) / (2 * count); };
+    chosen[k] = middles_before(repeat + 1) > middles_before(repeat);
   }
   return chosen;
 }

@@ -38,6 +38,28 @@ TEST(Workspace, ThinsALargeSetToWholePosesOfEveryObject) {
   for (const int touches : of_pose) EXPECT_LE(touches, 4);
 }
 
+TEST(Workspace, SearchesManyRepeatsOfFewPosesOverTheWholeSession) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 4;
+  rig.rounds = 50;  // 3,600 touches, 72 poses
+  const auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
+  ASSERT_TRUE(workspace.ok()) << workspace.status();
+  ASSERT_TRUE(PrepareSearch(workspace->get(), {}).ok());
+  const touches::Observations& all = *(*workspace)->observations;
+  const touches::Observations& searched = *(*workspace)->searched;
+  EXPECT_TRUE((*workspace)->thinned);
+  const int used = static_cast<int>(std::count(searched.used.begin(), searched.used.end(), 1));
+  EXPECT_LE(used, kMaxSearched);
+  EXPECT_GT(used, 0.9 * kMaxSearched);
+  // Of each object's stretch of the session every tenth part is seen alike.
+  std::vector<int> of_part(10 * rig.objects.size());
+  for (int k = 0; k < searched.size(); ++k) {
+    const int number = searched.row[k] % (all.size() / 3);
+    if (searched.used[k]) ++of_part[10 * searched.object[k] + 10 * number / (all.size() / 3)];
+  }
+  for (const int touches : of_part) EXPECT_NEAR(touches, used / 30, used / 75);
+}
+
 TEST(Workspace, WeighsTheRowsOfATouchByTheRootOfItsWeight) {
   const auto workspace = MakeWorkspace(touches::MakeTestInput({}), {});
   ASSERT_TRUE(workspace.ok()) << workspace.status();

@@ -43,7 +43,8 @@ absl::StatusOr<diagnosis::DiagnosisInput> InputFor(const std::string& csv, const
   diagnosis::DiagnosisInput input;
   input.set = std::make_shared<const session::MeasurementSet>(std::move(set));
   input.model = std::make_shared<const model::Model>(std::move(model));
-  for (const std::string& object : input.set->objects) input.surfaces[object] = objects.surfaces.at(object);
+  // As with --mesh-dir: the meshes that the file does not name are there too.
+  input.surfaces = objects.surfaces;
   return input;
 }
 

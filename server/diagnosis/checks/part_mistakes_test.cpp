@@ -1,0 +1,132 @@
+#include "server/diagnosis/checks/part_mistakes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/checks/spoilt_test_file.h"
+
+namespace touchstone::diagnosis::checks {
+namespace {
+
+using ::testing::HasSubstr;
+
+// 3 objects, one after the other: 24 poses in each of 4 rounds, touches 0 to 287.
+DiagnosisInput FileOfRounds(uint64_t seed) {
+  touches::HiddenRig rig = Rig(seed);
+  rig.rounds = 4;
+  return MakeFile(rig);
+}
+
+TEST(PartMistakes, FingersExchangedInSomeRoundsAreToldWithTheTouches) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    const auto problems = ProblemsOf(Spoilt(FileOfRounds(seed), With([](auto* f) {
+                                              f->touches = {{24, 71}};
+                                              f->finger_order = {1, 0, 2};
+                                            })));
+    ASSERT_FALSE(problems.empty());
+    EXPECT_EQ(problems[0].kind, "finger_order");
+    EXPECT_THAT(problems[0].fix, HasSubstr("--touches 2"));
+    EXPECT_THAT(problems[0].fix, HasSubstr("--swap-fingers l,m"));
+    EXPECT_THAT(problems[0].words, HasSubstr(" of the 288 touches alone (touches 2"));
+    EXPECT_LT(problems[0].rmse_after_s, 0.15 * problems[0].rmse_before_s);
+  }
+}
+
+TEST(PartMistakes, TouchesOfOneObjectUnderTheNameOfAnotherAreTold) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    DiagnosisInput input = FileOfRounds(seed);
+    // From here on no row is called lat10, but its mesh is there.
+    input = Spoilt(input, With([](auto* f) { f->rename_objects = {{"lat10", "lat20"}}; }));
+    const auto problems = ProblemsOf(input);
+    ASSERT_FALSE(problems.empty());
+    EXPECT_EQ(problems[0].kind, "wrong_mesh");
+    EXPECT_THAT(problems[0].detail, HasSubstr("lat20 is lat10, touches 9"));
+    EXPECT_THAT(problems[0].words,
+                HasSubstr(" of the 192 touches that the file calls lat20 were touches of lat10"));
+    EXPECT_THAT(problems[0].fix, HasSubstr("--rename-object lat20=lat10"));
+    EXPECT_LT(problems[0].rmse_after_s, 0.15 * problems[0].rmse_before_s);
+  }
+}
+
+TEST(PartMistakes, TimesOfOneObjectInAnotherUnitAreTold) {
+  const auto problems = ProblemsOf(Spoilt(FileOfRounds(1), With([](auto* f) {
+                                            f->touches = {{96, 191}};
+                                            f->scale_times = 1e-3;
+                                          })));
+  ASSERT_FALSE(problems.empty());
+  EXPECT_EQ(problems[0].kind, "units_time");
+  EXPECT_THAT(problems[0].fix, HasSubstr("--scale-times 1000"));
+}
+
+TEST(PartMistakes, TimesThatAreOneRowOffFromSomewhereOnAreTold) {
+  const auto problems = ProblemsOf(Spoilt(FileOfRounds(2), With([](auto* f) {
+                                            f->touches = {{150, 287}};
+                                            f->shift_rows = 1;
+                                          })));
+  ASSERT_FALSE(problems.empty());
+  EXPECT_EQ(problems[0].kind, "row_shift");
+  EXPECT_THAT(problems[0].fix, HasSubstr("--shift-rows=-1"));
+}
+
+TEST(TwoMistakes, BothAreToldWithOneCommand) {
+  struct Pair {
+    const char *name, *kinds[2], *options[2];
+    MeasurementFix spoil;
+  };
+  const std::vector<Pair> pairs = {
+      {"fingers and times",
+       {"finger_order", "units_time"},
+       {"--finger-order r,l,m", "--scale-times 10 "},
+       With([](auto* f) {
+         f->finger_order = {1, 2, 0}, f->scale_times = 0.1;
+       })},
+      {"names and fingers",
+       {"finger_order", "object_names"},
+       {"--swap-fingers l,m", "--swap-objects lat10,lat20"},
+       With([](auto* f) {
+         f->finger_order = {1, 0, 2};
+         f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
+       })},
+      {"frame and times",
+       {"units_time", "frame"},
+       {"--scale-times 1000 ", "--permute-axes=-y,x,z"},
+       With([](auto* f) { f->scale_times = 1e-3, f->axes = *session::ParseAxes("y,-x,z"); })},
+  };
+  for (const Pair& pair : pairs) {
+    SCOPED_TRACE(pair.name);
+    const auto problems = ProblemsOf(Spoilt(FileOfRounds(3), pair.spoil));
+    ASSERT_EQ(problems.size(), 2u);
+    std::vector<std::string> kinds = {problems[0].kind, problems[1].kind};
+    EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(pair.kinds[0], pair.kinds[1])) << problems[0].words;
+    EXPECT_EQ(problems[0].fix, problems[1].fix);
+    for (const char* option : pair.options) EXPECT_THAT(problems[0].fix, HasSubstr(option));
+    EXPECT_LT(problems[0].rmse_after_s, 0.03);
+  }
+}
+
+TEST(MeshUnits, AMeshInAnotherUnitIsToldOfTheWholeSetAndOfOneObject) {
+  const std::vector<std::vector<std::string>> objects = {{"lat00", "lat10", "lat20"}, {"lat20"}};
+  for (const std::vector<std::string>& wrong : objects)
+    for (const double factor : {1e-3, 1 / 25.4, 10.0}) {
+      SCOPED_TRACE(testing::Message() << wrong.size() << ", " << factor);
+      DiagnosisInput input = FileOfRounds(1);
+      for (const std::string& object : wrong) {
+        geometry::TriangleMesh mesh = input.surfaces[object]->mesh();
+        for (Eigen::Vector3f& vertex : mesh.vertices_m) vertex *= static_cast<float>(factor);
+        input.surfaces[object] = *geometry::Surface::Create(object, std::move(mesh));
+      }
+      const auto problems = ProblemsOf(input);
+      ASSERT_EQ(problems.size(), 1u);
+      EXPECT_EQ(problems[0].kind, "units_length");
+      EXPECT_THAT(problems[0].detail, HasSubstr("mesh of lat"));
+      EXPECT_THAT(problems[0].words, HasSubstr(factor == 1e-3 ? "lat20 is in another unit: 1000 times"
+                                               : factor < 1   ? "lat20 is in another unit: 25.4 times"
+                                                              : "lat20 is in another unit: 1/10 times"));
+      EXPECT_LT(problems[0].rmse_after_s, 0.03);
+    }
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::checks
