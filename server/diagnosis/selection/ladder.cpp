@@ -223,7 +223,8 @@ class LadderBuilder {
     step.words = from.words;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
-    step.words = WhereInWords(fit_, from);
+    if (const std::string where = WhereInWords(fit_, from); !where.empty())
+      step.words = absl::StrCat(where, step.words.empty() ? "" : " ", step.words);
     std::vector<std::string> equivalent = {step.effect};
     for (const CompetingEffect& other : from.competing)
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())

@@ -22,6 +22,19 @@ std::string InWords(const Extension& extension) {
   return extension.object.empty() ? extension.name : absl::StrCat(extension.name, " on ", extension.object);
 }
 
+// Whether each group with values of its own has so many rows for each of them.
+bool HaveRowsForOwnValues(const inference::ObservationModel& observations,
+                          const inference::Parameterization& model, int min_rows_per_parameter) {
+  for (int group = 0; group < static_cast<int>(observations.groups().size()); ++group) {
+    const auto own = std::count_if(
+        model.parameters().begin(), model.parameters().end(),
+        [&](const inference::FreeParameter& p) { return p.object == observations.groups()[group]; });
+    const int rows = observations.FirstRowOfGroup(group + 1) - observations.FirstRowOfGroup(group);
+    if (own > 0 && rows < min_rows_per_parameter * (own + 1)) return false;
+  }
+  return true;
+}
+
 // P(chi^2_q > x)
 double ChiSquaredTail(double x, int q) {
   if (x <= 0 || q <= 0) return 1;
@@ -33,14 +46,16 @@ double ChiSquaredTail(double x, int q) {
 bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions,
                              bool rare) const {
   // So few numbers are followed by anything.
-  if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1))
+  if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1) ||
+      (rare && !HaveRowsForOwnValues(*experiment_.observations, after.model, rules_.min_rows_per_parameter)))
     return false;
   if (after.log_evidence - before.log_evidence < EnterNats(rare)) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
-  return inference::HeldOutRmse(experiment_, after) <
-         (1 - rules_.min_relative_cv_gain) * inference::HeldOutRmse(experiment_, before);
+  // Values of single objects cannot be predicted from other objects.
+  const auto unseen = rare ? inference::HeldOutRmseByBlock : inference::HeldOutRmse;
+  return unseen(experiment_, after) < (1 - rules_.min_relative_cv_gain) * unseen(experiment_, before);
 }
 
 absl::StatusOr<inference::Fit> StepwiseSearch::FitExtension(const Extension& extension) const {
