@@ -85,7 +85,9 @@ TEST_F(SurfaceErrorTest, PredictsRowsLeftOutFromTheOthersOnly) {
   const Eigen::MatrixXd v =
       DenseCovariance(*this, *observations, *contrasts, details, likelihood->hypotheses()[kHypothesis]);
   Eigen::MatrixXd columns(likelihood->rows(), 2);
-  columns << v.llt().matrixL() * Noise(1), Noise(2);
+  const Eigen::MatrixXd lower = v.llt().matrixL();
+  columns.col(0) = lower * Noise(1);
+  columns.col(1) = Noise(2);
   std::vector<int> fold_of_row(likelihood->rows());
   std::vector<std::vector<int>> outside(kFolds), inside(kFolds);
   for (int row = 0; row < likelihood->rows(); ++row) {
