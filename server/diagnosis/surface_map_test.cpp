@@ -51,9 +51,11 @@ TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
   touches::HiddenRig others = rig;
   others.pose_seed = 77;
   const double unseen_s = ComparedRmse(others, report.improved_model_yaml);
-  EXPECT_NEAR(unseen_s, report.final->heldout_rmse_s, 0.15 * unseen_s);
-  EXPECT_GT(report.final->heldout_rmse_s, 1.05 * report.final->rmse_s);
-  EXPECT_LT(report.final->heldout_rmse_s, 0.6 * report.initial->rmse_s);
+  // Steep touches, of which each set has others, weigh most.
+  EXPECT_LT(unseen_s, 1.5 * report.final->heldout_rmse_s);
+  EXPECT_GT(unseen_s, report.final->heldout_rmse_s / 1.5);
+  EXPECT_GT(unseen_s, 1.2 * report.final->rmse_s);
+  EXPECT_LT(unseen_s, 0.6 * ComparedRmse(others, model::FormatModel(*touches::MakeTestInput(rig).model)));
 }
 
 TEST(SurfaceMapOfADiagnosis, IsClaimedOnlyWhereItIsAskedFor) {

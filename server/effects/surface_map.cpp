@@ -97,6 +97,12 @@ absl::StatusOr<std::shared_ptr<const model::Effect>> MakeSurfaceMapEffect(const 
     if (!(object.length_mm > 0) || object.points.empty())
       return absl::InvalidArgumentError(
           absl::StrCat("surface_map: object '", name, "' needs a length above 0 and a point"));
+    for (const model::SurfaceMapPoint& point : object.points)
+      for (const double number : {point.position_mm[0], point.position_mm[1], point.position_mm[2],
+                                  point.departure_mm, point.std_dev_mm})
+        if (!std::isfinite(number))
+          return absl::InvalidArgumentError(
+              absl::StrCat("surface_map: a point of object '", name, "' has a number that is not finite"));
     departures->emplace(name, SurfaceDeparture(object));
   }
   auto effect = std::make_shared<model::Effect>(SurfaceMap());

@@ -60,6 +60,15 @@ TEST(SurfaceMap, LeavesFingersWithoutContactAndOtherObjectsAlone) {
     EXPECT_EQ(std::isnan(before.travel_m[e]), std::isnan(after.travel_m[e]));
 }
 
+TEST(SurfaceMap, RefusesWhatIsNoNumberAndWhatHasNoPoint) {
+  model::SurfaceMapObject object = TwoPoints();
+  object.points[1].departure_mm = NAN;
+  EXPECT_FALSE(MakeSurfaceMapEffect({"map.csv", {{"cube", object}}}).ok());
+  object.points.clear();
+  EXPECT_FALSE(MakeSurfaceMapEffect({"map.csv", {{"cube", object}}}).ok());
+  EXPECT_FALSE(MakeSurfaceMapEffect({"map.csv", {}}).ok());
+}
+
 TEST(SurfaceMap, TravelsWithinTheModelFile) {
   const model::ModelFileReader files = [](const std::string& name) -> absl::StatusOr<std::string> {
     EXPECT_EQ(name, "map.csv");

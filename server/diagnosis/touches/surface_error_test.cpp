@@ -79,6 +79,43 @@ TEST_F(SurfaceErrorTest, IsTheGaussianWithTheFieldsCovariance) {
   }
 }
 
+TEST_F(SurfaceErrorTest, PredictsRowsLeftOutFromTheOthersOnly) {
+  constexpr int kFolds = 3;
+  constexpr int kHypothesis = 40;
+  const Eigen::MatrixXd v =
+      DenseCovariance(*this, *observations, *contrasts, details, likelihood->hypotheses()[kHypothesis]);
+  Eigen::MatrixXd columns(likelihood->rows(), 2);
+  const Eigen::MatrixXd lower = v.llt().matrixL();
+  columns.col(0) = lower * Noise(1);
+  columns.col(1) = Noise(2);
+  std::vector<int> fold_of_row(likelihood->rows());
+  std::vector<std::vector<int>> outside(kFolds), inside(kFolds);
+  for (int row = 0; row < likelihood->rows(); ++row) {
+    fold_of_row[row] = row / 2 % kFolds;
+    for (int fold = 0; fold < kFolds; ++fold)
+      (fold == fold_of_row[row] ? inside : outside)[fold].push_back(row);
+  }
+  std::vector<Eigen::MatrixXd> grams;
+  const Eigen::MatrixXd expected =
+      likelihood->FieldLeftOut(columns, kHypothesis, fold_of_row, kFolds, &grams);
+  const auto part = [&](const Eigen::MatrixXd& of, const std::vector<int>& rows,
+                        const std::vector<int>& cols) {
+    Eigen::MatrixXd picked(rows.size(), cols.size());
+    for (size_t r = 0; r < rows.size(); ++r)
+      for (size_t c = 0; c < cols.size(); ++c)
+        picked(static_cast<int>(r), static_cast<int>(c)) = of(rows[r], cols[c]);
+    return picked;
+  };
+  for (int fold = 0; fold < kFolds; ++fold) {
+    const Eigen::MatrixXd kept = part(columns, outside[fold], {0, 1});
+    const Eigen::MatrixXd solved = part(v, outside[fold], outside[fold]).ldlt().solve(kept);
+    const Eigen::MatrixXd by_hand = part(v, inside[fold], outside[fold]) * solved;
+    const Eigen::MatrixXd found = part(expected, inside[fold], {0, 1});
+    EXPECT_LT((found - by_hand).norm(), 0.03 * by_hand.norm()) << fold;
+    EXPECT_LT((grams[fold] - kept.transpose() * solved).norm(), 0.01 * grams[fold].norm()) << fold;
+  }
+}
+
 TEST_F(SurfaceErrorTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
   Eigen::MatrixXd values(likelihood->rows(), 4);
   for (int c = 0; c < 4; ++c) values.col(c) = Noise(10 + c);
