@@ -154,8 +154,7 @@ NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof, const D
   double degrees_of_freedom = 0;
   for (const ReadingGroup& group : sample.groups)
     degrees_of_freedom += static_cast<double>(group.residual_s.size()) - 1;
-  const double given_back =
-      std::sqrt(degrees_of_freedom / std::max(degrees_of_freedom - effective_dof, 1.0));
+  const double given_back = std::sqrt(degrees_of_freedom / std::max(degrees_of_freedom - effective_dof, 1.0));
   NoiseModel best = search.best();
   best.sigma_s *= given_back;
   for (NoiseEstimate* estimate : {&found.sigma_s, &found.length_sigma_m})

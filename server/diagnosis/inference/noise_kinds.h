@@ -19,9 +19,9 @@ struct RepeatedReading {
 
 // What the noise is found in.
 struct NoiseSample {
-  std::vector<ReadingGroup> groups;       // residuals, less any smooth error
-  std::vector<ReadingGroup> repeats;      // the same less the mean over repeats: no misfit, if there are repeats
-  std::vector<double> delays_s;           // readings after the first of their group, s, as they were recorded
+  std::vector<ReadingGroup> groups;   // residuals, less any smooth error
+  std::vector<ReadingGroup> repeats;  // the same less the mean over repeats: no misfit, if there are repeats
+  std::vector<double> delays_s;       // readings after the first of their group, s, as they were recorded
   std::vector<RepeatedReading> repeated;  // which of the expected readings are missing
   int size = 0;                           // one more than the largest index that a group may have
   int channels = 0;

@@ -13,7 +13,7 @@ struct ReadingGroup {
   std::vector<double> residual_s;
   std::vector<double> growth;  // what the noise may grow with: tan of the incidence
   std::vector<int> channel;    // of each reading: the finger
-  double slowness = 1;         // seconds per metre over their root mean square: what a noise of lengths grows with
+  double slowness = 1;  // seconds per metre over their root mean square: what a noise of lengths grows with
 };
 
 enum class NoiseShape { kGaussian, kStudent, kMixture };
@@ -25,9 +25,9 @@ struct NoiseModel {
   double slope = 0;
   std::vector<double> channel_scale;  // by channel; empty: 1
   double length_share = 0;            // of the variance that is a noise of lengths, 0 to 1
-  double degrees_of_freedom = 0;  // of Student's t
-  double share = 0;               // of outliers in the mixture,
-  double width = 0;               // and their sigma over the others'
+  double degrees_of_freedom = 0;      // of Student's t
+  double share = 0;                   // of outliers in the mixture,
+  double width = 0;                   // and their sigma over the others'
 };
 
 // Scale of reading i of a group over sigma.
