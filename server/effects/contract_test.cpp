@@ -233,7 +233,8 @@ TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
   for (const model::EffectRole role :
        {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
         model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError,
-        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength, model::EffectRole::kNoiseByFinger})
+        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength,
+        model::EffectRole::kNoiseByFinger})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 

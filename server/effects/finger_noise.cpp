@@ -36,11 +36,13 @@ model::Effect FingerNoise() {
       .name = "finger_noise",
       .stage = model::Stage::kSensor,
       .role = model::EffectRole::kNoiseByFinger,
-      .meaning = "Some fingers' times scatter more than others', each independently, with a normal distribution.",
+      .meaning =
+          "Some fingers' times scatter more than others', each independently, with a normal distribution.",
       .signature = "Repeats differ more in the differences that involve one finger; the others agree among "
                    "themselves. Taken for one kind of noise it looks like slightly heavy tails.",
       .check_on_rig = "Repeat one touch thirty times and compare the scatter of l - m, m - r and l - r.",
-      .remedy = "Look at that finger's switch, spring and cable; swap two fingers and see whether the noise goes along.",
+      .remedy = "Look at that finger's switch, spring and cable; swap two fingers and see whether the noise "
+                "goes along.",
       .rows = kRows,
       .apply = Apply,
   });

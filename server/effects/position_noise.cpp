@@ -33,15 +33,20 @@ model::Effect PositionNoise() {
       .name = "position_noise",
       .stage = model::Stage::kSensor,
       .role = model::EffectRole::kNoiseOfLength,
-      .meaning = "Where each finger triggers scatters independently, by a length: slow touches scatter more in time.",
-      .signature = "Repeats of a touch at half the speed scatter twice as much in time and alike in millimetres. At "
-                   "one speed it looks like gaussian_noise; over several, taken for one kind of noise, like heavy "
-                   "tails.",
-      .check_on_rig = "Repeat one touch thirty times at each of two speeds: compare the standard deviations in mm.",
-      .remedy = "Stiffer tips or arm and better switches; touching faster hides it in the times, not in the lengths.",
+      .meaning = "Where each finger triggers scatters independently, by a length: slow touches scatter more "
+                 "in time.",
+      .signature =
+          "Repeats of a touch at half the speed scatter twice as much in time and alike in millimetres. At "
+          "one speed it looks like gaussian_noise; over several, taken for one kind of noise, like heavy "
+          "tails.",
+      .check_on_rig =
+          "Repeat one touch thirty times at each of two speeds: compare the standard deviations in mm.",
+      .remedy = "Stiffer tips or arm and better switches; touching faster hides it in the times, not in the "
+                "lengths.",
       .confounded_with =
           {
-              {"gaussian_noise", "Repeats at another speed: a noise of lengths changes in time, one of times does not."},
+              {"gaussian_noise",
+               "Repeats at another speed: a noise of lengths changes in time, one of times does not."},
           },
       .rows = kRows,
       .apply = Apply,

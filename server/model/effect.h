@@ -50,16 +50,16 @@ struct ParameterInfo {
 // What an effect does to the data: to their expectation, or to one property of their scatter. A diagnosis fits
 // systematic effects and judges each of the others by the likelihood of what the best explanation leaves.
 enum class EffectRole {
-  kSystematic,    // changes the expected times
-  kNoiseLevel,    // standard deviation of one reading
-  kNoiseGrowth,   // growth of the noise with the incidence
-  kNoiseTails,    // degrees of freedom of heavy tails
-  kQuantisation,  // readings fall on ticks
-  kDropout,       // readings are missing
-  kNoiseMemory,   // a wander in session time, each finger on its own
+  kSystematic,     // changes the expected times
+  kNoiseLevel,     // standard deviation of one reading
+  kNoiseGrowth,    // growth of the noise with the incidence
+  kNoiseTails,     // degrees of freedom of heavy tails
+  kQuantisation,   // readings fall on ticks
+  kDropout,        // readings are missing
+  kNoiseMemory,    // a wander in session time, each finger on its own
   kNoiseOfLength,  // standard deviation of where a finger triggers: in time it grows as the speed falls
   kNoiseByFinger,  // what a finger's noise has beyond the others'
-  kSmoothError,   // a smooth error of the surface, drawn anew for every object
+  kSmoothError,    // a smooth error of the surface, drawn anew for every object
 };
 
 // Another effect that may explain the same data, and what tells the two apart.

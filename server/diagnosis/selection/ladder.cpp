@@ -8,7 +8,9 @@
 #include "server/base/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/doubts.h"
+#include "server/diagnosis/selection/dropouts.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_support.h"
 #include "server/diagnosis/selection/time_structure.h"
@@ -33,7 +35,7 @@ constexpr double kSameSurface =
 absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
   if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
   const touches::Observations& o = *workspace.observations;
-  const touches::Contrasts contrasts(o, workspace.nominal.time_s);
+  const touches::Contrasts contrasts = WeighedContrasts(workspace, o, workspace.nominal.time_s);
   const inference::Likelihood likelihood(
       touches::FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0, nullptr);
   const touches::TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
@@ -79,6 +81,7 @@ class LadderBuilder {
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
     if (!doubts_.remounted) AddNoiseSteps(selection_.noise, &ladder_);
+    if (!selection_.memory && !doubts_.remounted) RemoveAbsentMemory(*workspace_.observations, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
     const bool rest =
         StructureRemains() || selection_.curve || TimeStructureRemains() || unplaced_ || doubts_.any();
@@ -123,6 +126,8 @@ class LadderBuilder {
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
     AddTimeStructure(o, best, &ladder_.noise_floor);
+    ladder_.noise_floor.declared_s = DeclaredSigma(*workspace_.input.model);
+    ladder_.dropouts = DropoutsInWords(o, ladder_.prediction);
     return absl::OkStatus();
   }
 

@@ -26,4 +26,9 @@ struct NoiseMemory {
 std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& observations,
                                            const std::vector<double>& residuals);
 
+// Whether a wander of this size that a model has is ruled out: no wander fits the residuals better by 5 nats. False
+// where the set could not show it (few touches, no session times, a memory longer than half the session).
+bool WanderIsAbsent(const touches::Observations& observations, const std::vector<double>& residuals,
+                    double sigma_s, double time_s);
+
 }  // namespace touchstone::diagnosis::selection
