@@ -146,6 +146,7 @@ void AddLadder(const selection::Ladder& ladder, report::Diagnosis* diagnosis) {
   diagnosis->confounded = ladder.confounded;
   diagnosis->candidates = ladder.candidates;
   diagnosis->unexplained = ladder.unexplained;
+  if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (!ladder.changed) return;
   diagnosis->improved_model_yaml = model::FormatModel(ladder.improved);
   diagnosis->improved_model_hash = ladder.improved.Hash();

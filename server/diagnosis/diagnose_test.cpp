@@ -1,3 +1,4 @@
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -222,6 +223,58 @@ TEST(Diagnose, FindsNoiseThatGrowsOnSlopes) {
   const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"incidence_noise"}) << report.summary;
   EXPECT_NEAR(report.steps[0].parameters[0].value, 2, 0.7);
+}
+
+TEST(Diagnose, SaysThatNoiseOfTheModelIsNotThere) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.known = {{"poll_interval", {"interval_us=8000"}}, {"heavy_tail_noise", {"degrees_of_freedom=3"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_EQ(report.verdict, selection::Verdict::kWrongValues) << report.summary;
+  EXPECT_THAT(report.superfluous, testing::UnorderedElementsAre("poll_interval", "heavy_tail_noise"));
+  EXPECT_THAT(report.improved_model_yaml, testing::Not(HasSubstr("poll_interval")));
+  EXPECT_THAT(report.improved_model_yaml, HasSubstr("gaussian_noise"));
+}
+
+TEST(Diagnose, KeepsNoiseOfTheModelThatIsThere) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.sigma_us = 300;
+  rig.hidden =
+      rig.known = {{"poll_interval", {"interval_us=8000"}}, {"missed_contact", {"probability=0.05"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  EXPECT_TRUE(report.superfluous.empty()) << report.summary;
+  EXPECT_TRUE(report.steps.empty()) << report.summary;
+}
+
+TEST(Diagnose, ALoudFingerIsNoHeavyTail) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.rounds = 4;
+  rig.hidden = {{"finger_noise", {"sigma_us=0,0,4000"}}};
+  const report::Diagnosis report = DiagnoseRig(rig);
+  ASSERT_EQ(StepNames(report), std::vector<std::string>{"finger_noise"}) << report.summary;
+  ASSERT_EQ(report.steps[0].parameters.size(), 3u);
+  EXPECT_EQ(report.steps[0].parameters[2].entry, "r");
+  EXPECT_NEAR(report.steps[0].parameters[2].value, 4000, 500);
+}
+
+// The factor by which the model's sigma is off, and the verdict.
+TEST(Diagnose, ASigmaThatIsOffByAFactorIsAWrongValueAndOneThatIsNearIsEstimatedAnew) {
+  for (const auto& [declared_us, verdict] :
+       {std::pair(900.0, selection::Verdict::kWrongValues), std::pair(1500.0, selection::Verdict::kAdequate),
+        std::pair(2700.0, selection::Verdict::kAdequate),
+        std::pair(6000.0, selection::Verdict::kWrongValues)}) {
+    DiagnosisInput input = touches::MakeTestInput({});
+    input.model = std::make_shared<const model::Model>(touches::WithEffects(
+        model::NominalModel(), {{"gaussian_noise", {absl::StrCat("sigma_us=", declared_us)}}}));
+    const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
+    ASSERT_TRUE(report.ok()) << report.status();
+    EXPECT_EQ(report->verdict, verdict) << declared_us << ": " << report->summary;
+    ASSERT_EQ(report->refitted.size(), 1u) << declared_us;
+    EXPECT_NEAR(report->refitted[0].parameters[0].value, 2000, 200);
+    EXPECT_THAT(report->summary, HasSubstr("Repeats scatter by")) << declared_us;
+  }
 }
 
 TEST(Diagnose, FindsMissedContacts) {

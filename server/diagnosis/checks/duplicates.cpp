@@ -28,7 +28,7 @@ double ResolutionS(const session::MeasurementSet& set) {
 double ModelNoiseS(const model::Model& model) {
   double variance = 0;
   for (const model::EffectInstance& instance : model.effects)
-    if (instance.effect->name == "gaussian_noise" && !instance.values.empty())
+    if (instance.effect->role == model::EffectRole::kNoiseLevel && !instance.values.empty())
       variance += instance.values[0] * instance.values[0];
   return std::sqrt(variance);
 }

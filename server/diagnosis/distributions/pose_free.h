@@ -28,7 +28,7 @@ struct PoseFreeComparison {
   // The model that the set was compared with: the given one, with the noise of the rounds if that differs.
   std::shared_ptr<const model::Model> model;
   NoiseChange noise_change = NoiseChange::kNone;
-  bool model_has_noise = false;  // gaussian_noise
+  bool model_has_noise = false;  // EffectRole::kNoiseLevel
   double size_ratio = 1;         // of measured to simulated times where it is absurd (a wrong unit); else 1
 
   // The test. All p are probabilities of a set at least as far off if the model were right.

@@ -81,7 +81,7 @@ void PoseFreeExperiment::EstimateNoise() {
   if (!noise_is_known() || scatter.sigma_s == 0) return;
   auto noisy = std::make_shared<model::Model>(*input.model);
   for (model::EffectInstance& instance : noisy->effects) {
-    if (instance.effect->name != "gaussian_noise") continue;
+    if (instance.effect->role != model::EffectRole::kNoiseLevel) continue;
     const double sigma_s = instance.ValuesFor(set.objects[0])[0];
     const double std_error_s = scatter.sigma_s / std::sqrt(2 * scatter.degrees_of_freedom);
     if (std::abs(scatter.sigma_s - sigma_s) < kMinNoiseChange * std_error_s) return;
@@ -93,7 +93,7 @@ void PoseFreeExperiment::EstimateNoise() {
     return;
   }
   model::EffectInstance noise;
-  noise.effect = effects::Catalogue().Find("gaussian_noise");
+  noise.effect = effects::FindByRole(model::EffectRole::kNoiseLevel);
   noise.values = {scatter.sigma_s};
   noisy->effects.push_back(std::move(noise));
   noise_changed = noise_is_new = true;

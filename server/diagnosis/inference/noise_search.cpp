@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
+#include <utility>
 
 namespace touchstone::diagnosis::inference {
 namespace {
 
 constexpr size_t kMaxPart = 1500;      // groups that the shape of tails is judged on
 constexpr double kEnterNats = 10;      // gain in log likelihood that a further noise parameter needs
-constexpr double kAlreadyNats = 3;     // ... that one which is declared needs
-constexpr double kExcludedNats = 5;    // loss that rules a declared value out
 constexpr double kSimplerNats = 1;     // that a noise of times beside one of lengths must bring
 constexpr double kKurtosisSigmas = 4;  // of the sample's excess kurtosis before tails are looked at
 constexpr double kMinSlope = 0.02, kMaxSlope = 10;
@@ -70,6 +70,20 @@ double Kurtosis(const std::vector<ReadingGroup>& groups, const NoiseModel& model
   return (fourth * count / (second * second) - 3) / std::sqrt(24 / count);
 }
 
+// Sigma from the median of what residuals are in units of their own scale; sigma itself where that is 0.
+double MedianSigma(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
+  constexpr double kMedianOfNormal = 0.6745;
+  std::vector<double> sizes;
+  for (const ReadingGroup& group : groups) {
+    const double n = static_cast<double>(group.residual_s.size());
+    for (size_t i = 0; i < group.residual_s.size(); ++i)
+      sizes.push_back(std::abs(group.residual_s[i]) / std::sqrt(1 - 1 / n) / RelativeScale(group, i, model));
+  }
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle > 0 ? *middle / kMedianOfNormal : model.sigma_s;
+}
+
 }  // namespace
 
 NoiseSearch::NoiseSearch(const NoiseSample& sample, const DeclaredNoise& declared, NoiseFindings* found)
@@ -83,26 +97,6 @@ const std::vector<ReadingGroup>& NoiseSearch::GroupsOfShape() const {
 
 double NoiseSearch::shape_dof() const {
   return std::max(ContrastsOf(GroupsOfShape()), 1.0);
-}
-
-bool NoiseSearch::Declared(Kind kind) const {
-  if (kind == kGrowth) return declared_.slope.has_value();
-  if (kind == kLength) return declared_.length_sigma_m.has_value();
-  return !declared_.channel_sigma_s.empty();
-}
-
-NoiseModel NoiseSearch::AsDeclared(Kind kind) const {
-  NoiseModel told = best_.model;
-  const double length_s = declared_.length_sigma_m.value_or(0) * sample_.rms_slowness_s_per_m;
-  const double variance = std::max(declared_.sigma_s * declared_.sigma_s + length_s * length_s, 1e-24);
-  if (kind == kGrowth) told.slope = *declared_.slope;
-  if (kind == kLength) told.length_share = std::min(length_s * length_s / variance, 1.0);
-  if (kind == kChannels) {
-    told.channel_scale.clear();
-    for (const double beyond_s : declared_.channel_sigma_s)
-      told.channel_scale.push_back(std::sqrt(1 + beyond_s * beyond_s / variance));
-  }
-  return told;
 }
 
 bool NoiseSearch::Possible(Kind kind) const {
@@ -160,6 +154,25 @@ void NoiseSearch::FitChannels(Description* trial) const {
     }
   const double quietest = *std::min_element(scales.begin(), scales.end());
   for (double& scale : scales) scale /= quietest;
+  trial->log_likelihood = ProfileSigma(sample_.groups, &trial->model);
+  // Whoever may be as quiet as the quietest is: the least of several is not to make the others loud.
+  std::vector<size_t> order(scales.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return scales[a] < scales[b]; });
+  for (const size_t channel : order) {
+    const double loud = std::exchange(scales[channel], 1.0);
+    const double alike = ProfileSigma(sample_.groups, &trial->model);
+    if (alike >= trial->log_likelihood - kAlreadyNats) {
+      trial->log_likelihood = std::max(alike, trial->log_likelihood);
+      continue;
+    }
+    scales[channel] = loud;
+    const auto at = [&](double log_scale) {
+      scales[channel] = std::exp(log_scale);
+      return ProfileSigma(sample_.groups, &trial->model);
+    };
+    at(Maximise(at, std::log(loud) - 0.3, std::log(loud) + 0.1, 10, &trial->log_likelihood));
+  }
   trial->log_likelihood = ProfileSigma(sample_.groups, &trial->model);
 }
 
@@ -224,15 +237,18 @@ NoiseSearch::Description NoiseSearch::FitMixture(const Description& from) const 
   return best;
 }
 
-NoiseSearch::Description NoiseSearch::WithTails(const Description& from) const {
-  if (!TailsLookHeavy(from.model)) return from;
+NoiseSearch::Description NoiseSearch::WithTails(const Description& plain) const {
+  if (!TailsLookHeavy(plain.model)) return plain;
+  // A few wild outliers leave nothing of the usual sigma: the search for it begins at the median.
+  Description from = plain;
+  from.model.sigma_s = MedianSigma(part_, plain.model);
   NoiseModel gaussian = from.model;
   const double before = ProfileSigma(part_, &gaussian);
   Description student = FitStudent(from), mixture = FitMixture(from);
   student.tails.gain_nats = student.log_likelihood - before;
   if (student.tails.gain_nats >= kEnterNats && student.log_likelihood >= mixture.log_likelihood - 3)
     return student;
-  return mixture.log_likelihood - before >= kEnterNats ? mixture : from;
+  return mixture.log_likelihood - before >= kEnterNats ? mixture : plain;
 }
 
 // Log likelihood on the part, less what the parameters must earn.
@@ -264,35 +280,6 @@ void NoiseSearch::DropKindsThatTailsExplain() {
   const double gain = best_.tails.gain_nats;
   best_ = FitStudent(best_);
   best_.tails.gain_nats = gain;
-}
-
-// Tails that the model has: are they there, and as heavy?
-void NoiseSearch::JudgeDeclaredTails() {
-  if (!declared_.degrees_of_freedom || !best_.gaussian()) return;
-  NoiseModel gaussian = best_.model, told = best_.model;
-  const double without = ProfileSigma(part_, &gaussian);
-  told.shape = NoiseShape::kStudent;
-  told.degrees_of_freedom = *declared_.degrees_of_freedom;
-  if (without - ProfileSigma(part_, &told) < kExcludedNats) return;
-  Description student = FitStudent(best_);
-  student.tails.gain_nats = student.log_likelihood - without;
-  if (student.tails.gain_nats >= kAlreadyNats)
-    best_ = std::move(student);
-  else
-    found_->degrees_of_freedom.absent = true;
-}
-
-// Growth, lengths and channels that the model has and the data do not.
-void NoiseSearch::JudgeDeclaredScales() {
-  const std::vector<ReadingGroup>& groups = GroupsOfShape();
-  for (const Kind kind : {kGrowth, kLength, kChannels}) {
-    if (!Declared(kind) || best_.has[kind] || !Possible(kind)) continue;
-    NoiseModel without = best_.model, told = AsDeclared(kind);
-    if (ProfileSigma(groups, &without) - ProfileSigma(groups, &told) < kExcludedNats) continue;
-    (kind == kGrowth   ? found_->slope.absent
-     : kind == kLength ? found_->length_sigma_m.absent
-                       : found_->channels_absent) = true;
-  }
 }
 
 void NoiseSearch::DescribeGrowth() {

@@ -22,6 +22,9 @@ class NoiseSearch {
   double shape_dof() const;
 
  private:
+  static constexpr double kAlreadyNats = 3;   // gain in log likelihood that a declared parameter needs
+  static constexpr double kExcludedNats = 5;  // loss that rules a declared value out
+
   // What the scale of a reading may depend on.
   enum Kind { kGrowth, kLength, kChannels, kKinds };
   struct Description {
@@ -47,7 +50,7 @@ class NoiseSearch {
   Description FitStudent(const Description& from) const;
   Description FitMixture(const Description& from) const;
   // Heavy tails or a few outliers, if they earn their parameters.
-  Description WithTails(const Description& from) const;
+  Description WithTails(const Description& plain) const;
   double Score(const Description& description) const;
   void DropKindsThatTailsExplain();
   void JudgeDeclaredTails();

@@ -12,8 +12,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-constexpr char kNoiseEffect[] = "gaussian_noise";
-
 std::string PInWords(const distributions::PoseFreeComparison& comparison) {
   return absl::StrCat("(p = ", absl::StrFormat("%.2g", comparison.p_value), ")");
 }
@@ -105,10 +103,10 @@ std::string WriteNoiseChange(const distributions::PoseFreeComparison& comparison
   report->set_improved_model_yaml(model::FormatModel(*comparison.model));
   report->set_improved_model_hash(comparison.model->Hash());
   const bool is_new = comparison.noise_change == distributions::NoiseChange::kNewEffect;
+  const auto effect = effects::FindByRole(model::EffectRole::kNoiseLevel);
   if (is_new) {
-    const auto effect = effects::Catalogue().Find(kNoiseEffect);
     v1::Step* step = report->add_steps();
-    step->set_effect(kNoiseEffect);
+    step->set_effect(effect->name);
     step->set_probability(1);
     step->set_scope("rig");
     step->set_lack_of_fit_p(comparison.p_value);
@@ -118,7 +116,7 @@ std::string WriteNoiseChange(const distributions::PoseFreeComparison& comparison
     WriteNoiseParameter(*comparison.noise, step->add_parameters());
   } else {
     v1::Refit* refit = report->add_refitted();
-    refit->set_effect(kNoiseEffect);
+    refit->set_effect(effect->name);
     WriteNoiseParameter(*comparison.noise, refit->add_parameters());
   }
   return absl::StrCat(

@@ -5,9 +5,11 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/base/readable_time.h"
 #include "server/diagnosis/selection/time_structure.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -38,6 +40,30 @@ std::string HowWrong(const Diagnosis& diagnosis) {
       "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
       TimeInWords(rmse_s), TimeInWords(diagnosis.noise_floor->sigma_s),
       diagnosis.noise_floor->from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
+}
+
+// Repeats that scatter by more or by less than the model says. Empty: as it says.
+std::string FloorAgainstModel(const selection::NoiseFloor& floor) {
+  constexpr double kBeyond = 1.7;  // half widths of the 95 % interval: 3.3 standard errors
+  constexpr double kRelevant = 0.02;
+  if (!floor.from_repeats || !(floor.declared_s > 0)) return "";
+  const double apart_s = floor.sigma_s - floor.declared_s;
+  if (std::abs(apart_s) < kRelevant * floor.declared_s ||
+      std::abs(apart_s) < kBeyond * 0.5 * (floor.upper_s - floor.lower_s))
+    return "";
+  return absl::StrFormat(
+      "Repeats scatter by %s (%s to %s), where the model says %s of noise: %s", TimeInWords(floor.sigma_s),
+      TimeInWords(floor.lower_s), TimeInWords(floor.upper_s), TimeInWords(floor.declared_s),
+      apart_s > 0 ? "either the noise has grown, or something that differs between repeats is taken for it."
+                  : "the rig is quieter than its model.");
+}
+
+std::string SuperfluousInWords(const std::string& name) {
+  const auto effect = effects::Catalogue().Find(name);
+  return absl::StrCat("The data do without ", name,
+                      effect != nullptr && effect->random() ? ": their scatter shows no trace of it"
+                                                            : ": its value is zero as far as they can tell",
+                      " (`touchstone model remove MODEL ", name, " -o NEW`).");
 }
 
 // Repeats that have a course in time in common scatter by more than noise.
@@ -96,14 +122,13 @@ std::string Summarize(const Diagnosis& diagnosis) {
     return absl::StrCat(kNoTouch, " ", diagnosis.touches_needed, " usable touches would do.");
   }
   std::vector<std::string> sentences = {HowWrong(diagnosis)};
+  if (diagnosis.noise_floor)
+    if (std::string words = FloorAgainstModel(*diagnosis.noise_floor); !words.empty())
+      sentences.push_back(std::move(words));
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
     sentences.push_back(
         absl::StrCat("In the model ", refit.effect, " has another value: ", Values(refit.parameters), "."));
-  for (const std::string& effect : diagnosis.superfluous)
-    sentences.push_back(
-        absl::StrCat("The data do without ", effect,
-                     ": its value is zero as far as they can tell (`touchstone model remove MODEL ", effect,
-                     " -o NEW`)."));
+  for (const std::string& effect : diagnosis.superfluous) sentences.push_back(SuperfluousInWords(effect));
   for (const selection::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);

@@ -29,6 +29,26 @@ TEST(Summarize, CallsAFloorWithoutRepeatsAnUpperBound) {
   EXPECT_THAT(Summarize(diagnosis), HasSubstr("5 ms is noise at most"));
 }
 
+TEST(Summarize, SaysThatRepeatsScatterByMoreThanTheModelSays) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
+  selection::NoiseFloor& floor = *diagnosis.noise_floor;
+  floor.sigma_s = 0.013, floor.lower_s = 0.0125, floor.upper_s = 0.0135;
+  floor.from_repeats = true;
+  EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
+  floor.declared_s = 0.005;
+  EXPECT_THAT(Summarize(diagnosis),
+              HasSubstr("Repeats scatter by 13 ms (12.5 ms to 13.5 ms), where the model says 5 ms of noise"));
+  floor.declared_s = 0.0133;
+  EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
+}
+
+TEST(Summarize, CallsNoiseThatIsNotThereSuperfluous) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kWrongValues);
+  diagnosis.superfluous = {"poll_interval", "tip_radius"};
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("without poll_interval: their scatter shows no trace of it"));
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("without tip_radius: its value is zero"));
+}
+
 TEST(Summarize, WithoutNoiseGivesTheErrorAlone) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kNone);
   diagnosis.noise_floor->sigma_s = 0;

@@ -21,8 +21,25 @@ bool ChangesNothing(const inference::Fit& fit, int index) {
   return true;
 }
 
-void DescribeFit(const inference::Experiment& experiment, const inference::Fit& fit,
-                 double initial_log_evidence, RankedCandidate* candidate) {
+// The error of every touch, noisy ones in full, as the steps and the final error count them; the held-out error
+// keeps its ratio.
+void SetErrors(const Workspace& workspace, const inference::Fit& fit, RankedCandidate* candidate) {
+  const touches::Contrasts& contrasts = *workspace.contrasts;
+  const Eigen::VectorXd weighted = fit.columns.values.col(0);
+  double squares = 0;
+  for (int row = 0; row < contrasts.rows(); ++row) {
+    const double value = weighted[row] / contrasts.root_weights()[contrasts.touch_of_row()[row]];
+    squares += value * value;
+  }
+  const double rows = std::max<double>(1, static_cast<double>(weighted.size()));
+  const double weighted_rmse_s = std::sqrt(weighted.squaredNorm() / rows);
+  candidate->rmse_s = std::sqrt(squares / rows);
+  candidate->heldout_rmse_s = inference::HeldOutRmse(workspace.experiment, fit);
+  if (weighted_rmse_s > 0) candidate->heldout_rmse_s *= candidate->rmse_s / weighted_rmse_s;
+}
+
+void DescribeFit(const Workspace& workspace, const inference::Fit& fit, double initial_log_evidence,
+                 RankedCandidate* candidate) {
   candidate->gain_nats = fit.log_evidence - initial_log_evidence;
   const int index = static_cast<int>(fit.model.base().effects.size()) - 1;
   if (ChangesNothing(fit, index)) {
@@ -31,9 +48,7 @@ void DescribeFit(const inference::Experiment& experiment, const inference::Fit& 
     return;
   }
   candidate->parameters = fit.model.Describe(index, fit.point, fit.covariance);
-  const Eigen::VectorXd r = fit.columns.values.col(0);
-  candidate->rmse_s = std::sqrt(r.squaredNorm() / std::max<double>(1, static_cast<double>(r.size())));
-  candidate->heldout_rmse_s = inference::HeldOutRmse(experiment, fit);
+  SetErrors(workspace, fit, candidate);
 }
 
 }  // namespace
@@ -66,7 +81,7 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
     if (one || fitted < kMaxFitted) {
       ++(one ? fitted_on_one : fitted);
       TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit fit, search.FitExtension(extension));
-      DescribeFit(workspace.experiment, fit, initial.log_evidence, &candidate);
+      DescribeFit(workspace, fit, initial.log_evidence, &candidate);
     } else {
       candidate.note = CandidateNote::kLinearised;
     }

@@ -7,7 +7,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/doubts.h"
+#include "server/diagnosis/selection/dropouts.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
@@ -32,7 +34,7 @@ constexpr double kSameSurface =
 absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
   if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
   const touches::Observations& o = *workspace.observations;
-  const touches::Contrasts contrasts(o, workspace.nominal.time_s);
+  const touches::Contrasts contrasts = WeighedContrasts(workspace, o, workspace.nominal.time_s);
   const inference::Likelihood likelihood(
       touches::FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0, nullptr);
   const touches::TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
@@ -91,6 +93,7 @@ class LadderBuilder {
         ladder_.steps[j].words =
             "Repeats agree within rounds: an object put down anew each round would look alike.";
       }
+    if (!selection_.memory && !doubts_.remounted) RemoveAbsentMemory(*workspace_.observations, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
     const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
                       selection_.partial || unplaced_ || doubts_.any();
@@ -135,6 +138,8 @@ class LadderBuilder {
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
     AddTimeStructure(o, best, &ladder_.noise_floor);
+    ladder_.noise_floor.declared_s = DeclaredSigma(*workspace_.input.model);
+    ladder_.dropouts = DropoutsInWords(o, ladder_.prediction);
     return absl::OkStatus();
   }
 

@@ -17,7 +17,8 @@ struct Ladder {
   std::vector<RefittedEffect> refitted;
   std::vector<LadderStep> steps;         // in the order in which they explain most
   std::vector<std::string> superfluous;  // effects of the initial model that the data do without
-  Quality final;                         // after all steps and refits
+  std::string dropouts;  // where contacts are missed, for people; empty: nowhere in particular
+  Quality final;         // after all steps and refits
   std::vector<ConfoundedEffects> confounded;
   std::vector<RankedCandidate> candidates;  // best first
   std::optional<UnexplainedRest> unexplained;
@@ -42,6 +43,9 @@ void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder);
 
 // A wander of the fingers, as a step or a refit.
 void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
+
+// Takes a wander out of the improved model that the given one has and the residuals rule out.
+void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);
 
 // Every effect of the catalogue as the only step.
 absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,

@@ -258,4 +258,27 @@ bool Forgets(const NoiseMemory& memory) {
   return memory.forgets_nats > kForgetsNats;
 }
 
+bool WanderIsAbsent(const touches::Observations& o, const std::vector<double>& residuals, double sigma_s,
+                    double time_s) {
+  constexpr double kRuledOutNats = 5;
+  if (!o.set->has_session_time || o.fingers < 2 || !(sigma_s > 0)) return false;
+  const Course course = CourseOf(o, residuals);
+  double span_s = 0;
+  for (const double gap_s : course.gap_s)
+    if (std::isfinite(gap_s)) span_s += gap_s;
+  if (course.touches() < kMinComplete || time_s > 0.5 * span_s) return false;
+  const double count = static_cast<double>(course.touches()) * course.channels;
+  const double none = Likelihood(course, 0, time_s).log_likelihood;
+  // The wander has its size; the white noise beside it is what fits best.
+  double declared = -INFINITY;
+  for (double log_ratio = std::log(1e-4); log_ratio < std::log(1e4); log_ratio += 0.1) {
+    const double ratio = std::exp(log_ratio), white2 = sigma_s * sigma_s / ratio;
+    const WanderLikelihood profiled = Likelihood(course, ratio, time_s);
+    // The profile leaves a sum of squares of count times its own variance.
+    const double over = profiled.white_s * profiled.white_s / white2;
+    declared = std::max(declared, profiled.log_likelihood - 0.5 * count * (over - 1 - std::log(over)));
+  }
+  return none - declared > kRuledOutNats;
+}
+
 }  // namespace touchstone::diagnosis::selection

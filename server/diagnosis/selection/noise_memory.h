@@ -33,4 +33,9 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& observat
 // Whether the data say that the wander comes back within the session.
 bool Forgets(const NoiseMemory& memory);
 
+// Whether a wander of this size that a model has is ruled out: no wander fits the residuals better by 5 nats. False
+// where the set could not show it (few touches, no session times, a memory longer than half the session).
+bool WanderIsAbsent(const touches::Observations& observations, const std::vector<double>& residuals,
+                    double sigma_s, double time_s);
+
 }  // namespace touchstone::diagnosis::selection

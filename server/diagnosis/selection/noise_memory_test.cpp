@@ -102,5 +102,27 @@ TEST(NoiseMemory, AnEventIsNoWander) {
   EXPECT_FALSE(FindNoiseMemory(session.o, session.residuals)->everywhere);
 }
 
+TEST(WanderIsAbsent, WhereThereIsNoiseWithoutMemoryOnly) {
+  for (uint64_t seed = 20; seed < 24; ++seed) {
+    const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
+    EXPECT_TRUE(WanderIsAbsent(session.o, session.residuals, 0.007, 300));
+    // These data could not show them.
+    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.0001, 300));
+    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.007, 9000));
+  }
+}
+
+TEST(WanderIsAbsent, NotWhereItIs) {
+  for (uint64_t seed = 30; seed < 34; ++seed) {
+    double state[3] = {0, 0, 0};
+    const CourseOfSession session(seed, [&state](int, int i, RandomStream* random) {
+      const double rho = std::exp(-10.0 / 300);
+      state[i] = rho * state[i] + 0.004 * std::sqrt(1 - rho * rho) * random->Normal();
+      return state[i];
+    });
+    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.004, 300));
+  }
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis::selection

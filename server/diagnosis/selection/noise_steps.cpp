@@ -1,6 +1,7 @@
 // The kind of noise, as steps where the model has none of it, as refits where its values are others.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/base/normal.h"
 #include "server/base/units.h"
@@ -151,6 +152,7 @@ class NoiseStepWriter {
     step.probability = ProbabilityOf(gain_nats);
     step.parameters = {estimate};
     step.quality = ladder_.final;  // noise changes no expectation: the errors stay
+    if (effect->role == model::EffectRole::kDropout) step.words = std::exchange(ladder_.dropouts, "");
     ladder_.steps.push_back(std::move(step));
     model::EffectInstance instance;
     instance.effect = effect;
@@ -167,6 +169,15 @@ class NoiseStepWriter {
 
 void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder) {
   NoiseStepWriter(ladder).WriteMemory(memory);
+}
+
+void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder) {
+  for (const model::EffectInstance& instance : ladder->improved.effects) {
+    if (instance.effect->role != model::EffectRole::kNoiseMemory || !instance.object_values.empty()) continue;
+    if (!WanderIsAbsent(observations, ladder->residuals, instance.values[0], instance.values[1])) return;
+    NoiseStepWriter(ladder).Remove(model::EffectRole::kNoiseMemory);
+    return;
+  }
 }
 
 namespace {

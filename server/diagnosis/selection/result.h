@@ -40,6 +40,7 @@ struct NoiseFloor {
   double sigma_s = 0;
   double lower_s = 0, upper_s = 0;  // 95 % interval; 0 if unknown
   double degrees_of_freedom = 0;
+  double declared_s = 0;      // what the model says that it is; 0: it gives no one value
   bool from_repeats = false;  // false: an upper bound from the best model's residuals
   // The same without what changes slowly through the session, from neighbours in time (von Neumann); 0 without
   // repeats. Less than sigma_s where repeats share a course in time, which is not noise.

@@ -253,23 +253,13 @@ absl::StatusOr<inference::NoiseFindings> NoiseOf(const Workspace& workspace, con
                               workspace.predictor->Run(fit.model.base(), true, false));
   const std::vector<double> residuals =
       workspace.thinned ? touches::Residuals(o, details) : ResidualsWithoutSurface(workspace, fit);
-  std::vector<double> tangents(residuals.size());
-  std::vector<char> expected(residuals.size());
-  // A finger that would have had farther to go than any that reported is beyond the rig's stroke.
-  double farthest_m = 0;
-  for (size_t e = 0; e < residuals.size(); ++e)
-    if (!std::isnan(o.time_s[e]) && details.travel_m[e] > farthest_m) farthest_m = details.travel_m[e];
-  for (size_t e = 0; e < residuals.size(); ++e) {
-    const double cosine = std::clamp(details.cos_incidence[e], 0.05, 1.0);
-    tangents[e] = std::sqrt(1 / (cosine * cosine) - 1);
-    expected[e] = !std::isnan(details.time_s[e]) && details.travel_m[e] <= farthest_m;
-  }
   const double surface_dof =
       workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
   inference::DeclaredNoise declared = DeclaredNoiseOf(*workspace.input.model);
   // Tails may stand for the outliers that were left out.
   if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
-  return inference::FindNoise(touches::MakeNoiseSample(o, residuals, tangents, expected),
+  return inference::FindNoise(touches::MakeNoiseSample(o, residuals, touches::TangentsOfIncidence(details),
+                                                       touches::ExpectedReadings(o, details)),
                               fit.model.size() + surface_dof, declared);
 }
 

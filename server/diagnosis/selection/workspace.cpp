@@ -250,6 +250,16 @@ touches::Observations SearchedOf(const touches::Observations& o, bool thinned) {
 
 }  // namespace
 
+touches::Contrasts WeighedContrasts(const Workspace& workspace, const touches::Observations& o,
+                                    const std::vector<double>& expected_s) {
+  touches::Contrasts contrasts(o, expected_s);
+  if (workspace.weights_by_row.empty()) return contrasts;
+  std::vector<double> weights;
+  for (const int k : contrasts.touches()) weights.push_back(workspace.weights_by_row[o.row[k]]);
+  contrasts.SetWeights(weights);
+  return contrasts;
+}
+
 absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row) {
   const touches::Observations& o = *workspace->observations;
   workspace->thinned = o.size() > kMaxSearched;
@@ -258,12 +268,9 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->searched_nominal,
                               workspace->searched_predictor->Run(*workspace->input.model, true, false));
   const touches::Observations& searched = *workspace->searched;
-  workspace->contrasts = std::make_unique<touches::Contrasts>(searched, workspace->searched_nominal.time_s);
-  if (!weights_by_row.empty()) {
-    std::vector<double> weights;
-    for (const int k : workspace->contrasts->touches()) weights.push_back(weights_by_row[searched.row[k]]);
-    workspace->contrasts->SetWeights(weights);
-  }
+  workspace->weights_by_row = weights_by_row;
+  workspace->contrasts = std::make_unique<touches::Contrasts>(
+      WeighedContrasts(*workspace, searched, workspace->searched_nominal.time_s));
   double slope = 0;  // s/m
   for (const int k : workspace->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
   slope /= std::max<size_t>(workspace->contrasts->touches().size(), 1);

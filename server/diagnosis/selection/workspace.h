@@ -27,6 +27,8 @@ struct Workspace {
   // Touches that a comparison uses, whatever the model, as long as it meets the object and no edge. [k]
   std::vector<char> comparable;
 
+  std::vector<double> weights_by_row;  // of the set's rows, in every fit; empty: all 1
+
   // What the search sees.
   std::unique_ptr<touches::Observations> searched;
   std::unique_ptr<touches::Predictor> searched_predictor;
@@ -41,6 +43,10 @@ struct Workspace {
 // Errors: input that contradicts itself, a mesh that most touches miss, times in the wrong unit.
 absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& input,
                                                          const DiagnosisContext& context);
+
+// Contrasts of the touches of `observations`, weighed as the noise asks for.
+touches::Contrasts WeighedContrasts(const Workspace& workspace, const touches::Observations& observations,
+                                    const std::vector<double>& expected_s);
 
 // Chooses the touches of the search anew, after some were left out. `weights_by_row`: of the set's rows (empty: all 1).
 absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row);

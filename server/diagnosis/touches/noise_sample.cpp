@@ -103,6 +103,25 @@ std::vector<inference::RepeatedReading> RepeatedOf(const Observations& o, const 
 
 }  // namespace
 
+std::vector<char> ExpectedReadings(const Observations& o, const Prediction& prediction) {
+  double farthest_m = 0;
+  for (size_t e = 0; e < o.time_s.size(); ++e)
+    if (!std::isnan(o.time_s[e]) && prediction.travel_m[e] > farthest_m) farthest_m = prediction.travel_m[e];
+  std::vector<char> expected(o.time_s.size());
+  for (size_t e = 0; e < expected.size(); ++e)
+    expected[e] = !std::isnan(prediction.time_s[e]) && prediction.travel_m[e] <= farthest_m;
+  return expected;
+}
+
+std::vector<double> TangentsOfIncidence(const Prediction& prediction) {
+  std::vector<double> tangents;
+  for (const double cos_incidence : prediction.cos_incidence) {
+    const double cosine = std::clamp(cos_incidence, 0.05, 1.0);
+    tangents.push_back(std::sqrt(1 / (cosine * cosine) - 1));
+  }
+  return tangents;
+}
+
 inference::NoiseSample MakeNoiseSample(const Observations& observations,
                                        const std::vector<double>& residuals_s,
                                        const std::vector<double>& tan_incidence,

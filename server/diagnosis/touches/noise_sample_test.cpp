@@ -150,6 +150,9 @@ TEST(FindNoise, OneLoudFingerIsNoHeavyTail) {
   const inference::NoiseEstimate& loud = found.channel_sigma_s[2];
   EXPECT_NEAR(loud.value, std::sqrt(3) * kSigma, 4 * loud.std_error);
   EXPECT_LT(loud.std_error, 0.1 * kSigma);
+  // The others are alike.
+  EXPECT_EQ(found.channel_sigma_s[0].value, 0);
+  EXPECT_EQ(found.channel_sigma_s[1].value, 0);
 }
 
 TEST(FindNoise, HeavyTailsAreNoLoudFinger) {

@@ -104,8 +104,7 @@ TEST(OutsideTheCatalogue, AnOldValueCompetesWithANewEffect) {
   ExpectRight("old value wrong, realistic");
 }
 
-// Not met yet: noise that the model claims and the data do not have passes as ADEQUATE.
-TEST(OutsideTheCatalogue, DISABLED_NoiseThatIsNotThereIsSaid) {
+TEST(OutsideTheCatalogue, NoiseThatIsNotThereIsSaid) {
   ExpectRight("polling that is not there, strong");
   ExpectRight("tails that are not there, strong");
 }
