@@ -1,4 +1,6 @@
 // The verdict in one sentence.
+#include <map>
+
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
@@ -27,9 +29,27 @@ bool FallsAtAll(double from_us, double to_us) {
   return Time(from_us) != Time(to_us) && to_us < from_us;
 }
 
+// What repeats show comes before what distributions hide.
+std::string FoundInRepeats(const v1::DistributionComparison& comparison) {
+  static const std::map<std::string, const char*> kKinds = {
+      {"session", "repeats change with their place in the session"},
+      {"previous_press", "repeats depend on the previous touch"},
+      {"tails", "repeats scatter with tails"},
+      {"ticks", "all times sit on ticks"}};
+  std::vector<std::string> found;
+  for (const v1::RepeatFinding& finding : comparison.findings()) {
+    const auto kind = kKinds.find(finding.kind());
+    found.push_back(absl::StrCat(kind == kKinds.end() ? finding.kind() : kind->second, " (p ",
+                                 Probability(finding.p()), ")"));
+  }
+  return absl::StrCat("The model lacks something that shows without poses: ", Join(found, "and"), ".");
+}
+
 std::string Compared(const v1::Report& report) {
   if (report.has_distributions()) {
-    const double p = report.distributions().p();
+    // Of all measures together, where the report has it.
+    const double p = report.has_initial() ? report.initial().lack_of_fit_p() : report.distributions().p();
+    if (!report.distributions().findings().empty()) return FoundInRepeats(report.distributions());
     const std::string lacks =
         report.steps().empty() ? "M" : absl::StrCat("The model lacks ", Steps(report), "; with it, m");
     return absl::StrCat(lacks, "easured and simulated touches ",
@@ -47,7 +67,7 @@ std::string Compared(const v1::Report& report) {
 std::string Unexplained(const v1::Report& report) {
   std::string on;
   if (!report.unexplained().covariates().empty()) {
-    on = absl::StrCat(" It depends on ", report.unexplained().covariates(0).name(), ".");
+    on = absl::StrCat(" It depends on ", CovariateName(report.unexplained().covariates(0).name()), ".");
   }
   if (report.steps().empty()) {
     return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
@@ -62,7 +82,7 @@ std::string CheckData(const v1::Report& report) {
   const std::string what = absl::StrCat("Check the data before the model: ", ProblemTitle(problem));
   if (!(problem.rmse_after_us() > 0) || !(problem.rmse_after_us() < problem.rmse_before_us()))
     return absl::StrCat(what, ".");
-  return absl::StrCat(what, "; mended, ", Falls(problem.rmse_before_us(), problem.rmse_after_us()), ".");
+  return absl::StrCat(what, "; fixed, ", Falls(problem.rmse_before_us(), problem.rmse_after_us()), ".");
 }
 
 std::string TooLittle(const v1::Report& report) {
@@ -80,6 +100,9 @@ std::string Headline(const v1::Report& report) {
   if (report.has_distributions()) return Compared(report);
   switch (report.verdict()) {
     case v1::Report::ADEQUATE:
+      if (report.has_finger_scatter())
+        return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
+                            FingerScatterWords(report), ".");
       return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(report.touches()),
                           " touches can tell.");
     case v1::Report::WRONG_VALUES: {

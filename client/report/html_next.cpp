@@ -106,16 +106,29 @@ std::string HtmlNextTouches(const v1::Report& report) {
                     NumberCell(Number(next.separation(), 2)),
                     one_purpose ? "" : Cell(Typeset(next.purpose())), "</tr>\n");
   }
+  // Each purpose with what it takes.
+  std::map<std::string, std::string> verdicts;
+  for (const v1::ProposedTouch& next : report.next_touches()) {
+    const std::string verdict = VerdictTouches(next);
+    if (!verdict.empty()) verdicts.emplace(next.purpose(), verdict);
+  }
+  std::string needed;
+  for (const auto& [purpose, verdict] : verdicts)
+    absl::StrAppend(&needed, "<p>",
+                    one_purpose || purpose.empty() ? "It takes " : absl::StrCat(Typeset(purpose), ": "),
+                    Typeset(verdict), ".</p>\n");
   return Section(
       "next", "Next touches",
       one_purpose && !first.empty() ? absl::StrCat("What they are for: ", Typeset(first), ".")
                                     : "Touches that would discriminate between the remaining explanations.",
       absl::StrCat(
-          Pictures(report),
+          needed, Pictures(report),
           Figure(absl::StrCat(table, "</tbody></table></div>"),
                  "Arrows end where the middle finger should meet the surface; the bar at the tail lies "
                  "along the row of fingers. Apart: the expected difference between the explanations, in "
-                 "standard deviations of the noise.")));
+                 "standard deviations of the noise. To a verdict: until the expected log evidence between "
+                 "the two "
+                 "is 6 nats (odds of 400), if one of them is the cause.")));
 }
 
 std::string HtmlDistributions(const v1::Report& report) {
@@ -126,6 +139,20 @@ std::string HtmlDistributions(const v1::Report& report) {
       Typeset(Probability(comparison.p())), ", against ", Typeset(Count(comparison.simulated_touches())),
       " simulated touches",
       comparison.plan().empty() ? "" : absl::StrCat(" (", Typeset(comparison.plan()), ")"), ".</p>\n");
+  if (!comparison.findings().empty()) {
+    absl::StrAppend(&body, "<h3>What repeats show</h3>\n<div class=\"scroll\"><table>",
+                    HeaderRow({"Finding", ">p", "Effects that would do it"}), "<tbody>");
+    for (const v1::RepeatFinding& finding : comparison.findings()) {
+      const std::vector<std::string> effects(finding.compatible_effects().begin(),
+                                             finding.compatible_effects().end());
+      absl::StrAppend(&body, "<tr>", Cell(Typeset(finding.words())), NumberCell(Probability(finding.p())),
+                      Cell(effects.empty() ? "none of the catalogue" : Escape(Join(effects, "or"))), "</tr>");
+    }
+    body +=
+        "</tbody></table></div>\n<p class=\"note\">p: how often repeats that change places within their "
+        "pose, or "
+        "Gaussian noise, show as much; paid for every test.</p>\n<h3>Distributions against the model</h3>\n";
+  }
   if (!comparison.statistics().empty()) {
     absl::StrAppend(&body, "<div class=\"scroll\"><table>",
                     HeaderRow({"Statistic", ">measured", ">simulated", ">p"}), "<tbody>");

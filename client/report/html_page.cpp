@@ -83,8 +83,10 @@ std::string Typeset(absl::string_view text) {
       if (whole && after_number) out.replace(at, plain.size(), set);
     }
   }
-  return absl::StrReplaceAll(out,
-                             {{" +- ", "\u00a0\u00b1\u00a0"}, {"-&gt;", "\u2192"}, {"&lt; ", "&lt;\u00a0"}});
+  return absl::StrReplaceAll(out, {{" +- ", "\u00a0\u00b1\u00a0"},
+                                   {"&lt;-&gt;", "\u2194"},
+                                   {"-&gt;", "\u2192"},
+                                   {"&lt; ", "&lt;\u00a0"}});
 }
 
 std::string Section(absl::string_view id, absl::string_view title, absl::string_view lead,

@@ -46,7 +46,7 @@ const char* HtmlStyle();   // the text of <style>
 const char* HtmlScript();  // the text of <script>
 
 std::string HtmlHead(const v1::Report& report);          // verdict, ladder, warnings
-std::string HtmlDataProblems(const v1::Report& report);  // mistakes of the file, and what mends them
+std::string HtmlDataProblems(const v1::Report& report);  // mistakes of the file, and what fixes them
 std::string HtmlWhatToDo(const v1::Report& report);
 std::string HtmlWhy(const v1::Report& report);
 std::string HtmlUnexplained(const v1::Report& report);
@@ -56,6 +56,7 @@ std::string HtmlFit(const v1::Report& report);      // parity and histograms
 std::string HtmlDistributions(const v1::Report& report);
 std::string HtmlNextTouches(const v1::Report& report);
 std::string HtmlData(const v1::Report& report);
+std::string HtmlProvenance(const v1::Report& report);
 std::string HtmlMethods(const v1::Report& report);  // how the numbers were computed
 
 }  // namespace touchstone::client

@@ -1,4 +1,4 @@
-// Check the data: the mistakes that explain the error better than physics can, and the commands that mend the file.
+// Check the data: the mistakes that explain the error better than physics can, and the commands that fix the file.
 #include <algorithm>
 
 #include <absl/strings/str_cat.h>
@@ -9,7 +9,9 @@
 namespace touchstone::client {
 namespace {
 
-// Errors before and after, as bars of one scale; nothing where the file cannot be mended.
+constexpr int kCommandColumns = 96;  // that a page has room for
+
+// Errors before and after, as bars of one scale; nothing where the file cannot be fixed.
 std::string ErrorBars(const v1::DataProblem& problem) {
   const double before = problem.rmse_before_us(), after = problem.rmse_after_us();
   if (!(before > 0) || !(after > 0)) return "";
@@ -20,8 +22,8 @@ std::string ErrorBars(const v1::DataProblem& problem) {
   };
   return absl::StrCat(
       "<table class=\"ladder\"><caption class=\"vh\">Error of the given model on the file as it is and ",
-      "mended</caption>", HeaderRow({"The file", "", ">RMSE of the given model"}), "<tbody>",
-      row("as it is", before, "given"), row("mended", after, "better"), "</tbody></table>");
+      "fixed</caption>", HeaderRow({"The file", "", ">RMSE of the given model"}), "<tbody>",
+      row("as it is", before, "given"), row("fixed", after, "better"), "</tbody></table>");
 }
 
 }  // namespace
@@ -34,16 +36,16 @@ std::string HtmlDataProblems(const v1::Report& report) {
     std::string body = absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(problem));
     if (!problem.fix().empty())
       absl::StrAppend(&body, "<div class=\"row\"><button type=\"button\" data-copy=\"", id,
-                      "\">Copy</button><span>mends the file</span></div>\n<pre id=\"", id, "\">",
-                      Escape(problem.fix()), "</pre>\n");
+                      "\">Copy</button><span>fixes the file</span></div>\n<pre id=\"", id, "\">",
+                      Escape(ShellLines(problem.fix(), kCommandColumns)), "</pre>\n");
     absl::StrAppend(&items, "<li><span class=\"count\">", number, "</span><div><h3>",
-                    Escape(ProblemTitle(problem)), "</h3>", body, "</div></li>\n");
+                    Typeset(ProblemTitle(problem)), "</h3>", body, "</div></li>\n");
   }
   if (items.empty()) return "";
   return Section(
       "check", "Check the data",
       "A mistake in the file explains the error far better than physics can. No effect was looked for: "
-      "mend the file, and diagnose again.",
+      "fix the file, and diagnose again.",
       absl::StrCat("<ol class=\"steps\">", items, "</ol>\n"));
 }
 

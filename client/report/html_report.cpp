@@ -17,9 +17,11 @@ std::string HtmlReport(const v1::Report& report) {
       Escape(report.model_name().empty() ? "Touchstone report"
                                          : absl::StrCat("Touchstone report: ", report.model_name())),
       "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
-  for (const auto part :
-       {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions, HtmlWhy, HtmlUnexplained, HtmlWhere,
-        HtmlObjects, HtmlFit, HtmlNextTouches, HtmlData, HtmlMethods}) {
+  // Where nothing of the catalogue is the answer, what is known of the rest comes before what was tried.
+  const bool no_name = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
+  for (const auto part : {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions,
+                          no_name ? HtmlUnexplained : HtmlWhy, no_name ? HtmlWhy : HtmlUnexplained, HtmlWhere,
+                          HtmlObjects, HtmlFit, HtmlNextTouches, HtmlData, HtmlMethods, HtmlProvenance}) {
     page += part(report);
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",

@@ -92,6 +92,59 @@ TEST(HtmlReport, ShowsMistakesOfTheFileWithTheirEvidenceAndTheCommand) {
   EXPECT_EQ(Occurrences(HtmlReport(AdequateReport()), "<section id=\"check\""), 0);
 }
 
+TEST(HtmlReport, DrawsACurveWithoutANameWithItsKnots) {
+  v1::Report report = UnexplainedReport();
+  v1::Unexplained& rest = *report.mutable_unexplained();
+  rest.clear_formula();
+  rest.clear_formula_yaml();
+  rest.set_lookup_yaml("- lookup: {name: rest_session_time_s}\n");
+  rest.set_nearest_formula("k * session_time_s");
+  rest.set_nearest_formula_share(0.84);
+  v1::UnexplainedCurve& curve = *rest.mutable_curve();
+  curve.set_covariate("session_time_s");
+  curve.set_covariate_unit("s");
+  curve.set_unit("mm");
+  for (const double knot : {0, 100, 200, 300}) curve.add_knots(knot);
+  for (const char* finger : {"l", "m"}) {
+    curve.add_curves()->set_finger(finger);
+    for (const double value : {0.0, 0.1, 0.2, 0.1})
+      curve.mutable_curves(curve.curves_size() - 1)->add_values(value);
+  }
+  const std::string page = HtmlReport(report);
+  EXPECT_EQ(Occurrences(page, "class=\"dots knots f"), 2);
+  EXPECT_EQ(Occurrences(page, "The curve over session time (s)"), 1);
+  EXPECT_EQ(Occurrences(page, "added travel (mm)"), 1);
+  EXPECT_EQ(Occurrences(page, "k * session_time_s</code>, with 84"), 1);
+  EXPECT_EQ(Occurrences(page, "rest_session_time_s}"), 1);
+}
+
+TEST(HtmlReport, SaysHowToMakeItAgain) {
+  v1::Report report = AdequateReport();
+  EXPECT_EQ(Occurrences(HtmlReport(report), "<section id=\"provenance\""), 0);
+  v1::Provenance& provenance = *report.mutable_provenance();
+  provenance.set_command("touchstone diagnose 'my <set>.csv'");
+  provenance.set_set_sha256(std::string(64, 'a'));
+  provenance.set_date("2031-05-06T07:08:09Z");
+  provenance.add_meshes()->set_object("cup");
+  provenance.mutable_meshes(0)->set_mesh_hash(std::string(64, 'b'));
+  const std::string page = HtmlReport(report);
+  EXPECT_EQ(Occurrences(page, "touchstone diagnose &#39;my &lt;set&gt;.csv&#39;</pre>"), 1);
+  for (const std::string& hash : {std::string(64, 'a'), std::string(64, 'b')})
+    EXPECT_EQ(Occurrences(page, absl::StrCat("title=\"", hash, "\"")), 1);
+  EXPECT_EQ(Occurrences(page, "2031-05-06T07:08:09Z"), 1);
+}
+
+TEST(HtmlReport, TestsEachFingerAgainstThePlaceInTheSession) {
+  v1::Report report = MissingEffectsReport();
+  for (v1::CovariateCurve& curve : *report.mutable_curves()) curve.set_p(1), curve.set_p_after(1);
+  v1::FingerDependence* finger = report.mutable_curves(0)->add_fingers();
+  finger->set_finger("m");
+  finger->set_p(3e-9);
+  finger->set_p_after(0.4);
+  EXPECT_EQ(Occurrences(HtmlReport(report), "finger m p 3\u00d710<sup>\u22129</sup> given, 0.40 improved"),
+            1);
+}
+
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
   const std::string html = HtmlReport(v1::Report());
   EXPECT_EQ(Occurrences(html, "<section"), 0);

@@ -123,6 +123,8 @@ svg.chart{width:100%;height:auto;overflow:visible}
 .line.ideal{stroke:var(--soft);stroke-width:1;stroke-dasharray:4 3}
 .dots{fill:none;stroke-linecap:round;stroke-width:3}
 .dots.given{stroke:var(--given);opacity:.45}.dots.better{stroke:var(--better);opacity:.45}
+.dots.knots{stroke-width:6;opacity:1}.wrap{white-space:pre-wrap;overflow-wrap:anywhere}
+table.narrow{width:auto;min-width:min(34rem,100%)}
 .f0{stroke:var(--f0)}.f1{stroke:var(--f1)}.f2{stroke:var(--f2)}.f3{stroke:var(--f3)}.f4{stroke:var(--f4)}
 .f5{stroke:var(--f5)}
 rect.f0{fill:var(--f0)}rect.f1{fill:var(--f1)}rect.f2{fill:var(--f2)}rect.f3{fill:var(--f3)}

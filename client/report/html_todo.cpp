@@ -60,8 +60,12 @@ std::string StepBody(const v1::Step& step) {
                                    Definition("To fix it", step.remedy()));
   if (step.scope() == "object") terms += Definition("Scope", "one value per object");
   if (step.probability() > 0) {
-    terms += Definition("Probability", absl::StrCat(EffectProbability(step.probability()),
-                                                    " among all effects that could take its place"));
+    const std::string p = EffectProbability(step.probability());
+    terms += Definition("Probability",
+                        step.equivalent().empty()
+                            ? absl::StrCat(p, " among all effects that could take its place")
+                            : absl::StrCat(p, " that it is one of these ", 1 + step.equivalent_size(),
+                                           ", among all effects that could take their place"));
   }
   return absl::StrCat(body, ParameterTable(step.parameters()),
                       terms.empty() ? "" : absl::StrCat("<dl>", terms, "</dl>"));

@@ -43,14 +43,10 @@ std::string Facts(const v1::Report& report) {
       absl::StrAppend(&text, ", from ", Count(report.data().repeats()), " repeats");
     text += ".";
   }
-  if (report.initial().rmse_us() > 0 && floor.sigma_us > 0) {
-    const double ratio = report.initial().rmse_us() / floor.sigma_us;
-    if (ratio > 1.02) {
-      absl::StrAppend(&text, " The given model's error is ", Number(ratio, 2),
-                      " times the floor: ", floor.bound ? "at least " : "", Share(report.reducible_share()),
-                      " of its mean square is the model's, not noise.");
-    }
-  }
+  const std::string times = TimesTheFloor(report);
+  if (!times.empty()) absl::StrAppend(&text, " The given model's error is ", times, ".");
+  if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
+    absl::StrAppend(&text, " Of the fingers, ", FingerScatterWords(report), ".");
   return Typeset(text);
 }
 

@@ -72,10 +72,26 @@ std::string Groups(const v1::Report& report) {
       "noise floor. Last column: the group\u2019s share of the error beyond the floor.</p>\n");
 }
 
-// The curves count "first" from 0, for the finger that touched first.
+// "first" is 1 for the finger that touched first, as in formulas.
 std::string AxisTitle(const v1::CovariateCurve& curve) {
-  return curve.covariate() == "first" ? "first finger (0) or later (1)"
-                                      : Covariate(curve.covariate(), curve.unit());
+  if (curve.covariate() == "first") return "later finger (0) or first (1)";
+  if (curve.covariate() == "touch_number") return "touch number";
+  return Covariate(curve.covariate(), curve.unit());
+}
+
+// "p 3e-9, with the improved model 0.40"
+std::string DependenceWords(double p, double p_after, bool improved) {
+  return absl::StrCat("p ", Probability(p),
+                      improved ? absl::StrCat(" given, ", Probability(p_after), " improved") : "");
+}
+
+// Each finger alone, of curves over the place in the session.
+std::string FingerDependences(const v1::CovariateCurve& curve, bool improved) {
+  std::string items;
+  for (const v1::FingerDependence& finger : curve.fingers())
+    absl::StrAppend(&items, items.empty() ? "" : "; ", "finger ", Escape(finger.finger()), " ",
+                    Typeset(DependenceWords(finger.p(), finger.p_after(), improved)));
+  return items.empty() ? "" : absl::StrCat("<figcaption>", items, "</figcaption>");
 }
 
 // Before and after share the vertical axis, in the unit that fits the larger.
@@ -99,7 +115,8 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
   std::string pair;
   for (const bool after : {false, true}) {
     if (after && report.improved_model_yaml().empty()) break;
-    Chart chart(232, 190, after ? "improved model" : "given model", x_axis, y_axis);
+    Chart chart(report.improved_model_yaml().empty() ? 480 : 232, 190,
+                after ? "improved model" : "given model", x_axis, y_axis);
     chart.ZeroLine();
     std::vector<std::string> fingers;
     for (const v1::CurveBin& bin : curve.bins()) {
@@ -121,10 +138,15 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
     pair += chart.Svg(absl::StrCat("Mean residual of each finger against ", x_axis.title, ", ",
                                    after ? "improved model" : "given model"));
   }
-  return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>p ",
-                      Typeset(Probability(curve.p())),
-                      curve.p() < kDependenceP ? ": the residual depends on it" : "",
-                      "</span></p><div class=\"pair\">", pair, "</div></figure>\n");
+  const bool improved = !report.improved_model_yaml().empty();
+  const bool still = improved && curve.p_after() < kDependenceP;
+  return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>",
+                      Typeset(DependenceWords(curve.p(), curve.p_after(), improved)),
+                      still                      ? ": the residual still depends on it"
+                      : curve.p() < kDependenceP ? ": the residual depends on it"
+                                                 : "",
+                      "</span></p><div class=\"pair\">", pair, "</div>", FingerDependences(curve, improved),
+                      "</figure>\n");
 }
 
 // Strongest dependence first; those of numbered groups (face 3) are left to the tables of groups.
@@ -135,7 +157,9 @@ std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::Report& report) {
   for (const v1::CovariateCurve& curve : report.curves()) {
     if (!curve.bins().empty() && kinds.count(curve.covariate()) == 0) curves.push_back(&curve);
   }
-  const auto rank = [](const v1::CovariateCurve* curve) { return std::isnan(curve->p()) ? 2 : curve->p(); };
+  const auto rank = [](const v1::CovariateCurve* curve) {
+    return std::isnan(curve->p()) ? 2 : std::min(curve->p(), curve->p_after());
+  };
   std::stable_sort(curves.begin(), curves.end(),
                    [&](const auto* a, const auto* b) { return rank(a) < rank(b); });
   return curves;
@@ -148,7 +172,9 @@ std::string Curves(const v1::Report& report) {
   std::vector<std::pair<std::string, std::string>> keys;
   size_t shown = 0;
   for (const v1::CovariateCurve* curve : curves) {
-    const bool depends = curve->p() < kDependenceP || shown < kMinCurves;
+    // The place in the session is always shown: what changes with it is no noise.
+    const bool depends = curve->p() < kDependenceP || curve->p_after() < kDependenceP ||
+                         !curve->fingers().empty() || shown < kMinCurves;
     (depends ? open : folded) += CurvePair(report, *curve);
     shown += depends;
     for (const v1::CurveBin& bin : curve->bins()) {
@@ -167,7 +193,10 @@ std::string Curves(const v1::Report& report) {
       "<h3>Residual against every covariate</h3>\n", Legend(keys), "<div class=\"grid wide\">", open,
       "</div>\n", folded,
       "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
-      "permutation, corrected for the number of covariates.</p>\n");
+      "permutation, corrected for the number of covariates (and of fingers, where each is tested alone). "
+      "Only "
+      "differences between fingers are measured, so what one finger does shows in the others with the other "
+      "sign.</p>\n");
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// Why: every effect of the catalogue as the one that is missing, and which of them these data cannot tell
-// apart; where no effect explains the rest, what it depends on.
+// Why: every effect of the catalogue as the one that is missing, and which of them these data cannot tell apart.
 #include <cmath>
 #include <map>
 #include <set>
@@ -69,16 +68,31 @@ std::string CandidateTable(const v1::Report& report) {
                                    HeaderRow({"Effect", ">Probability", ">It would leave", "",
                                               "Parameter \u00b1 standard error", "95 % interval"}),
                                    "<tbody>");
+  const bool none = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
+  // Equivalents share the probability of their step.
+  std::set<std::string> first_step;
+  if (!report.steps().empty() && !report.steps(0).equivalent().empty()) {
+    first_step.insert(report.steps(0).equivalent().begin(), report.steps(0).equivalent().end());
+    first_step.insert(report.steps(0).effect());
+  }
+  const std::string shared =
+      first_step.empty()
+          ? ""
+          : absl::StrCat(" Effects marked as one of these fit alike and share a probability of ",
+                         EffectProbability(report.steps(0).probability()), ".");
   for (const v1::Candidate& candidate : report.candidates()) {
     if (!(candidate.rmse_us() > 0) && !candidate.note().empty()) continue;
     const double left = UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us());
     const double p = candidate.probability();
+    const bool shares = first_step.count(candidate.effect()) > 0;
     absl::StrAppend(
-        &table, p < 0.05 ? "<tr class=\"dim\">" : "<tr>",
+        &table, p < 0.05 || none ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
-                          candidate.scope() == "object" ? "<br><small>a value per object</small>" : "")),
+                          candidate.scope() == "object" ? "<br><small>a value per object</small>" : "",
+                          shares ? "<br><small>one of these</small>" : "")),
         NumberCell(EffectProbability(p)), NumberCell(left > 0 ? Time(left) : ""),
-        Cell(left > 0 ? Bar(left / largest, p < 0.05 ? "share" : "better", floor > 0 ? floor / largest : -1)
+        Cell(left > 0 ? Bar(left / largest, p < 0.05 || none ? "share" : "better",
+                            floor > 0 ? floor / largest : -1)
                       : "",
              "barcell"));
     if (candidate.note().empty()) {
@@ -88,9 +102,12 @@ std::string CandidateTable(const v1::Report& report) {
     }
     table += "</tr>\n";
   }
-  return Figure(absl::StrCat(table, "</tbody></table></div>"),
-                "Each effect alone, as the first to be added. It would leave: the RMSE on touches left out "
-                "of the fit, dashed the noise floor. Intervals: 95 %, the upright line is zero, no effect.") +
+  return Figure(
+             absl::StrCat(table, "</tbody></table></div>"),
+             absl::StrCat("Each effect alone, as the first to be added. It would leave: the RMSE on touches "
+                          "left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
+                          "zero, no effect.",
+                          Typeset(shared))) +
          NotFitted(report);
 }
 
@@ -108,53 +125,14 @@ std::string Ambiguities(const v1::Report& report) {
 }  // namespace
 
 std::string HtmlWhy(const v1::Report& report) {
-  return Section("why", "Why",
-                 "Every effect of the catalogue, fitted and judged on touches that the fit did not see.",
-                 absl::StrCat(CandidateTable(report), Ambiguities(report)));
-}
-
-std::string HtmlUnexplained(const v1::Report& report) {
-  const v1::Unexplained& rest = report.unexplained();
-  std::string body;
-  if (!rest.covariates().empty()) {
-    body = absl::StrCat("<div class=\"scroll\"><table>",
-                        HeaderRow({"The rest depends on", ">p", ">gain in log evidence (nats)"}), "<tbody>");
-    for (const v1::CovariateTest& test : rest.covariates()) {
-      absl::StrAppend(&body, "<tr>", Cell(Escape(test.name()), "name"), NumberCell(Probability(test.p())),
-                      NumberCell(Number(test.gain_nats())), "</tr>");
-    }
-    body += "</tbody></table></div>\n";
-  }
-  if (!rest.formula().empty()) {
-    absl::StrAppend(&body, "<h3>A formula that fits, as a suggestion and not a cause</h3>\n<pre>",
-                    Escape(rest.formula()), "</pre>\n<dl>");
-    for (const v1::ParameterValue& parameter : rest.parameters()) {
-      absl::StrAppend(&body, "<dt>", Escape(ParameterName(parameter)), "</dt><dd>",
-                      Typeset(ValueWithError(parameter)), "</dd>");
-    }
-    if (rest.heldout_rmse_us() > 0) {
-      absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(Time(rest.heldout_rmse_us())),
-                      " on touches left out of the fit; it removes ", Typeset(Share(rest.heldout_gain())),
-                      " of the excess error there</dd>");
-    }
-    if (!rest.nearest_effect().empty()) {
-      absl::StrAppend(&body, "<dt>Looks most like</dt><dd>", Escape(rest.nearest_effect()), " (cosine ",
-                      Typeset(Fixed(rest.nearest_cosine(), 2)),
-                      " between the two; 1 would be the same)</dd>");
-    }
-    body += "</dl>\n";
-  }
-  if (!rest.formula_yaml().empty()) {
-    absl::StrAppend(&body,
-                    "<h3>To add it, under <code>effects</code> in the model file</h3>\n"
-                    "<div class=\"row\"><button type=\"button\" data-copy=\"formula\">Copy</button></div>\n"
-                    "<pre id=\"formula\">",
-                    Escape(rest.formula_yaml()), "</pre>\n");
-  }
+  // Beside an unexplained verdict without steps the table is what was tried, not an answer.
+  const bool none = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
   return Section(
-      "unexplained", "What no built-in effect explains",
-      "A structure that is left after all steps. p: likelihood ratio of the best term, all terms paid for.",
-      body);
+      "why", none ? "What was tried" : "Why",
+      none ? "Every effect of the catalogue alone, judged on touches that the fit did not see: none "
+             "explains the error."
+           : "Every effect of the catalogue, fitted and judged on touches that the fit did not see.",
+      absl::StrCat(CandidateTable(report), Ambiguities(report)));
 }
 
 }  // namespace touchstone::client

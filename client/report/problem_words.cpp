@@ -2,6 +2,7 @@
 #include <map>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 
 #include "client/report/words.h"
 
@@ -24,6 +25,18 @@ std::string ProblemTitle(const v1::DataProblem& problem) {
   const auto title = kTitles.find(problem.kind());
   return absl::StrCat(title == kTitles.end() ? problem.kind() : title->second,
                       problem.detail().empty() ? "" : absl::StrCat(" (", problem.detail(), ")"));
+}
+
+std::string ShellLines(const std::string& command, int columns) {
+  std::string text, line;
+  for (const absl::string_view word : absl::StrSplit(command, ' ')) {
+    if (!line.empty() && static_cast<int>(line.size() + 1 + word.size()) > columns) {
+      absl::StrAppend(&text, line, " \\\n");
+      line.clear();
+    }
+    absl::StrAppend(&line, line.empty() ? "" : " ", word);
+  }
+  return text + line;
 }
 
 }  // namespace touchstone::client

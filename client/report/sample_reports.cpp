@@ -244,7 +244,8 @@ v1::Report CheckDataReport() {
   problem->set_kind("lateral_reversed");
   problem->set_detail("lateral -> -lateral");
   problem->set_words(
-      "It looks as if the lateral vectors point from the last finger to the first. Mended, the model as it "
+      "It looks as if the lateral vectors point from the last finger to the first. With that fixed, the "
+      "model as it "
       "is would be "
       "off by 14.4 ms instead of 866 ms.");
   problem->set_fix("touchstone session fix measurements/lab-2026-03.csv --reverse-lateral -o fixed.csv");
@@ -255,7 +256,7 @@ v1::Report CheckDataReport() {
   other->set_detail("l <-> r");
   other->set_words(
       "These data cannot tell it from another mistake: the time columns of the fingers l and r are "
-      "exchanged. Mended, "
+      "exchanged. With that fixed, "
       "the model as it is would be off by 14.4 ms instead of 866 ms.");
   other->set_fix("touchstone session fix measurements/lab-2026-03.csv --swap-fingers l,r -o fixed.csv");
   other->set_rmse_before_us(865613);

@@ -103,6 +103,8 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
     }
     out->Rows(rows);
   }
+  for (const v1::RepeatFinding& finding : comparison.findings())
+    out->Paragraph(absl::StrCat(finding.words(), " p ", Probability(finding.p()), "."));
   if (comparison.compatible_effects_size() > 0) {
     out->Label("Why");
     out->Paragraph(absl::StrCat("The difference could be explained by ",
@@ -131,8 +133,11 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   for (int i = 0; i < report.steps_size(); ++i) {
     const v1::Step& step = report.steps(i);
     const double after = UnseenError(step.heldout_rmse_us(), step.rmse_us());
+    // The probability is that of the step with its equivalents.
+    const std::string note =
+        step.equivalent().empty() ? "" : absl::StrCat("one of ", 1 + step.equivalent_size(), ", see below");
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
-              Change(before, after), "", TextLayout::kPlain, &rows);
+              Change(before, after), note, TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
     for (int c = 0, shown = 0; i == 0 && c < report.candidates_size() && shown < kMaxCompetingEffects; ++c) {
       const v1::Candidate& candidate = report.candidates(c);
@@ -148,7 +153,9 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   out->Rows(rows);
   for (const v1::Step& step : report.steps()) {
     if (step.equivalent().empty()) continue;
-    out->Paragraph(absl::StrCat(StepName(step), ": these data cannot tell them apart. ",
+    const std::string p = EffectProbability(step.probability());
+    out->Paragraph(absl::StrCat(StepName(step), ": these data cannot tell them apart",
+                                p.empty() ? "" : absl::StrCat(" (one of these: ", p, ")"), ". ",
                                 ToDecide(step.discriminating_measurement())));
   }
   for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report)) {
@@ -165,9 +172,11 @@ void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
   if (rest.heldout_gain() > 0)
     absl::StrAppend(&text, ": it removes ", Share(rest.heldout_gain()),
                     " of the excess error on unseen touches");
-  if (!rest.nearest_effect().empty())
-    absl::StrAppend(&text, "; it looks most like ", rest.nearest_effect(), " (cosine ",
-                    Fixed(rest.nearest_cosine(), 2), ")");
+  if (!rest.nearest_formula().empty())
+    absl::StrAppend(&text, "; the nearest simple formula is ", rest.nearest_formula(), " with ",
+                    Share(rest.nearest_formula_share()), " of its gain in log evidence");
+  const std::string nearest = NearestEffectWords(rest);
+  if (!nearest.empty()) absl::StrAppend(&text, "; ", nearest);
   out->Paragraph(text + ". --save-model FILE --with-formula writes the model with it.");
 }
 
@@ -179,9 +188,14 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
     std::vector<std::string> names;
     for (int i = 0; i < std::min(rest.covariates_size(), 4); ++i) {
       const double p = rest.covariates(i).p();
-      names.push_back(absl::StrCat(rest.covariates(i).name(), " (p ", Probability(p), ")"));
+      names.push_back(absl::StrCat(CovariateName(rest.covariates(i).name()), " (p ", Probability(p), ")"));
     }
-    out->Paragraph(absl::StrCat("The rest depends on ", absl::StrJoin(names, ", "), "."));
+    std::string text = absl::StrCat("The rest depends on ", names[0], ".");
+    names.erase(names.begin());
+    if (!names.empty())
+      absl::StrAppend(&text, " Each alone, it would also follow ", absl::StrJoin(names, ", "),
+                      "; these may only go along.");
+    out->Paragraph(text);
   }
   if (rest.formula().empty()) {
     AddLookup(rest, out);
@@ -191,10 +205,8 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
   if (rest.heldout_gain() > 0) {
     absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen touches");
   }
-  if (!rest.nearest_effect().empty()) {
-    absl::StrAppend(&text, "; it looks most like ", rest.nearest_effect(), " (cosine ",
-                    Fixed(rest.nearest_cosine(), 2), ")");
-  }
+  const std::string nearest = NearestEffectWords(rest);
+  if (!nearest.empty()) absl::StrAppend(&text, "; ", nearest);
   out->Paragraph(text + ".");
   for (const v1::ParameterValue& parameter : rest.parameters()) out->Paragraph(Parameter(parameter, true));
   if (rest.formula_yaml().empty()) return;
@@ -228,6 +240,7 @@ void AddNextTouches(const v1::Report& report, TextLayout* out) {
     std::set<std::string> objects;
     int touches = 0;
     double separation = 0;
+    std::string verdict;
   };
   std::vector<std::string> order;
   std::map<std::string, Purpose> purposes;
@@ -237,13 +250,15 @@ void AddNextTouches(const v1::Report& report, TextLayout* out) {
     purpose.objects.insert(touch.object());
     ++purpose.touches;
     purpose.separation = std::max(purpose.separation, touch.separation());
+    purpose.verdict = VerdictTouches(touch);
   }
   out->Label("Next touches");
   for (const std::string& name : order) {
     const Purpose& purpose = purposes[name];
     out->Paragraph(
         absl::StrCat(purpose.touches, " on ", absl::StrJoin(purpose.objects, ", "), name.empty() ? "" : ": ",
-                     name, "; up to ", Number(purpose.separation, 2), " noise sigmas apart per touch."),
+                     name, "; up to ", Number(purpose.separation, 2), " noise sigmas apart per touch",
+                     purpose.verdict.empty() ? "" : absl::StrCat("; ", purpose.verdict), "."),
         TextLayout::kPlain, 2);
   }
 }

@@ -15,6 +15,7 @@ namespace touchstone::client {
 namespace {
 
 using TextCell = TextLayout::Cell;
+constexpr double kSessionP = 0.01;
 
 void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
@@ -43,17 +44,12 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
 
 void AddHowWrong(const v1::Report& report, TextLayout* out) {
   if (!(report.initial().rmse_us() > 0)) return;
-  const Floor floor = NoiseFloorOf(report);
-  const double ratio = floor.sigma_us > 0 ? report.initial().rmse_us() / floor.sigma_us : 0;
-  std::string text = absl::StrCat("RMSE ", Time(report.initial().rmse_us()));
-  if (ratio > 1.02) {
-    absl::StrAppend(&text, ", ", Number(ratio, 2), " times the floor: ", floor.bound ? "at least " : "",
-                    Share(report.reducible_share()), " of the error is the model's, not noise.");
-  } else {
-    text += ratio > 0 ? ", no more than the floor." : ".";
-  }
+  const std::string times = TimesTheFloor(report);
   out->Label("How wrong");
-  out->Paragraph(text);
+  out->Paragraph(
+      absl::StrCat("RMSE ", Time(report.initial().rmse_us()), times.empty() ? "" : ", ", times, "."));
+  if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
+    out->Paragraph(absl::StrCat("Of the fingers, ", FingerScatterWords(report), "."));
   if (report.finger_bias_us_size() > 0) {
     std::vector<std::string> fingers;
     for (int i = 0; i < report.finger_bias_us_size(); ++i) {
@@ -85,6 +81,37 @@ void AddWhere(const v1::Report& report, TextLayout* out) {
     widest = std::max(widest, Share(slice.share_of_excess_error()).size());
   }
   for (auto& row : rows) row[2].text.insert(0, widest - std::min(widest, row[2].text.find(" %") + 2), ' ');
+  out->Rows(rows);
+}
+
+// Whether the fingers' residuals depend on the place in the session, with the given and with the improved model.
+void AddSession(const v1::Report& report, TextLayout* out) {
+  const std::vector<const v1::CovariateCurve*> curves = SessionCurves(report);
+  if (curves.empty()) return;
+  const bool improved = !report.improved_model_yaml().empty();
+  double smallest = 1;
+  for (const v1::CovariateCurve* curve : curves)
+    for (const v1::FingerDependence& finger : curve->fingers())
+      smallest = std::min({smallest, finger.p(), finger.p_after()});
+  out->Label("Session");
+  if (smallest > kSessionP) {
+    out->Paragraph(absl::StrCat("No finger's error changes with ", CovariateName(curves[0]->covariate()),
+                                curves.size() > 1 ? " or the touch's number" : "", " (p ",
+                                Probability(smallest), " at least)."));
+    return;
+  }
+  std::vector<std::vector<TextCell>> rows = {{{"against"}}};
+  for (const v1::FingerDependence& finger : curves[0]->fingers())
+    rows[0].push_back({absl::StrCat("finger ", finger.finger()), true});
+  for (TextCell& cell : rows[0]) cell.style = TextLayout::kDim;
+  for (const v1::CovariateCurve* curve : curves) {
+    std::vector<TextCell> row = {{CovariateName(curve->covariate())}};
+    for (const v1::FingerDependence& finger : curve->fingers())
+      row.push_back({absl::StrCat("p ", Probability(finger.p()),
+                                  improved ? absl::StrCat(" -> ", Probability(finger.p_after())) : ""),
+                     true});
+    rows.push_back(row);
+  }
   out->Rows(rows);
 }
 
@@ -134,6 +161,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddDataProblems(report, &out);
   AddDistributions(report, &out);
   AddWhere(report, &out);
+  AddSession(report, &out);
   AddWhy(report, &out);
   AddUnexplained(report, &out);
   AddLadder(report, &out);

@@ -103,10 +103,9 @@ TEST(TerminalReport, LadderTellsUnseenTouchesAndLackOfFitWhereThereIsRoom) {
 
 TEST(TerminalReport, NamesWhatTheDataCannotTellApartAndWhatWouldDecide) {
   const std::string text = TerminalReport(MissingEffectsReport(), 200, false);
-  EXPECT_THAT(
-      text,
-      HasSubstr("tip_radius or surface_offset: these data cannot tell them apart. To decide: touches on "
-                "the edge of a box"));
+  EXPECT_THAT(text, HasSubstr("tip_radius or surface_offset: these data cannot tell them apart (one of "
+                              "these: 0.99). To decide: touches on "
+                              "the edge of a box"));
   EXPECT_THAT(text, HasSubstr("channel_latency or finger_length: these data cannot tell them apart."));
 }
 
@@ -132,7 +131,7 @@ TEST(TerminalReport, ShowsTheFormulaAsItCanBeAdded) {
   for (const std::string& line : Lines(report.unexplained().formula_yaml())) {
     EXPECT_THAT(text, HasSubstr(line));
   }
-  EXPECT_THAT(text, HasSubstr("depends on travel_mm (p 1e-9)"));
+  EXPECT_THAT(text, HasSubstr("depends on travel (p 1e-9)"));
 }
 
 TEST(TerminalReport, TellsWhichValuesWereWrong) {

@@ -226,9 +226,12 @@ std::vector<Rung> Ladder(const v1::Report& report) {
         report.final().lack_of_fit_p());
   }
   for (const v1::Step& step : report.steps()) {
-    add(Rung::kStep, absl::StrCat("+ ", StepName(step)), step.rmse_us(), step.heldout_rmse_us(),
+    add(Rung::kStep, absl::StrCat("+ ", RungName(step)), step.rmse_us(), step.heldout_rmse_us(),
         step.lack_of_fit_p());
   }
+  if (!report.data_problems().empty() && report.data_problems(0).rmse_after_us() > 0)
+    add(Rung::kSuggestion, "with the file fixed", report.data_problems(0).rmse_after_us(), kUnknown,
+        kUnknown);
   const v1::Unexplained& rest = report.unexplained();
   if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && rest.rmse_us() > 0) {
     add(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula",

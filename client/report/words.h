@@ -73,6 +73,25 @@ std::string SummaryToShow(const v1::Report& report);
 // "columns of the fingers (l <-> m)": what kind of mistake a file has.
 std::string ProblemTitle(const v1::DataProblem& problem);
 
+// "incidence" of incidence_deg, "session time" of session_time_s.
+std::string CovariateName(const std::string& name);
+// "6.9 times the floor: 97.9 % of the error is the model's, not noise", as the verdict allows to say; empty
+// without a floor.
+std::string TimesTheFloor(const v1::Report& report);
+// What one noise for all fingers does not explain; empty if nothing.
+std::string FingerScatterWords(const v1::Report& report);
+// Curves over the place in the session, which are tested finger by finger.
+std::vector<const v1::CovariateCurve*> SessionCurves(const v1::Report& report);
+// "it looks most like tip_radius (cosine 0.93; 1 would be the same)", or that nothing does; empty if unknown.
+std::string NearestEffectWords(const v1::Unexplained& rest);
+// A step's name that is never long: "oblique_slip or 3 others".
+std::string RungName(const v1::Step& step);
+// "about 9 such touches to a verdict (6 nats)", or empty.
+std::string VerdictTouches(const v1::ProposedTouch& touch);
+
+// A command over as many lines as it needs, so that a shell takes them as one.
+std::string ShellLines(const std::string& command, int columns);
+
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 

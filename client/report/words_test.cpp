@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +11,9 @@
 
 namespace touchstone::client {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 v1::ParameterValue Value(double value, double error, const char* unit) {
   v1::ParameterValue parameter;
@@ -78,13 +82,13 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "from 9.10 ms to 815 us.");
   EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
   EXPECT_EQ(Headline(CheckDataReport()),
-            "Check the data before the model: lateral vectors reversed (lateral -> -lateral); mended, the "
+            "Check the data before the model: lateral vectors reversed (lateral -> -lateral); fixed, the "
             "error falls "
             "from 866 ms to 14.4 ms.");
   EXPECT_EQ(Headline(TooLittleDataReport()),
             "Too little data for a verdict: 6 touches; 16 usable touches would do.");
   EXPECT_EQ(Headline(UnexplainedReport()),
-            "The model is wrong in a way that no built-in effect explains. It depends on travel_mm.");
+            "The model is wrong in a way that no built-in effect explains. It depends on travel.");
   EXPECT_EQ(Headline(CompareReport()), "The model is off by 41.0 ms, 8.2 times the noise floor.");
   EXPECT_EQ(Headline(WithoutPosesReport()),
             "Measured and simulated touches differ as distributions (p = 0.0005).");
@@ -163,6 +167,38 @@ TEST(JsonReport, IsValidJsonWhereNumbersAreNotKnown) {
   report.mutable_initial()->set_lack_of_fit_p(std::nan(""));
   const nlohmann::json json = nlohmann::json::parse(*JsonReport(report));
   EXPECT_EQ(json["initial"]["lack_of_fit_p"], "NaN");
+}
+
+TEST(Headline, OfAnAdequateModelNamesAFingerThatScattersOtherwise) {
+  v1::Report report = AdequateReport();
+  EXPECT_THAT(Headline(report), HasSubstr("Nothing is missing"));
+  v1::FingerScatter& scatter = *report.mutable_finger_scatter();
+  scatter.set_finger("m");
+  scatter.set_rmse_us(2500);
+  scatter.set_others_rmse_us(5100);
+  scatter.set_p(1e-12);
+  EXPECT_THAT(Headline(report), Not(HasSubstr("Nothing is missing")));
+  EXPECT_THAT(Headline(report), HasSubstr("2.50 ms on finger m and 5.10 ms on the others"));
+}
+
+TEST(TimesTheFloor, BlamesTheFileWhereTheFileIsWrong) {
+  v1::Report report = CheckDataReport();
+  EXPECT_THAT(TimesTheFloor(report), HasSubstr("the error is the file's but for 14.4 ms"));
+  EXPECT_THAT(TimesTheFloor(report), Not(HasSubstr("the model's, not noise")));
+  EXPECT_THAT(TimesTheFloor(MissingEffectsReport()), HasSubstr("is the model's, not noise"));
+}
+
+TEST(CovariateName, IsInWords) {
+  EXPECT_EQ(CovariateName("session_time_s"), "session time");
+  EXPECT_EQ(CovariateName("incidence_deg"), "incidence");
+  EXPECT_EQ(CovariateName("approach_z"), "approach_z");
+}
+
+TEST(VerdictTouches, SaysHowManyAreNeeded) {
+  v1::ProposedTouch touch;
+  EXPECT_EQ(VerdictTouches(touch), "");
+  touch.set_touches_to_verdict(9);
+  EXPECT_EQ(VerdictTouches(touch), "about 9 such touches to a verdict (6 nats)");
 }
 
 }  // namespace

@@ -97,6 +97,7 @@ absl::StatusOr<PoseFreeComparison> ComparePoseFree(const DiagnosisInput& input,
   }
   DescribeTest(experiment, rank, fitted, &comparison);
   comparison.diagnosed = diagnose;
+  if (diagnose) comparison.findings = FindInRounds(experiment);
   if (diagnose && !comparison.compatible) {
     TOUCHSTONE_ASSIGN_OR_RETURN(comparison.compatible_effects, CompatibleEffects(experiment, rank));
   }

@@ -13,6 +13,7 @@
 
 #include "server/diagnosis/distributions/compatible_effects.h"
 #include "server/diagnosis/distributions/pose_free_description.h"
+#include "server/diagnosis/distributions/round_findings.h"
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/residuals/histogram_bins.h"
 
@@ -43,6 +44,7 @@ struct PoseFreeComparison {
 
   // Set by a diagnosis only.
   bool diagnosed = false;
+  std::vector<RoundFinding> findings;  // what repeats show among themselves
   std::vector<CompatibleEffect>
       compatible_effects;  // where the model is not compatible; most compatible first
 };

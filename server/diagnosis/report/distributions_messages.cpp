@@ -4,9 +4,12 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
+
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/residuals_messages.h"
+#include "server/diagnosis/selection/result.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
@@ -49,6 +52,34 @@ void WriteNoiseFloor(const distributions::RoundNoise& noise, v1::Report* report)
   floor->set_from_repeats(true);
 }
 
+const char* NameOf(distributions::RoundFindingKind kind) {
+  switch (kind) {
+    case distributions::RoundFindingKind::kSession:
+      return "session";
+    case distributions::RoundFindingKind::kPreviousPress:
+      return "previous_press";
+    case distributions::RoundFindingKind::kTails:
+      return "tails";
+    case distributions::RoundFindingKind::kTicks:
+      return "ticks";
+  }
+  return "";
+}
+
+// "Repeats of ... (p 3e-12). Compatible effects: a, b. "
+std::string FindingsInWords(const std::vector<distributions::RoundFinding>& findings) {
+  std::string words;
+  for (const distributions::RoundFinding& finding : findings)
+    absl::StrAppend(&words, finding.words, " ",
+                    finding.p_value < 1e-15 ? "p < 1e-15." : absl::StrFormat("p = %.1g.", finding.p_value),
+                    finding.compatible.empty()
+                        ? ""
+                        : absl::StrCat(" In the catalogue ", absl::StrJoin(finding.compatible, ", "),
+                                       " would do that; which it is, if it is one, these data cannot tell."),
+                    " ");
+  return words;
+}
+
 void WriteTest(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
   report->mutable_initial()->set_lack_of_fit_p(comparison.p_value);
   v1::DistributionComparison* distributions = report->mutable_distributions();
@@ -66,6 +97,17 @@ void WriteTest(const distributions::PoseFreeComparison& comparison, v1::Report* 
   }
   for (const distributions::CompatibleEffect& effect : comparison.compatible_effects)
     distributions->add_compatible_effects(effect.effect);
+  for (const distributions::RoundFinding& finding : comparison.findings) {
+    v1::RepeatFinding* message = distributions->add_findings();
+    message->set_kind(NameOf(finding.kind));
+    message->set_p(finding.p_value);
+    message->set_words(finding.words);
+    *message->mutable_compatible_effects() = {finding.compatible.begin(), finding.compatible.end()};
+    for (const std::string& effect : finding.compatible)
+      if (std::count(distributions->compatible_effects().begin(), distributions->compatible_effects().end(),
+                     effect) == 0)
+        distributions->add_compatible_effects(effect);
+  }
   for (const residuals::ComparedHistogram& histogram : comparison.histograms)
     WriteHistogram(histogram, report);
 }
@@ -107,7 +149,7 @@ std::string WriteNoiseChange(const distributions::PoseFreeComparison& comparison
   if (is_new) {
     v1::Step* step = report->add_steps();
     step->set_effect(effect->name);
-    step->set_probability(1);
+    step->set_probability(selection::kMaxProbability);
     step->set_scope("rig");
     step->set_lack_of_fit_p(comparison.p_value);
     step->set_meaning(effect->meaning);
@@ -141,6 +183,14 @@ std::string CompatibleEffectsInWords(const std::vector<distributions::Compatible
 void WriteDiagnosis(const distributions::PoseFreeComparison& comparison, v1::Report* report) {
   const std::string noise_words = WriteNoiseChange(comparison, report);
   report->mutable_final()->set_lack_of_fit_p(comparison.p_value);
+  if (comparison.compatible && !comparison.findings.empty()) {
+    report->set_verdict(v1::Report::UNEXPLAINED);
+    report->set_summary(absl::StrCat(noise_words, FindingsInWords(comparison.findings),
+                                     "As distributions, the times ", "do not differ from the model's ",
+                                     PInWords(comparison),
+                                     ". To know more, write down the poses of the touches."));
+    return;
+  }
   if (comparison.compatible) {
     report->set_verdict(comparison.noise_change == distributions::NoiseChange::kNewEffect
                             ? v1::Report::MISSING_EFFECTS
@@ -152,10 +202,11 @@ void WriteDiagnosis(const distributions::PoseFreeComparison& comparison, v1::Rep
     return;
   }
   report->set_verdict(v1::Report::UNEXPLAINED);
-  report->set_summary(
-      absl::StrCat(noise_words, "As distributions, the measured times differ from the model's ",
-                   PInWords(comparison), ". ", CompatibleEffectsInWords(comparison.compatible_effects),
-                   "To know more, write down the poses of the touches."));
+  report->set_summary(absl::StrCat(noise_words, FindingsInWords(comparison.findings),
+                                   "As distributions, the measured times differ from the model's ",
+                                   PInWords(comparison), ". ",
+                                   CompatibleEffectsInWords(comparison.compatible_effects),
+                                   "To know more, write down the poses of the touches."));
 }
 
 }  // namespace

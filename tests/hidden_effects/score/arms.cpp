@@ -221,6 +221,19 @@ std::vector<Arm> MakeArms() {
        {}},
   };
   for (Arm& arm : OutsideArms()) arms.push_back(std::move(arm));
+  // What repeats show among themselves, without any pose. Last, since the place of an arm is a part
+  // of its seeds.
+  for (const char* effect : {"thermal_drift", "return_hysteresis", "heavy_tail_noise", "poll_interval"})
+    arms.push_back({std::string("no poses, ") + effect,
+                    Kind::kNoPoses,
+                    20,
+                    [effect](W w, uint64_t s) {
+                      Scenario scenario = FullSet(w);
+                      scenario.with_poses = false;
+                      scenario.hidden = {RealisticEffect(effect, scenario, s)};
+                      return scenario;
+                    },
+                    {}});
   return arms;
 }
 

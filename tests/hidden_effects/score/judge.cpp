@@ -159,6 +159,17 @@ std::string Number(double value) {
   return text;
 }
 
+// The distribution differs, or repeats show something; then the truth must be among what would do it.
+void JudgeNoPoses(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
+  const bool found = report.distributions().p() < 0.01 || report.distributions().findings_size() > 0;
+  marks->push_back({truth.hidden.empty() ? "false detection" : "detects", found});
+  if (truth.hidden.empty() || report.distributions().findings().empty()) return;
+  bool named = false;
+  for (const v1::RepeatFinding& finding : report.distributions().findings())
+    for (const std::string& effect : finding.compatible_effects()) named |= effect == truth.hidden[0].effect;
+  marks->push_back({"truth among what repeats allow", named});
+}
+
 }  // namespace
 
 std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report& report,
@@ -185,8 +196,7 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
       break;
     case Kind::kNoPoses:
       marks.push_back({"names a culprit", report.steps_size() > 0});
-      marks.push_back(
-          {truth.hidden.empty() ? "false detection" : "detects", report.distributions().p() < 0.01});
+      JudgeNoPoses(truth, report, &marks);
       break;
     case Kind::kWrongValue: {
       bool value_right = false;

@@ -1,0 +1,84 @@
+// What a verdict rests on, in words: how far off the model is and whose error that is, fingers that differ, the place in
+// the session.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <absl/strings/strip.h>
+
+#include "client/report/words.h"
+
+namespace touchstone::client {
+
+std::string CovariateName(const std::string& name) {
+  if (name == "touch") return "the order of the touches";
+  if (name == "touch_number") return "touch number";
+  if (name == "first") return "which finger touches first";
+  absl::string_view stem = name;
+  for (const char* unit : {"_mm_s2", "_mm_s", "_per_m", "_mm", "_deg", "_us", "_s"})
+    if (absl::ConsumeSuffix(&stem, unit)) break;
+  // approach_z and what the user named (cov_*) stay as formulas have them.
+  return stem.size() < name.size() ? absl::StrReplaceAll(stem, {{"_", " "}}) : name;
+}
+
+std::string TimesTheFloor(const v1::Report& report) {
+  const Floor floor = NoiseFloorOf(report);
+  const double ratio = floor.sigma_us > 0 ? report.initial().rmse_us() / floor.sigma_us : 0;
+  if (!(ratio > 0)) return "";
+  if (ratio <= 1.02) return "no more than the floor";
+  const std::string times = absl::StrCat(Number(ratio, 2), " times the floor");
+  const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(report.reducible_share()));
+  if (report.verdict() == v1::Report::CHECK_DATA) {
+    const double after = report.data_problems().empty() ? 0 : report.data_problems(0).rmse_after_us();
+    return absl::StrCat(times, ", which says nothing of the model yet: the error is the file's",
+                        after > 0 ? absl::StrCat(" but for ", Time(after)) : "");
+  }
+  if (report.verdict() == v1::Report::TOO_LITTLE_DATA)
+    return absl::StrCat(times, ", from so few touches a rough figure");
+  return absl::StrCat(times, ": ", share, " of the error is the model's, not noise");
+}
+
+std::string FingerScatterWords(const v1::Report& report) {
+  // Beside a rest that nothing explains, fingers differ anyway.
+  if (!report.has_finger_scatter() || report.verdict() == v1::Report::UNEXPLAINED) return "";
+  const v1::FingerScatter& scatter = report.finger_scatter();
+  return absl::StrCat("the error that is left is ", Time(scatter.rmse_us()), " on finger ", scatter.finger(),
+                      " and ", Time(scatter.others_rmse_us()),
+                      " on the others: one noise for all fingers does not do that (p ",
+                      Probability(scatter.p()), ")");
+}
+
+std::vector<const v1::CovariateCurve*> SessionCurves(const v1::Report& report) {
+  std::vector<const v1::CovariateCurve*> curves;
+  for (const v1::CovariateCurve& curve : report.curves())
+    if (!curve.fingers().empty()) curves.push_back(&curve);
+  return curves;
+}
+
+std::string NearestEffectWords(const v1::Unexplained& rest) {
+  if (rest.nearest_effect().empty()) return "";
+  const std::string cosine = absl::StrCat("cosine ", Fixed(rest.nearest_cosine(), 2));
+  // Below it two thirds and more of the size are something else.
+  constexpr double kAlike = 0.7;
+  return rest.nearest_cosine() < kAlike
+             ? absl::StrCat("nothing of the catalogue looks like it (the nearest is ", rest.nearest_effect(),
+                            ", ", cosine, ")")
+             : absl::StrCat("it looks most like ", rest.nearest_effect(), " (", cosine,
+                            "; 1 would be the same)");
+}
+
+std::string RungName(const v1::Step& step) {
+  if (step.equivalent_size() < 2) return StepName(step);
+  return absl::StrCat(step.effect(), " or ", step.equivalent_size(), " others");
+}
+
+std::string VerdictTouches(const v1::ProposedTouch& touch) {
+  if (touch.touches_to_verdict() == 0) return "";
+  return absl::StrCat("about ", Count(touch.touches_to_verdict()),
+                      touch.touches_to_verdict() == 1 ? " such touch" : " such touches",
+                      " to a verdict (6 nats)");
+}
+
+}  // namespace touchstone::client
