@@ -1,4 +1,4 @@
-// What a diagnosis advises is done by a command and found again, on the public sets: a mistake in the file is mended, a
+// What a diagnosis advises is done by a command and found again, on the public sets: a mistake in the file is fixed, a
 // curve without a name is added.
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
@@ -73,9 +73,9 @@ TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
     ASSERT_EQ(words[0], "touchstone");
     std::vector<std::string> command(words.begin() + 1, words.end());
     command.push_back("--force");
-    const Outcome mended = Run(command);
-    ASSERT_EQ(mended.exit_code, 0) << mended.err;
-    EXPECT_THAT(mended.err, HasSubstr("960 touches"));
+    const Outcome repaired = Run(command);
+    ASSERT_EQ(repaired.exit_code, 0) << repaired.err;
+    EXPECT_THAT(repaired.err, HasSubstr("960 touches"));
     const nlohmann::json after = Diagnose("fixed.csv");
     EXPECT_EQ(after["verdict"], "MISSING_EFFECTS");
     ASSERT_FALSE(after["steps"].empty());
@@ -113,9 +113,11 @@ TEST_F(AdviceCommand, SaysWhatItCannotDo) {
     EXPECT_EQ(outcome.exit_code, 2);
     return outcome.err;
   };
-  EXPECT_THAT(error({}), HasSubstr("nothing to mend was named"));
+  EXPECT_THAT(error({}), HasSubstr("nothing to fix was named"));
   EXPECT_THAT(error({"--swap-fingers", "l,q"}), HasSubstr("a finger from l to r was expected"));
-  EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'"));
+  EXPECT_THAT(error({"--swap-objects", "lat10,cup"}), HasSubstr("has no object 'cup'; known: lat00, lat05"));
+  EXPECT_THAT(error({"--scale-times", "0"}), HasSubstr("--scale-times: '0': a factor above 0 was expected"));
+  EXPECT_THAT(error({"--scale-lengths", "-1"}), HasSubstr("--scale-lengths: '-1': a factor above 0"));
   EXPECT_THAT(error({"--permute-axes=x,x,z"}), HasSubstr("--permute-axes"));
   EXPECT_THAT(error({"--scale-speed", "1e9"}), HasSubstr("out of range"));
   EXPECT_THAT(error({"--touches", "9-3", "--swap-fingers", "l,m"}), HasSubstr("the first and the last"));

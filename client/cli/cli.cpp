@@ -14,6 +14,7 @@
 #include "client/cli/common.h"
 #include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/provenance.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
@@ -239,6 +240,7 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
 }
 
 int Cli::Run(int argc, char** argv) {
+  command_line_ = ShellCommand(argc, argv);
   // Last in every help, since they are the same everywhere.
   for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
   for (const auto& [command, run] : runs_)

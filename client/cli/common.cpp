@@ -1,5 +1,6 @@
 #include "client/cli/common.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 #include <unistd.h>
@@ -11,6 +12,8 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/effects/all_effects.h"
+#include "server/model/model.h"
 
 namespace touchstone::cli {
 
@@ -67,6 +70,13 @@ absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {
       text.find('/') != std::string::npos || path.extension() == ".yaml" || path.extension() == ".yml";
   if (looks_like_file) {
     TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMaxModelBytes));
+    // A server cannot read files that a model names: their content goes along.
+    if (absl::StrContains(ref.yaml(), "surface_map")) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          const model::Model model,
+          model::ParseModel(ref.yaml(), text, effects::Catalogue(), model::FilesBeside(text)));
+      ref.set_yaml(model::FormatModel(model));
+    }
     return ref;
   }
   std::error_code ignored;

@@ -84,6 +84,8 @@ class Cli {
   // What --renderer and --egl-device say; INVALID_ARGUMENT for an unknown kind.
   absl::StatusOr<image::RendererOptions> Renderer() const;
   const OutputOptions& output() const { return output_; }
+  // What was typed, as a shell takes it.
+  const std::string& command_line() const { return command_line_; }
 
   // A line to stderr: Log unless --quiet, Detail only with --verbose.
   void Log(absl::string_view line) const;
@@ -116,6 +118,7 @@ class Cli {
   SourceOptions source_;
   std::map<const CLI::App*, std::function<absl::Status()>> runs_;
   std::map<const CLI::App*, CommandFiles> files_;
+  std::string command_line_;
   std::vector<std::string> inputs_;  // paths that the running command reads
   bool stdout_taken_ = false;        // an output of the running command is standard output
 };

@@ -260,6 +260,8 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                                  options.further_meshes));
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
+  if (!set.csv.empty()) comparison->set_sha256_ = Sha256Hex(set.csv);
+  comparison->meshes_ = std::move(meshes);
   if (!set.session.empty()) return comparison;
   if (set.measured.has_value()) {
     *evidence.mutable_set() = service::ToProto(*set.measured);

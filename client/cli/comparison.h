@@ -10,6 +10,7 @@
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/provenance.h"
 
 namespace touchstone::cli {
 
@@ -44,7 +45,7 @@ class Comparison {
   client::Connection& connection() { return *connection_; }
   const v1::Evidence& evidence() const { return evidence_; }
 
-  // Runs the call that `start` makes; shows progress; returns the report. Ctrl-C cancels it.
+  // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it.
   template <typename Response, typename Start>
   absl::StatusOr<v1::Report> Run(const Start& start) const;
 
@@ -56,7 +57,9 @@ class Comparison {
   const Cli& cli_;
   std::unique_ptr<client::Connection> connection_;
   v1::Evidence evidence_;
-  std::string sent_ahead_;  // the session's name
+  std::string sent_ahead_;                // the session's name
+  std::string set_sha256_;                // of the set's file; empty: it is none here
+  std::vector<source::MeshSpec> meshes_;  // files that were read
 };
 
 // The report as JSON and as HTML, as the options ask.
@@ -83,6 +86,7 @@ absl::StatusOr<v1::Report> Comparison::Run(const Start& start) const {
   const absl::Status status = client::FromGrpc(reader->Finish());
   if (!status.ok()) return status;
   if (!reported) return absl::InternalError("the source ended without a report");
+  AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &report);
   return report;
 }
 

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "client/cli/comparison.h"
+#include "client/cli/model_output.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -15,6 +16,7 @@ struct DiagnoseOptions : ComparisonOptions {
   std::string save_model;
   std::string keep_as;
   bool with_formula = false;
+  bool with_surface_map = false;
 };
 
 // The formula of what no built-in effect explains, or the curve, as effects of this model. Empty: there is none.
@@ -58,7 +60,7 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   model.name = std::filesystem::path(options.save_model).stem().string();
   if (!model::ParseModel(model::FormatModel(model), options.save_model, effects::Catalogue()).ok())
     model.name = as_it_was.name;
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.save_model, model::FormatModel(model)));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", options.save_model, model));
   const std::string hash = model.Hash().substr(0, 12);
   cli.LogWritten(options.save_model,
                  changed || suggested
@@ -76,8 +78,15 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   if (options.with_formula && options.save_model.empty())
     return absl::InvalidArgumentError(
         "--with-formula: it says what --save-model writes; give --save-model FILE");
+  if (options.with_surface_map && options.save_model.empty() && options.keep_as.empty())
+    return absl::InvalidArgumentError(
+        "--with-surface-map: it says what --save-model writes; give --save-model FILE");
+  if (options.with_surface_map && !SurfaceMapPath(options.save_model).empty())
+    TOUCHSTONE_RETURN_IF_ERROR(
+        cli.CheckOutputs({{"--with-surface-map", SurfaceMapPath(options.save_model)}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::DiagnoseRequest request;
+  request.set_with_surface_map(options.with_surface_map);
   *request.mutable_evidence() = comparison->evidence();
   request.set_save_model(options.keep_as);
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
@@ -105,6 +114,8 @@ void AddDiagnose(Cli* cli) {
       "--json report.json\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
       "--with-formula\n"
+      "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
+      "--with-surface-map\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
@@ -113,6 +124,10 @@ void AddDiagnose(Cli* cli) {
   command->add_flag("--with-formula", options->with_formula,
                     "With --save-model: add the suggested formula, or the curve, of what no built-in effect "
                     "explains");
+  command->add_flag(
+      "--with-surface-map", options->with_surface_map,
+      "With --save-model: where the surfaces depart from their meshes, write a map of them beside "
+      "the model (FILE's name with .surface.csv), which the model then applies");
   command
       ->add_option("--keep-as", options->keep_as,
                    "With --server: keep the improved model there under this name, served at once")

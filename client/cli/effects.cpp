@@ -111,6 +111,19 @@ constexpr char kLookupHelp[] =
     "  touchstone model add nominal lookup name=warm_up adds=time_us covariate=session_time_s \\\n"
     "    knots=0,300,900 l=0,2100,4000 m=0,0,0 r=0,-2100,-4000 -o warm.yaml\n";
 
+constexpr char kSurfaceMapHelp[] =
+    "\nA model file has it as\n\n"
+    "  - surface_map: {file: better.surface.csv}   # relative to the model file's folder\n\n"
+    "and the map is a CSV file with the columns object, x_mm, y_mm, z_mm (a place on the mesh), departure_mm "
+    "(along "
+    "the\n"
+    "outward normal), std_dev_mm, length_mm and rms_mm; between its points it is interpolated "
+    "(server/model/surface_map.md).\n\n"
+    "  touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
+    "--with-surface-map\n"
+    "  touchstone model add nominal.yaml surface_map file=scan.csv -o scanned.yaml\n"
+    "  touchstone mesh correct lat00.off --map better.surface.csv -o lat00_measured.off\n";
+
 Json FormulaJson() {
   Json variables = Json::array();
   for (const effects::FormulaVariable& variable : effects::FormulaVariables())
@@ -155,6 +168,7 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
   }
   if (effect.name() == "formula") text += FormulaHelp();
   if (effect.name() == "lookup") text += kLookupHelp;
+  if (effect.name() == "surface_map") text += kSurfaceMapHelp;
   return cli.Print(text);
 }
 

@@ -1,9 +1,9 @@
-// touchstone mesh import|supershape|info: mesh files.
+// touchstone mesh import|supershape|info|correct: mesh files.
 #include <filesystem>
 
 #include <absl/strings/ascii.h>
 
-#include "client/cli/common.h"
+#include "client/cli/mesh_options.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -12,21 +12,6 @@
 
 namespace touchstone::cli {
 namespace {
-
-struct MeshOptions {
-  std::string input;
-  std::string output;
-  std::string unit = "mm";
-  std::string up = "z";
-  double scale = 1;
-  double fit_mm = 0;
-  // Supershapes.
-  std::string name;
-  uint64_t triangles = 20000;
-  std::optional<double> width_mm;
-  std::string longitude;  // "m,n1,n2,n3[,a,b]"
-  std::string latitude;
-};
 
 Json ReportJson(const geometry::TriangleMesh& mesh, const geometry::MeshReport& report) {
   const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
@@ -104,7 +89,9 @@ void Report(const Cli& cli, const std::string& name, const geometry::TriangleMes
     cli.Print(ReportInWords(name, mesh, report)).IgnoreError();
 }
 
-absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const MeshOptions& options) {
+}  // namespace
+
+absl::StatusOr<geometry::TriangleMesh> ReadMesh(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--unit", options.unit, geometry::MeshUnitNames()).status());
   TOUCHSTONE_RETURN_IF_ERROR(OneOf("--up", options.up, geometry::MeshUpAxisNames()).status());
   geometry::MeshImport import;
@@ -119,7 +106,7 @@ absl::StatusOr<geometry::TriangleMesh> Read(const Cli& cli, const MeshOptions& o
   return mesh;
 }
 
-absl::Status Write(const Cli& cli, const MeshOptions& options, const geometry::TriangleMesh& mesh) {
+absl::Status WriteMesh(const Cli& cli, const MeshOptions& options, const geometry::TriangleMesh& mesh) {
   // The ending names the format; standard output gets OFF.
   const std::string extension = std::filesystem::path(options.output).extension().string();
   const std::string format = IsStandardOutput(options.output) ? "off"
@@ -134,13 +121,15 @@ absl::Status Write(const Cli& cli, const MeshOptions& options, const geometry::T
   return absl::OkStatus();
 }
 
+namespace {
+
 absl::Status RunImport(const Cli& cli, const MeshOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
-  return Write(cli, options, mesh);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, ReadMesh(cli, options));
+  return WriteMesh(cli, options, mesh);
 }
 
 absl::Status RunInfo(const Cli& cli, const MeshOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, Read(cli, options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, ReadMesh(cli, options));
   Report(cli, options.input, mesh);
   return absl::OkStatus();
 }
@@ -182,8 +171,10 @@ absl::Status RunSupershape(const Cli& cli, const MeshOptions& options) {
   if (options.width_mm) parameters.width_m = ToSi(Unit::kMillimetre, *options.width_mm);
   TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh,
                               geometry::MakeSupershape(parameters, options.triangles));
-  return Write(cli, options, mesh);
+  return WriteMesh(cli, options, mesh);
 }
+
+}  // namespace
 
 void AddImportOptions(CLI::App* command, MeshOptions* options) {
   const auto add = [&](const std::string& name, auto& value, const std::string& type,
@@ -195,14 +186,14 @@ void AddImportOptions(CLI::App* command, MeshOptions* options) {
       "Instead of unit and scale: make the longest side of the box this long");
 }
 
-}  // namespace
-
 void AddMesh(Cli* cli) {
   auto options = std::make_shared<MeshOptions>();
-  CLI::App* group = cli->AddGroup("mesh", "Converts, makes and inspects mesh files.",
-                                  "touchstone mesh info cup.stl --unit inch\n"
-                                  "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
-                                  "touchstone mesh supershape lat20 --triangles 100000 -o lat20.obj");
+  CLI::App* group =
+      cli->AddGroup("mesh", "Converts, makes and inspects mesh files.",
+                    "touchstone mesh info cup.stl --unit inch\n"
+                    "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
+                    "touchstone mesh supershape lat20 --triangles 100000 -o lat20.obj\n"
+                    "touchstone mesh correct cup.off --map better.surface.csv -o cup_measured.off");
   const auto add_output = [&](CLI::App* command) {
     cli->AddOutput(command, "-o,--output", &options->output,
                    "The file to write, .off or .obj; -: stdout, OFF")
@@ -243,6 +234,28 @@ void AddMesh(Cli* cli) {
                                    [cli, options] { return RunInfo(*cli, *options); });
   info->add_option("FILE", options->input, "The mesh to read")->type_name("")->required();
   AddImportOptions(info, options.get());
+
+  CLI::App* correct =
+      cli->AddCommand(group, "correct",
+                      "Writes a mesh as it was measured: its surface moved along the normals by a surface "
+                      "map, refined so far that "
+                      "the map's bumps show.",
+                      "touchstone mesh correct lat00.off --map better.surface.csv -o lat00_measured.off\n"
+                      "touchstone mesh correct scan.ply --map better.surface.csv --object cup -o cup.off",
+                      [cli, options] { return RunMeshCorrect(*cli, *options); });
+  cli->AddInput(
+      correct, correct->add_option("MESH", options->input, "The mesh to correct")->type_name("")->required());
+  cli->AddInput(correct, correct
+                             ->add_option("--map", options->map,
+                                          "The surface map that touchstone diagnose --with-surface-map wrote")
+                             ->type_name("FILE")
+                             ->required());
+  correct
+      ->add_option("--object", options->object,
+                   "Which object of the map the mesh is. Default: the mesh file's name without its ending")
+      ->type_name("NAME");
+  add_output(correct);
+  AddImportOptions(correct, options.get());
 }
 
 }  // namespace touchstone::cli

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "client/cli/common.h"
+#include "client/cli/model_output.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -45,7 +46,7 @@ Json ModelJson(const model::Model& model) {
 }
 
 absl::Status Save(const Cli& cli, const model::Model& model, const ModelOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, model::FormatModel(model)));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "-o", options.output, model));
   if (options.output.empty()) return absl::OkStatus();
   if (cli.output().json)
     PrintJson(ModelJson(model));
@@ -95,8 +96,8 @@ absl::Status SaveChanged(const Cli& cli, const model::Model& before, model::Mode
 absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      model::Model after,
-      model::AddEffect(before, options.effect, options.assignments, effects::Catalogue()));
+      model::Model after, model::AddEffect(before, options.effect, options.assignments, effects::Catalogue(),
+                                           model::FilesBeside("")));
   return SaveChanged(cli, before, std::move(after), options);
 }
 

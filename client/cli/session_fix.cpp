@@ -98,9 +98,21 @@ absl::Status ReadTouchRanges(const FixOptions& options, session::MeasurementFix*
   return absl::OkStatus();
 }
 
+absl::Status CheckFactors(const FixOptions& options) {
+  for (const auto& [option, factor] : {std::pair<const char*, double>{"--scale-times", options.scale_times},
+                                       {"--scale-lengths", options.scale_lengths},
+                                       {"--scale-targets", options.scale_targets},
+                                       {"--scale-standoff", options.scale_standoff},
+                                       {"--scale-speed", options.scale_speed}})
+    if (!(factor > 0 && std::isfinite(factor)))
+      return Expected(option, ShortestNumber(factor), "a factor above 0 was");
+  return absl::OkStatus();
+}
+
 absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int fingers) {
   session::MeasurementFix fix;
   TOUCHSTONE_RETURN_IF_ERROR(ReadTouchRanges(options, &fix));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckFactors(options));
   TOUCHSTONE_RETURN_IF_ERROR(ReadFingers(options, fingers, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &fix));
   fix.drop_duplicates = options.drop_duplicates;
@@ -119,7 +131,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   fix.reverse_approach = options.reverse_approach;
   if (fix.empty())
     return absl::InvalidArgumentError(
-        "nothing to mend was named; touchstone diagnose names the options where it finds a mistake");
+        "nothing to fix was named; touchstone diagnose names the options where it finds a mistake");
   return fix;
 }
 
@@ -133,7 +145,7 @@ absl::Status RunFix(const Cli& cli, const FixOptions& options) {
   const absl::StatusOr<session::MeasurementSet> after = session::ParseMeasurementSet(fixed, options.output);
   if (!after.ok())
     return absl::InvalidArgumentError(
-        absl::StrCat("mended like this it is no measurement file: ", after.status().message()));
+        absl::StrCat("fixed like this it is no measurement file: ", after.status().message()));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, fixed));
   const int dropped = before.size() - after->size();
   // The format has no place for remarks, so the log is where the change is told.
@@ -150,7 +162,7 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<FixOptions>();
   CLI::App* command =
       cli->AddCommand(group, "fix",
-                      "Mends a discrete mistake of a measurement file, as touchstone diagnose names it "
+                      "Fixes a discrete mistake of a measurement file, as touchstone diagnose names it "
                       "(verdict CHECK_DATA). Numbers "
                       "that do not change keep their digits; several options are done in the order in which "
                       "they stand below.",

@@ -1,4 +1,4 @@
-// touchstone session fix: mends a discrete mistake of a measurement file.
+// touchstone session fix: fixes a discrete mistake of a measurement file.
 #pragma once
 
 #include "client/cli/common.h"

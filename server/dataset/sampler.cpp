@@ -146,6 +146,15 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
   return simulator_.RunSensor(&batch, &workspace->touch);
 }
 
+// Of the sample before, whose touch may be the list's last.
+double TouchSampler::PauseBefore(const touch::Plan& plan, uint64_t index) const {
+  if (plan.kind != touch::Plan::Kind::kList) return plan.touch_interval_s;
+  const auto session_time_s = [&](uint64_t i) {
+    return plan.list[NumberOf(i) % plan.list.size()].session_time_s;
+  };
+  return touch::PauseBetween(session_time_s(index - 1), session_time_s(index));
+}
+
 void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
                              absl::Span<const double> previous_press_m, Workspace* workspace) const {
   const touch::Plan& plan = specification_.plan;
@@ -162,6 +171,8 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
     else
       touch::SetTouch(pose, plan.speed_m_s, plan.touch_interval_s * indices[slot], indices[slot], k, &batch);
   }
+  for (size_t k = 0; k < block.size(); ++k)
+    if (batch.index[k] > 0) batch.pause_s[k] = PauseBefore(plan, batch.index[k]);
   // A covariate that some touch of the list lacks stays out: the simulation says that it is missing.
   for (const std::string& name : list_covariates_) {
     std::vector<double>& values = batch.covariates[name];

@@ -64,6 +64,7 @@ class TouchSampler {
                  Workspace* workspace) const;
   absl::Status RunBlock(size_t object, absl::Span<const uint64_t> indices, Until until,
                         absl::Span<const double> previous_press_m, Workspace* workspace) const;
+  double PauseBefore(const touch::Plan& plan, uint64_t index) const;
   void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const double> previous_press_m,
                  Workspace* workspace) const;
   absl::Status Hopeless(size_t object, uint64_t index) const;

@@ -12,9 +12,11 @@
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/early_verdicts.h"
+#include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/selection/ladder.h"
+#include "server/diagnosis/selection/quality.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -58,11 +60,6 @@ double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-double ReducibleShare(const selection::NoiseFloor& floor, const selection::Quality& initial) {
-  const double noise_s2 = floor.sigma_s * floor.sigma_s, error_s2 = initial.rmse_s * initial.rmse_s;
-  return error_s2 > 0 ? std::clamp(1 - noise_s2 / error_s2, 0.0, 1.0) : 0;
-}
-
 // The residuals of the initial and of the improved model, described.
 residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
                                         const std::vector<double>& before,
@@ -70,15 +67,6 @@ residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
                                         double sigma_s) {
   return residuals::DescribeResiduals(*workspace.observations, workspace.nominal, improved, before, after,
                                       {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
-}
-
-report::Diagnosis Begin(const selection::Workspace& workspace) {
-  report::Diagnosis diagnosis;
-  diagnosis.model_name = workspace.input.model->name;
-  diagnosis.model_hash = workspace.input.model->Hash();
-  diagnosis.data = touches::SummarizeData(*workspace.observations);
-  diagnosis.warnings = workspace.warnings;
-  return diagnosis;
 }
 
 void AddSentences(report::Diagnosis* diagnosis) {
@@ -190,14 +178,16 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
     diagnosis.duration_s = Now() - began;
     return diagnosis;
   }
+  // As a comparison finds it: the search leaves out outliers.
+  const double compared_s = touches::Rmse(o, touches::Residuals(o, workspace->nominal));
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::SelectionResult selection,
                               selection::SelectExplanation(workspace.get()));
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
-  report::Diagnosis diagnosis = Begin(*workspace);
+  report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
-  diagnosis.initial = selection::QualityOf(*workspace, selection.initial_model, before);
-  TOUCHSTONE_RETURN_IF_ERROR(
-      selection::SetErrorsAsCompared(*workspace, *workspace->input.model, &*diagnosis.initial));
+  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.initial,
+                              selection::QualityOf(*workspace, selection.initial_model, before));
+  selection::SetError(compared_s, &*diagnosis.initial);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   AddLadder(ladder, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
@@ -229,13 +219,9 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const Dia
                               selection::MakeWorkspace(input, gated));
   if (!gate.Enter("comparing", 0.3)) return absl::CancelledError(kCancelled);
   const touches::Observations& o = *workspace->observations;
-  report::Diagnosis diagnosis = Begin(*workspace);
+  report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
-  const double rmse_s = touches::Rmse(o, residuals);
-  diagnosis.noise_floor = selection::NoiseFloorOf(o, residuals, 0);
-  diagnosis.initial = {rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)};
-  diagnosis.final = diagnosis.initial;
-  diagnosis.reducible_share = ReducibleShare(*diagnosis.noise_floor, *diagnosis.initial);
+  AddHowWrong(*workspace, residuals, &diagnosis);
   if (diagnosis.data.touches > 0)
     diagnosis.residuals =
         DescribeBoth(*workspace, residuals, workspace->nominal, residuals, diagnosis.noise_floor->sigma_s);

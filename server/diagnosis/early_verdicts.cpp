@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis {
@@ -20,26 +20,9 @@ constexpr int kLeft = 24;
 // Repeats of one touch say nothing of the model: as many values must come from different touches.
 constexpr int kMinPoses = 4;
 
-// What `compare` says.
-void AddHowWrong(const touches::Observations& o, const touches::Prediction& nominal,
-                 report::Diagnosis* diagnosis) {
-  if (diagnosis->data.touches == 0) return;
-  const std::vector<double> residuals = touches::Residuals(o, nominal);
-  const double rmse_s = touches::Rmse(o, residuals);
-  diagnosis->noise_floor = selection::NoiseFloorOf(o, residuals, 0);
-  diagnosis->initial = {rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)};
-  diagnosis->final = diagnosis->initial;
-  const double floor_s = diagnosis->noise_floor->sigma_s;
-  diagnosis->reducible_share =
-      rmse_s > 0 ? std::clamp(1 - floor_s * floor_s / (rmse_s * rmse_s), 0.0, 1.0) : 0;
-}
-
 report::Diagnosis ReportOf(const selection::Workspace& workspace) {
-  report::Diagnosis diagnosis;
-  diagnosis.model_name = workspace.input.model->name;
-  diagnosis.model_hash = workspace.input.model->Hash();
-  diagnosis.data = touches::SummarizeData(*workspace.observations);
-  AddHowWrong(*workspace.observations, workspace.nominal, &diagnosis);
+  report::Diagnosis diagnosis = BeginDiagnosis(workspace);
+  AddHowWrong(workspace, touches::Residuals(*workspace.observations, workspace.nominal), &diagnosis);
   return diagnosis;
 }
 
@@ -91,7 +74,6 @@ report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int
   report::Diagnosis diagnosis = ReportOf(workspace);
   diagnosis.verdict = selection::Verdict::kTooLittleData;
   diagnosis.touches_needed = touches_needed;
-  diagnosis.warnings = workspace.warnings;
   for (std::string& warning : report::DataWarnings(diagnosis.data))
     diagnosis.warnings.push_back(std::move(warning));
   diagnosis.summary = report::Summarize(diagnosis);

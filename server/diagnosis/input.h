@@ -21,6 +21,8 @@ struct DiagnosisInput {
   std::vector<std::shared_ptr<const model::Effect>>
       also;  // formulas of the user that compete with the catalogue
   uint64_t seed = 0;
+  // Where the surfaces are what is left: put a map of them into the improved model instead of their size.
+  bool with_surface_map = false;
 };
 
 struct DiagnosisContext {

@@ -2,6 +2,7 @@
 
 #include "server/effects/formula.h"
 #include "server/effects/lookup.h"
+#include "server/effects/surface_map.h"
 
 // The built-in touch effects by stage, in the order in which a stage applies and the catalogue lists them:
 // one line each, the name of the function that its file exports. Registration by static objects is not used:
@@ -18,6 +19,7 @@
   /* contact */                          \
   EFFECT(TipRadius)                      \
   EFFECT(SurfaceError)                   \
+  EFFECT(SurfaceMap)                     \
   /* motion */                           \
   EFFECT(SpeedError)                     \
   EFFECT(AccelerationRamp)               \
@@ -35,6 +37,8 @@
   EFFECT(HeavyTailNoise)                 \
   EFFECT(MissedContact)                  \
   EFFECT(CorrelatedNoise)                \
+  EFFECT(PositionNoise)                  \
+  EFFECT(FingerNoise)                    \
   /* any stage */                        \
   EFFECT(Formula)                        \
   EFFECT(Lookup)
@@ -73,6 +77,11 @@ class BuiltInCatalogue : public model::EffectCatalogue {
   absl::StatusOr<std::shared_ptr<const model::Effect>> MakeLookup(
       const model::LookupSpec& spec) const override {
     return MakeLookupEffect(spec);
+  }
+
+  absl::StatusOr<std::shared_ptr<const model::Effect>> MakeSurfaceMap(
+      const model::SurfaceMapSpec& spec) const override {
+    return MakeSurfaceMapEffect(spec);
   }
 
  private:

@@ -10,8 +10,9 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::latency_s, "latency_us", Unit::kMicrosecond, -50000, 50000, 0, 2000,
-     "How much later each finger's channel reports, first to last.", /*sum_zero=*/true},
+    {&Parameters::latency_s, "latency_us", Unit::kMicrosecond, -1e6, 1e6, 0, 2000,
+     "How much later each finger's channel reports, first to last.",
+     /*sum_zero=*/true, /*reciprocal=*/false, /*usual=*/50000},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {

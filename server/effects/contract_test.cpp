@@ -53,7 +53,9 @@ FileValues TypicalValues(const model::Effect& effect, int fingers, double steps)
 class EffectContract : public testing::TestWithParam<std::shared_ptr<const model::Effect>> {
  protected:
   const model::Effect& effect() const { return *GetParam(); }
-  bool describes_only() const { return effect().name == "formula" || effect().name == "lookup"; }
+  bool describes_only() const {
+    return effect().name == "formula" || effect().name == "lookup" || effect().name == "surface_map";
+  }
 };
 
 TEST_P(EffectContract, HasTextsForPeople) {
@@ -233,7 +235,8 @@ TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
   for (const model::EffectRole role :
        {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
         model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError,
-        model::EffectRole::kNoiseMemory})
+        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength,
+        model::EffectRole::kNoiseByFinger})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
@@ -245,17 +248,18 @@ TEST(Catalogue, HasTheEffectsOfTheDesignInItsOrder) {
   for (const auto& effect : Catalogue().All()) names.push_back(effect->name);
   EXPECT_THAT(
       names, testing::ElementsAre("tool_yaw", "tool_tilt", "finger_spacing", "finger_length", "gravity_sag",
-                                  "object_scale", "object_pose", "tip_radius", "surface_error", "speed_error",
-                                  "acceleration_ramp", "contact_slowdown", "object_push", "oblique_slip",
-                                  "channel_latency", "thermal_drift", "return_hysteresis", "clock_skew",
-                                  "poll_interval", "gaussian_noise", "incidence_noise", "heavy_tail_noise",
-                                  "missed_contact", "correlated_noise", "formula", "lookup"));
+                                  "object_scale", "object_pose", "tip_radius", "surface_error", "surface_map",
+                                  "speed_error", "acceleration_ramp", "contact_slowdown", "object_push",
+                                  "oblique_slip", "channel_latency", "thermal_drift", "return_hysteresis",
+                                  "clock_skew", "poll_interval", "gaussian_noise", "incidence_noise",
+                                  "heavy_tail_noise", "missed_contact", "correlated_noise", "position_noise",
+                                  "finger_noise", "formula", "lookup"));
 }
 
 TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {
   int previous = 0;
   for (const auto& effect : Catalogue().All()) {
-    if (effect->parameters.empty()) continue;  // a formula, a lookup
+    if (effect->parameters.empty()) continue;  // a formula, a lookup, a map
     EXPECT_GE(static_cast<int>(effect->stage), previous) << effect->name;
     previous = static_cast<int>(effect->stage);
     EXPECT_EQ(effect->before_cast, effect->name == "tip_radius");

@@ -35,6 +35,7 @@ struct ParameterRow {
   const char* meaning;
   bool sum_zero = false;    // per finger: only differences can be seen, so the values sum to 0
   bool reciprocal = false;  // the response is smooth in 1 / value, and infinity stands for "none"
+  double usual = 0;         // the largest magnitude that rigs show; 0: up to the bounds
 };
 
 template <typename P>
@@ -103,6 +104,7 @@ model::Effect DefineEffect(const EffectDefinition<P>& definition) {
                                                                            : model::Arity::kPerFinger;
     info.lower = row.lower;
     info.upper = row.upper;
+    if (row.usual > 0) info.usual_lower = -row.usual, info.usual_upper = row.usual;
     info.neutral = row.neutral;
     info.typical = row.typical;
     info.sum_zero = row.sum_zero;

@@ -72,6 +72,7 @@ TouchBatch TestBatch(int size, int fingers, uint64_t seed, bool all_hit) {
     b.standoff_m[touch] = random.Uniform(0.1, 0.2);
     b.speed_m_s[touch] = random.Uniform(0.01, 0.04);
     b.session_time_s[touch] = random.Uniform(0, 7200);
+    b.pause_s[touch] = 7 + 0.001 * touch;
     double first_s = 1e9;
     double last_s = 0;
     for (int finger = 0; finger < fingers; ++finger) {
@@ -139,6 +140,7 @@ std::vector<std::string> ChangedFields(const TouchBatch& a, const TouchBatch& b)
   TOUCHSTONE_COMPARE(standoff_m)
   TOUCHSTONE_COMPARE(speed_m_s)
   TOUCHSTONE_COMPARE(session_time_s)
+  TOUCHSTONE_COMPARE(pause_s)
   TOUCHSTONE_COMPARE(previous_press_m)
   TOUCHSTONE_COMPARE(spacing_m)
   TOUCHSTONE_COMPARE(stroke_m)

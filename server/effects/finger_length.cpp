@@ -10,9 +10,9 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::offset_m, "offset_mm", Unit::kMillimetre, -5, 5, 0, 0.2,
+    {&Parameters::offset_m, "offset_mm", Unit::kMillimetre, -50, 50, 0, 0.2,
      "How much farther each finger travels, first to last; positive: the finger is short.",
-     /*sum_zero=*/true},
+     /*sum_zero=*/true, /*reciprocal=*/false, /*usual=*/5},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {

@@ -16,6 +16,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/formula_program.h"
+#include "server/effects/user_term.h"
 
 namespace touchstone::effects {
 
@@ -63,12 +64,6 @@ std::string DescribeFailure(const CompiledFormula& formula, const TouchBatch& to
                       "\"");
 }
 
-// The array that the formula adds to.
-std::vector<double>& Target(const model::FormulaSpec& spec, TouchBatch& touches) {
-  if (spec.stage == model::Stage::kPose) return touches.travel_offset_m;
-  return spec.stage == model::Stage::kSensor ? touches.reported_time_s : touches.travel_m;
-}
-
 void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> values, TouchBatch& touches) {
   if (!touches.formula_error.empty()) return;
   const model::FormulaSpec& spec = *formula.spec;
@@ -82,38 +77,22 @@ void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> value
     if (input.parameter >= 0)
       inputs[i] = FromSi(spec.parameters[input.parameter].unit, values[input.parameter]);
     if (input.covariate.empty()) continue;
-    const auto column = touches.covariates.find(input.covariate);
-    if (column == touches.covariates.end()) {
-      touches.formula_error = absl::StrCat("formula '", spec.name, "' needs the column ", input.covariate,
-                                           ", which these touches do not have");
-      return;
-    }
-    columns[i] = column->second.data();
+    columns[i] = ColumnOf(input.covariate, absl::StrCat("formula '", spec.name, "'"), &touches);
+    if (columns[i] == nullptr) return;
   }
 
-  std::vector<double>& target = Target(spec, touches);
-  const bool needs_contact = spec.stage != model::Stage::kPose;
-  const double si_factor = spec.adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre;
-  for (int finger = 0; finger < touches.fingers(); ++finger) {
-    for (int touch = 0; touch < touches.size(); ++touch) {
-      const int entry = touches.At(finger, touch);
-      if (needs_contact && std::isnan(touches.travel_m[entry])) continue;
-      for (size_t i = 0; i < formula.inputs.size(); ++i) {
-        if (columns[i] != nullptr)
-          inputs[i] = columns[i][touch];
-        else if (formula.inputs[i].read != nullptr)
-          inputs[i] = formula.inputs[i].read(touches, finger, touch);
-      }
-      const double value = evaluator->Value();
-      if (!std::isfinite(value)) {
-        touches.formula_error = DescribeFailure(formula, touches, finger, touch, inputs, value);
-        return;
-      }
-      double added = value * si_factor;
-      if (spec.stage == model::Stage::kSensor && !spec.adds_time) added *= touches.time_per_travel_s_m[entry];
-      target[entry] += added;
+  AddToFingers(spec, &touches, [&](int finger, int touch, double* added) {
+    for (size_t i = 0; i < formula.inputs.size(); ++i) {
+      if (columns[i] != nullptr)
+        inputs[i] = columns[i][touch];
+      else if (formula.inputs[i].read != nullptr)
+        inputs[i] = formula.inputs[i].read(touches, finger, touch);
     }
-  }
+    *added = evaluator->Value();
+    if (std::isfinite(*added)) return true;
+    touches.formula_error = DescribeFailure(formula, touches, finger, touch, inputs, *added);
+    return false;
+  });
 }
 
 bool IsPlainName(const std::string& name) {
@@ -169,35 +148,23 @@ absl::Status CheckParameters(const model::FormulaSpec& spec) {
 // Finds what each name of the expression means in the formula's stage.
 absl::Status Resolve(const model::FormulaSpec& spec, CompiledFormula* formula, model::EffectNeeds* needs) {
   std::vector<bool> used(spec.parameters.size(), false);
+  std::vector<std::string> parameters;
+  for (const model::ParameterInfo& parameter : spec.parameters) parameters.push_back(parameter.name);
   for (const UsedName& name : formula->program->names()) {
-    const auto wrong = [&](absl::string_view what) {
-      return absl::InvalidArgumentError(absl::StrCat("character ", name.character, ": ", what));
-    };
     Input input;
     for (size_t p = 0; p < spec.parameters.size(); ++p)
       if (spec.parameters[p].name == name.name) input.parameter = static_cast<int>(p);
-    std::vector<std::string> known;
-    for (const FormulaVariable& variable : FormulaVariables()) {
-      known.push_back(variable.name);
-      if (name.name != variable.name) continue;
-      if (variable.since > spec.stage)
-        return wrong(absl::StrCat(name.name, " is known from the ", model::StageName(variable.since),
-                                  " stage on, and this formula acts in the ", model::StageName(spec.stage),
-                                  " stage"));
-      input.read = variable.read;
-    }
     if (input.parameter >= 0) {
       used[input.parameter] = true;
-    } else if (absl::StartsWith(name.name, "cov_") && name.name.size() > 4) {
-      input.covariate = name.name;
-      needs->covariates.push_back(name.name);
-    } else if (input.read == nullptr) {
-      for (const model::ParameterInfo& parameter : spec.parameters) known.push_back(parameter.name);
-      return wrong(absl::StrCat("unknown variable '", name.name, "'", DidYouMean(name.name, known)));
+    } else {
+      const auto variable = FindInput("formula", spec, name.name, parameters);
+      if (!variable.ok())
+        return absl::InvalidArgumentError(
+            absl::StrCat("character ", name.character, ": ", variable.status().message()));
+      if (*variable != nullptr) input.read = (*variable)->read;
+      if (*variable == nullptr) input.covariate = name.name;
+      AddNeedsOf(name.name, needs);
     }
-    needs->curvature |= name.name == "curvature_per_m";
-    needs->previous_press |= name.name == "previous_press_mm";
-    needs->session_time |= name.name == "session_time_s";
     formula->inputs.push_back(std::move(input));
   }
   for (size_t p = 0; p < used.size(); ++p)
@@ -210,10 +177,7 @@ absl::Status Resolve(const model::FormulaSpec& spec, CompiledFormula* formula, m
 absl::StatusOr<std::shared_ptr<const model::Effect>> Make(const model::FormulaSpec& spec) {
   if (!IsPlainName(spec.name))
     return absl::InvalidArgumentError("a name has letters, digits and '_', and starts with a letter");
-  if (spec.adds_time && spec.stage != model::Stage::kSensor)
-    return absl::InvalidArgumentError(
-        absl::StrCat("time_us can be added in the sensor stage only, not in the ",
-                     model::StageName(spec.stage), " stage; there add travel_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckAdds(spec));
   TOUCHSTONE_RETURN_IF_ERROR(CheckParameters(spec));
 
   auto formula = std::make_shared<CompiledFormula>();

@@ -105,6 +105,7 @@ TEST(Formula, KnowsEveryVariableWithItsMeaning) {
       {"finger", 1},
       {"speed_mm_s", touches.speed_m_s[touch] * kMillimetresPerMetre},
       {"session_time_s", touches.session_time_s[touch]},
+      {"pause_s", touches.pause_s[touch]},
       {"previous_press_mm", touches.previous_press_m[entry] * kMillimetresPerMetre},
       {"approach_x", touches.approach[touch].x()},
       {"approach_y", touches.approach[touch].y()},
@@ -191,6 +192,7 @@ TEST(Formula, SaysWhatItNeeds) {
   };
   EXPECT_TRUE(needs("curvature_per_m").curvature);
   EXPECT_FALSE(needs("travel_mm").curvature);
+  EXPECT_TRUE(needs("pause_s").session_time);
   EXPECT_TRUE(needs("previous_press_mm").previous_press);
   EXPECT_THAT(needs("cov_b + cov_a*cov_b").covariates, testing::ElementsAre("cov_b", "cov_a"));
 }

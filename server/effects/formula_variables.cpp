@@ -34,6 +34,9 @@ double SpeedMmS(const TouchBatch& b, int, int touch) {
 double SessionTimeS(const TouchBatch& b, int, int touch) {
   return b.session_time_s[touch];
 }
+double PauseS(const TouchBatch& b, int, int touch) {
+  return b.pause_s[touch];
+}
 double PreviousPressMm(const TouchBatch& b, int finger, int touch) {
   return b.previous_press_m[b.At(finger, touch)] * kMillimetres;
 }
@@ -58,6 +61,7 @@ constexpr FormulaVariable kVariables[] = {
      Finger},
     {"speed_mm_s", "mm/s", model::Stage::kPose, "commanded speed", SpeedMmS},
     {"session_time_s", "s", model::Stage::kPose, "time since the session began", SessionTimeS},
+    {"pause_s", "s", model::Stage::kPose, "time since the session's previous touch; 0 for the first", PauseS},
     {"previous_press_mm", "mm", model::Stage::kPose,
      "how far this finger was pressed in by the session's previous touch; 0 for the first", PreviousPressMm},
     {"approach_x", "", model::Stage::kPose, "direction of motion, unit vector in the object frame",

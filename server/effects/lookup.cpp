@@ -5,14 +5,14 @@
 // A finger without contact gets nothing. A covariate that is not finite is an error of the whole batch.
 #include "server/effects/lookup.h"
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/formula.h"
+#include "server/effects/user_term.h"
 
 namespace touchstone::effects {
 
@@ -23,8 +23,7 @@ model::Effect Lookup() {
   effect.stage = model::Stage::kMotion;
   effect.meaning =
       "A curve of your own, or one that a diagnosis found: it adds travel_mm or time_us to each finger, by "
-      "the "
-      "value of one covariate. It needs a name, a covariate, knots and values.";
+      "the value of one covariate. It needs a name, a covariate, knots and values.";
   effect.signature =
       "What the curve shows. The diagnosis gives one where no built-in effect explains what depends on a "
       "covariate.";
@@ -52,11 +51,6 @@ struct LookupInput {
   double (*read)(const TouchBatch&, int, int) = nullptr;  // null: a cov_* column
 };
 
-std::vector<double>& LookupTarget(const model::LookupSpec& spec, TouchBatch& touches) {
-  if (spec.stage == model::Stage::kPose) return touches.travel_offset_m;
-  return spec.stage == model::Stage::kSensor ? touches.reported_time_s : touches.travel_m;
-}
-
 void ApplyLookup(const LookupInput& input, TouchBatch& touches) {
   if (!touches.formula_error.empty()) return;
   const model::LookupSpec& spec = input.spec;
@@ -68,40 +62,25 @@ void ApplyLookup(const LookupInput& input, TouchBatch& touches) {
   }
   const double* column = nullptr;
   if (input.read == nullptr) {
-    const auto found = touches.covariates.find(spec.covariate);
-    if (found == touches.covariates.end()) {
-      touches.formula_error =
-          absl::StrCat(title, " needs the column ", spec.covariate, ", which these touches do not have");
-      return;
-    }
-    column = found->second.data();
+    column = ColumnOf(spec.covariate, title, &touches);
+    if (column == nullptr) return;
   }
-  std::vector<double>& target = LookupTarget(spec, touches);
-  const bool needs_contact = spec.stage != model::Stage::kPose;
-  const double si_factor = spec.adds_time ? kSecondsPerMicrosecond : kMetresPerMillimetre;
-  for (int finger = 0; finger < touches.fingers(); ++finger) {
-    for (int touch = 0; touch < touches.size(); ++touch) {
-      const int entry = touches.At(finger, touch);
-      if (needs_contact && std::isnan(touches.travel_m[entry])) continue;
-      const double covariate = column != nullptr ? column[touch] : input.read(touches, finger, touch);
-      if (!std::isfinite(covariate)) {
-        touches.formula_error = absl::StrCat(title, ": ", spec.covariate, " is ", ShortestNumber(covariate),
-                                             " for touch ", touches.index[touch], ", finger ", finger);
-        return;
-      }
-      double added = LookupValue(spec, finger, covariate) * si_factor;
-      if (spec.stage == model::Stage::kSensor && !spec.adds_time) added *= touches.time_per_travel_s_m[entry];
-      target[entry] += added;
+  AddToFingers(spec, &touches, [&](int finger, int touch, double* added) {
+    const double covariate = column != nullptr ? column[touch] : input.read(touches, finger, touch);
+    if (!std::isfinite(covariate)) {
+      touches.formula_error = absl::StrCat(title, ": ", spec.covariate, " is ", ShortestNumber(covariate),
+                                           " for touch ", touches.index[touch], ", finger ", finger);
+      return false;
     }
-  }
+    *added = LookupValue(spec, finger, covariate);
+    return true;
+  });
 }
 
 absl::Status CheckCurve(const model::LookupSpec& spec) {
   const auto wrong = [](const auto&... parts) { return absl::InvalidArgumentError(absl::StrCat(parts...)); };
   if (spec.name.empty() || spec.name.size() > 64) return wrong("a name has 1 to 64 characters");
-  if (spec.adds_time && spec.stage != model::Stage::kSensor)
-    return wrong("time_us can be added in the sensor stage only, not in the ", model::StageName(spec.stage),
-                 " stage; there add travel_mm");
+  TOUCHSTONE_RETURN_IF_ERROR(CheckAdds(spec));
   if (spec.knots.size() < 2 || spec.knots.size() > kMaxLookupKnots)
     return wrong("it has ", spec.knots.size(), " knots; it needs 2 to ", kMaxLookupKnots);
   for (size_t n = 0; n < spec.knots.size(); ++n)
@@ -120,23 +99,9 @@ absl::Status CheckCurve(const model::LookupSpec& spec) {
 
 absl::Status FindCovariate(LookupInput* input, model::EffectNeeds* needs) {
   const std::string& name = input->spec.covariate;
-  std::vector<std::string> known;
-  for (const FormulaVariable& variable : FormulaVariables()) {
-    known.push_back(variable.name);
-    if (name != variable.name) continue;
-    if (variable.since > input->spec.stage)
-      return absl::InvalidArgumentError(absl::StrCat(
-          name, " is known from the ", model::StageName(variable.since),
-          " stage on, and this lookup acts in the ", model::StageName(input->spec.stage), " stage"));
-    input->read = variable.read;
-  }
-  if (input->read == nullptr && !(absl::StartsWith(name, "cov_") && name.size() > 4))
-    return absl::InvalidArgumentError(
-        absl::StrCat("unknown covariate '", name, "'", DidYouMean(name, known)));
-  if (input->read == nullptr) needs->covariates.push_back(name);
-  needs->curvature = name == "curvature_per_m";
-  needs->previous_press = name == "previous_press_mm";
-  needs->session_time = name == "session_time_s";
+  TOUCHSTONE_ASSIGN_OR_RETURN(const FormulaVariable* variable, FindInput("lookup", input->spec, name, {}));
+  if (variable != nullptr) input->read = variable->read;
+  AddNeedsOf(name, needs);
   return absl::OkStatus();
 }
 

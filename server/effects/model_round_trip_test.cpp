@@ -88,10 +88,14 @@ model::Model RandomModel(uint64_t seed) {
       instance.values = instance.effect->NeutralValues(model.fingers);
     } else if (effect->name == "lookup") {
       instance.effect = RandomLookup(model.fingers, &random);
+    } else if (effect->name == "surface_map") {
+      instance.effect = *Catalogue().MakeSurfaceMap(
+          {"map.csv", {{"obj 1", {20, 0.1, {{{random.Uniform(-9, 9), 2, 3}, random.Uniform(-1, 1), 0.1}}}}}});
     } else {
       instance.values = RandomValues(*effect, model.fingers, &random);
     }
-    instance.per_object = !instance.effect->lookup && (effect->always_per_object || random.Below(3) == 0);
+    instance.per_object = !instance.effect->lookup && !instance.effect->surface_map &&
+                          (effect->always_per_object || random.Below(3) == 0);
     if (instance.per_object)
       for (uint64_t i = random.Below(3); i > 0; --i)
         instance.object_values[absl::StrCat("obj ", i)] =
@@ -164,6 +168,31 @@ effects:
   EXPECT_THAT(pose.ValuesFor("lat05"), testing::ElementsAre(0, 0, 0.001, 0, 0, 0));
   EXPECT_THAT(pose.ValuesFor("lat20"),
               testing::ElementsAre(0, 0, 0.001, 0, 0, testing::DoubleNear(0.0349066, 1e-6)));
+}
+
+TEST(ModelFile, HoldsAnyEffectOnOneObjectOnly) {
+  for (const auto& effect : Catalogue().All()) {
+    if (effect->parameters.empty()) continue;
+    model::Model model = model::NominalModel();
+    model::EffectInstance instance{effect, true, effect->NeutralValues(model.fingers), {}};
+    std::vector<double> values = instance.values;
+    for (size_t p = 0, at = 0; p < effect->parameters.size();
+         at += effect->parameters[p++].Count(model.fingers)) {
+      const model::ParameterInfo& parameter = effect->parameters[p];
+      values[at] =
+          ToSi(parameter.unit, parameter.neutral == parameter.upper ? parameter.typical
+                                                                    : parameter.neutral + parameter.typical);
+      if (parameter.sum_zero) values[at + 1] = -values[at];
+    }
+    instance.object_values["lat10"] = values;
+    model.effects = {instance};
+    const absl::StatusOr<model::Model> again =
+        model::ParseModel(model::FormatModel(model), "one object", Catalogue());
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->Hash(), model.Hash()) << effect->name;
+    EXPECT_EQ(again->effects[0].ValuesFor("lat00")[0], instance.values[0]) << effect->name;
+    EXPECT_NE(again->effects[0].ValuesFor("lat10")[0], instance.values[0]) << effect->name;
+  }
 }
 
 TEST(AddEffect, BuildsFormulasFromTheCommandLine) {

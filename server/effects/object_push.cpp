@@ -10,7 +10,8 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::shift_m, "shift_mm", Unit::kMillimetre, 0, 5, 0, 0.3, "How far the object gives way."},
+    {&Parameters::shift_m, "shift_mm", Unit::kMillimetre, 0, 50, 0, 0.3, "How far the object gives way.",
+     /*sum_zero=*/false, /*reciprocal=*/false, /*usual=*/5},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {

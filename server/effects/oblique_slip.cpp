@@ -13,8 +13,9 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::travel_m, "travel_mm", Unit::kMillimetre, 0, 5, 0, 0.3,
-     "Extra travel before the finger triggers, at 45 deg of incidence."},
+    {&Parameters::travel_m, "travel_mm", Unit::kMillimetre, 0, 50, 0, 0.3,
+     "Extra travel before the finger triggers, at 45 deg of incidence.",
+     /*sum_zero=*/false, /*reciprocal=*/false, /*usual=*/5},
 };
 
 void Apply(const Parameters& p, TouchBatch& touches) {

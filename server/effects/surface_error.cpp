@@ -1,9 +1,8 @@
 // Surface error: the real surface departs from its mesh by smooth bumps along the normal, as bad prints do.
 //   d_i -= h(contact_i) / cos(inc_i),  h a smooth random field with the given RMS and correlation length
-// First order: the bump moves the surface along its normal, and neither the normal nor the place of the
-// contact on the surface is found anew. Beyond 84 deg the division is held at cos = 0.1. Every object has a
-// field of its own, drawn from (seed, name of the object), fixed to the object: it moves and turns with it. h
-// has the given RMS over the whole surface of the object, exactly up to the sampling of the surface (1 %).
+// First order, see surface_departure.h. Every object has a field of its own, drawn from (seed, name of the object),
+// fixed to the object: it moves and turns with it. h has the given RMS over the whole surface of the object, exactly
+// up to the sampling of the surface (1 %).
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -12,12 +11,12 @@
 #include "server/base/random.h"
 #include "server/effects/define_effect.h"
 #include "server/effects/smooth_field.h"
+#include "server/effects/surface_departure.h"
 #include "server/geometry/surface.h"
 
 namespace touchstone::effects {
 namespace {
 
-constexpr double kMinCosine = 0.1;
 constexpr int kSurfacePoints = 4096;
 constexpr size_t kMaxRemembered = 64;
 
@@ -96,19 +95,8 @@ void Apply(const Parameters& p, TouchBatch& touches) {
   if (p.rms_m == 0) return;
   static FieldCache& cache = *new FieldCache;  // never destroyed: worker threads may outlive main
   const std::shared_ptr<const SmoothField> field = cache.Get(*touches.surface, touches.seed, p.length_m);
-  const Eigen::Matrix3d mesh_from_object = touches.surface_rotation.transpose() / touches.surface_scale;
-  for (int finger = 0; finger < touches.fingers(); ++finger) {
-    for (int touch = 0; touch < touches.size(); ++touch) {
-      const int entry = touches.At(finger, touch);
-      if (std::isnan(touches.travel_m[entry])) continue;
-      const Eigen::Vector3d point_in_mesh =
-          mesh_from_object * (touches.contact_m[entry] - touches.surface_translation_m);
-      const double height_m = p.rms_m * field->At(point_in_mesh);
-      const double earlier_m = height_m / std::max(touches.cos_incidence[entry], kMinCosine);
-      touches.travel_m[entry] -= earlier_m;
-      touches.contact_m[entry] -= earlier_m * touches.approach[touch];
-    }
-  }
+  MoveSurface([&](const Eigen::Vector3d& point_in_mesh) { return p.rms_m * field->At(point_in_mesh); },
+              touches);
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ void TouchBatch::Reset(int size, int fingers) {
   standoff_m.resize(touches);
   speed_m_s.resize(touches);
   session_time_s.assign(touches, 0.0);
+  pause_s.assign(touches, 0.0);
   previous_press_m.assign(entries, 0.0);
   covariates.clear();
 

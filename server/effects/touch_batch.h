@@ -47,6 +47,7 @@ class TouchBatch {
   std::vector<double> standoff_m;      // per touch
   std::vector<double> speed_m_s;       // per touch: commanded
   std::vector<double> session_time_s;  // per touch
+  std::vector<double> pause_s;         // per touch: since the session's previous touch; 0 for the first
   // Per finger: how far the previous touch of the session pressed it in after its contact; 0 for the first touch.
   std::vector<double> previous_press_m;
   std::map<std::string, std::vector<double>> covariates;  // per touch, by name ("cov_temperature")

@@ -3,6 +3,8 @@
 // read the same rows. This header is the interface; the physics stands in effects/, one file per effect.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -34,10 +36,14 @@ struct ParameterInfo {
   std::string name;  // ends in the unit's suffix: "shift_mm"
   Unit unit = Unit::kNone;
   Arity arity = Arity::kScalar;
-  double lower = 0;       // inclusive
-  double upper = 0;       // inclusive
-  double neutral = 0;     // the default: the value that changes nothing
-  double typical = 0;     // the size that rigs show; the scale of the prior: neutral +- typical
+  double lower = 0;    // inclusive
+  double upper = 0;    // inclusive
+  double neutral = 0;  // the default: the value that changes nothing
+  double typical = 0;  // the size that rigs show; the scale of the prior: neutral +- typical
+  // What rigs show, within the bounds: a value beyond it is simulated, but a diagnosis that finds one asks for a look at
+  // the set-up.
+  double usual_lower = -INFINITY;
+  double usual_upper = INFINITY;
   bool sum_zero = false;  // per finger: only differences between fingers can be seen, so the values sum to 0
   bool reciprocal = false;  // the response is smooth in 1 / value: a fit moves that, and "none" is infinity
   std::string meaning;
@@ -50,14 +56,16 @@ struct ParameterInfo {
 // What an effect does to the data: to their expectation, or to one property of their scatter. A diagnosis fits
 // systematic effects and judges each of the others by the likelihood of what the best explanation leaves.
 enum class EffectRole {
-  kSystematic,    // changes the expected times
-  kNoiseLevel,    // standard deviation of one reading
-  kNoiseGrowth,   // growth of the noise with the incidence
-  kNoiseTails,    // degrees of freedom of heavy tails
-  kQuantisation,  // readings fall on ticks
-  kDropout,       // readings are missing
-  kNoiseMemory,   // a wander in session time, each finger on its own
-  kSmoothError,   // a smooth error of the surface, drawn anew for every object
+  kSystematic,     // changes the expected times
+  kNoiseLevel,     // standard deviation of one reading
+  kNoiseGrowth,    // growth of the noise with the incidence
+  kNoiseTails,     // degrees of freedom of heavy tails
+  kQuantisation,   // readings fall on ticks
+  kDropout,        // readings are missing
+  kNoiseMemory,    // a wander in session time, each finger on its own
+  kNoiseOfLength,  // standard deviation of where a finger triggers: in time it grows as the speed falls
+  kNoiseByFinger,  // what a finger's noise has beyond the others'
+  kSmoothError,    // a smooth error of the surface, drawn anew for every object
 };
 
 // Another effect that may explain the same data, and what tells the two apart.
@@ -74,26 +82,44 @@ struct EffectNeeds {
   std::vector<std::string> covariates = {};  // cov_* columns
 };
 
-// What a formula effect is made of, as the model file has it.
-struct FormulaSpec {
+// What formulas and lookups have in common, as the model file has it: they add something to each finger.
+struct UserTerm {
   std::string name;
   bool adds_time = false;  // adds: time_us instead of travel_mm
   Stage stage = Stage::kMotion;
+};
+
+// What a formula effect is made of.
+struct FormulaSpec : UserTerm {
   std::string expression;  // in the units of files
   std::vector<ParameterInfo> parameters;
   std::vector<double> values;  // in the unit of files, one per parameter
 };
 
-// What a lookup effect is made of, as the model file has it: a curve over one covariate, linear between its knots
-// and constant beyond them.
-struct LookupSpec {
-  std::string name;
-  bool adds_time = false;  // adds: time_us instead of travel_mm
-  Stage stage = Stage::kMotion;
+// What a lookup effect is made of: a curve over one covariate, linear between its knots and constant beyond them.
+struct LookupSpec : UserTerm {
   std::string covariate;      // a variable of formulas or a cov_* column
   std::vector<double> knots;  // rising, in the covariate's unit
   std::vector<std::vector<double>>
       values;  // mm or us at the knots: one list for every finger, or one per finger
+};
+
+// How one object's surface departs from its mesh, in the units of the map's file (surface_map.md).
+struct SurfaceMapPoint {
+  std::array<double, 3> position_mm{};  // in the frame of the mesh file
+  double departure_mm = 0;              // along the outward normal
+  double std_dev_mm = 0;
+};
+struct SurfaceMapObject {
+  double length_mm = 0,
+         rms_mm = 0;  // of the departures: correlation length, size before anything is measured
+  std::vector<SurfaceMapPoint> points;
+};
+
+// What a surface map is made of.
+struct SurfaceMapSpec {
+  std::string file;                                 // as the model file names it
+  std::map<std::string, SurfaceMapObject> objects;  // by name
 };
 
 struct Effect {
@@ -111,8 +137,9 @@ struct Effect {
   std::vector<ParameterInfo> parameters;
   std::vector<ConfoundedEffect> confounded_with;  // each pair is declared by one of the two
   EffectNeeds needs;
-  std::shared_ptr<const FormulaSpec> formula;  // set for formulas only
-  std::shared_ptr<const LookupSpec> lookup;    // set for lookups only
+  std::shared_ptr<const FormulaSpec> formula;         // set for formulas only
+  std::shared_ptr<const LookupSpec> lookup;           // set for lookups only
+  std::shared_ptr<const SurfaceMapSpec> surface_map;  // set for surface maps only
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, effects::TouchBatch& batch)> apply;
@@ -127,14 +154,16 @@ struct Effect {
 class EffectCatalogue {
  public:
   virtual ~EffectCatalogue() = default;
-  // By stage, in the order of application. The last two, "formula" and "lookup", only describe: they have no
-  // parameters and change nothing.
+  // By stage, in the order of application. "surface_map" and the last two, "formula" and "lookup", only describe:
+  // they have no parameters and change nothing.
   virtual std::vector<std::shared_ptr<const Effect>> All() const = 0;
   virtual std::shared_ptr<const Effect> Find(const std::string& name) const = 0;  // null if unknown
   // Checks and compiles a formula; the error names the place in the expression.
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec& spec) const = 0;
   // Checks a curve; the error names the field.
   virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec& spec) const = 0;
+  // Makes a map of departures that were read from its file act.
+  virtual absl::StatusOr<std::shared_ptr<const Effect>> MakeSurfaceMap(const SurfaceMapSpec& spec) const = 0;
 };
 
 }  // namespace touchstone::model

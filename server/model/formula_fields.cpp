@@ -8,15 +8,11 @@
 namespace touchstone::model {
 namespace {
 
-absl::Status Missing(absl::string_view what, absl::string_view example) {
-  return absl::InvalidArgumentError(absl::StrCat(what, " is missing; write for example ", example));
-}
-
 absl::StatusOr<double> NumberField(const FormulaFields::Parameter& parameter, const char* field) {
   const auto text = parameter.fields.find(field);
   if (text == parameter.fields.end())
-    return Missing(absl::StrCat("formula parameter ", parameter.name, ": '", field, "'"),
-                   "{value: 0, unit: mm, min: -1, max: 1}");
+    return MissingField(absl::StrCat("formula parameter ", parameter.name), field,
+                        "{value: 0, unit: mm, min: -1, max: 1}");
   absl::StatusOr<double> value = ParseNumber(text->second);
   if (value.ok()) return value;
   return absl::InvalidArgumentError(
@@ -26,8 +22,8 @@ absl::StatusOr<double> NumberField(const FormulaFields::Parameter& parameter, co
 absl::StatusOr<Unit> UnitField(const FormulaFields::Parameter& parameter) {
   const auto text = parameter.fields.find("unit");
   if (text == parameter.fields.end())
-    return Missing(absl::StrCat("formula parameter ", parameter.name, ": 'unit'"),
-                   "unit: mm, or unit: 1 for a ratio");
+    return MissingField(absl::StrCat("formula parameter ", parameter.name), "unit",
+                        "unit: mm, or unit: 1 for a ratio");
   Unit unit = Unit::kNone;
   if (text->second == "1" || UnitFromSymbol(text->second, &unit)) return unit;
   return absl::InvalidArgumentError(
@@ -39,27 +35,9 @@ absl::StatusOr<Unit> UnitField(const FormulaFields::Parameter& parameter) {
 
 absl::StatusOr<FormulaSpec> FormulaFields::ToSpec() const {
   FormulaSpec spec;
-  if (name.empty()) return Missing("formula: 'name'", "name: lead_screw");
-  if (expression.empty()) return Missing("formula: 'expression'", "expression: \"k * finger\"");
-  if (adds.empty()) return Missing("formula: 'adds'", "adds: travel_mm (or time_us)");
-  if (adds != "travel_mm" && adds != "time_us")
-    return absl::InvalidArgumentError(
-        absl::StrCat("formula: adds is '", adds, "'; it must be travel_mm or time_us"));
-  spec.name = name;
+  TOUCHSTONE_RETURN_IF_ERROR(FillTerm("formula", "lead_screw", &spec));
+  if (expression.empty()) return MissingField("formula", "expression", "expression: \"k * finger\"");
   spec.expression = expression;
-  spec.adds_time = adds == "time_us";
-  spec.stage = spec.adds_time ? Stage::kSensor : Stage::kMotion;
-  if (!stage.empty()) {
-    bool found = false;
-    for (const Stage candidate : {Stage::kPose, Stage::kContact, Stage::kMotion, Stage::kSensor}) {
-      if (stage != StageName(candidate)) continue;
-      spec.stage = candidate;
-      found = true;
-    }
-    if (!found)
-      return absl::InvalidArgumentError(
-          absl::StrCat("formula: stage is '", stage, "'; it must be pose, contact, motion or sensor"));
-  }
   for (const Parameter& parameter : parameters) {
     ParameterInfo info;
     info.name = parameter.name;

@@ -7,18 +7,15 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/model/effect.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 
-struct FormulaFields {
+struct FormulaFields : UserTermFields {
   struct Parameter {
     std::string name;
     std::map<std::string, std::string> fields;  // value, unit, min, max
   };
-  std::string name;
-  std::string adds;
-  std::string stage;  // empty: motion for travel_mm, sensor for time_us
   std::string expression;
   std::vector<Parameter> parameters;
 

@@ -12,19 +12,6 @@
 namespace touchstone::model {
 namespace {
 
-absl::Status MissingField(absl::string_view what, absl::string_view example) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("lookup: '", what, "' is missing; write for example ", example));
-}
-
-absl::StatusOr<Stage> StageOf(const std::string& text, bool adds_time) {
-  if (text.empty()) return adds_time ? Stage::kSensor : Stage::kMotion;
-  for (const Stage stage : {Stage::kPose, Stage::kContact, Stage::kMotion, Stage::kSensor})
-    if (text == StageName(stage)) return stage;
-  return absl::InvalidArgumentError(
-      absl::StrCat("lookup: stage is '", text, "'; it must be pose, contact, motion or sensor"));
-}
-
 std::string Join(const std::vector<double>& numbers) {
   return absl::StrJoin(numbers, " ", [](std::string* out, double x) { *out += ShortestNumber(x); });
 }
@@ -33,17 +20,10 @@ std::string Join(const std::vector<double>& numbers) {
 
 absl::StatusOr<LookupSpec> LookupFields::ToSpec(int fingers) const {
   LookupSpec spec;
-  if (name.empty()) return MissingField("name", "name: warm_up");
-  if (adds.empty()) return MissingField("adds", "adds: travel_mm (or time_us)");
-  if (adds != "travel_mm" && adds != "time_us")
-    return absl::InvalidArgumentError(
-        absl::StrCat("lookup: adds is '", adds, "'; it must be travel_mm or time_us"));
-  if (covariate.empty()) return MissingField("covariate", "covariate: session_time_s");
-  if (knots.empty()) return MissingField("knots", "knots: [0, 300, 900]");
-  if (values.empty()) return MissingField("values", "values: [0, 0.1, 0.2]");
-  spec.name = name;
-  spec.adds_time = adds == "time_us";
-  TOUCHSTONE_ASSIGN_OR_RETURN(spec.stage, StageOf(stage, spec.adds_time));
+  TOUCHSTONE_RETURN_IF_ERROR(FillTerm("lookup", "warm_up", &spec));
+  if (covariate.empty()) return MissingField("lookup", "covariate", "covariate: session_time_s");
+  if (knots.empty()) return MissingField("lookup", "knots", "knots: [0, 300, 900]");
+  if (values.empty()) return MissingField("lookup", "values", "values: [0, 0.1, 0.2]");
   spec.covariate = covariate;
   spec.knots = knots;
   if (values.count("") != 0 && values.size() == 1) {

@@ -7,14 +7,11 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/model/effect.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 
-struct LookupFields {
-  std::string name;
-  std::string adds;
-  std::string stage;  // empty: motion for travel_mm, sensor for time_us
+struct LookupFields : UserTermFields {
   std::string covariate;
   std::vector<double> knots;
   std::map<std::string, std::vector<double>> values;  // by finger name; "" alone: of every finger

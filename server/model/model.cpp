@@ -5,6 +5,7 @@
 #include "server/base/text.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/parameter_values.h"
+#include "server/model/surface_map_file.h"
 
 namespace touchstone::model {
 namespace {
@@ -48,6 +49,7 @@ std::string Model::Hash() const {
                         ShortestNumber(parameter.lower), " ", ShortestNumber(parameter.upper), "\n");
     }
     if (effect.lookup) AppendText("lookup", LookupDefinition(*effect.lookup), &text);
+    if (effect.surface_map) AppendText("surface_map", FormatSurfaceMap(effect.surface_map->objects), &text);
     AppendValues(instance, instance.values, fingers, &text);
     for (const auto& [object, values] : instance.object_values) {
       AppendText("object", object, &text);

@@ -8,6 +8,7 @@
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
+#include "server/model/surface_map_file.h"
 
 namespace touchstone::model {
 namespace {
@@ -31,6 +32,7 @@ std::string AllValues(const EffectInstance& instance, int fingers) {
     parts.push_back(absl::StrCat(effect.formula->adds_time ? "time_us" : "travel_mm",
                                  " += ", effect.formula->expression));
   if (effect.lookup) parts.push_back(LookupInWords(*effect.lookup));
+  if (effect.surface_map) parts.push_back(SurfaceMapInWords(*effect.surface_map));
   for (size_t i = 0; i < effect.parameters.size(); ++i)
     parts.push_back(
         absl::StrCat(effect.parameters[i].name, " = ",
@@ -82,6 +84,10 @@ void CompareEffects(const EffectInstance& before, int fingers_before, const Effe
   if (effect.lookup && LookupDefinition(*before.effect->lookup) != LookupDefinition(*effect.lookup))
     lines->push_back(absl::StrCat(title, ": ", LookupInWords(*before.effect->lookup), " -> ",
                                   LookupInWords(*effect.lookup), ", values changed"));
+  if (effect.surface_map &&
+      FormatSurfaceMap(before.effect->surface_map->objects) != FormatSurfaceMap(effect.surface_map->objects))
+    lines->push_back(absl::StrCat(title, ": ", SurfaceMapInWords(*before.effect->surface_map), " -> ",
+                                  SurfaceMapInWords(*effect.surface_map), ", values changed"));
   if (before.per_object != after.per_object)
     lines->push_back(absl::StrCat(title, ": scope ", before.per_object ? "object -> rig" : "rig -> object"));
   CompareValues(title, "", effect, before.values, fingers_before, after.values, fingers_after, lines);

@@ -13,6 +13,7 @@
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
+#include "server/model/surface_map_file.h"
 
 namespace touchstone::model {
 namespace {
@@ -121,10 +122,26 @@ absl::StatusOr<std::shared_ptr<const Effect>> LookupFrom(const std::vector<Assig
   return catalogue.MakeLookup(spec);
 }
 
+// "file=better.surface.csv".
+absl::StatusOr<std::shared_ptr<const Effect>> SurfaceMapFrom(const std::vector<Assignment>& assignments,
+                                                             const EffectCatalogue& catalogue,
+                                                             const ModelFileReader& files) {
+  if (assignments.size() != 1 || assignments[0].key != "file")
+    return absl::InvalidArgumentError(
+        "surface_map takes file=FILE and nothing else; the format is in server/model/surface_map.md");
+  if (files == nullptr) return absl::InvalidArgumentError("surface_map: no file can be read here");
+  SurfaceMapSpec spec;
+  spec.file = assignments[0].value;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, files(spec.file));
+  TOUCHSTONE_ASSIGN_OR_RETURN(spec.objects, ParseSurfaceMap(text, spec.file));
+  return catalogue.MakeSurfaceMap(spec);
+}
+
 }  // namespace
 
 absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_name,
-                                const std::vector<std::string>& texts, const EffectCatalogue& catalogue) {
+                                const std::vector<std::string>& texts, const EffectCatalogue& catalogue,
+                                const ModelFileReader& files) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Assignment> assignments, Split(texts));
   EffectInstance added;
   added.effect = catalogue.Find(effect_name);
@@ -140,6 +157,13 @@ absl::StatusOr<Model> AddEffect(const Model& model, const std::string& effect_na
   }
   if (effect_name == "lookup") {
     TOUCHSTONE_ASSIGN_OR_RETURN(added.effect, LookupFrom(assignments, model.fingers, catalogue));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckAddition(model, *added.effect));
+    Model result = model;
+    result.effects.push_back(std::move(added));
+    return result;
+  }
+  if (effect_name == "surface_map") {
+    TOUCHSTONE_ASSIGN_OR_RETURN(added.effect, SurfaceMapFrom(assignments, catalogue, files));
     TOUCHSTONE_RETURN_IF_ERROR(CheckAddition(model, *added.effect));
     Model result = model;
     result.effects.push_back(std::move(added));

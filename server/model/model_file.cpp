@@ -5,6 +5,7 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -12,6 +13,7 @@
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
+#include "server/model/surface_map_file.h"
 #include "server/model/yaml_tree.h"
 
 namespace touchstone::model {
@@ -21,8 +23,8 @@ using Kind = YamlNode::Kind;
 
 class ModelReader {
  public:
-  ModelReader(const std::string& origin, const EffectCatalogue& catalogue)
-      : origin_(origin), catalogue_(catalogue) {}
+  ModelReader(const std::string& origin, const EffectCatalogue& catalogue, const ModelFileReader& files)
+      : origin_(origin), catalogue_(catalogue), files_(files) {}
 
   absl::StatusOr<Model> Read(const YamlNode& root) {
     TOUCHSTONE_RETURN_IF_ERROR(
@@ -134,6 +136,8 @@ class ModelReader {
       TOUCHSTONE_RETURN_IF_ERROR(ReadFormula(key, body, &instance));
     } else if (effect->name == "lookup") {
       TOUCHSTONE_RETURN_IF_ERROR(ReadLookup(key, body, &instance));
+    } else if (effect->name == "surface_map") {
+      TOUCHSTONE_RETURN_IF_ERROR(ReadSurfaceMap(key, body, &instance));
     } else {
       instance.effect = effect;
       instance.values = effect->NeutralValues(model_.fingers);
@@ -289,6 +293,35 @@ class ModelReader {
     return absl::OkStatus();
   }
 
+  absl::Status ReadSurfaceMap(const YamlNode& key, const YamlNode& body, EffectInstance* instance) const {
+    TOUCHSTONE_RETURN_IF_ERROR(CheckKeys(body, "surface_map", {"file", "csv"}));
+    const YamlNode *file = body.Find("file"), *csv = body.Find("csv");
+    if (file == nullptr)
+      return Error(key, "surface_map: 'file' is missing; write for example {file: map.csv}");
+    SurfaceMapSpec spec;
+    TOUCHSTONE_ASSIGN_OR_RETURN(spec.file, Text(*file, "surface_map.file"));
+    if (csv == nullptr && files_ == nullptr)
+      return Error(*file,
+                   absl::StrCat("surface_map: the content of '", spec.file,
+                                "' is missing: only a model file that is read here can name files. Give "
+                                "its text as 'csv', as `touchstone model show` prints it"));
+    if (csv == nullptr) {
+      const absl::StatusOr<std::string> text = files_(spec.file);
+      if (!text.ok()) return Error(*file, absl::StrCat("surface_map: ", text.status().message()));
+      TOUCHSTONE_ASSIGN_OR_RETURN(spec.objects, ParseSurfaceMap(*text, spec.file));
+    } else {
+      if (csv->kind != Kind::kScalar)
+        return Error(*csv, absl::StrCat("surface_map.csv is ", csv->KindInWords(), "; it must be a text"));
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          spec.objects,
+          ParseSurfaceMap(csv->text, absl::StrCat(origin_, ":", csv->line, ": surface_map.csv")));
+    }
+    absl::StatusOr<std::shared_ptr<const Effect>> effect = catalogue_.MakeSurfaceMap(spec);
+    if (!effect.ok()) return Error(key, effect.status().message());
+    instance->effect = *std::move(effect);
+    return absl::OkStatus();
+  }
+
   absl::StatusOr<std::vector<double>> Numbers(const YamlNode& node, absl::string_view what) const {
     TOUCHSTONE_RETURN_IF_ERROR(Want(node, Kind::kSequence, what, "[0, 10, 20]"));
     std::vector<double> numbers;
@@ -301,15 +334,23 @@ class ModelReader {
 
   const std::string& origin_;
   const EffectCatalogue& catalogue_;
+  const ModelFileReader& files_;
   Model model_;
 };
 
 }  // namespace
 
 absl::StatusOr<Model> ParseModel(const std::string& yaml, const std::string& origin,
-                                 const EffectCatalogue& catalogue) {
+                                 const EffectCatalogue& catalogue, const ModelFileReader& files) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const YamlNode root, ParseYaml(yaml, origin));
-  return ModelReader(origin, catalogue).Read(root);
+  return ModelReader(origin, catalogue, files).Read(root);
+}
+
+ModelFileReader FilesBeside(const std::string& model_path) {
+  return [folder = std::filesystem::path(model_path).parent_path()](const std::string& name) {
+    // An absolute name stays as it is.
+    return ReadFile((folder / name).string(), kMaxYamlBytes);
+  };
 }
 
 }  // namespace touchstone::model

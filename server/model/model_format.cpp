@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
 
 #include <algorithm>
 
@@ -10,6 +11,7 @@
 #include "server/model/finger_name.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
+#include "server/model/surface_map_file.h"
 
 namespace touchstone::model {
 namespace {
@@ -103,9 +105,19 @@ void AppendLookup(const LookupSpec& spec, std::string* text) {
     absl::StrAppend(text, "        ", Scalar(FingerName(i, fingers)), ": ", NumberList(spec.values[i]), "\n");
 }
 
+void AppendSurfaceMap(const SurfaceMapSpec& spec, FileContent content, std::string* text) {
+  if (content == FileContent::kBeside) {
+    absl::StrAppend(text, "  - surface_map: {file: ", Scalar(spec.file), "}\n");
+    return;
+  }
+  absl::StrAppend(text, "  - surface_map:\n      file: ", Scalar(spec.file), "\n      csv: |\n");
+  for (const absl::string_view line : absl::StrSplit(FormatSurfaceMap(spec.objects), '\n', absl::SkipEmpty()))
+    absl::StrAppend(text, "        ", line, "\n");
+}
+
 }  // namespace
 
-std::string FormatModel(const Model& model) {
+std::string FormatModel(const Model& model, FileContent content) {
   std::string text = absl::StrCat("touchstone: model/1\nname: ", Scalar(model.name),
                                   "\nend_effector: {fingers: ", model.fingers,
                                   ", spacing_mm: ", FileNumber(Unit::kMillimetre, model.spacing_m), "}\n",
@@ -118,6 +130,10 @@ std::string FormatModel(const Model& model) {
     }
     if (effect.lookup) {
       AppendLookup(*effect.lookup, &text);
+      continue;
+    }
+    if (effect.surface_map) {
+      AppendSurfaceMap(*effect.surface_map, content, &text);
       continue;
     }
     std::vector<std::string> entries = Entries(effect, instance.values, model.fingers);

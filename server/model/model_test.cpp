@@ -50,6 +50,9 @@ class TwoEffects : public EffectCatalogue {
   absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec&) const override {
     return absl::UnimplementedError("no lookups here");
   }
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeSurfaceMap(const SurfaceMapSpec&) const override {
+    return absl::UnimplementedError("no maps here");
+  }
 
  private:
   std::vector<std::shared_ptr<const Effect>> effects_;

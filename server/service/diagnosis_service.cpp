@@ -72,6 +72,21 @@ class Worker {
   std::thread thread_;  // last: it uses the others
 };
 
+// What went in, by its hashes. A set that came as a stored session or in pieces is known by the client.
+void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input, v1::Report* report) {
+  v1::Provenance* provenance = report->mutable_provenance();
+  provenance->set_seed(input.seed);
+  if (evidence.measurements_case() == v1::Evidence::kCsv)
+    provenance->set_set_sha256(Sha256Hex(evidence.csv()));
+  for (const std::string& object : input.set->objects) {
+    const auto surface = input.surfaces.find(object);
+    if (surface == input.surfaces.end()) continue;
+    v1::MeshProvenance* mesh = provenance->add_meshes();
+    mesh->set_object(object);
+    mesh->set_mesh_hash(surface->second->hash());
+  }
+}
+
 // Reads the evidence, works on it, sends progress and at the end the report. `send` returns false when the
 // client is gone.
 absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
@@ -89,7 +104,9 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources));
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, work(input, how));
-        return diagnosis::report::ToReport(diagnosis);
+        v1::Report report = diagnosis::report::ToReport(diagnosis);
+        AddProvenance(evidence, input, &report);
+        return report;
       },
       resources->pool.get());
   v1::Progress progress;
@@ -153,8 +170,13 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
     if (const absl::Status status = ModelStore::CheckName(name); !status.ok())
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   v1::Report report;
-  absl::Status status =
-      RunAndSend(context, request->evidence(), touchstone::diagnosis::Diagnose, resources_, writer, &report);
+  const Work work = [with_surface_map = request->with_surface_map()](const diagnosis::DiagnosisInput& input,
+                                                                     const diagnosis::DiagnosisContext& how) {
+    diagnosis::DiagnosisInput asked = input;
+    asked.with_surface_map = with_surface_map;
+    return touchstone::diagnosis::Diagnose(asked, how);
+  };
+  absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
   if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);
   return ToGrpc(status);

@@ -26,7 +26,8 @@ absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& 
     if (entry.path().extension() != ".yaml") continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(entry.path().string(), 1 << 20));
     TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
-                                model::ParseModel(text, entry.path().string(), effects::Catalogue()));
+                                model::ParseModel(text, entry.path().string(), effects::Catalogue(),
+                                                  model::FilesBeside(entry.path().string())));
     model.name = entry.path().stem().string();
     store->models_[model.name] = std::make_shared<const model::Model>(std::move(model));
   }
@@ -42,7 +43,8 @@ void ModelStore::Refresh() const {
     if (entry.path().extension() != ".yaml" || models_.count(name)) continue;
     const auto text = ReadFile(entry.path().string(), 1 << 20);
     if (!text.ok()) continue;
-    auto model = model::ParseModel(*text, entry.path().string(), effects::Catalogue());
+    auto model = model::ParseModel(*text, entry.path().string(), effects::Catalogue(),
+                                   model::FilesBeside(entry.path().string()));
     if (!model.ok()) continue;
     model->name = name;
     models_[name] = std::make_shared<const model::Model>(*std::move(model));

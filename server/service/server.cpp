@@ -34,7 +34,8 @@ absl::Status CheckOptions(const ServerOptions& options) {
 absl::StatusOr<std::shared_ptr<const model::Model>> DefaultModel(const std::string& name, ModelStore* store) {
   if (!absl::EndsWith(name, ".yaml")) return store->FindByName(name);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(name, 1 << 20));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, model::ParseModel(text, name, effects::Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model,
+                              model::ParseModel(text, name, effects::Catalogue(), model::FilesBeside(name)));
   TOUCHSTONE_RETURN_IF_ERROR(store->Create(model));
   return store->FindByName(model.name);
 }

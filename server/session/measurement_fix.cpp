@@ -38,14 +38,13 @@ absl::Status Refused(const MeasurementSet& set, absl::string_view what) {
 
 absl::Status CheckObject(const MeasurementSet& set, const std::string& name) {
   if (std::find(set.objects.begin(), set.objects.end(), name) != set.objects.end()) return absl::OkStatus();
-  return Refused(set, absl::StrCat("has no object '", name, "'; it has ", absl::StrJoin(set.objects, ", "),
-                                   DidYouMean(name, set.objects)));
+  return Refused(set, absl::StrCat("has no object '", name, "'", DidYouMean(name, set.objects)));
 }
 
 absl::Status CheckFix(const MeasurementFix& fix, const MeasurementSet& set) {
   const bool moves = fix.axes || fix.reverse_approach || fix.reverse_lateral || !fix.move_objects_m.empty() ||
                      fix.scale_targets != 1 || fix.scale_standoff != 1 || fix.scale_speed != 1;
-  if (moves && !set.has_poses) return Refused(set, "has no poses, so none can be mended");
+  if (moves && !set.has_poses) return Refused(set, "has no poses, so none can be fixed");
   for (const double factor : {fix.scale_times, fix.scale_targets, fix.scale_standoff, fix.scale_speed})
     if (!(factor > 0 && std::isfinite(factor)))
       return Refused(set, absl::StrCat("a factor above 0 was expected, not ", ShortestNumber(factor)));

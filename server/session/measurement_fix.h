@@ -1,6 +1,6 @@
-// Discrete mistakes of measurement files, mended: columns in the wrong order, names exchanged, another unit, a frame
+// Discrete mistakes of measurement files, fixed: columns in the wrong order, names exchanged, another unit, a frame
 // that is turned. One transformation serves the check that looks for the mistake (diagnosis/checks/) and the command
-// that mends the file (`touchstone session fix`), so that what the one found is what the other does.
+// that fixes the file (`touchstone session fix`), so that what the one found is what the other does.
 #pragma once
 
 #include <optional>
@@ -41,14 +41,14 @@ struct MeasurementFix {
   bool empty() const;
 };
 
-// Mends the set. Returns the rows of the old set that are left, in their order. Errors: an object or a finger that the
+// Fixes the set. Returns the rows of the old set that are left, in their order. Errors: an object or a finger that the
 // set does not have, a factor that is not above 0, poses that the set does not have.
 absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, MeasurementSet* set);
 
 // The options of `touchstone session fix` that do it: "--swap-fingers l,m". `fingers`: of the file.
 std::string FixOptions(const MeasurementFix& fix, int fingers);
 
-// Mends the bytes of a measurement file. Fields that stay are copied byte for byte, and so are numbers that only move
+// Fixes the bytes of a measurement file. Fields that stay are copied byte for byte, and so are numbers that only move
 // or change their sign.
 absl::StatusOr<std::string> FixMeasurementFile(absl::string_view csv, const std::string& origin,
                                                const MeasurementFix& fix);

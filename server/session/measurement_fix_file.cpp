@@ -1,4 +1,4 @@
-// A measurement file mended as text, so that what does not change keeps its bytes.
+// A measurement file fixed as text, so that what does not change keeps its bytes.
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>

@@ -18,7 +18,7 @@ const char kMendedHeader[] =
     "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us,cov_note\n";
 
 // The fix of what `set` sets, done to rows below the header; the rows of the result.
-std::string Mended(const std::string& rows, const std::function<void(MeasurementFix*)>& set) {
+std::string FixedText(const std::string& rows, const std::function<void(MeasurementFix*)>& set) {
   MeasurementFix fix;
   set(&fix);
   const auto text = FixMeasurementFile(absl::StrCat(kMendedHeader, rows), "set.csv", fix);
@@ -29,25 +29,25 @@ std::string Mended(const std::string& rows, const std::function<void(Measurement
 
 TEST(MeasurementFix, MovesTimesAndKeepsEveryOtherByte) {
   const std::string row = "7, cup,20.0,60,1,2,3,0,0,-1,1,0,0,1000.50,,0,1e0\r\n";
-  EXPECT_EQ(Mended(row,
-                   [](auto* f) {
-                     f->finger_order = {1, 0, 2};
-                   }),
+  EXPECT_EQ(FixedText(row,
+                      [](auto* f) {
+                        f->finger_order = {1, 0, 2};
+                      }),
             "7, cup,20.0,60,1,2,3,0,0,-1,1,0,0,,1000.50,0,1e0\r\n");
-  EXPECT_EQ(Mended(row,
-                   [](auto* f) {
-                     f->finger_order = {1, 2, 0};
-                   }),
+  EXPECT_EQ(FixedText(row,
+                      [](auto* f) {
+                        f->finger_order = {1, 2, 0};
+                      }),
             "7, cup,20.0,60,1,2,3,0,0,-1,1,0,0,0,1000.50,,1e0\r\n");
 }
 
 TEST(MeasurementFix, TurnsVectorsWithTheirDigits) {
   const std::string row = "0,cup,20,60,1.50,2.0,-3,0.60,0,-0.80,0,1.0,0,5,0,7,\n";
-  EXPECT_EQ(Mended(row, [](auto* f) { f->reverse_approach = true; }),
+  EXPECT_EQ(FixedText(row, [](auto* f) { f->reverse_approach = true; }),
             "0,cup,20,60,1.50,2.0,-3,-0.60,0,0.80,0,1.0,0,5,0,7,\n");
-  EXPECT_EQ(Mended(row, [](auto* f) { f->reverse_lateral = true; }),
+  EXPECT_EQ(FixedText(row, [](auto* f) { f->reverse_lateral = true; }),
             "0,cup,20,60,1.50,2.0,-3,0.60,0,-0.80,0,-1.0,0,5,0,7,\n");
-  EXPECT_EQ(Mended(row, [](auto* f) { f->axes = *ParseAxes("-y,x,z"); }),
+  EXPECT_EQ(FixedText(row, [](auto* f) { f->axes = *ParseAxes("-y,x,z"); }),
             "0,cup,20,60,-2.0,1.50,-3,0,0.60,-0.80,-1.0,0,0,5,0,7,\n");
 }
 
@@ -105,15 +105,15 @@ TEST(MeasurementFix, AnObjectThatNoRowHasAnyMoreIsGone) {
 TEST(MeasurementFix, RenamesObjectsAtOnceSoThatTwoCanSwap) {
   const std::string rows =
       "0,\"a,b\",20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,8,\n";
-  EXPECT_EQ(Mended(rows,
-                   [](auto* f) {
-                     f->rename_objects = {{"a,b", "cup"}, {"cup", "a,b"}};
-                   }),
+  EXPECT_EQ(FixedText(rows,
+                      [](auto* f) {
+                        f->rename_objects = {{"a,b", "cup"}, {"cup", "a,b"}};
+                      }),
             "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,\"a,b\",20,60,1,2,3,0,0,-1,1,0,0,5,0,8,\n");
-  EXPECT_THAT(Mended(rows,
-                     [](auto* f) {
-                       f->rename_objects = {{"cap", "cup"}};
-                     }),
+  EXPECT_THAT(FixedText(rows,
+                        [](auto* f) {
+                          f->rename_objects = {{"cap", "cup"}};
+                        }),
               HasSubstr("has no object 'cap'"));
 }
 
@@ -121,28 +121,32 @@ TEST(MeasurementFix, ScalesMovesShiftsAndDrops) {
   const std::string rows =
       "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,6,0,8,\n"
       "2,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,9\n";
-  EXPECT_THAT(Mended(rows, [](auto* f) { f->scale_times = 1000; }), HasSubstr(",0,5000,0,7000,\n1,"));
-  EXPECT_THAT(Mended(rows, [](auto* f) { f->scale_targets = f->scale_standoff = 10; }),
+  EXPECT_THAT(FixedText(rows, [](auto* f) { f->scale_times = 1000; }), HasSubstr(",0,5000,0,7000,\n1,"));
+  EXPECT_THAT(FixedText(rows, [](auto* f) { f->scale_targets = f->scale_standoff = 10; }),
               HasSubstr("0,cup,20,600,10,20,30,0,0,-1"));
-  EXPECT_THAT(Mended(rows, [](auto* f) { f->scale_speed = 0.5; }), HasSubstr("1,cup,10,60,4"));
-  EXPECT_THAT(Mended(rows,
-                     [](auto* f) {
-                       f->move_objects_m = {{"cup", {0, 0, -0.020}}};
-                     }),
+  EXPECT_THAT(FixedText(rows, [](auto* f) { f->scale_speed = 0.5; }), HasSubstr("1,cup,10,60,4"));
+  EXPECT_THAT(FixedText(rows,
+                        [](auto* f) {
+                          f->move_objects_m = {{"cup", {0, 0, -0.020}}};
+                        }),
               HasSubstr("1,cup,20,60,4,2,23,0"));
-  EXPECT_EQ(Mended(rows, [](auto* f) { f->shift_rows = 1; }),
+  EXPECT_EQ(FixedText(rows, [](auto* f) { f->shift_rows = 1; }),
             "1,cup,20,60,4,2,3,0,0,-1,1,0,0,5,0,7,\n2,cup,20,60,1,2,3,0,0,-1,1,0,0,6,0,8,9\n");
-  EXPECT_EQ(Mended(rows, [](auto* f) { f->shift_rows = -1; }),
+  EXPECT_EQ(FixedText(rows, [](auto* f) { f->shift_rows = -1; }),
             "0,cup,20,60,1,2,3,0,0,-1,1,0,0,6,0,8,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,5,0,7,\n");
-  EXPECT_EQ(Mended(rows, [](auto* f) { f->drop_duplicates = true; }),
+  EXPECT_EQ(FixedText(rows, [](auto* f) { f->drop_duplicates = true; }),
             "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,6,0,8,\n");
 }
 
 TEST(MeasurementFix, RefusesWhatTheSetDoesNotHave) {
   const std::string row = "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n";
-  EXPECT_THAT(Mended(row, [](auto* f) { f->finger_order = {0, 0, 2}; }), HasSubstr("each was expected once"));
-  EXPECT_THAT(Mended(row, [](auto* f) { f->scale_times = 0; }), HasSubstr("a factor above 0"));
-  EXPECT_THAT(Mended(row, [](auto* f) { f->shift_rows = 1; }), HasSubstr("cannot be shifted"));
+  EXPECT_THAT(FixedText(row,
+                        [](auto* f) {
+                          f->finger_order = {0, 0, 2};
+                        }),
+              HasSubstr("each was expected once"));
+  EXPECT_THAT(FixedText(row, [](auto* f) { f->scale_times = 0; }), HasSubstr("a factor above 0"));
+  EXPECT_THAT(FixedText(row, [](auto* f) { f->shift_rows = 1; }), HasSubstr("cannot be shifted"));
   MeasurementFix fix;
   fix.reverse_lateral = true;
   EXPECT_THAT(

@@ -100,6 +100,9 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
     for (int k = 0; k < count; ++k) {
       const touch::CommandedTouch& touch = request.touches[begin + k];
       touch::SetTouch(touch, request.first_index + begin + k, k, &batch);
+      if (begin + k > 0)
+        batch.pause_s[k] =
+            touch::PauseBetween(request.touches[begin + k - 1].session_time_s, touch.session_time_s);
       if (!simulator.needed_covariates().empty())
         TOUCHSTONE_RETURN_IF_ERROR(touch::SetCovariates(simulator.needed_covariates(), touch,
                                                         absl::StrCat("touches[", begin + k, "]"), k, &batch));

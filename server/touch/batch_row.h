@@ -26,6 +26,11 @@ inline void SetTouch(const TouchPose& pose, double speed_m_s, double session_tim
   batch->session_time_s[row] = session_time_s;
 }
 
+// Between a touch and the session's previous one; 0 where the session begins anew.
+inline double PauseBetween(double previous_s, double session_time_s) {
+  return session_time_s > previous_s ? session_time_s - previous_s : 0;
+}
+
 // The stroke and the covariates are the batch's: see below.
 inline void SetTouch(const CommandedTouch& touch, uint64_t index, int row, effects::TouchBatch* batch) {
   SetTouch(touch, touch.speed_m_s, touch.session_time_s, index, row, batch);

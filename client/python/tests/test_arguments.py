@@ -82,3 +82,15 @@ def test_targets_are_checked():
     for bad in ("localhost", "host:", ":1", "host:0", "host:99999", ""):
         with pytest.raises(InvalidRequest, match="host:port"):
             parse_targets(bad)
+
+
+def test_a_model_takes_its_surface_map_along(tmp_path):
+    (tmp_path / "map.csv").write_text("object,x_mm\nlat00,1\n")
+    path = tmp_path / "model.yaml"
+    path.write_text("effects:\n  - surface_map: {file: map.csv}\n  - tip_radius: {radius_mm: 1}\n")
+    assert model_ref(path).yaml == (
+        "effects:\n  - surface_map:\n      file: map.csv\n      csv: |\n          object,x_mm\n          lat00,1\n"
+        "  - tip_radius: {radius_mm: 1}\n")
+    (tmp_path / "map.csv").unlink()
+    with pytest.raises(InvalidRequest, match="map.csv"):
+        model_ref(path)

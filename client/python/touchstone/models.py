@@ -167,9 +167,27 @@ def model_ref(model: ModelLike) -> types_pb2.ModelRef:
     return types_pb2.ModelRef(yaml=read_model_file(model))
 
 
+# "- surface_map: {file: better.surface.csv}", as the command line writes it.
+_SURFACE_MAP = re.compile(
+    r"^([ \t]*)- surface_map:[ \t]*\{[ \t]*file:[ \t]*(\"[^\"]*\"|[^,}\"]+?)[ \t]*\}[ \t]*$", re.MULTILINE)
+
+
+def _with_content(found: re.Match, folder: pathlib.Path) -> str:
+    """The same effect with the text of the map in it: a server cannot read the files that a model names."""
+    indent, name = found.groups()
+    path = folder / name.strip('"')
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise InvalidRequest(f"surface_map {path}: {error.strerror}.") from None
+    body = "".join(f"{indent}        {line}\n" for line in lines if line.strip())
+    return f"{indent}- surface_map:\n{indent}    file: {name}\n{indent}    csv: |\n{body}".rstrip("\n")
+
+
 def read_model_file(path: str | os.PathLike) -> str:
     try:
-        return pathlib.Path(path).read_text(encoding="utf-8")
+        text = pathlib.Path(path).read_text(encoding="utf-8")
+        return re.sub(_SURFACE_MAP, lambda found: _with_content(found, pathlib.Path(path).parent), text)
     except OSError as error:
         raise InvalidRequest(f"Model file {os.fspath(path)}: {error.strerror}.") from None
     except UnicodeDecodeError:

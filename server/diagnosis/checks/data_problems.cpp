@@ -57,7 +57,7 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
   return RmseOf(mended, pool);
 }
 
-// The command that mends the file. The server may not know the file's name.
+// The command that fixes the file. The server may not know the file's name.
 std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set,
                        const std::string& output = kFixedFile) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
@@ -128,7 +128,7 @@ class ProblemList {
     if (!in_part) {
       problem.fix = FixCommand(fix, *input.set, output);
       problem.rmse_after_s = RmseAfter(input, fix, pool_);
-      absl::StrAppend(&problem.words, " Mended, the model as it is would be off by ",
+      absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
                       TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
     }
     problems_.push_back(std::move(problem));

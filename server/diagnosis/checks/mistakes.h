@@ -1,4 +1,4 @@
-// The discrete mistakes that a measurement file may have, each with what mends it.
+// The discrete mistakes that a measurement file may have, each with what fixes it.
 #pragma once
 
 #include <string>

@@ -53,7 +53,7 @@ class Trial {
   // `rows`: of the input's set. `input` must outlive it.
   Trial(const DiagnosisInput& input, std::vector<int> rows);
 
-  // Fails where the mended set contradicts the model; that mistake is out then.
+  // Fails where the fixed set contradicts the model; that mistake is out then.
   absl::StatusOr<TrialResult> Run(const session::MeasurementFix& fix) const;
 
   const DiagnosisInput& input() const { return input_; }

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kMaxData = 3000;          // touches that stand for the present data
 constexpr int kRunLength = 50;          // in runs, so that a press still reaches the next touch
+constexpr int kMaxToVerdict = 100000;   // more touches than that are no advice
 constexpr double kMinSeparation = 0.5;  // squared sigmas in all, below which no touch discriminates
 
 // The best model against a competing one: either may be true, and the other is fitted to it.
@@ -67,17 +68,20 @@ class TouchChooser {
 
  private:
   bool alone() const { return models_.size() == 1; }
+  int TouchesToVerdict(const std::vector<double>& nats) const;
   double Worth(int k) const;
   int Best() const;  // -1: no candidate is worth anything
-  ProposedTouch Propose(int k) const;
+  ProposedTouch Propose(int k);
 
   const touches::Observations& candidates_;
   const std::vector<CompetingModel>& models_;
   const std::vector<LinearisedPrediction>& predictions_;
   const int max_touches_;
   std::vector<ModelPair> pairs_;  // the best model with each other one, or with itself if it is alone
-  std::vector<char> chosen_;      // [candidate]
-  std::vector<int> of_object_;    // chosen touches
+  std::vector<std::vector<double>> nats_;  // [pair][touches so far]: expected log evidence
+  std::vector<int> pair_of_purpose_;       // of each proposed touch
+  std::vector<char> chosen_;               // [candidate]
+  std::vector<int> of_object_;             // chosen touches
 };
 
 TouchChooser::TouchChooser(const touches::Observations& candidates, const std::vector<CompetingModel>& models,
@@ -114,7 +118,7 @@ int TouchChooser::Best() const {
   return best;
 }
 
-ProposedTouch TouchChooser::Propose(int k) const {
+ProposedTouch TouchChooser::Propose(int k) {
   ProposedTouch proposed = TouchOf(candidates_, k);
   if (alone()) {
     proposed.purpose = absl::StrCat("learns the values of ", models_[0].name);
@@ -125,25 +129,40 @@ ProposedTouch TouchChooser::Propose(int k) const {
   const auto pair = std::max_element(
       pairs_.begin(), pairs_.end(),
       [k](const ModelPair& a, const ModelPair& b) { return a.RelativeGain(k) < b.RelativeGain(k); });
+  pair_of_purpose_.push_back(static_cast<int>(pair - pairs_.begin()));
   const std::string& other = models_[pair - pairs_.begin() + 1].name;
   proposed.purpose = absl::StrCat("tells ", models_[0].name, " from ", other);
   proposed.separation_sigmas = std::sqrt(pair->Gain(k));
   return proposed;
 }
 
+// Half the squared separation is the expected log evidence. Beyond the proposed touches it grows by as much for each.
+int TouchChooser::TouchesToVerdict(const std::vector<double>& nats) const {
+  for (size_t n = 0; n < nats.size(); ++n)
+    if (nats[n] >= kVerdictNats) return static_cast<int>(n) + 1;
+  const double needed = std::ceil(kVerdictNats / nats.back() * static_cast<double>(nats.size()));
+  return needed <= kMaxToVerdict ? static_cast<int>(needed) : 0;
+}
+
 std::vector<ProposedTouch> TouchChooser::Choose() {
+  nats_.resize(pairs_.size());
   std::vector<ProposedTouch> proposed;
   for (int n = 0; n < max_touches_; ++n) {
     const int best = Best();
     if (best < 0) break;
     proposed.push_back(Propose(best));
-    for (ModelPair& pair : pairs_) pair.competing.Add(best), pair.best.Add(best);
+    for (size_t j = 0; j < pairs_.size(); ++j) {
+      pairs_[j].competing.Add(best), pairs_[j].best.Add(best);
+      nats_[j].push_back(0.5 * pairs_[j].separation());
+    }
     chosen_[best] = 1;
     ++of_object_[candidates_.object[best]];
   }
   double separation = 0;
   for (const ModelPair& pair : pairs_) separation = std::max(separation, pair.separation());
   if (!alone() && separation < kMinSeparation) proposed.clear();
+  for (size_t n = 0; n < proposed.size() && !alone(); ++n)
+    proposed[n].touches_to_verdict = TouchesToVerdict(nats_[pair_of_purpose_[n]]);
   return proposed;
 }
 

@@ -28,7 +28,12 @@ struct ProposedTouch {
   // In standard deviations of the noise: the expected difference between the two models of the purpose; for
   // one model what its values leave open about this touch.
   double separation_sigmas = 0;
+  // About how many touches like the proposed ones bring the expected log evidence between the two models to
+  // kVerdictNats; 0: one model only, or more than anybody would make.
+  int touches_to_verdict = 0;
 };
+
+inline constexpr double kVerdictNats = 6;
 
 // At most `max_touches` touches, most informative first. `models` are fitted to the observations, best first.
 //

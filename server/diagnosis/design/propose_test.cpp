@@ -61,6 +61,26 @@ TEST(ProposeTouches, WhatNoTouchCanTellGivesNone) {
       testing::IsEmpty());
 }
 
+TEST(ProposeTouches, SayHowManyReachAVerdict) {
+  // 6 nats are 12 squared sigmas between the models, whoever of them is right; more touches reach them in fact.
+  const auto few = Proposed({kLength, kLatency}, 1);
+  const auto many = Proposed({kLength, kLatency}, 12);
+  ASSERT_EQ(few.size(), 1u);
+  ASSERT_EQ(many.size(), 12u);
+  double squares = 0;
+  int reached = 0;
+  for (const ProposedTouch& touch : many) {
+    squares += touch.separation_sigmas * touch.separation_sigmas;
+    ++reached;
+    if (0.5 * squares >= kVerdictNats) break;
+  }
+  ASSERT_LT(reached, 12);
+  EXPECT_EQ(many[0].touches_to_verdict, reached);
+  EXPECT_EQ(few[0].touches_to_verdict, std::ceil(12 / std::pow(few[0].separation_sigmas, 2)));
+  // One model has no other to be told from.
+  EXPECT_EQ(Proposed({kLength}, 2)[0].touches_to_verdict, 0);
+}
+
 TEST(ProposeTouches, TellMoreThanTouchesAtRandom) {
   const Effects radius = {{"tip_radius", {"radius_mm=1"}}}, slip = {{"oblique_slip", {"travel_mm=-0.2"}}};
   Effects allowed = slip;

@@ -76,9 +76,10 @@ std::string VariationInWords(const model::Model& model, const EffectDirection& d
 }
 
 bool VisibleWithoutPoses(const model::Effect& effect, bool noise_is_known) {
-  const bool noise = effect.role == model::EffectRole::kNoiseLevel ||
-                     effect.role == model::EffectRole::kNoiseGrowth ||
-                     effect.role == model::EffectRole::kNoiseTails;
+  const bool noise =
+      effect.role == model::EffectRole::kNoiseLevel || effect.role == model::EffectRole::kNoiseGrowth ||
+      effect.role == model::EffectRole::kNoiseOfLength || effect.role == model::EffectRole::kNoiseByFinger ||
+      effect.role == model::EffectRole::kNoiseTails;
   if (effect.role == model::EffectRole::kDropout || effect.role == model::EffectRole::kNoiseMemory ||
       (noise && noise_is_known))
     return false;

@@ -15,6 +15,8 @@ constexpr uint32_t kMaxAttempts = 64;
 void Fill(const std::vector<touch::CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k,
           int t, effects::TouchBatch* batch) {
   touch::SetTouch(touches[k], numbers[k], t, batch);
+  if (k > 0)
+    batch->pause_s[t] = touch::PauseBetween(touches[k - 1].session_time_s, touches[k].session_time_s);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSigma = 0.005;   // of the rows
 constexpr double kColumn = 50;     // size of a column, per m or rad
-constexpr double kPushM = 0.8e-3;  // within the bounds of object_push, 0 to 5 mm
+constexpr double kPushM = 0.8e-3;  // within the bounds of object_push, 0 to 50 mm
 
 class FitTest : public ::testing::Test {
  protected:
@@ -131,6 +131,29 @@ TEST_F(FitTest, HeldOutErrorSeesThatGroupsDisagree) {
   const Fit apart = *FitModel(experiment, Free({"object_push"}, true));
   EXPECT_LT(HeldOutRmse(experiment, apart), 1.25 * kSigma);
   EXPECT_GT(HeldOutRmse(experiment, together), 5 * kSigma);
+}
+
+TEST_F(FitTest, RefittedHeldOutErrorOfAnEffectThatHoldsEverywhereIsTheNoise) {
+  rows.measured += kPushM * rows.columns["object_push"];
+  const Fit fit = *FitModel(experiment, Free({"object_push"}));
+  const double heldout = *HeldOutRmseRefitted(experiment, fit);
+  EXPECT_GT(heldout, std::sqrt(fit.columns.values.col(0).squaredNorm() / rows.rows()));
+  EXPECT_LT(heldout, 1.1 * kSigma);
+}
+
+// The effect begins in the last fifth of the session: places that are left out follow the others, that time does not.
+TEST_F(FitTest, RefittedHeldOutErrorSeesThatTimesDisagree) {
+  rows.columns["tool_tilt"].setZero();
+  for (int row = rows.rows() * 4 / 5; row < rows.rows(); ++row) rows.columns["tool_tilt"][row] = kColumn;
+  for (int row = 0; row < rows.rows(); ++row) rows.measured[row] += kPushM * rows.columns["tool_tilt"][row];
+  const Fit fit = *FitModel(experiment, Free({"tool_tilt"}));
+  EXPECT_GT(*HeldOutRmseRefitted(experiment, fit), 2 * kSigma);
+}
+
+TEST_F(FitTest, RefittedHeldOutErrorEndsWhenItIsCancelled) {
+  const Fit fit = *FitModel(experiment, Free({"object_push"}));
+  experiment.cancelled = [] { return true; };
+  EXPECT_EQ(HeldOutRmseRefitted(experiment, fit).status().code(), absl::StatusCode::kCancelled);
 }
 
 }  // namespace

@@ -4,21 +4,110 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "server/base/status.h"
 
 namespace touchstone::diagnosis::inference {
 namespace {
 
-constexpr int kFolds = 5;  // of blocks
+constexpr int kFolds = 5;             // of blocks, of the time
+constexpr double kUninformed = 1e-3;  // of what all rows say of a value
+constexpr int kRefitIterations = 4;   // a fit without a part begins where the whole one ended
 
-// The rows of each part that is left out.
-std::vector<std::vector<int>> FoldsOf(const ObservationModel& observations, const Parameterization& model) {
+using Folds = std::vector<std::vector<int>>;  // the rows of each part that is left out
+
+// Empty: a group's own values cannot be learned from other groups, and two groups say too little of a third.
+Folds GroupFolds(const ObservationModel& observations, const Parameterization& model) {
   const bool own_values = std::any_of(model.parameters().begin(), model.parameters().end(),
                                       [](const FreeParameter& c) { return !c.object.empty(); });
-  const bool by_group = observations.groups().size() >= 3 && !own_values;
-  std::vector<std::vector<int>> folds(by_group ? observations.groups().size() : kFolds);
-  for (int row = 0; row < observations.rows(); ++row)
-    folds[by_group ? observations.GroupOfRow(row) : observations.BlockOfRow(row) % kFolds].push_back(row);
+  if (observations.groups().size() < 3 || own_values) return {};
+  Folds folds(observations.groups().size());
+  for (int row = 0; row < observations.rows(); ++row) folds[observations.GroupOfRow(row)].push_back(row);
   return folds;
+}
+
+Folds BlockFolds(const ObservationModel& observations) {
+  Folds folds(kFolds);
+  for (int row = 0; row < observations.rows(); ++row)
+    folds[observations.BlockOfRow(row) % kFolds].push_back(row);
+  return folds;
+}
+
+// Stretches of time with as many rows each.
+Folds TimeFolds(const ObservationModel& observations) {
+  std::vector<int> order(observations.rows());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return observations.TimeOfRow(a) < observations.TimeOfRow(b); });
+  Folds folds(kFolds);
+  for (size_t place = 0; place < order.size(); ++place)
+    folds[place * kFolds / order.size()].push_back(order[place]);
+  return folds;
+}
+
+// The rows without one part: what is left out is neither wrong nor moved by anything.
+class WithoutRows : public ObservationModel {
+ public:
+  WithoutRows(const ObservationModel& all, const std::vector<int>& left_out)
+      : all_(all), left_out_(left_out) {}
+
+  int rows() const override { return all_.rows(); }
+  const std::vector<std::string>& groups() const override { return all_.groups(); }
+  int FirstRowOfGroup(int group) const override { return all_.FirstRowOfGroup(group); }
+  int GroupOfRow(int row) const override { return all_.GroupOfRow(row); }
+  int BlockOfRow(int row) const override { return all_.BlockOfRow(row); }
+  double TimeOfRow(int row) const override { return all_.TimeOfRow(row); }
+  absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
+    return all_.Predict(model);
+  }
+  Eigen::VectorXd Residual(const std::vector<double>& predicted) const override {
+    return Without(all_.Residual(predicted));
+  }
+  Eigen::VectorXd Change(const std::vector<double>& predicted,
+                         const std::vector<double>& moved) const override {
+    return Without(all_.Change(predicted, moved));
+  }
+
+ private:
+  Eigen::VectorXd Without(Eigen::VectorXd rows) const {
+    for (const int row : left_out_) rows[row] = 0;
+    return rows;
+  }
+  const ObservationModel& all_;
+  const std::vector<int>& left_out_;
+};
+
+// The fit, where a search without these rows begins. A value of which the other rows know next to nothing begins where
+// it changes nothing: it must not stay what the rows that are left out have said.
+Parameterization StartWithout(const Fit& fit, const std::vector<int>& left_out) {
+  Eigen::VectorXd point = fit.point;
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const auto column = fit.columns.values.col(1 + i);
+    double inside = 0;
+    for (const int row : left_out) inside += column[row] * column[row];
+    if (column.squaredNorm() - inside < kUninformed * column.squaredNorm())
+      point[i] = fit.model.parameters()[i].neutral;
+  }
+  Parameterization start = fit.model;
+  start.MoveTo(start.Clip(point));
+  return start;
+}
+
+// Sum of squares over all rows, each predicted by a fit that did not see it.
+absl::StatusOr<double> RefittedSquares(const Experiment& experiment, const Fit& fit, const Folds& folds) {
+  double sum = 0;
+  for (const std::vector<int>& fold : folds) {
+    if (fold.empty()) continue;
+    const WithoutRows others(*experiment.observations, fold);
+    Experiment without = experiment;
+    without.observations = &others;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Fit again,
+                                FitModel(without, StartWithout(fit, fold), kRefitIterations));
+    const Eigen::VectorXd residual = experiment.observations->Residual(again.predicted);
+    for (const int row : fold) sum += residual[row] * residual[row];
+  }
+  return sum;
 }
 
 // The least squares step within the parameters' bounds: what runs out of them is held there.
@@ -55,9 +144,8 @@ Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& inner, const Eigen::VectorXd&
   return step;
 }
 
-}  // namespace
-
-double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+// One linear step from the whole fit for each part that is left out.
+double LinearHeldOut(const Folds& folds, const Fit& fit) {
   const Eigen::MatrixXd& columns = fit.columns.values;
   const int n = static_cast<int>(columns.rows()), p = fit.model.size();
   if (n == 0) return 0;
@@ -73,7 +161,7 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     all(i, i) += variance / (scale * scale);  // what the other rows leave open stays where it is
   }
   double sum = 0;
-  for (const std::vector<int>& fold : FoldsOf(*experiment.observations, fit.model)) {
+  for (const std::vector<int>& fold : folds) {
     if (fold.empty()) continue;
     Eigen::MatrixXd jf(fold.size(), p);
     Eigen::VectorXd rf(fold.size());
@@ -82,6 +170,36 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
     sum += (rf - jf * step).squaredNorm();
   }
   return std::sqrt(sum / n);
+}
+
+}  // namespace
+
+double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
+  const Folds folds = GroupFolds(*experiment.observations, fit.model);
+  return LinearHeldOut(folds.empty() ? BlockFolds(*experiment.observations) : folds, fit);
+}
+
+double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit) {
+  return LinearHeldOut(BlockFolds(*experiment.observations), fit);
+}
+
+absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit) {
+  const ObservationModel& observations = *experiment.observations;
+  const int n = observations.rows();
+  if (n == 0 || fit.model.size() == 0) return HeldOutRmse(experiment, fit);
+  std::vector<int> group_rows;
+  for (size_t group = 0; group <= observations.groups().size(); ++group)
+    group_rows.push_back(observations.FirstRowOfGroup(static_cast<int>(group)));
+  const Likelihood plain(group_rows, nullptr, 0, nullptr);
+  Experiment without_surface = experiment;
+  without_surface.likelihood = &plain;
+  double largest = 0;
+  for (const Folds& folds :
+       {GroupFolds(observations, fit.model), BlockFolds(observations), TimeFolds(observations)}) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, RefittedSquares(without_surface, fit, folds));
+    largest = std::max(largest, squares);
+  }
+  return std::sqrt(largest / n);
 }
 
 }  // namespace touchstone::diagnosis::inference

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kVisible = 10;  // squared scale over standard error from where a direction counts as visible
 constexpr double kPriorWidth = 10;  // of a value's prior (Cauchy) over the size that rigs show
+constexpr double kUnusualNats = 7;  // that a value beyond what rigs show costs: one rig in a thousand
 constexpr double kRidge = 1e-4;     // prior precision over 1 / scale^2: holds what nothing determines
 
 // The minimum of the quadratic form within bounds, by holding parameters that run out of them there.
@@ -126,9 +127,10 @@ double LogSum(const std::vector<double>& logs) {
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point) {
   double sum = 0;
   for (size_t i = 0; i < parameters.size(); ++i) {
-    const double x =
-        (point[static_cast<int>(i)] - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
-    sum -= std::log1p(x * x);
+    const double value = point[static_cast<int>(i)];
+    if (value < parameters[i].usual_lower || value > parameters[i].usual_upper) sum -= kUnusualNats;
+    const double x = (value - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
+    sum += parameters[i].log_prior - std::log1p(x * x);
   }
   return sum;
 }
@@ -151,6 +153,7 @@ LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
   std::vector<double> log_likelihoods, log_evidences;
   for (int s = 0; s < static_cast<int>(grams.size()); ++s) {
     const Eigen::MatrixXd& gram = grams[s];
+    if (gram.size() == 0) continue;
     const double sigma0 = likelihood.Sigma(gram(members[0], members[0]), 0);
     const Minimum m = Minimise(gram, members, parameters, point, sigma0 * sigma0);
     const double sigma = likelihood.Sigma(m.q, static_cast<int>(m.free.size()));

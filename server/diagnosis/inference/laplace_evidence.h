@@ -21,7 +21,7 @@ struct LaplaceEvidence {
   Eigen::MatrixXd covariance;  // of the parameters; zero where one is held at a bound
 };
 
-// `grams`: inner products of the residual and of derivative columns, by hypothesis; `members`: which of them are
+// `grams`: inner products of the residual and of derivative columns, by hypothesis (empty: it is left out); `members`: which of them are
 // the residual (first) and the derivatives by `parameters`. Values are held within bounds. `point`: where the
 // columns were taken.
 LaplaceEvidence ComputeLaplaceEvidence(const Likelihood& likelihood,
@@ -36,7 +36,8 @@ std::vector<Eigen::MatrixXd> Grams(const Likelihood& likelihood, const Likelihoo
 // The log of the sum of exp(logs), however large or small they are; -inf for none.
 double LogSum(const std::vector<double>& logs);
 
-// What the prior says of values: Cauchy round what changes nothing, ten times as wide as rigs usually show.
+// What the prior says of values: Cauchy round what changes nothing, ten times as wide as rigs usually show; and of the
+// choice of an object.
 double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eigen::VectorXd& point);
 
 }  // namespace touchstone::diagnosis::inference

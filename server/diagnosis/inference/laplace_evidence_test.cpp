@@ -89,6 +89,15 @@ TEST_F(LaplaceEvidenceTest, DoesNotDependOnTheUnitOfAParameter) {
   EXPECT_NEAR(Evidence({kResidual, kActs}, {in_millimetres}).log_evidence, in_metres, 1e-6);
 }
 
+TEST(LogPriorOfValues, FallsWhereAValueLeavesWhatRigsShow) {
+  std::vector<FreeParameter> parameters(1);
+  parameters[0].scale = 1;
+  const double free = LogPriorOfValues(parameters, Eigen::VectorXd::Constant(1, 3.1));
+  parameters[0].usual_upper = 3;
+  EXPECT_LT(LogPriorOfValues(parameters, Eigen::VectorXd::Constant(1, 3.1)), free - 5);
+  EXPECT_GT(LogPriorOfValues(parameters, Eigen::VectorXd::Constant(1, 2.9)), free);
+}
+
 TEST(LogPriorOfValues, FallsFromTheValueThatChangesNothing) {
   FreeParameter parameter;
   parameter.neutral = 0.5;

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/matern.h"
+#include "server/diagnosis/inference/support_points.h"
+
 namespace touchstone::diagnosis::inference {
 namespace {
 
@@ -14,28 +17,6 @@ constexpr double kLengths[] = {0.04, 0.07, 0.12, 0.2, 0.35};
 constexpr double kRatios[] = {0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9, 1.35, 2, 3, 5, 8, 15, 30};
 constexpr int kMaxPoints = 160;
 constexpr int kMaxWithInner = 128;  // columns
-
-double Matern52(double distance, double length) {
-  const double x = std::sqrt(5.0) * distance / length;
-  return (1 + x + x * x / 3) * std::exp(-x);
-}
-
-// Points that stand for all: every one if there are few, else far from one another (greedy).
-std::vector<Eigen::Vector3d> Inducing(const std::vector<Eigen::Vector3d>& points) {
-  if (static_cast<int>(points.size()) <= kMaxPoints) return points;
-  std::vector<Eigen::Vector3d> chosen = {points[0]};
-  std::vector<double> nearest(points.size(), INFINITY);
-  while (static_cast<int>(chosen.size()) < kMaxPoints) {
-    size_t farthest = 0;
-    for (size_t k = 0; k < points.size(); ++k) {
-      nearest[k] = std::min(nearest[k], (points[k] - chosen.back()).squaredNorm());
-      if (nearest[k] > nearest[farthest]) farthest = k;
-    }
-    if (nearest[farthest] <= 0) break;
-    chosen.push_back(points[farthest]);
-  }
-  return chosen;
-}
 
 // Features of the field at a group's rows, turned so that they are orthogonal; `energies`: their squared norms.
 Eigen::MatrixXd OrthogonalFeatures(const std::vector<SmoothErrorSite>& sites,
@@ -102,8 +83,8 @@ void Likelihood::MakeBases(const SmoothErrorGeometry& geometry, const std::vecto
       const int first = group_rows_[group], rows = group_rows_[group + 1] - first;
       if (rows == 0) continue;
       bases_[l].directions[group] =
-          OrthogonalFeatures(geometry.sites[group], Inducing(geometry.distinct_m[group]), length_m[l], first,
-                             rows, &energies[l][group]);
+          OrthogonalFeatures(geometry.sites[group], SupportPoints(geometry.distinct_m[group], kMaxPoints),
+                             length_m[l], first, rows, &energies[l][group]);
     }
   };
   ParallelFor(pool, lengths * groups, 1, make);
@@ -185,6 +166,33 @@ Eigen::MatrixXd Likelihood::Gram(const Columns& columns, int s) const {
   return gram;
 }
 
+std::vector<Eigen::MatrixXd> Likelihood::InnerByGroup(const Columns& columns) const {
+  std::vector<Eigen::MatrixXd> inner;
+  for (size_t group = 0; group + 1 < group_rows_.size(); ++group) {
+    const auto rows =
+        columns.values.middleRows(group_rows_[group], group_rows_[group + 1] - group_rows_[group]);
+    inner.push_back(rows.transpose() * rows);
+  }
+  return inner;
+}
+
+std::vector<Eigen::MatrixXd> Likelihood::GramByGroup(const Columns& columns,
+                                                     const std::vector<Eigen::MatrixXd>& inner, int s) const {
+  std::vector<Eigen::MatrixXd> grams = inner;
+  const int l = hypotheses_[s].length_index;
+  if (l < 0) return grams;
+  const Eigen::VectorXd shrinkage = Shrinkage(s);
+  int next = 0;
+  for (size_t group = 0; group < grams.size(); ++group) {
+    const int size = static_cast<int>(bases_[l].directions[group].cols());
+    const auto projected = columns.projected[l].middleRows(next, size);
+    grams[group].noalias() -=
+        projected.transpose() * (shrinkage.segment(next, size).asDiagonal() * projected);
+    next += size;
+  }
+  return grams;
+}
+
 Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
   Eigen::VectorXd norms = columns.values.colwise().squaredNorm().transpose();
   const int l = hypotheses_[s].length_index;
@@ -228,35 +236,42 @@ Eigen::VectorXd Likelihood::FieldMean(const Columns& r, int s) const {
   return mean;
 }
 
-Eigen::VectorXd Likelihood::FieldLeftOut(const Eigen::VectorXd& r, int s, const std::vector<int>& fold_of_row,
-                                         int folds) const {
-  Eigen::VectorXd expected = Eigen::VectorXd::Zero(rows());
+Eigen::MatrixXd Likelihood::FieldLeftOut(const Eigen::MatrixXd& columns, int s,
+                                         const std::vector<int>& fold_of_row, int folds,
+                                         std::vector<Eigen::MatrixXd>* grams) const {
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(rows(), columns.cols());
+  std::vector<Eigen::MatrixXd> own_grams(folds, columns.transpose() * columns);
+  for (int row = 0; row < rows(); ++row)
+    own_grams[fold_of_row[row]] -= columns.row(row).transpose() * columns.row(row);
   const int l = hypotheses_[s].length_index;
-  if (l < 0) return expected;
-  const double precision = std::pow(hypotheses_[s].amplitude_over_sigma, -2);
-  for (size_t group = 0; group < bases_[l].directions.size(); ++group) {
+  const size_t groups = l < 0 ? 0 : bases_[l].directions.size();
+  const double precision = l < 0 ? 0 : std::pow(hypotheses_[s].amplitude_over_sigma, -2);
+  for (size_t group = 0; group < groups; ++group) {
     const Eigen::MatrixXd& directions = bases_[l].directions[group];
     const int first = group_rows_[group];
     if (directions.cols() == 0) continue;
-    const Eigen::VectorXd all = directions.transpose() * r.segment(first, directions.rows());
+    const Eigen::MatrixXd all = directions.transpose() * columns.middleRows(first, directions.rows());
     const Eigen::VectorXd energies = directions.colwise().squaredNorm().transpose();
     for (int fold = 0; fold < folds; ++fold) {
       std::vector<int> members;
       for (int row = 0; row < directions.rows(); ++row)
         if (fold_of_row[first + row] == fold) members.push_back(row);
-      if (members.empty()) continue;
-      Eigen::MatrixXd left_out(members.size(), directions.cols());
-      Eigen::VectorXd values(members.size());
-      for (size_t m = 0; m < members.size(); ++m) {
-        left_out.row(static_cast<int>(m)) = directions.row(members[m]);
-        values[static_cast<int>(m)] = r[first + members[m]];
+      const int count = static_cast<int>(members.size());
+      Eigen::MatrixXd left_out(count, directions.cols()), values(count, columns.cols());
+      for (int m = 0; m < count; ++m) {
+        left_out.row(m) = directions.row(members[m]);
+        values.row(m) = columns.row(first + members[m]);
       }
       Eigen::MatrixXd rest = -left_out.transpose() * left_out;
       rest.diagonal().array() += energies.array() + precision;
-      const Eigen::VectorXd field = left_out * rest.ldlt().solve(all - left_out.transpose() * values);
-      for (size_t m = 0; m < members.size(); ++m) expected[first + members[m]] = field[static_cast<int>(m)];
+      const Eigen::MatrixXd kept = all - left_out.transpose() * values;
+      const Eigen::MatrixXd weights = rest.ldlt().solve(kept);
+      own_grams[fold] -= kept.transpose() * weights;
+      const Eigen::MatrixXd field = left_out * weights;
+      for (int m = 0; m < count; ++m) expected.row(first + members[m]) = field.row(m);
     }
   }
+  if (grams != nullptr) *grams = std::move(own_grams);
   return expected;
 }
 

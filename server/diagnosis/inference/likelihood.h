@@ -52,6 +52,11 @@ class Likelihood {
 
   // X' V^-1 X under hypothesis s, sigma = 1.
   Eigen::MatrixXd Gram(const Columns& columns, int s) const;
+  // The part of each group in Gram: groups share no error, so the parts sum to it. `inner`: of InnerByGroup.
+  std::vector<Eigen::MatrixXd> GramByGroup(const Columns& columns, const std::vector<Eigen::MatrixXd>& inner,
+                                           int s) const;
+  // X' X of each group's rows.
+  std::vector<Eigen::MatrixXd> InnerByGroup(const Columns& columns) const;
   // a' V^-1 B, every column of b, and diag(B' V^-1 B).
   Eigen::MatrixXd Cross(const Columns& a, const Columns& b, int s) const;
   Eigen::VectorXd Norms(const Columns& columns, int s) const;
@@ -64,9 +69,10 @@ class Likelihood {
 
   // What the field explains of residual r under hypothesis s (posterior mean), rows.
   Eigen::VectorXd FieldMean(const Columns& r, int s) const;
-  // What the field expects of each row of `r` from the rows of its group in other folds. `fold_of_row`: 0 .. folds-1.
-  Eigen::VectorXd FieldLeftOut(const Eigen::VectorXd& r, int s, const std::vector<int>& fold_of_row,
-                               int folds) const;
+  // What the field expects of each row of `columns` from the rows of its group in other folds. `fold_of_row`:
+  // 0 .. folds-1. `grams`, if given: X' V^-1 X of the rows outside each fold, sigma = 1.
+  Eigen::MatrixXd FieldLeftOut(const Eigen::MatrixXd& columns, int s, const std::vector<int>& fold_of_row,
+                               int folds, std::vector<Eigen::MatrixXd>* grams = nullptr) const;
 
  private:
   struct Basis {                              // of one length

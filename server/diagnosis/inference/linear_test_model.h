@@ -25,6 +25,7 @@ class LinearTestModel : public ObservationModel {
   int FirstRowOfGroup(int group) const override { return group * rows_per_group_; }
   int GroupOfRow(int row) const override { return row / rows_per_group_; }
   int BlockOfRow(int row) const override { return row / repeats_; }
+  double TimeOfRow(int row) const override { return row; }
   std::vector<int> GroupRows() const {
     std::vector<int> first;
     for (int g = 0; g <= static_cast<int>(names_.size()); ++g) first.push_back(FirstRowOfGroup(g));

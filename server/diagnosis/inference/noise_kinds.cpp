@@ -2,61 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <map>
 
-#include "server/diagnosis/inference/noise_likelihood.h"
+#include "server/diagnosis/inference/noise_search.h"
 
 namespace touchstone::diagnosis::inference {
 namespace {
 
-constexpr int kMaxGroups = 1500;            // that a shape is judged on
-constexpr double kEnterNats = 10;           // gain in log likelihood that a further noise parameter needs
-constexpr double kKurtosisSigmas = 4;       // of the sample's excess kurtosis before tails are looked at
+constexpr double kExcludedNats = 5;         // loss that rules a declared value out
 constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
 constexpr double kMinTick = 20e-6;          // s
-constexpr double kMaxSlope = 10;
-
-// The maximum of f on [low, high] by golden section.
-double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* max) {
-  const double golden = 0.5 * (std::sqrt(5.0) - 1);
-  double a = high - golden * (high - low), b = low + golden * (high - low);
-  double fa = f(a), fb = f(b);
-  for (int step = 0; step < steps; ++step) {
-    if (fa > fb)
-      high = b, b = a, fb = fa, a = high - golden * (high - low), fa = f(a);
-    else
-      low = a, a = b, fa = fb, b = low + golden * (high - low), fb = f(b);
-  }
-  *max = std::max(fa, fb);
-  return fa > fb ? a : b;
-}
-
-// Standard error from the curvature of a log likelihood at its maximum.
-double CurvatureError(const std::function<double(double)>& f, double at, double step) {
-  const double bend = f(at + step) + f(at - step) - 2 * f(at);
-  return bend < 0 ? step / std::sqrt(-bend) : 0;
-}
-
-std::vector<ReadingGroup> Thinned(const std::vector<ReadingGroup>& all) {
-  if (static_cast<int>(all.size()) <= kMaxGroups) return all;
-  std::vector<ReadingGroup> part;
-  for (int j = 0; j < kMaxGroups; ++j) part.push_back(all[all.size() * j / kMaxGroups]);
-  return part;
-}
-
-// Excess kurtosis of residuals in units of their own scale.
-bool TailsLookHeavy(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
-  double second = 0, fourth = 0, count = 0;
-  for (const ReadingGroup& group : groups) {
-    const double n = static_cast<double>(group.residual_s.size());
-    for (size_t i = 0; i < group.residual_s.size(); ++i) {
-      const double x = group.residual_s[i] / std::sqrt(1 - 1 / n) / (1 + model.slope * group.growth[i]);
-      second += x * x, fourth += x * x * x * x, count += 1;
-    }
-  }
-  if (count < 20 || second <= 0) return false;
-  return fourth * count / (second * second) - 3 > kKurtosisSigmas * std::sqrt(24 / count);
-}
+constexpr size_t kMinDelays = 20;
+constexpr double kMinMissed = 0.002;  // share of the readings: less is no property of the rig
 
 // Times of a polling loop differ by whole multiples of its interval: the interval that `differences` (sorted) fit,
 // near `interval`; 0 if they do not.
@@ -77,9 +34,9 @@ double RefinedTick(const std::vector<double>& differences, double interval) {
   return on_tick < 0.99 * differences.size() ? 0 : interval;
 }
 
-NoiseEstimate FindPolling(std::vector<double> differences) {
+NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<double>& declared_s) {
   NoiseEstimate found;
-  if (differences.size() < 20) return found;
+  if (differences.size() < kMinDelays) return found;
   std::sort(differences.begin(), differences.end());
   // The smallest step between different values is the interval, or a small multiple of it.
   double min_gap = differences[0];
@@ -87,157 +44,81 @@ NoiseEstimate FindPolling(std::vector<double> differences) {
     const double gap = differences[j] - differences[j - 1];
     if (gap > 2 * kTickTolerance) min_gap = std::min(min_gap, gap);
   }
-  for (int divisor = 1; divisor <= 3; ++divisor) {
+  double interval = 0;
+  for (int divisor = 1; divisor <= 3 && interval == 0; ++divisor) {
     if (min_gap / divisor < kMinTick) break;
-    const double interval = RefinedTick(differences, min_gap / divisor);
-    if (interval == 0) continue;
-    found.value = interval;
-    found.std_error =
-        0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
-    found.std_error = std::max(found.std_error, 1e-9);
-    // Each difference would fall on a tick by chance with this probability.
-    found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
-    return found;
+    interval = RefinedTick(differences, min_gap / divisor);
   }
+  if (interval == 0 && declared_s && *declared_s >= kMinTick) {
+    interval = RefinedTick(differences, *declared_s);
+    found.absent = interval == 0;
+  }
+  if (interval == 0) return found;
+  found.value = interval;
+  found.std_error =
+      0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
+  found.std_error = std::max(found.std_error, 1e-9);
+  // Each difference would fall on a tick by chance with this probability.
+  found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
   return found;
+}
+
+// The probability of silence from sensors that were silent in some of their repeats and not in all: what was silent
+// in all of them may be out of reach, and leaving it out must not make silence look rarer than it is. The root of
+//   silent = sum over readings of m p (1 - p^(m-1)) / (1 - p^m),  m: how often a reading was expected
+double SilenceAmongRepeats(const std::vector<RepeatedReading>& repeated) {
+  double silent = 0;
+  std::map<double, int> by_expected;
+  for (const RepeatedReading& reading : repeated) {
+    if (reading.AlwaysSilent() || reading.expected < 2) continue;
+    silent += reading.silent;
+    ++by_expected[reading.expected];
+  }
+  if (silent == 0) return 0;
+  double low = 0, high = 1 - 1e-9;
+  for (int step = 0; step < 60; ++step) {
+    const double p = 0.5 * (low + high);
+    double mean = 0;
+    for (const auto& [m, readings] : by_expected)
+      mean += readings * m * p * (1 - std::pow(p, m - 1)) / (1 - std::pow(p, m));
+    (mean < silent ? low : high) = p;
+  }
+  return 0.5 * (low + high);
+}
+
+// Log likelihood of counts, less a constant.
+double SilenceLog(double silent, double all, double p) {
+  const double reported = all - silent;
+  return (silent > 0 ? silent * std::log(p) : 0) + (reported > 0 ? reported * std::log1p(-p) : 0);
 }
 
 // A sensor that is silent in every repeat is out of reach there (the stroke ended, a finger cannot meet the object);
 // that is no chance, unless chance alone would bring about as many such groups.
-NoiseEstimate FindMissed(const std::vector<RepeatedReading>& repeated) {
-  double silent = 0, all = 0, always = 0;
+NoiseEstimate FindMissed(const std::vector<RepeatedReading>& repeated,
+                         const std::optional<double>& declared) {
+  double silent = 0, all = 0, always = 0, by_chance = 0;
+  const double among_repeats = SilenceAmongRepeats(repeated);
   for (const RepeatedReading& reading : repeated) {
     always += reading.AlwaysSilent();
+    if (reading.expected > 1) by_chance += std::pow(among_repeats, reading.expected);
     if (!reading.AlwaysSilent()) silent += reading.silent, all += reading.expected;
   }
-  const double sometimes = all > 0 ? silent / all : 0;
-  double by_chance = 0;
-  for (const RepeatedReading& reading : repeated)
-    if (reading.expected > 1) by_chance += std::pow(sometimes, reading.expected);
-  if (always <= by_chance + 3 * std::sqrt(by_chance) + 0.5)
+  const bool chance = always <= by_chance + 3 * std::sqrt(by_chance) + 0.5;
+  if (chance)
     for (const RepeatedReading& reading : repeated)
       if (reading.AlwaysSilent()) silent += reading.silent, all += reading.expected;
 
   NoiseEstimate found;
-  if (silent < 3 || silent < 0.002 * all) return found;
-  found.value = silent / all;
+  if (all == 0) return found;
+  found.value = chance || among_repeats == 0 ? silent / all : among_repeats;
+  const bool rare = silent < 3 || silent < kMinMissed * all;
+  if (rare && declared && *declared > 0 && *declared < 1)
+    found.absent = SilenceLog(silent, all, found.value) - SilenceLog(silent, all, *declared) >= kExcludedNats;
+  if (rare) return found;
   found.std_error = std::sqrt(found.value * (1 - found.value) / all);
   found.gain_nats = silent * std::log(1 / 1e-4);
   return found;
 }
-
-// The kind of noise that residuals have, from the simplest on: each further parameter must earn its likelihood.
-class NoiseSearch {
- public:
-  NoiseSearch(const std::vector<ReadingGroup>& all, NoiseFindings* found)
-      : all_(all), groups_(Thinned(all)), found_(found) {
-    best_log_ = ProfileSigma(groups_, &best_);
-  }
-
-  const NoiseModel& best() const { return best_; }
-
-  // Does it grow with the covariate?
-  void TryGrowth() {
-    double log_likelihood = -INFINITY;
-    NoiseModel sloped = best_;
-    const NoiseModel from = best_;
-    const auto at = [&](double log_slope) {
-      sloped.slope = std::exp(log_slope);
-      sloped.sigma_s = from.sigma_s;
-      return ProfileSigma(groups_, &sloped);
-    };
-    at(Maximise(at, std::log(0.02), std::log(kMaxSlope), 20, &log_likelihood));
-    slope_gain_ = log_likelihood - best_log_;
-    if (slope_gain_ >= kEnterNats) best_ = sloped, best_log_ = log_likelihood;
-  }
-
-  // Heavy tails, or a few outliers among Gaussian noise?
-  void TryTails() {
-    if (!TailsLookHeavy(groups_, best_)) return;
-    const double before = best_log_;
-    const StudentFit student = FitStudent(best_);
-    NoiseModel mixture;
-    const double mixture_log = FitMixture(&mixture);
-    if (student.log_likelihood - before >= kEnterNats && student.log_likelihood >= mixture_log - 3) {
-      found_->degrees_of_freedom = {student.model.degrees_of_freedom, student.std_error,
-                                    student.log_likelihood - before};
-      best_ = student.model, best_log_ = student.log_likelihood;
-    } else if (mixture_log - before >= kEnterNats) {
-      for (const ReadingGroup& group : all_)
-        if (OutlierProbability(group, mixture) > 0.5) found_->outliers.push_back(group.index);
-      best_ = mixture, best_log_ = mixture_log;
-    }
-    if (slope_gain_ >= kEnterNats && best_.shape != NoiseShape::kGaussian) DropSlopeThatTailsExplain();
-  }
-
-  void DescribeGrowth() {
-    if (slope_gain_ < kEnterNats) return;
-    NoiseModel at = best_;
-    const auto by_slope = [&](double slope) {
-      at.slope = slope;
-      at.sigma_s = best_.sigma_s;
-      return ProfileSigma(groups_, &at);
-    };
-    found_->slope = {best_.slope, CurvatureError(by_slope, best_.slope, 0.05 * best_.slope), slope_gain_};
-  }
-
- private:
-  struct StudentFit {
-    NoiseModel model;
-    double log_likelihood = -INFINITY;
-    double std_error = 0;  // of the degrees of freedom
-  };
-  StudentFit FitStudent(const NoiseModel& from) const {
-    StudentFit fit;
-    fit.model = from;
-    fit.model.shape = NoiseShape::kStudent;
-    const auto at = [&](double log_dof) {
-      fit.model.degrees_of_freedom = std::exp(log_dof);
-      fit.model.sigma_s = from.sigma_s;
-      return ProfileSigma(groups_, &fit.model);
-    };
-    const double log_dof = Maximise(at, std::log(1.2), std::log(60.0), 9, &fit.log_likelihood);
-    const double relative_error = CurvatureError(at, log_dof, 0.1);
-    at(log_dof);
-    fit.std_error = fit.model.degrees_of_freedom * relative_error;
-    return fit;
-  }
-
-  // The best mixture of noise and outliers on a grid; returns its log likelihood.
-  double FitMixture(NoiseModel* mixture) const {
-    double best = -INFINITY;
-    for (const double width : {6.0, 15.0, 40.0, 100.0})
-      for (const double share : {0.002, 0.007, 0.02, 0.05}) {
-        NoiseModel at = best_;
-        at.shape = NoiseShape::kMixture;
-        at.width = width, at.share = share;
-        const double value = ProfileSigma(groups_, &at);
-        if (value > best) best = value, *mixture = at;
-      }
-    return best;
-  }
-
-  // Tails may have looked like a slope.
-  void DropSlopeThatTailsExplain() {
-    NoiseModel level = best_;
-    level.slope = 0;
-    slope_gain_ = best_log_ - ProfileSigma(groups_, &level);
-    if (slope_gain_ >= kEnterNats) return;
-    best_ = level;
-    if (best_.shape != NoiseShape::kStudent) return;
-    const StudentFit student = FitStudent(level);
-    found_->degrees_of_freedom.value = student.model.degrees_of_freedom;
-    found_->degrees_of_freedom.std_error = student.std_error;
-    best_ = student.model;
-  }
-
-  const std::vector<ReadingGroup>& all_;
-  std::vector<ReadingGroup> groups_;
-  NoiseFindings* found_;
-  NoiseModel best_;
-  double best_log_ = 0;
-  double slope_gain_ = 0;
-};
 
 // What a group should count for where the noise is not the same everywhere.
 std::vector<double> WeightsOf(const std::vector<ReadingGroup>& all, const NoiseModel& model,
@@ -247,7 +128,7 @@ std::vector<double> WeightsOf(const std::vector<ReadingGroup>& all, const NoiseM
     double squares = 0, variance = 0;
     const double n = static_cast<double>(group.residual_s.size());
     for (size_t i = 0; i < group.residual_s.size(); ++i) {
-      const double s = model.sigma_s * (1 + model.slope * group.growth[i]);
+      const double s = model.sigma_s * RelativeScale(group, i, model);
       squares += group.residual_s[i] * group.residual_s[i] / (s * s);
       variance += s * s / n;
     }
@@ -261,37 +142,35 @@ std::vector<double> WeightsOf(const std::vector<ReadingGroup>& all, const NoiseM
 
 }  // namespace
 
-NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof) {
+NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof, const DeclaredNoise& declared) {
   NoiseFindings found;
-  found.poll_interval_s = FindPolling(sample.delays_s);
-  found.missed_probability = FindMissed(sample.repeated);
+  found.poll_interval_s = FindPolling(sample.delays_s, declared.poll_interval_s);
+  found.missed_probability = FindMissed(sample.repeated, declared.missed_probability);
   if (sample.groups.empty()) return found;
-  NoiseSearch search(sample.groups, &found);
-  search.TryGrowth();
-  search.TryTails();
-  search.DescribeGrowth();
+  NoiseSearch search(sample, declared, &found);
+  search.Run();
 
   // What the fit has followed of the noise is given back.
-  NoiseModel best = search.best();
   double degrees_of_freedom = 0;
   for (const ReadingGroup& group : sample.groups)
     degrees_of_freedom += static_cast<double>(group.residual_s.size()) - 1;
-  const double left = std::max(degrees_of_freedom - effective_dof, 1.0);
-  best.sigma_s *= std::sqrt(degrees_of_freedom / left);
-  found.sigma_s = {best.sigma_s, best.sigma_s / std::sqrt(2 * left), 0};
-  // Slope and tails share what is known of the scale.
-  if (found.slope.gain_nats > 0) found.sigma_s.std_error *= 2;
-  if (found.degrees_of_freedom.gain_nats > 0) found.sigma_s.std_error *= 1.6;
+  const double given_back = std::sqrt(degrees_of_freedom / std::max(degrees_of_freedom - effective_dof, 1.0));
+  NoiseModel best = search.best();
+  best.sigma_s *= given_back;
+  for (NoiseEstimate* estimate : {&found.sigma_s, &found.length_sigma_m})
+    estimate->value *= given_back, estimate->std_error *= given_back;
+  for (NoiseEstimate& estimate : found.channel_sigma_s)
+    estimate.value *= given_back, estimate.std_error *= given_back;
 
   // Polling adds the scatter of the ticks.
   if (found.poll_interval_s.gain_nats > 0) {
     const double tick = found.poll_interval_s.value;
-    const double variance = best.sigma_s * best.sigma_s - tick * tick / 12;
+    const double variance = found.sigma_s.value * found.sigma_s.value - tick * tick / 12;
     found.sigma_s.value = variance > 0 ? std::sqrt(variance) : 0;
     if (found.sigma_s.value < 0.1 * tick) found.sigma_s.value = 0;
   }
   const bool heavy_tails = found.degrees_of_freedom.gain_nats > 0;
-  if (heavy_tails || found.slope.gain_nats > 0)
+  if (heavy_tails || found.slope.gain_nats > 0 || found.length_sigma_m.gain_nats > 0)
     found.weights =
         WeightsOf(sample.groups, best, heavy_tails ? best.degrees_of_freedom : INFINITY, sample.size);
   return found;

@@ -12,6 +12,8 @@ struct ReadingGroup {
   int index = 0;  // of the touch
   std::vector<double> residual_s;
   std::vector<double> growth;  // what the noise may grow with: tan of the incidence
+  std::vector<int> channel;    // of each reading: the finger
+  double slowness = 1;  // seconds per metre over their root mean square: what a noise of lengths grows with
 };
 
 enum class NoiseShape { kGaussian, kStudent, kMixture };
@@ -19,11 +21,17 @@ enum class NoiseShape { kGaussian, kStudent, kMixture };
 struct NoiseModel {
   NoiseShape shape = NoiseShape::kGaussian;
   double sigma_s = 0;
-  double slope = 0;               // s_i = sigma (1 + slope growth_i)
-  double degrees_of_freedom = 0;  // of Student's t
-  double share = 0;               // of outliers in the mixture,
-  double width = 0;               // and their sigma over the others'
+  // Scale of reading i: sigma (1 + slope growth_i) channel_scale_i sqrt(1 - w + w slowness^2), w = length_share.
+  double slope = 0;
+  std::vector<double> channel_scale;  // by channel; empty: 1
+  double length_share = 0;            // of the variance that is a noise of lengths, 0 to 1
+  double degrees_of_freedom = 0;      // of Student's t
+  double share = 0;                   // of outliers in the mixture,
+  double width = 0;                   // and their sigma over the others'
 };
+
+// Scale of reading i of a group over sigma.
+double RelativeScale(const ReadingGroup& group, size_t i, const NoiseModel& model);
 
 double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model);
 

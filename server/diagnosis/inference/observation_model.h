@@ -25,6 +25,8 @@ class ObservationModel {
   virtual int GroupOfRow(int row) const = 0;
   // Rows of one block share their errors (repeats of one pose): they are left out of a fit together.
   virtual int BlockOfRow(int row) const = 0;
+  // When the row was measured, in any unit that grows with time: what a stretch of time is, that is left out together.
+  virtual double TimeOfRow(int row) const = 0;
 
   // What the deterministic part of a model expects, one number per reading; NaN where it expects none. Only the
   // methods below read it.

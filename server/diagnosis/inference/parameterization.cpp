@@ -77,6 +77,8 @@ void Parameterization::Free(int index, bool refit) {
       c.upper = parameter.upper * si;
       c.neutral = parameter.sum_zero ? 0 : parameter.neutral * si;
       if (parameter.sum_zero) c.lower = std::min(c.lower, -c.upper);
+      c.usual_lower = parameter.usual_lower * si;
+      c.usual_upper = parameter.usual_upper * si;
       if (parameter.reciprocal) {
         c.reciprocal = true;
         c.neutral = 0;
@@ -95,6 +97,7 @@ void Parameterization::Free(int index, bool refit) {
         continue;
       }
       for (const std::string& object : objects_) {
+        if (instance.object_values.count(object) == 0) continue;
         c.object = object;
         if (refit) c.neutral = start(instance.object_values.at(object));
         parameters_.push_back(c);
@@ -112,6 +115,25 @@ void Parameterization::Add(std::shared_ptr<const model::Effect> effect, bool per
     for (const std::string& object : objects_) instance.object_values[object] = instance.values;
   base_.effects.push_back(std::move(instance));
   Free(static_cast<int>(base_.effects.size()) - 1, false);
+}
+
+void Parameterization::AddOn(std::shared_ptr<const model::Effect> effect, const std::string& object) {
+  model::EffectInstance instance;
+  instance.values = effect->NeutralValues(base_.fingers);
+  instance.per_object = true;
+  instance.object_values[object] = instance.values;
+  instance.effect = std::move(effect);
+  base_.effects.push_back(std::move(instance));
+  const size_t first = parameters_.size();
+  Free(static_cast<int>(base_.effects.size()) - 1, false);
+  if (parameters_.size() > first)
+    parameters_[first].log_prior = -std::log(std::max<double>(1, static_cast<double>(objects_.size())));
+}
+
+std::string Parameterization::OnlyObject(int index) const {
+  const model::EffectInstance& instance = base_.effects[index];
+  const bool one = instance.per_object && instance.object_values.size() == 1 && objects_.size() > 1;
+  return one ? instance.object_values.begin()->first : "";
 }
 
 Parameterization Parameterization::Without(int index) const {
@@ -187,6 +209,7 @@ std::vector<ParameterEstimate> Parameterization::Describe(int index, const Eigen
   const model::Effect& effect = *instance.effect;
   std::vector<std::string> objects = {""};
   if (instance.per_object) objects = objects_;
+  if (const std::string only = OnlyObject(index); !only.empty()) objects = {only};
   for (const std::string& object : objects) {
     const std::vector<double>& values = object.empty() ? instance.values : instance.object_values.at(object);
     for (int p = 0; p < static_cast<int>(effect.parameters.size()); ++p) {

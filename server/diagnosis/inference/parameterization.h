@@ -1,6 +1,7 @@
 // A model with some of its values free, as a point in R^n that a fit can move.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,10 +20,13 @@ struct FreeParameter {
   std::string object;           // whose value; empty: every object's
   std::vector<double> weights;  // change of the effect's flat values (SI) per unit of this one
   double lower = 0, upper = 0;  // of this one
-  double scale = 1;             // size that rigs show: unit of steps and width of the prior
-  double neutral = 0;           // the value that changes nothing, or that the model had
-  bool reciprocal = false;      // the value is 1 / this one (ParameterInfo::reciprocal)
-  int shape = 0;                // parameters of one shape differ by object only
+  double usual_lower = -INFINITY,
+         usual_upper = INFINITY;  // what rigs show: beyond it a value needs strong evidence
+  double scale = 1;               // size that rigs show: unit of steps and width of the prior
+  double neutral = 0;             // the value that changes nothing, or that the model had
+  bool reciprocal = false;        // the value is 1 / this one (ParameterInfo::reciprocal)
+  int shape = 0;                  // parameters of one shape differ by object only
+  double log_prior = 0;           // nats, whatever the value: of the choice of one object among many
 };
 
 class Parameterization {
@@ -36,6 +40,10 @@ class Parameterization {
   void Free(int index, bool refit);
   // Appends an effect at values that change nothing (or, for formulas, at those given) and sets it free.
   void Add(std::shared_ptr<const model::Effect> effect, bool per_object);
+  // The same on one object only: on all others the effect changes nothing, and the choice among them is paid for.
+  void AddOn(std::shared_ptr<const model::Effect> effect, const std::string& object);
+  // The one object among several on which effect `index` acts; empty: it has a value for each.
+  std::string OnlyObject(int index) const;
   // Takes effect `index` out, with its free parameters.
   Parameterization Without(int index) const;
 

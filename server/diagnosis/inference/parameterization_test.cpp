@@ -36,6 +36,34 @@ TEST(Parameterization, GivesEveryObjectItsOwnValues) {
   EXPECT_NEAR(moved.effects[0].ValuesFor("b")[0], -0.02, 1e-15);
 }
 
+TEST(Parameterization, ActsOnOneObjectAndLeavesTheOthersAlone) {
+  Parameterization model(model::NominalModel(), {"a", "b", "c"});
+  model.AddOn(effects::Catalogue().Find("object_push"), "b");
+  ASSERT_EQ(model.size(), 1);
+  EXPECT_EQ(model.OnlyObject(0), "b");
+  const model::Model moved = model.At(Eigen::VectorXd::Constant(1, 0.002));
+  EXPECT_NEAR(moved.effects[0].ValuesFor("b")[0], 0.002, 1e-15);
+  EXPECT_EQ(moved.effects[0].ValuesFor("a")[0], 0);
+  EXPECT_EQ(moved.effects[0].ValuesFor("c")[0], 0);
+  const auto values = model.Describe(0, Eigen::VectorXd::Constant(1, 0.002), Eigen::MatrixXd());
+  ASSERT_EQ(values.size(), 1u);
+  EXPECT_EQ(values[0].object, "b");
+}
+
+TEST(Parameterization, PaysForTheChoiceOfAnObject) {
+  Parameterization model(model::NominalModel(), {"a", "b", "c", "d"});
+  model.AddOn(effects::Catalogue().Find("finger_length"), "b");
+  double log_prior = 0;
+  for (const FreeParameter& p : model.parameters()) log_prior += p.log_prior;
+  EXPECT_NEAR(log_prior, -std::log(4), 1e-12);
+}
+
+TEST(Parameterization, AnEffectWithAValueForEachObjectActsOnMoreThanOne) {
+  Parameterization model(model::NominalModel(), {"a", "b"});
+  model.Add(effects::Catalogue().Find("object_push"), true);
+  EXPECT_EQ(model.OnlyObject(0), "");
+}
+
 TEST(Parameterization, HoldsValuesWithinTheirBounds) {
   Parameterization model(model::NominalModel(), {});
   model.Add(effects::Catalogue().Find("tip_radius"), false);

@@ -16,6 +16,7 @@ void WriteProposedTouch(const design::ProposedTouch& proposed, v1::Report* repor
   message->set_object(proposed.object);
   message->set_purpose(proposed.purpose);
   message->set_separation(proposed.separation_sigmas);
+  message->set_touches_to_verdict(static_cast<uint32_t>(proposed.touches_to_verdict));
   v1::CommandedTouch* touch = message->mutable_touch();
   WriteVector(proposed.touch.target_m, touch->mutable_target_m());
   WriteVector(proposed.touch.approach, touch->mutable_approach());

@@ -53,6 +53,13 @@ void WriteCurve(const residuals::ResidualCurve& curve, int fingers, v1::Covariat
   message->set_covariate(curve.covariate);
   message->set_unit(curve.unit);
   message->set_p(curve.p_value);
+  message->set_p_after(curve.improved_p_value);
+  for (const residuals::FingerDependence& own : curve.fingers) {
+    v1::FingerDependence* finger = message->add_fingers();
+    finger->set_finger(model::FingerName(own.finger, fingers));
+    finger->set_p(own.p_value);
+    finger->set_p_after(own.improved_p_value);
+  }
   for (const residuals::ResidualCurveBin& bin : curve.bins) {
     v1::CurveBin* bin_message = message->add_bins();
     bin_message->set_finger(model::FingerName(bin.finger, fingers));
@@ -111,6 +118,13 @@ void WriteResiduals(const residuals::ResidualSummary& residuals, int fingers, v1
   for (const residuals::ErrorGroup& group : residuals.grouped.groups) WriteGroup(group, report->add_groups());
   for (const double bias_s : residuals.grouped.finger_bias_s)
     report->add_finger_bias_us(Microseconds(bias_s));
+  if (residuals.finger_scatter) {
+    v1::FingerScatter* message = report->mutable_finger_scatter();
+    message->set_finger(model::FingerName(residuals.finger_scatter->finger, fingers));
+    message->set_rmse_us(Microseconds(residuals.finger_scatter->rmse_s));
+    message->set_others_rmse_us(Microseconds(residuals.finger_scatter->others_rmse_s));
+    message->set_p(residuals.finger_scatter->p_value);
+  }
   for (const residuals::WorstTouch& touch : residuals.worst_touches)
     WriteWorstTouch(touch, report->add_worst_touches());
   for (const residuals::ResidualCurve& curve : residuals.curves)

@@ -44,8 +44,7 @@ std::string HowWrong(const Diagnosis& diagnosis) {
 std::string TimeInRepeats(const selection::NoiseFloor& floor) {
   return absl::StrFormat(
       "Repeats of a touch differ by %s, but touches made one after the other by %s only (z %.1f): something "
-      "changes "
-      "slowly through the session, and that is not noise.",
+      "changes slowly through the session, and that is not noise.",
       TimeInWords(floor.sigma_s), TimeInWords(floor.sigma_without_time_s), floor.time_structure_z);
 }
 
@@ -53,7 +52,7 @@ std::string WhatRemains(const selection::UnexplainedRest& rest) {
   if (rest.formula.empty() && !rest.lookup_yaml.empty() && !rest.covariates.empty())
     return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
                         rest.covariates[0].name, " along a curve that would leave ", TimeInWords(rest.rmse_s),
-                        ".");
+                        ".", rest.words.empty() ? "" : " ", rest.words);
   if (rest.formula.empty() && !rest.covariates.empty())
     return absl::StrCat("What remains depends on ", rest.covariates[0].name,
                         "; no effect of the catalogue explains it.");
@@ -79,8 +78,7 @@ std::vector<std::string> DataWarnings(const touches::DataSummary& data) {
   if (data.objects.size() == 1)
     warnings.push_back(
         "One object only: what belongs to the rig and what to this object cannot be told apart well. Touch "
-        "at least "
-        "three objects.");
+        "at least three objects.");
   if (data.repeats == 0)
     warnings.push_back(
         "No touch was repeated: the noise floor is an upper bound, taken from what the best model leaves.");

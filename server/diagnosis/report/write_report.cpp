@@ -1,11 +1,10 @@
 #include "server/diagnosis/report/write_report.h"
 
-#include <algorithm>
-
 #include "server/base/units.h"
 #include "server/diagnosis/report/design_messages.h"
 #include "server/diagnosis/report/distributions_messages.h"
 #include "server/diagnosis/report/residuals_messages.h"
+#include "server/effects/formula.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::report {
@@ -82,7 +81,7 @@ void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message
 void WriteStep(const selection::LadderStep& step, v1::Step* message) {
   message->set_effect(step.effect);
   for (const std::string& name : step.equivalent) message->add_equivalent(name);
-  message->set_probability(std::min(step.probability, selection::kMaxProbability));
+  message->set_probability(step.probability);
   WriteParameters(step.parameters, message);
   message->set_rmse_us(Microseconds(step.quality.rmse_s));
   message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse_s));
@@ -99,12 +98,26 @@ void WriteStep(const selection::LadderStep& step, v1::Step* message) {
 void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
   message->set_effect(candidate.effect);
   WriteParameters(candidate.parameters, message);
-  message->set_probability(std::min(candidate.probability, selection::kMaxProbability));
+  message->set_probability(candidate.probability);
   message->set_rmse_us(Microseconds(candidate.rmse_s));
   message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse_s));
   message->set_gain_nats(candidate.gain_nats);
   message->set_note(ToMessage(candidate.note));
   message->set_scope(ToMessage(candidate.scope));
+}
+
+void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) {
+  message->set_covariate(lookup.covariate);
+  for (const effects::FormulaVariable& variable : effects::FormulaVariables())
+    if (lookup.covariate == variable.name) message->set_covariate_unit(variable.unit);
+  message->set_unit(lookup.adds_time ? "us" : "mm");
+  *message->mutable_knots() = {lookup.knots.begin(), lookup.knots.end()};
+  const int lists = static_cast<int>(lookup.values.size());
+  for (int i = 0; i < lists; ++i) {
+    v1::FingerCurve* curve = message->add_curves();
+    if (lists > 1) curve->set_finger(model::FingerName(i, lists));
+    *curve->mutable_values() = {lookup.values[i].begin(), lookup.values[i].end()};
+  }
 }
 
 void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* message) {
@@ -123,6 +136,10 @@ void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* m
   message->set_nearest_effect(rest.nearest_effect);
   message->set_nearest_cosine(rest.nearest_cosine);
   message->set_lookup_yaml(rest.lookup_yaml);
+  message->set_nearest_formula(rest.nearest_formula);
+  message->set_nearest_formula_share(rest.nearest_formula_share);
+  if (rest.lookup != nullptr) WriteCurve(*rest.lookup->lookup, message->mutable_curve());
+  message->set_words(rest.words);
 }
 
 void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {

@@ -159,6 +159,7 @@ TEST(ToReport, HasWhatNoEffectExplains) {
   diagnosis.unexplained->formula = "k * sin(2*pi*travel_mm/lead)";
   diagnosis.unexplained->formula_yaml = "- formula: {}\n";
   diagnosis.unexplained->lookup_yaml = "- lookup: {}\n";
+  diagnosis.unexplained->words = "From touch 480 on finger l travels 0.25 mm farther.";
   diagnosis.unexplained->rmse_s = 0.007;
   diagnosis.unexplained->heldout_rmse_s = 0.0075;
   diagnosis.unexplained->heldout_gain = 0.8;
@@ -172,6 +173,7 @@ TEST(ToReport, HasWhatNoEffectExplains) {
   EXPECT_EQ(rest.formula(), "k * sin(2*pi*travel_mm/lead)");
   EXPECT_EQ(rest.formula_yaml(), "- formula: {}\n");
   EXPECT_EQ(rest.lookup_yaml(), "- lookup: {}\n");
+  EXPECT_EQ(rest.words(), "From touch 480 on finger l travels 0.25 mm farther.");
   EXPECT_DOUBLE_EQ(rest.rmse_us(), 7000);
   EXPECT_DOUBLE_EQ(rest.heldout_rmse_us(), 7500);
   EXPECT_DOUBLE_EQ(rest.heldout_gain(), 0.8);

@@ -74,9 +74,9 @@ std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observation
       });
   if (fingers > 1 && prediction.first_finger.size() == size_t(observations.size())) {
     add("first", "first finger", "", [&prediction](int k, int i) {
-      return prediction.first_finger[k] < 0 ? NAN : double(prediction.first_finger[k] != i);
+      return prediction.first_finger[k] < 0 ? NAN : double(prediction.first_finger[k] == i);
     });
-    list.back().labels = {"first finger", "later finger"};
+    list.back().labels = {"later finger", "first finger"};  // 1 for the first, as in formulas
   }
 
   // What was commanded.
@@ -95,6 +95,9 @@ std::vector<ResidualCovariate> ListResidualCovariates(const touches::Observation
   if (set.has_session_time)
     add("session_time_s", "session time", "s",
         [&set, &row](int k, int) { return set.session_time_s[row[k]]; });
+  if (set.has_session_time)
+    add("pause_s", "pause since the touch before", "s",
+        [&observations](int k, int) { return touches::PauseS(observations, k); });
   for (const auto& [name, values] : set.covariates) {
     const std::vector<double>& column = values;
     list.push_back({name, name, "", {}, [&column, &row](int k, int) { return column[row[k]]; }});

@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kBins = 12;
 constexpr int kMaxTouches = 60000;
+constexpr int kTestsPerCurve = 1000;  // numbers of random streams: apart by more than there are curves
 
 // Upper ends of bins that hold equally many cells; categories have a bin each.
 std::vector<double> BinEnds(const ResidualCovariate& covariate, std::vector<double> values) {
@@ -80,6 +81,46 @@ std::vector<ResidualCurveBin> BinsOfFinger(const std::vector<ResidualCell>& cell
   return bins;
 }
 
+// NaN equals NaN.
+bool Differ(const std::vector<double>& a, const std::vector<double>& b) {
+  for (size_t n = 0; n < a.size(); ++n)
+    if (a[n] != b[n] && !(std::isnan(a[n]) && std::isnan(b[n]))) return true;
+  return false;
+}
+
+// The cells with what the improved model leaves in the place of what is tested.
+std::vector<ResidualCell> ImprovedCells(const std::vector<ResidualCell>& cells) {
+  std::vector<ResidualCell> improved;
+  for (ResidualCell cell : cells) {
+    if (std::isnan(cell.after_s)) continue;
+    cell.before_s = cell.after_s;
+    improved.push_back(cell);
+  }
+  return improved;
+}
+
+std::vector<ResidualCell> CellsOfFinger(const std::vector<ResidualCell>& cells, int finger) {
+  std::vector<ResidualCell> own;
+  for (const ResidualCell& cell : cells)
+    if (cell.finger == finger) own.push_back(cell);
+  return own;
+}
+
+// The covariates of curves: those of slices without the finger, and the touch's number, which slices do without
+// beside the session time.
+std::vector<ResidualCovariate> CurveCovariates(const touches::Observations& observations,
+                                               const touches::Prediction& initial) {
+  std::vector<ResidualCovariate> covariates = ListResidualCovariates(observations, initial);
+  covariates.erase(std::remove_if(covariates.begin(), covariates.end(),
+                                  [](const ResidualCovariate& c) { return c.name == "finger"; }),
+                   covariates.end());
+  if (observations.size() > 1)
+    covariates.push_back({"touch_number", "touch number", "", {}, [&observations](int k, int) {
+                            return double(observations.set->touch[observations.row[k]]);
+                          }});
+  return covariates;
+}
+
 }  // namespace
 
 std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& observations,
@@ -91,10 +132,8 @@ std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& obser
   std::vector<int> touches = ThinnedTouches(observations, before, kMaxTouches);
   std::stable_sort(touches.begin(), touches.end(),
                    [&](int a, int b) { return observations.pose[a] < observations.pose[b]; });
-  std::vector<ResidualCovariate> covariates = ListResidualCovariates(observations, initial);
-  covariates.erase(std::remove_if(covariates.begin(), covariates.end(),
-                                  [](const ResidualCovariate& c) { return c.name == "finger"; }),
-                   covariates.end());
+  const std::vector<ResidualCovariate> covariates = CurveCovariates(observations, initial);
+  const bool changed = Differ(before, after);
   std::vector<ResidualCurve> curves;
   for (const ResidualCovariate& covariate : covariates) {
     std::vector<ResidualCell> cells;
@@ -118,8 +157,25 @@ std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& obser
         curve.bins.insert(curve.bins.end(), bins.begin(), bins.end());
       }
       // Among many curves one bends by chance: Bonferroni.
-      const double p = DependenceP(cells, ends, fingers, seed, static_cast<int>(curves.size()));
-      curve.p_value = std::min(1.0, static_cast<double>(covariates.size()) * p);
+      const double number_of_tests = static_cast<double>(covariates.size());
+      int number = static_cast<int>(curves.size());
+      const auto test = [&](const std::vector<ResidualCell>& tested, double tests) {
+        const double p = DependenceP(tested, ends, fingers, seed, number);
+        number += kTestsPerCurve;
+        return std::min(1.0, tests * p);
+      };
+      const std::vector<ResidualCell> improved = changed ? ImprovedCells(cells) : std::vector<ResidualCell>();
+      curve.p_value = test(cells, number_of_tests);
+      curve.improved_p_value = changed ? test(improved, number_of_tests) : curve.p_value;
+      const bool of_session = covariate.name == "session_time_s" || covariate.name == "touch_number";
+      for (int i = 0; of_session && i < fingers; ++i) {
+        FingerDependence own;
+        own.finger = i;
+        own.p_value = test(CellsOfFinger(cells, i), number_of_tests * fingers);
+        own.improved_p_value =
+            changed ? test(CellsOfFinger(improved, i), number_of_tests * fingers) : own.p_value;
+        curve.fingers.push_back(own);
+      }
     }
     curves.push_back(std::move(curve));
   }

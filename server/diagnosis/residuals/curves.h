@@ -20,6 +20,12 @@ struct ResidualCurveBin {
   double improved_mean_residual_s = 0;  // of the improved model
 };
 
+// Whether one finger alone depends on the place in the session, before and after the steps.
+struct FingerDependence {
+  int finger = 0;
+  double p_value = 1, improved_p_value = 1;  // like those of the curve, times the number of fingers
+};
+
 struct ResidualCurve {
   std::string covariate;  // "incidence_deg"
   std::string unit;       // of the covariate: "deg"; empty for ratios and categories
@@ -28,9 +34,11 @@ struct ResidualCurve {
   // Probability of a dependence at least this strong if there were none: permutation of poses (or of the
   // touches of a pose, where the covariate varies among them), times the number of curves.
   double p_value = 1;
+  double improved_p_value = 1;            // the same of what the improved model leaves
+  std::vector<FingerDependence> fingers;  // of session_time_s and touch_number; else empty
 };
 
-// A curve for every covariate but the finger. `before` and `after` are the residuals of the initial and the
+// A curve for every covariate but the finger, and for the touch's number in the order of the session. `before` and `after` are the residuals of the initial and the
 // improved model, [k * fingers + finger], seconds, NaN where a finger takes no part. `seed` is that of the
 // permutations. Reads at most 60,000 touches, the permutations at most 20,000 poses. Deterministic.
 std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& observations,

@@ -9,6 +9,7 @@ ResidualSummary DescribeResiduals(const touches::Observations& observations,
   ResidualSummary summary;
   summary.slices = FindSlices(observations, initial, before, scale.sigma_s);
   summary.grouped = GroupErrors(observations, before, scale.sigma_s);
+  summary.finger_scatter = FindFingerScatter(observations, after);
   summary.worst_touches = FindWorstTouches(observations, before);
   summary.curves = MakeResidualCurves(observations, initial, before, after, scale.seed);
   summary.histograms = MakeHistograms(observations, initial, improved, scale);

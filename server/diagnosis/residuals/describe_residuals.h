@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/diagnosis/residuals/curves.h"
+#include "server/diagnosis/residuals/finger_scatter.h"
 #include "server/diagnosis/residuals/groups.h"
 #include "server/diagnosis/residuals/histograms.h"
 #include "server/diagnosis/residuals/outlines.h"
@@ -19,6 +20,7 @@ namespace touchstone::diagnosis::residuals {
 struct ResidualSummary {
   std::vector<ErrorSlice> slices;
   GroupedErrors grouped;
+  std::optional<FingerScatter> finger_scatter;  // of what the improved model leaves
   std::vector<WorstTouch> worst_touches;
   std::vector<ResidualCurve> curves;
   std::vector<ComparedHistogram> histograms;

@@ -109,7 +109,8 @@ std::string SliceBins::Number(double value) const {
   // Long times are read in minutes.
   const bool minutes = covariate_->unit == "s" && !thresholds_.empty() && thresholds_.back() >= 600;
   const std::string unit = minutes ? "min" : covariate_->unit;
-  const double rounded = std::stod(absl::StrCat(minutes ? value / 60 : value));  // six figures
+  // Six figures; tenths of a minute, which nobody reads more finely.
+  const double rounded = minutes ? std::round(value / 6) / 10 : std::stod(absl::StrCat(value));
   return unit.empty() ? ShortestNumber(rounded) : absl::StrCat(ShortestNumber(rounded), " ", unit);
 }
 

@@ -9,7 +9,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kMaxFitted = 8;  // candidates that are fitted in full
+constexpr int kMaxFitted = 8;       // candidates that are fitted in full
+constexpr int kMaxFittedOnOne = 3;  // ... of those that do not act on all objects alike
 
 // Whether every value of the effect ended at its neutral, usually a bound.
 bool ChangesNothing(const inference::Fit& fit, int index) {
@@ -47,9 +48,12 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
                    [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<RankedCandidate> candidates;
   std::vector<double> all = {0};  // log evidence: nothing is missing
-  int fitted = 0;
+  int fitted = 0, fitted_on_one = 0;
   for (const Extension& extension : extensions) {
-    if (extension.candidate < 0) continue;
+    // Of those that do not act on all objects alike only the likely ones: there are many.
+    const bool one = extension.rare;
+    if (extension.candidate < 0 || (one && (fitted_on_one == kMaxFittedOnOne || !extension.visible)))
+      continue;
     RankedCandidate& candidate = candidates.emplace_back();
     candidate.effect = extension.name;
     candidate.scope =
@@ -59,8 +63,8 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
       continue;
     }
     candidate.gain_nats = extension.log_evidence - initial.log_evidence;
-    if (fitted < kMaxFitted) {
-      ++fitted;
+    if (one || fitted < kMaxFitted) {
+      ++(one ? fitted_on_one : fitted);
       TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit fit, search.FitExtension(extension));
       DescribeFit(workspace.experiment, fit, initial.log_evidence, &candidate);
     } else {
@@ -70,8 +74,7 @@ absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& wor
   }
   for (RankedCandidate& candidate : candidates)
     if (candidate.explains())
-      candidate.probability =
-          std::min(kMaxProbability, std::exp(candidate.gain_nats - inference::LogSum(all)));
+      candidate.probability = ProbabilityOfShare(candidate.gain_nats - inference::LogSum(all));
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const RankedCandidate& a, const RankedCandidate& b) {
                      return a.explains() != b.explains() ? a.explains() : a.gain_nats > b.gain_nats;

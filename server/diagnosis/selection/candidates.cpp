@@ -12,6 +12,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
+constexpr size_t kMaxObjectsVaried = 12;  // with a value each, of effects that seldom differ between objects
+
 // A ramp that ends before the first contact leaves no trace. These end a little before and after the usual travel;
 // the free parameter is 1 / acceleration.
 std::vector<double> RampStarts(const touches::Observations& o) {
@@ -23,7 +25,10 @@ std::vector<double> RampStarts(const touches::Observations& o) {
 
 Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user,
                         const touches::Observations& searched) {
-  Candidate candidate{std::move(effect), per_object, of_user, {}};
+  Candidate candidate;
+  candidate.effect = std::move(effect);
+  candidate.per_object = per_object;
+  candidate.of_user = of_user;
   const std::vector<model::ParameterInfo>& parameters = candidate.effect->parameters;
   if (!parameters.empty() && parameters.back().reciprocal && searched.size() > 0)
     candidate.further_starts = RampStarts(searched);
@@ -53,8 +58,16 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
     if (describes_only || effect->random() || has(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
-    if (input.set->objects.size() > 1 && effect->often_per_object)
+    if (searched.objects.size() < 2 || effect->always_per_object) continue;
+    if (effect->often_per_object || searched.objects.size() <= kMaxObjectsVaried) {
       candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.back().rare = !effect->often_per_object;
+    }
+    for (const std::string& object : searched.objects) {
+      candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.back().object = object;
+      candidates.back().rare = true;
+    }
   }
   for (const auto& effect : input.also)
     if (!has(inference::NameOf(*effect)) && !effect->random())

@@ -13,13 +13,15 @@ namespace touchstone::diagnosis::selection {
 struct Candidate {
   std::shared_ptr<const model::Effect> effect;
   bool per_object = false;
-  bool of_user = false;  // from `also`
+  bool of_user = false;     // from `also`
+  std::string object = {};  // the only one on which it acts; empty: on all
+  bool rare = false;        // acts on one object only, or differs between objects where rigs seldom show that
   // Values of the effect's last free parameter from where a fit starts as well: where the response is not linear.
   std::vector<double> further_starts = {};
 };
 
-// Every effect of the catalogue that changes expectations and that the model does not have yet, some also object by
-// object, and the user's own. `searched`: the touches of the search.
+// Every effect of the catalogue that changes expectations and that the model does not have yet; behind the same on all
+// objects, each with a value for every object and on one object only; and the user's own. `searched`: the touches of the search.
 std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches::Observations& searched);
 
 // Before the name of an effect that the model has, where another value of it competes with a new effect.

@@ -1,5 +1,7 @@
 #include "server/diagnosis/selection/curve_competition.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +19,7 @@ constexpr double kMemoryNats = 10;    // a wander must be this much better than 
 constexpr double kRougherNats = 3;    // ... and than a course without corners
 constexpr double kOvertakenNats = 1;  // a curve alone that is this much better takes a named effect's place
 
+constexpr double kBeyondWanderNats = 60;  // an effect worth as much is no mean or trend of a wander
 constexpr double kWorthUnderMemoryNats = 10;
 constexpr double kDroppedNats = 15;  // that it must be better by for each named effect it needs beside it
 
@@ -38,6 +41,8 @@ class Competition {
       : workspace_(workspace), result_(*result) {}
 
   absl::Status Run() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool partial, IsPartial());
+    if (partial) return absl::OkStatus();
     inference::Fit named = result_.without_formula;
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(named, ""));
     TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named));
@@ -70,6 +75,26 @@ class Competition {
     return ScoreCurves(workspace_.experiment, *workspace_.rows, fit, details, only);
   }
 
+  // An offset that a part of the touches has, in the place of constants and drifts of each finger.
+  absl::StatusOr<bool> IsPartial() {
+    if (result_.formula >= 0) return false;
+    inference::Parameterization rest = result_.fit.model;
+    for (int index = static_cast<int>(rest.base().effects.size()) - 1; index >= result_.initial_effects;
+         --index)
+      if (IsPerFinger(*rest.base().effects[index].effect)) rest = rest.Without(index);
+    inference::Fit fit = result_.fit;
+    if (rest.base().effects.size() < fit.model.base().effects.size()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(fit, inference::FitModel(workspace_.experiment, std::move(rest)));
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace_.searched_predictor->Run(fit.model.base(), false, false));
+    const touches::Observations& o = *workspace_.searched;
+    result_.partial = FindPartialOffset(o, touches::Residuals(o, prediction));
+    if (!result_.partial) return false;
+    result_.fit = result_.without_formula = std::move(fit);
+    return true;
+  }
+
   // A curve of time (of the previous press, for effects of that) in the place of named effects: of all together, then
   // of each. A constant per finger may be the mean of a course, a drift its trend.
   absl::Status ReplaceOvertaken(inference::Fit* named) {
@@ -86,6 +111,50 @@ class Competition {
     return absl::OkStatus();
   }
 
+  void NoteRival(const std::string& name, double ahead_nats, const std::string& words) {
+    const auto [rival, is_new] = result_.curve_rivals.try_emplace(name);
+    if (!is_new && rival->second.ahead_nats >= ahead_nats) return;
+    rival->second = {ahead_nats, words};
+  }
+
+  static bool IsPerFinger(const model::Effect& effect) {
+    return effect.parameters.size() == 1 && effect.parameters[0].arity == model::Arity::kPerFinger;
+  }
+
+  static double OneFingerNats(const model::Effect& effect, const NamelessCurve& curve) {
+    if (!IsPerFinger(effect)) return -INFINITY;
+    return effect.needs.session_time ? curve.one_finger_line_nats : curve.one_finger_constant_nats;
+  }
+
+  // A wander's mean and trend look like a constant and a drift of each finger.
+  absl::Status NoteWander(int index, const inference::Fit& named, const inference::Fit& without) {
+    const model::Effect& effect = *named.model.base().effects[index].effect;
+    if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kBeyondWanderNats)
+      return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> with, MemoryOf(named));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> alone, MemoryOf(without));
+    if (!with || !alone) return absl::OkStatus();
+    const double own = std::max(with->white_log_likelihood, with->log_likelihood - with->complexity_nats) -
+                       0.5 * (workspace_.searched->fingers - 1) * with->complexity_nats;
+    const double ahead_nats = alone->log_likelihood - alone->complexity_nats - own;
+    NoteRival(inference::NameOf(effect), ahead_nats,
+              "Noise with memory would say nearly the same: a wander of the fingers.");
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::optional<NoiseMemory>> MemoryOf(const inference::Fit& fit) const {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace_.searched_predictor->Run(fit.model.base(), false, false));
+    const touches::Observations& o = *workspace_.searched;
+    return FindNoiseMemory(o, touches::Residuals(o, prediction));
+  }
+
+  static std::string RivalInWords(const NamelessCurve& curve) {
+    return absl::StrCat("A course in time would say nearly the same: ",
+                        curve.words.empty() ? absl::StrCat("a curve of ", curve.covariate) : curve.words,
+                        ".");
+  }
+
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
   absl::StatusOr<bool> Overtake(const std::vector<int>& steps, inference::Fit* named) {
     inference::Parameterization rest = named->model;
@@ -100,13 +169,17 @@ class Competition {
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
                                 inference::FitModel(workspace_.experiment, std::move(rest)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves, CurvesOver(without, covariate));
-    if (curves.empty() || !IsSignificant(curves[0])) return false;
-    const double ahead = without.log_evidence + curves[0].gain_nats - named->log_evidence;
-    for (const std::string& name : names) {
-      double& rival = result_.curve_rivals.emplace(name, ahead).first->second;
-      rival = std::max(rival, ahead);
-    }
-    if (ahead < kOvertakenNats) return false;
+    if (curves.empty()) return false;
+    // An effect of one finger may say as much as a course of one finger does, in as few values.
+    double own = named->log_evidence;
+    if (steps.size() == 1)
+      own = std::max(own, without.log_evidence +
+                              OneFingerNats(*named->model.base().effects[steps[0]].effect, curves[0]));
+    const double behind = without.log_evidence - own;
+    for (const std::string& name : names)
+      NoteRival(name, behind + curves[0].any_gain_nats, RivalInWords(curves[0]));
+    if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteWander(steps[0], *named, without));
+    if (!IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
     return true;
@@ -137,10 +210,7 @@ class Competition {
 
   // A wander has no course that another session would repeat: it is noise, which a curve only traces.
   absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.searched_predictor->Run(with.fit.model.base(), false, false));
-    const touches::Observations& o = *workspace_.searched;
-    std::optional<NoiseMemory> memory = FindNoiseMemory(o, touches::Residuals(o, prediction));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<NoiseMemory> memory, MemoryOf(with.fit));
     if (!memory || !memory->everywhere ||
         memory->gain_nats < std::max(with.curve.gain_nats, memory->step_gain_nats) + kMemoryNats ||
         memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
@@ -155,15 +225,12 @@ class Competition {
 
   // Effects that were found under noise without memory must be worth their values under a wander too.
   absl::Status DropWhatWandered(NoiseMemory* memory) {
-    const touches::Observations& o = *workspace_.searched;
     for (int index = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
          index >= result_.initial_effects; --index) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           inference::Fit without,
           inference::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
-      TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                  workspace_.searched_predictor->Run(without.model.base(), false, false));
-      const std::optional<NoiseMemory> other = FindNoiseMemory(o, touches::Residuals(o, prediction));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> other, MemoryOf(without));
       if (!other || other->log_likelihood < memory->log_likelihood - kWorthUnderMemoryNats) continue;
       result_.fit = std::move(without);
       *memory = *other;

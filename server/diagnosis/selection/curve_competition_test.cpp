@@ -1,5 +1,6 @@
 #include "server/diagnosis/selection/curve_competition.h"
 
+#include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/touches/simulated_test_set.h"
@@ -22,6 +23,24 @@ SelectionResult ResultFor(const std::string& effect, const std::vector<std::stri
 
 TEST(CurveCompetition, ADriftKeepsItsName) {
   const SelectionResult result = ResultFor("thermal_drift", {"rate_mm_per_h=0.5,0,-0.5"});
+  EXPECT_FALSE(result.curve);
+  ASSERT_EQ(result.steps.size(), 1u);
+  EXPECT_GT(result.steps[0].probability, 0.9);
+}
+
+TEST(CurveCompetition, AStepOfOneFingerIsNoDriftAndNoLength) {
+  for (const char* mm : {"0,0.06", "0,0.2"}) {
+    const SelectionResult result =
+        ResultFor("lookup", {"name=step", "adds=travel_mm", "covariate=session_time_s", "knots=1199,1200",
+                             absl::StrCat("l=", mm), "m=0,0", "r=0,0"});
+    EXPECT_TRUE(result.curve || (!result.steps.empty() && result.steps[0].probability <= 0.9)) << mm;
+    for (const SelectedStep& step : result.steps)
+      EXPECT_NE(step.words.find("A course in time"), std::string::npos) << mm;
+  }
+}
+
+TEST(CurveCompetition, ALengthKeepsItsName) {
+  const SelectionResult result = ResultFor("finger_length", {"offset_mm=0.1,-0.2,0.1"});
   EXPECT_FALSE(result.curve);
   ASSERT_EQ(result.steps.size(), 1u);
   EXPECT_GT(result.steps[0].probability, 0.9);

@@ -35,6 +35,8 @@ std::vector<CurveCovariate> ListCurveCovariates(const touches::Observations& o,
   const bool several_sessions = std::count(o.previous.begin(), o.previous.end(), -1) > 1;
   if (!set.has_session_time || several_sessions)
     list.push_back({"touch", false, true, [](int k, int) { return double(k); }});
+  if (set.has_session_time)
+    list.push_back({"pause_s", false, false, [&o](int k, int) { return touches::PauseS(o, k); }});
   list.push_back({"incidence_deg", true, false, [&d, at](int k, int i) {
                     return std::acos(std::clamp(d.cos_incidence[at(k, i)], 0.0, 1.0)) / kRadiansPerDegree;
                   }});

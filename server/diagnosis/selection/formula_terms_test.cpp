@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/selection/workspace.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -13,20 +12,10 @@ using ::testing::HasSubstr;
 
 // The best term for a rig with this formula hidden.
 FormulaTerm BestTerm(const std::string& expression, const std::string& k) {
-  touches::HiddenRig rig;
-  rig.samples_per_face = 6;
-  rig.hidden = {{"formula",
-                 {"name=odd", "adds=travel_mm", "expression=" + expression, "k=" + k, "k_unit=1", "k_min=-9",
-                  "k_max=9"}}};
-  const auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
-  EXPECT_TRUE(workspace.ok()) << workspace.status();
-  EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
-  const auto fit = inference::FitModel(
-      (*workspace)->experiment,
-      inference::Parameterization(*(*workspace)->input.model, (*workspace)->searched->objects));
-  EXPECT_TRUE(fit.ok());
-  const auto details = (*workspace)->searched_predictor->Run(fit->model.base(), true, true);
-  return ScoreTerms((*workspace)->experiment, *(*workspace)->rows, *fit, *details)[0];
+  const TestSearch search = PrepareTestSearch({{"formula",
+                                                {"name=odd", "adds=travel_mm", "expression=" + expression,
+                                                 "k=" + k, "k_unit=1", "k_min=-9", "k_max=9"}}});
+  return ScoreTerms(search.workspace->experiment, *search.workspace->rows, search.fit, search.details)[0];
 }
 
 TEST(FormulaTerms, FindADirectionThatOneFingerDependsOn) {

@@ -1,18 +1,17 @@
 #include "server/diagnosis/selection/ladder.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/normal.h"
 #include "server/base/status.h"
-#include "server/base/units.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/round_structure.h"
-#include "server/diagnosis/selection/surface_support.h"
+#include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
-#include "server/effects/all_effects.h"
+#include "server/diagnosis/selection/where_in_words.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -22,10 +21,10 @@ constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says 
 constexpr double kMisfitP = 1e-2;
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
-constexpr double kLengthError = 0.4;        // relative, of a surface error's length: the grid's spacing
-constexpr double kElsewhereNats = 5;  // of what is no surface, for a rest that a lack of fit does not show
-constexpr double kZeroErrors = 2;     // standard errors of a value that may be zero
-constexpr double kZero = 1e-6;        // ... or this share of the typical size
+constexpr double kRoundsPossibleP =
+    1e-3;                          // of agreement within rounds, for a doubt of what scatter looks like
+constexpr double kZeroErrors = 2;  // standard errors of a value that may be zero
+constexpr double kZero = 1e-6;     // ... or this share of the typical size
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
@@ -55,11 +54,15 @@ inference::Parameterization Only(const inference::Parameterization& model, int i
   return part;
 }
 
+}  // namespace
+
 void AddTexts(const model::Effect& effect, LadderStep* step) {
   step->meaning = effect.meaning;
   step->check_on_rig = effect.check_on_rig;
   step->remedy = effect.remedy;
 }
+
+namespace {
 
 class LadderBuilder {
  public:
@@ -70,23 +73,32 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
+    DoubtUnusualValues(fit_, selection_, &ladder_);
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
     QuestionRounds();
-    ladder_.final = QualityOf(workspace_, selection_.without_formula, ladder_.residuals);
+    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.final,
+                                QualityOf(workspace_, selection_.without_formula, ladder_.residuals));
     left_ = ladder_.final;
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
-    if (!doubts_.remounted) AddNoiseSteps(selection_.noise, &ladder_);
+    const size_t steps = ladder_.steps.size();
+    if (!doubts_.remounted && !selection_.partial) AddNoiseSteps(selection_.noise, &ladder_);
+    if (rounds_.p < kRoundsPossibleP)
+      for (size_t j = steps; j < ladder_.steps.size(); ++j) {
+        ladder_.steps[j].probability = std::min(ladder_.steps[j].probability, 0.5);
+        ladder_.steps[j].words =
+            "Repeats agree within rounds: an object put down anew each round would look alike.";
+      }
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
-    const bool rest =
-        StructureRemains() || selection_.curve || TimeStructureRemains() || unplaced_ || doubts_.any();
+    const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
+                      selection_.partial || unplaced_ || doubts_.any();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           ladder_.unexplained,
           DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
-      if (TimeStructureRemains())
+      if (TimeStructureRemains() || Walks())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
@@ -208,15 +220,18 @@ class LadderBuilder {
     step.scope = instance.per_object ? EffectScope::kObject : EffectScope::kRig;
     AddTexts(*instance.effect, &step);
     step.probability = from.probability;
+    step.words = from.words;
     step.gain_nats = from.gain_nats;
     step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
+    step.words = WhereInWords(fit_, from);
     std::vector<std::string> equivalent = {step.effect};
     for (const CompetingEffect& other : from.competing)
       if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
         equivalent.push_back(other.name);
     step.equivalent.assign(equivalent.begin() + 1, equivalent.end());
     for (const CompetingEffect& other : from.competing)
-      if (other.stopped)
+      if (other.stopped && other.per_object == instance.per_object &&
+          other.object == fit_.model.OnlyObject(index))
         step.words += absl::StrCat(step.words.empty() ? "" : " ", other.name,
                                    " would do as well with a value beyond its bound.");
     if (!step.equivalent.empty()) {
@@ -225,7 +240,9 @@ class LadderBuilder {
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.predictor->Run(with_it.model.base(), false, false));
-    step.quality = QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        step.quality,
+        QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction)));
     step.model = with_it.model.base();
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
@@ -245,7 +262,8 @@ class LadderBuilder {
     const bool asked = selection_.fit.hypothesis != 0 &&
                        (gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit));
     // Where a curve of one covariate or a wander takes part, bumps are no explanation of what is left.
-    if (!asked || doubts_.any() || selection_.curve || selection_.memory) return absl::OkStatus();
+    if (!asked || doubts_.any() || selection_.curve || selection_.memory || selection_.partial)
+      return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(support_, FindSurfaceSupport(workspace_, selection_.fit));
     const model::EffectInstance* given = GivenSurface();
     const double rms_m = selection_.surface_error.rms_m;
@@ -256,93 +274,19 @@ class LadderBuilder {
     }
     if (support_.IsSurface()) {
       left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
-      if (given == nullptr)
-        AddSurfaceError();
-      else
-        RefitSurfaceError();
-      return absl::OkStatus();
+      if (given != nullptr) {
+        RefitSurfaceError(selection_.surface_error, &ladder_);
+        return absl::OkStatus();
+      }
+      return AddSurfaceStep(workspace_, selection_, support_, left_.lack_of_fit_p, &ladder_);
     }
-    unplaced_ = gain_nats > kSurfaceNats &&
-                std::max(support_.curve_nats, support_.finger_field_nats) > kElsewhereNats;
+    unplaced_ = gain_nats > kSurfaceNats && support_.IsElsewhere();
     return absl::OkStatus();
-  }
-
-  // Size and length, in the units of files. What the bounds of the effect cut off is cut off here too.
-  std::vector<inference::ParameterEstimate> DescribeSurface(const model::Effect& effect) const {
-    const SurfaceErrorFinding& found = selection_.surface_error;
-    const std::pair<double, double> values[] = {
-        {found.rms_m * kMillimetresPerMetre, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0))},
-        {found.length_m * kMillimetresPerMetre, kLengthError}};
-    std::vector<inference::ParameterEstimate> estimates;
-    for (const auto& [value, relative_error] : values) {
-      const model::ParameterInfo& parameter = effect.parameters[estimates.size()];
-      inference::ParameterEstimate estimate;
-      estimate.name = parameter.name;
-      estimate.unit = std::string(UnitSymbol(parameter.unit));
-      estimate.value = std::clamp(value, parameter.lower, parameter.upper);
-      estimate.std_error = value * relative_error;
-      estimate.lower = estimate.value * std::max(0.0, 1 - kNormalQuantile975 * relative_error);
-      estimate.upper = std::min(parameter.upper, estimate.value * (1 + kNormalQuantile975 * relative_error));
-      estimates.push_back(std::move(estimate));
-    }
-    return estimates;
-  }
-
-  static std::vector<double> SurfaceValues(const model::Effect& effect,
-                                           const std::vector<inference::ParameterEstimate>& estimates) {
-    std::vector<double> values;
-    for (const inference::ParameterEstimate& estimate : estimates) {
-      const model::ParameterInfo& parameter = effect.parameters[values.size()];
-      // Two per cent of the values stand for their error.
-      const double rounded = RoundedTo(estimate.value, 0.02 * estimate.value);
-      values.push_back(std::clamp(rounded, parameter.lower, parameter.upper) * kMetresPerMillimetre);
-    }
-    return values;
-  }
-
-  void AddSurfaceError() {
-    const SurfaceErrorFinding& found = selection_.surface_error;
-    const auto effect = effects::FindByRole(model::EffectRole::kSmoothError);
-    LadderStep step;
-    step.effect = effect->name;
-    step.scope = EffectScope::kObject;
-    AddTexts(*effect, &step);
-    step.probability = ProbabilityOf(found.gain_nats);
-    step.gain_nats = found.gain_nats;
-    step.discriminating_measurement = DiscriminatingMeasurement({effect->name});
-    step.parameters = DescribeSurface(*effect);
-    step.words = support_.Words(ladder_.final.rmse_s);
-    // How the bumps lie is not known: the model with them expects what it did without.
-    step.quality = ladder_.final;
-    step.quality.lack_of_fit_p = left_.lack_of_fit_p;
-    if (!has_formula()) ladder_.final.lack_of_fit_p = left_.lack_of_fit_p;
-    model::EffectInstance instance;
-    instance.effect = effect;
-    instance.per_object = true;
-    instance.values = SurfaceValues(*effect, step.parameters);
-    ladder_.improved.effects.push_back(std::move(instance));
-    step.model = ladder_.improved;
-    ladder_.steps.push_back(std::move(step));
-    ladder_.changed = true;
-  }
-
-  void RefitSurfaceError() {
-    for (model::EffectInstance& instance : ladder_.improved.effects) {
-      if (instance.effect->role != model::EffectRole::kSmoothError) continue;
-      RefittedEffect refit{instance.effect->name, DescribeSurface(*instance.effect)};
-      for (size_t p = 0; p < refit.parameters.size(); ++p)
-        refit.parameters[p].before = instance.values[p] * kMillimetresPerMetre;
-      instance.values = SurfaceValues(*instance.effect, refit.parameters);
-      instance.object_values.clear();
-      ladder_.refitted.push_back(std::move(refit));
-      ladder_.values_wrong = true;
-      ladder_.changed = true;
-    }
   }
 
   // Whether repeats agree within rounds: a curve of time or a wander would look alike.
   void QuestionRounds() {
-    if (selection_.curve || selection_.memory) return;
+    if (selection_.curve || selection_.memory || selection_.partial) return;
     const double sigma_s = ladder_.noise_floor.sigma_s;
     rounds_ = FindRoundStructure(*workspace_.observations, ladder_.prediction, ladder_.residuals);
     if (!SharesRounds(rounds_, sigma_s)) return;
@@ -356,7 +300,27 @@ class LadderBuilder {
            left_.rmse_s > (1 + kUnexplainedShare) * ladder_.noise_floor.sigma_s;
   }
 
-  std::string WordsOfRest() const { return unplaced_ ? support_.WordsOfRest() : doubts_.words; }
+  // A wander of which the session does not show that it comes back is no noise of a known memory.
+  bool Walks() const {
+    const auto& given = workspace_.input.model->effects;
+    return selection_.memory && !Forgets(*selection_.memory) &&
+           std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
+             return instance.effect->role == model::EffectRole::kNoiseMemory;
+           });
+  }
+
+  std::string WordsOfRest() const {
+    if (selection_.partial) return selection_.partial->words;
+    if (Walks())
+      return "The fingers wander through the whole session, and nothing shows that they come back: a walk, "
+             "or noise "
+             "whose memory is as long as the session. Find what moves, or make a longer session.";
+    const std::string words = unplaced_ ? support_.WordsOfRest() : doubts_.words;
+    if (!selection_.curve || selection_.curve->words.empty()) return words;
+    std::string course = absl::StrCat(selection_.curve->words, ".");
+    course[0] = absl::ascii_toupper(course[0]);
+    return words.empty() ? course : absl::StrCat(course, " ", words);
+  }
 
   // Of the mean square error that is no noise, what the steps take away.
   double ExplainedShare() const {

@@ -33,6 +33,9 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
 
 // Its parts.
 
+// What the catalogue says of an effect, for people.
+void AddTexts(const model::Effect& effect, LadderStep* step);
+
 // The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
 // noise floor and final errors, which noise does not change.
 void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder);

@@ -7,6 +7,9 @@
 #include <numeric>
 
 #include "server/base/units.h"
+#include "server/diagnosis/inference/laplace_evidence.h"
+#include "server/diagnosis/selection/held_out_curve.h"
+#include "server/diagnosis/selection/time_course.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -16,7 +19,6 @@ constexpr double kTypicalCurveM = 0.3e-3;         // size that rigs show: scale 
 constexpr int kBends = 8;                         // each a third of the last
 constexpr double kMinGainNats = 10;               // calibrated on sets without a hidden effect
 constexpr double kMinHeldOutGain = 0.003;
-constexpr int kCurveFolds = 5, kStretches = 60;
 constexpr double kWorthAllNats = 2;
 constexpr double kNegligibleNats = 30;  // hypotheses of the surface this far behind take no part
 
@@ -113,8 +115,9 @@ class CurveScorer {
 
   // The errors on what is left out, without a surface: what holds elsewhere must not need one.
   void HoldOut(NamelessCurve* curve) const {
-    curve->heldout_without_s = HeldOut(curve->of_time, false);
-    curve->heldout_with_s = HeldOut(curve->of_time, true);
+    curve->heldout_without_s =
+        HeldOutBeside(experiment_, touches_, fit_, Eigen::MatrixXd(), Eigen::MatrixXd(), curve->of_time);
+    curve->heldout_with_s = HeldOutBeside(experiment_, touches_, fit_, basis_, precision_, curve->of_time);
   }
 
  private:
@@ -215,39 +218,6 @@ class CurveScorer {
     return part;
   }
 
-  int FoldOf(int row, bool of_time) const {
-    if (!of_time) return experiment_.observations->BlockOfRow(row) % kCurveFolds;
-    const int k = touches_.contrasts().touches()[touches_.contrasts().touch_of_row()[row]];
-    return static_cast<int>(static_cast<int64_t>(k) * kStretches / std::max(o_.size(), 1)) % kCurveFolds;
-  }
-
-  double HeldOut(bool of_time, bool with_curve) const {
-    const int p = fit_.model.size(), m = with_curve ? static_cast<int>(basis_.cols()) : 0,
-              n = touches_.rows();
-    Eigen::MatrixXd x(n, p + m);
-    x.leftCols(p) = fit_.columns.values.middleCols(1, p);
-    if (m > 0) x.rightCols(m) = basis_;
-    const Eigen::VectorXd r = fit_.columns.values.col(0);
-    Eigen::MatrixXd penalty = Eigen::MatrixXd::Zero(p + m, p + m);
-    for (int i = 0; i < p; ++i) penalty(i, i) = std::pow(fit_.sigma / fit_.model.parameters()[i].scale, 2);
-    if (m > 0) penalty.bottomRightCorner(m, m) = precision_;
-    double squares = 0;
-    for (int fold = 0; fold < kCurveFolds; ++fold) {
-      std::vector<int> out;
-      for (int row = 0; row < n; ++row)
-        if (FoldOf(row, of_time) == fold) out.push_back(row);
-      Eigen::MatrixXd xo(out.size(), p + m);
-      Eigen::VectorXd ro(out.size());
-      for (size_t j = 0; j < out.size(); ++j) xo.row(j) = x.row(out[j]), ro[j] = r[out[j]];
-      if (p + m > 0) {
-        const Eigen::MatrixXd kept = x.transpose() * x - xo.transpose() * xo + penalty;
-        ro -= xo * kept.ldlt().solve(x.transpose() * r - xo.transpose() * ro);
-      }
-      squares += ro.squaredNorm();
-    }
-    return std::sqrt(squares / std::max(n, 1));
-  }
-
   const inference::Experiment& experiment_;
   const inference::Likelihood& likelihood_;
   const touches::TouchObservationModel& touches_;
@@ -275,6 +245,7 @@ std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
   int tried = 0;
   for (const CurveCovariate& covariate : covariates) {
     NamelessCurve best;
+    std::vector<double> competing;
     for (const bool per_finger : {false, true})
       for (const bool adds_time : {false, true}) {
         if ((!per_finger && !covariate.differs) || (adds_time && !several_speeds)) continue;
@@ -288,8 +259,20 @@ std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
         if (!scorer.MakeBasis(covariate, &curve)) continue;
         scorer.Fit(&curve);
         if (only.empty() ? curve.gain_nats > kMinGainNats / 2 : true) scorer.HoldOut(&curve);
+        competing.push_back(curve.gain_nats);
         if (best.covariate.empty() || curve.gain_nats > best.gain_nats) best = std::move(curve);
       }
+    TimeCourses courses;
+    if (covariate.of_time && (only.empty() || covariate.name == only))
+      courses = ScoreTimeCourses(experiment, touches, fit, details, covariate);
+    for (NamelessCurve& course : courses.curves) {
+      ++tried;
+      competing.push_back(course.gain_nats);
+      if (best.covariate.empty() || course.gain_nats > best.gain_nats) best = std::move(course);
+    }
+    best.one_finger_constant_nats = courses.one_finger_constant_nats;
+    best.one_finger_line_nats = courses.one_finger_line_nats;
+    best.any_gain_nats = inference::LogSum(competing) - std::log(std::max<double>(1, competing.size()));
     if (!best.covariate.empty()) curves.push_back(std::move(best));
   }
   // An evidence ratio of x is reached by chance with a probability below 1 / x (Markov); every curve is paid for.

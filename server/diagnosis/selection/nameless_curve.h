@@ -4,6 +4,7 @@
 //   r = J theta + B c + (surface) + e,   c ~ N(0, (D'D / bend^2 + I / (knots size^2))^-1)
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -36,6 +37,13 @@ struct NamelessCurve {
   // Root mean square of rows, s, fitted without a fifth of the poses (of the session's stretches, for time) and
   // measured there: of the fit alone, and with the curve.
   double heldout_without_s = 0, heldout_with_s = 0;
+  double any_gain_nats =
+      0;  // the same as gain_nats of any curve over this covariate, each as probable as the others
+  // The same of a constant and of a straight line in time of one finger, which finger is paid for: what the catalogue's
+  // effects say of one finger. Of time only.
+  double one_finger_constant_nats = -INFINITY, one_finger_line_nats = -INFINITY;
+  std::string
+      words;  // what a simple course is: "from touch 480 on finger l travels 0.25 mm farther"; else empty
 };
 
 // Curves over `fit`, largest gain first: one per covariate, the better of shared and per finger. Held-out errors are

@@ -2,35 +2,20 @@
 
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/selection/selection.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-using HiddenEffects = std::vector<std::pair<std::string, std::vector<std::string>>>;
-
-std::vector<NamelessCurve> CurvesOfRig(const HiddenEffects& hidden, uint64_t seed = 1) {
-  touches::HiddenRig rig;
-  rig.samples_per_face = 6;
-  rig.hidden = hidden;
-  rig.seed = seed;
-  const auto workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
-  EXPECT_TRUE(workspace.ok()) << workspace.status();
-  EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
-  const auto fit = inference::FitModel(
-      (*workspace)->experiment,
-      inference::Parameterization(*(*workspace)->input.model, (*workspace)->searched->objects));
-  EXPECT_TRUE(fit.ok());
-  const auto details = (*workspace)->searched_predictor->Run(fit->model.base(), true, true);
-  return ScoreCurves((*workspace)->experiment, *(*workspace)->rows, *fit, *details, "");
+std::vector<NamelessCurve> CurvesOf(const TestSearch& search) {
+  return ScoreCurves(search.workspace->experiment, *search.workspace->rows, search.fit, search.details, "");
 }
 
 TEST(NamelessCurve, FollowsAWaveInTheIncidence) {
   const std::vector<NamelessCurve> curves =
-      CurvesOfRig({{"lookup",
-                    {"name=wave", "adds=travel_mm", "covariate=incidence_deg", "knots=0,8,16,24,32,40,60",
-                     "values=0,0.3,0,0.3,0,0.3,0"}}});
+      CurvesOf(PrepareTestSearch({{"lookup",
+                                   {"name=wave", "adds=travel_mm", "covariate=incidence_deg",
+                                    "knots=0,8,16,24,32,40,60", "values=0,0.3,0,0.3,0,0.3,0"}}}));
   ASSERT_FALSE(curves.empty());
   EXPECT_EQ(curves[0].covariate, "incidence_deg");
   EXPECT_FALSE(curves[0].per_finger);
@@ -39,10 +24,10 @@ TEST(NamelessCurve, FollowsAWaveInTheIncidence) {
 }
 
 TEST(NamelessCurve, FollowsATimeThatNoLineDescribes) {
-  const std::vector<NamelessCurve> curves = CurvesOfRig(
+  const std::vector<NamelessCurve> curves = CurvesOf(PrepareTestSearch(
       {{"lookup",
         {"name=warm", "adds=travel_mm", "covariate=session_time_s", "knots=0,600,1200,1800,2400,3000",
-         "l=0,0.3,0,0.3,0,0.3", "m=0,0,0,0,0,0", "r=0,0,0,0,0,0"}}});
+         "l=0,0.3,0,0.3,0,0.3", "m=0,0,0,0,0,0", "r=0,0,0,0,0,0"}}}));
   ASSERT_FALSE(curves.empty());
   EXPECT_EQ(curves[0].covariate, "session_time_s");
   EXPECT_TRUE(curves[0].per_finger);
@@ -51,7 +36,7 @@ TEST(NamelessCurve, FollowsATimeThatNoLineDescribes) {
 
 TEST(NamelessCurve, IsNotFoundWhereNothingIsHidden) {
   for (uint64_t seed = 1; seed <= 3; ++seed)
-    for (const NamelessCurve& curve : CurvesOfRig({}, seed))
+    for (const NamelessCurve& curve : CurvesOf(PrepareTestSearch({}, seed)))
       EXPECT_FALSE(IsSignificant(curve)) << curve.covariate;
 }
 

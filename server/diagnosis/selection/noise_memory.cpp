@@ -9,6 +9,7 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kMinComplete = 60;
+constexpr double kForgetsNats = 4;  // simulated walks of 960 touches: 1 in 300 is beyond
 
 // Orthonormal contrasts of complete touches: their channels wander independently of each other.
 struct Course {
@@ -65,6 +66,40 @@ WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
   const double count = static_cast<double>(n) * channels;
   const double white2 = std::max(squares / count, 1e-30);
   return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
+}
+
+// The same of a walk, which remembers for ever: its variance grows by `rate` of the white noise's a second from `start`.
+double WalkLogLikelihood(const Course& course, double start, double rate) {
+  const int n = course.touches(), channels = course.channels;
+  std::vector<double> mean(channels, 0.0);
+  double variance = start, squares = 0, logs = 0;
+  for (int k = 0; k < n; ++k) {
+    if (std::isfinite(course.gap_s[k])) {
+      variance += rate * course.gap_s[k];
+    } else {
+      variance = start;
+      std::fill(mean.begin(), mean.end(), 0.0);
+    }
+    const double innovation = variance + 1, gain = variance / innovation;
+    for (int c = 0; c < channels; ++c) {
+      const double apart = course.value[static_cast<size_t>(k) * channels + c] - mean[c];
+      squares += apart * apart / innovation;
+      mean[c] += gain * apart;
+    }
+    logs += channels * std::log(innovation);
+    variance *= 1 - gain;
+  }
+  const double count = static_cast<double>(n) * channels;
+  return -0.5 * count * std::log(std::max(squares / count, 1e-30)) - 0.5 * logs;
+}
+
+// The best walk: a wander spreads at first by 2 variance / time a second.
+double BestWalk(const Course& course, double ratio, double time_s) {
+  double best = -INFINITY;
+  for (int a = -6; a <= 6; ++a)
+    for (const double start : {0.0, 0.1 * ratio, ratio})
+      best = std::max(best, WalkLogLikelihood(course, start, 2 * ratio / time_s * std::exp(0.25 * a)));
+  return best;
 }
 
 // The same of a course without corners: a Matern process of order 3/2, whose slope is continuous, as a Kalman filter over
@@ -205,6 +240,9 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   NoiseMemory found;
   found.gain_nats = best.log_likelihood - Likelihood(course, 0, time_s).log_likelihood - std::log(count);
   found.log_likelihood = best.log_likelihood;
+  found.white_log_likelihood = Likelihood(course, 0, time_s).log_likelihood;
+  found.complexity_nats = std::log(count);
+  found.forgets_nats = best.log_likelihood - BestWalk(course, ratio, time_s);
   found.everywhere = ShowsEverywhere(course, ratio, time_s);
   found.step_gain_nats = StepGain(course);
   found.smooth_gain_nats = FindBest(SmoothLikelihood, course, min_s, max_s).likelihood.log_likelihood -
@@ -214,6 +252,10 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   found.sigma_s.std_error = 0.5 * found.sigma_s.value * LogError(course, ratio, time_s, false);
   found.time_s = {time_s, time_s * LogError(course, ratio, time_s, true), found.gain_nats};
   return found;
+}
+
+bool Forgets(const NoiseMemory& memory) {
+  return memory.forgets_nats > kForgetsNats;
 }
 
 }  // namespace touchstone::diagnosis::selection

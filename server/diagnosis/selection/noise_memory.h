@@ -11,10 +11,14 @@
 namespace touchstone::diagnosis::selection {
 
 struct NoiseMemory {
-  inference::NoiseEstimate sigma_s;  // of the wander
-  inference::NoiseEstimate time_s;   // its correlation time
-  inference::NoiseEstimate white_s;  // of the noise without memory beside it
-  double log_likelihood = 0;
+  inference::NoiseEstimate sigma_s;                     // of the wander
+  inference::NoiseEstimate time_s;                      // its correlation time
+  inference::NoiseEstimate white_s;                     // of the noise without memory beside it
+  double log_likelihood = 0, white_log_likelihood = 0;  // with the wander; of noise without memory alone
+  double complexity_nats = 0;                           // of the wander's two values (BIC)
+  // By how much a wander that forgets fits better than a walk, which never does. Near 0 the session is too short to tell
+  // when, if ever, the course comes back: that is a course in time and not noise of a known memory.
+  double forgets_nats = 0;
   bool everywhere = false;    // the wander shows in three of four quarters of the session: it is no event
   double gain_nats = 0;       // log evidence over noise without memory (BIC)
   double step_gain_nats = 0;  // the same of one step of the fingers at the best moment, and no wander
@@ -25,5 +29,8 @@ struct NoiseMemory {
 // `residuals` [k * fingers + i]. Nothing without session times or with too few complete touches.
 std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& observations,
                                            const std::vector<double>& residuals);
+
+// Whether the data say that the wander comes back within the session.
+bool Forgets(const NoiseMemory& memory);
 
 }  // namespace touchstone::diagnosis::selection

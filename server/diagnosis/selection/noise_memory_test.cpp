@@ -51,6 +51,22 @@ TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
   EXPECT_GT(found->gain_nats, found->smooth_gain_nats + 3);
 }
 
+TEST(NoiseMemory, AWalkDoesNotForgetAndAWanderDoes) {
+  int walks = 0;
+  for (uint64_t seed = 20; seed < 30; ++seed) {
+    double walked[3] = {0, 0, 0}, wandered[3] = {0, 0, 0};
+    const CourseOfSession walk(
+        seed, [&walked](int, int i, RandomStream* random) { return walked[i] += 0.0008 * random->Normal(); });
+    walks += !Forgets(*FindNoiseMemory(walk.o, walk.residuals));
+    const CourseOfSession wander(seed, [&wandered](int, int i, RandomStream* random) {
+      const double rho = std::exp(-10.0 / 300);
+      return wandered[i] = rho * wandered[i] + 0.007 * std::sqrt(1 - rho * rho) * random->Normal();
+    });
+    EXPECT_TRUE(Forgets(*FindNoiseMemory(wander.o, wander.residuals))) << seed;
+  }
+  EXPECT_GE(walks, 9);
+}
+
 TEST(NoiseMemory, GainsNothingWithoutAWander) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
     const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });

@@ -4,7 +4,9 @@
 
 #include "server/base/normal.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/ladder.h"
+#include "server/diagnosis/selection/time_structure.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
@@ -14,6 +16,7 @@ constexpr double kSignificant = 3.3;   // standard errors, for a refit
 constexpr double kRelevant = 0.02;     // relative change, for a refit
 constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
 constexpr double kMinFloorUs = 2;      // of noise as a step: less is the rounding of the file
+constexpr double kSigmaFactor = 2;     // of sigma over what the model says, beyond which its value is wrong
 constexpr double kCertainNats = 1e3;   // noise is there or not: any scatter beyond rounding proves it
 
 class NoiseStepWriter {
@@ -33,6 +36,45 @@ class NoiseStepWriter {
       Add(effect, estimate, found.gain_nats);
   }
 
+  // The effect of this role is one that the data do without.
+  void Remove(model::EffectRole role) {
+    std::vector<model::EffectInstance>& effects = ladder_.improved.effects;
+    for (size_t index = effects.size(); index-- > 0;) {
+      if (effects[index].effect->role != role) continue;
+      ladder_.superfluous.push_back(effects[index].effect->name);
+      effects.erase(effects.begin() + static_cast<long>(index));
+      ladder_.values_wrong = ladder_.changed = true;
+    }
+  }
+
+  void WriteOrRemove(model::EffectRole role, const inference::NoiseEstimate& found) {
+    if (found.absent)
+      Remove(role);
+    else if (found.gain_nats > 0)
+      Write(role, found);
+  }
+
+  // What the fingers' noise has beyond the quietest finger's.
+  void WriteByFinger(const std::vector<inference::NoiseEstimate>& found) {
+    const auto effect = effects::FindByRole(model::EffectRole::kNoiseByFinger);
+    const model::ParameterInfo& parameter = effect->parameters[0];
+    std::vector<inference::ParameterEstimate> estimates;
+    std::vector<double> values;
+    for (const inference::NoiseEstimate& finger : found) {
+      estimates.push_back(Estimate(parameter, finger));
+      estimates.back().entry = model::FingerName(static_cast<int>(values.size()), ladder_.improved.fingers);
+      values.push_back(RoundedValue(parameter, estimates.back()));
+    }
+    for (model::EffectInstance& instance : ladder_.improved.effects) {
+      if (instance.effect->role != model::EffectRole::kNoiseByFinger) continue;
+      RefitAll(std::move(estimates), &instance);
+      return;
+    }
+    Add(effect, estimates[0], found[0].gain_nats);
+    ladder_.steps.back().parameters = std::move(estimates);
+    ladder_.improved.effects.back().values = std::move(values);
+  }
+
   // The wander has two parameters; a model that has it keeps values that are not clearly others.
   void WriteMemory(const NoiseMemory& memory) {
     const auto effect = effects::FindByRole(model::EffectRole::kNoiseMemory);
@@ -40,7 +82,7 @@ class NoiseStepWriter {
         Estimate(effect->parameters[0], memory.sigma_s), Estimate(effect->parameters[1], memory.time_s)};
     for (model::EffectInstance& instance : ladder_.improved.effects) {
       if (instance.effect->role != model::EffectRole::kNoiseMemory) continue;
-      RefitMemory(estimates, &instance);
+      RefitAll(estimates, &instance);
       return;
     }
     Add(effect, estimates[0], memory.gain_nats);
@@ -50,17 +92,19 @@ class NoiseStepWriter {
   }
 
  private:
-  void RefitMemory(std::vector<inference::ParameterEstimate> estimates, model::EffectInstance* present) {
+  // All values of an effect, one estimate each: new ones if any is clearly another.
+  void RefitAll(std::vector<inference::ParameterEstimate> estimates, model::EffectInstance* present) {
+    const std::vector<model::ParameterInfo>& parameters = present->effect->parameters;
     bool other = false;
     for (size_t p = 0; p < estimates.size(); ++p) {
-      const double before = FromSi(present->effect->parameters[p].unit, present->values[p]);
+      const double before = FromSi(parameters[std::min(p, parameters.size() - 1)].unit, present->values[p]);
       estimates[p].before = before;
       other |= std::abs(estimates[p].value - before) > kSignificant * estimates[p].std_error;
     }
     if (!other) return;
     for (size_t p = 0; p < estimates.size(); ++p)
-      present->values[p] =
-          ToSi(present->effect->parameters[p].unit, RoundedTo(estimates[p].value, estimates[p].std_error));
+      present->values[p] = RoundedValue(parameters[std::min(p, parameters.size() - 1)], estimates[p]);
+    present->object_values.clear();
     ladder_.refitted.push_back({present->effect->name, std::move(estimates)});
     ladder_.changed = true;
   }
@@ -125,25 +169,50 @@ void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder) {
   NoiseStepWriter(ladder).WriteMemory(memory);
 }
 
-void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder) {
-  NoiseStepWriter writer(ladder);
-  const bool has_sigma = std::any_of(
-      ladder->improved.effects.begin(), ladder->improved.effects.end(),
-      [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
+namespace {
+
+// The noise of one reading. Where repeats say how much they scatter, what a misfit adds to the residuals is no noise,
+// and neither is a course in time that repeats share.
+inference::NoiseEstimate SigmaOf(const inference::NoiseFindings& noise, const NoiseFloor& floor) {
   inference::NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = kCertainNats;
+  const bool plain = noise.slope.gain_nats == 0 && noise.degrees_of_freedom.gain_nats == 0 &&
+                     noise.poll_interval_s.gain_nats == 0 && noise.length_sigma_m.gain_nats == 0 &&
+                     noise.channel_sigma_s.empty();
+  if (!plain || !floor.from_repeats) return sigma;
+  const double floor_s = SharesTime(floor) ? floor.sigma_without_time_s : floor.sigma_s;
+  if (sigma.value <= floor_s + (floor.upper_s - floor.sigma_s)) return sigma;
+  sigma.value = floor_s;
+  sigma.std_error = floor_s / std::sqrt(2 * floor.degrees_of_freedom);
+  return sigma;
+}
+
+}  // namespace
+
+void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder) {
+  NoiseStepWriter writer(ladder);
+  const model::Model given = ladder->improved;
+  const bool has_sigma = std::any_of(
+      given.effects.begin(), given.effects.end(),
+      [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
+  const inference::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
-  if (scatter && (has_sigma || ladder->noise_floor.sigma_s * kMicrosecondsPerSecond > kMinFloorUs))
+  if (sigma.absent)
+    writer.Remove(model::EffectRole::kNoiseLevel);
+  else if (scatter && (has_sigma || ladder->noise_floor.sigma_s * kMicrosecondsPerSecond > kMinFloorUs))
     writer.Write(model::EffectRole::kNoiseLevel, sigma);
-  const std::pair<model::EffectRole, const inference::NoiseEstimate*> kinds[] = {
-      {model::EffectRole::kNoiseGrowth, &noise.slope},
-      {model::EffectRole::kNoiseTails, &noise.degrees_of_freedom},
-      {model::EffectRole::kQuantisation, &noise.poll_interval_s},
-      {model::EffectRole::kDropout, &noise.missed_probability},
-  };
-  for (const auto& [role, found] : kinds)
-    if (found->gain_nats > 0) writer.Write(role, *found);
+  writer.WriteOrRemove(model::EffectRole::kNoiseGrowth, noise.slope);
+  writer.WriteOrRemove(model::EffectRole::kNoiseTails, noise.degrees_of_freedom);
+  writer.WriteOrRemove(model::EffectRole::kQuantisation, noise.poll_interval_s);
+  writer.WriteOrRemove(model::EffectRole::kDropout, noise.missed_probability);
+  writer.WriteOrRemove(model::EffectRole::kNoiseOfLength, noise.length_sigma_m);
+  if (noise.channels_absent) writer.Remove(model::EffectRole::kNoiseByFinger);
+  if (!noise.channel_sigma_s.empty()) writer.WriteByFinger(noise.channel_sigma_s);
+  // Sigma is estimated anew by every diagnosis; a declared one that is off by a factor is a wrong value.
+  const double declared_s = DeclaredSigma(given);
+  if (declared_s > 0 && scatter && std::abs(std::log(sigma.value / declared_s)) > std::log(kSigmaFactor))
+    ladder->values_wrong = true;
 }
 
 }  // namespace touchstone::diagnosis::selection

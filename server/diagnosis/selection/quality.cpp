@@ -15,10 +15,10 @@ namespace {
 constexpr double kMinDegreesOfFreedom = 8;
 
 // Held-out error over error, on the touches of the search.
-double HeldOutRatio(const Workspace& workspace, const inference::Fit& fit) {
-  const double rmse = std::sqrt(fit.columns.values.col(0).squaredNorm() /
-                                std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  return rmse > 0 ? inference::HeldOutRmse(workspace.experiment, fit) / rmse : 1;
+double RatioOf(const inference::Fit& fit, double heldout_rmse_s) {
+  const double rmse_s = std::sqrt(fit.columns.values.col(0).squaredNorm() /
+                                  std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
+  return rmse_s > 0 ? heldout_rmse_s / rmse_s : 1;
 }
 
 // Without repeats: how much better a smooth remainder explains the residuals than none.
@@ -43,12 +43,14 @@ double LackOfFitP(const touches::Observations& o, const std::vector<double>& res
   return boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof, pure.degrees_of_freedom), f));
 }
 
-Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
-                  const std::vector<double>& residuals) {
+absl::StatusOr<Quality> QualityOf(const Workspace& workspace, const inference::Fit& fit,
+                                  const std::vector<double>& residuals) {
   Quality quality;
   const touches::Observations& o = *workspace.observations;
   quality.rmse_s = touches::Rmse(o, residuals);
-  quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double heldout_rmse_s,
+                              inference::HeldOutRmseRefitted(workspace.experiment, fit));
+  quality.heldout_rmse_s = quality.rmse_s * RatioOf(fit, heldout_rmse_s);
   quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
                                                                 : SmoothRemainderP(workspace, fit);
   return quality;
@@ -64,10 +66,14 @@ absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::
   return touches::Rmse(o, touches::Residuals(o, prediction));
 }
 
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
+void SetError(double rmse_s, Quality* quality) {
   if (quality->rmse_s > 0) quality->heldout_rmse_s *= rmse_s / quality->rmse_s;
   quality->rmse_s = rmse_s;
+}
+
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
+  SetError(rmse_s, quality);
   return absl::OkStatus();
 }
 
@@ -78,7 +84,7 @@ Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& 
       workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof + fit.model.size();
   const touches::SumOfSquares total = touches::TotalSquares(*workspace.searched, left);
   quality.rmse_s = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
-  quality.heldout_rmse_s = quality.rmse_s * HeldOutRatio(workspace, fit);
+  quality.heldout_rmse_s = quality.rmse_s * RatioOf(fit, inference::HeldOutRmse(workspace.experiment, fit));
   quality.lack_of_fit_p = LackOfFitP(*workspace.searched, left, effective_dof);
   return quality;
 }

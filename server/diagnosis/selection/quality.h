@@ -15,14 +15,17 @@ double LackOfFitP(const touches::Observations& observations, const std::vector<d
 bool HasRepeats(const touches::SumOfSquares& error);
 
 // Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
-// comes from the touches of the search.
-Quality QualityOf(const Workspace& workspace, const inference::Fit& fit,
-                  const std::vector<double>& residuals);
+// comes from the touches of the search, with every value fitted anew (inference/held_out.h).
+absl::StatusOr<Quality> QualityOf(const Workspace& workspace, const inference::Fit& fit,
+                                  const std::vector<double>& residuals);
 
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
-// Sets the errors of `quality` to those of `model` as a comparison finds them; the held-out error keeps its ratio.
+// Another error, s, of the same fit; the held-out error keeps its ratio to it.
+void SetError(double rmse_s, Quality* quality);
+
+// Sets the errors of `quality` to those of `model` as a comparison finds them.
 absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality);
 
 // The same for what the fit's surface error leaves, on the touches of the search.

@@ -2,6 +2,7 @@
 // into messages.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -113,13 +114,16 @@ struct UnexplainedRest {
   std::string
       words;  // what is known of it beside: "repeats with the pose, but not with the place"; may be empty
   std::string lookup_yaml;  // a curve in place of a formula, as a whole effect for a model file; empty: none
+  std::shared_ptr<const model::Effect> lookup;  // the same curve; null: none
+  std::string nearest_formula;       // the simple term that comes nearest to the curve; empty: none
+  double nearest_formula_share = 0;  // of the curve's gain, 0 to 1
 };
 
-// A discrete mistake in a measurement file, and how to mend it.
+// A discrete mistake in a measurement file, and how to fix it.
 struct DataProblem {
   std::string kind, detail;  // "finger_order", "l <-> m"; the kinds are those of v1::DataProblem
   std::string words;         // a sentence for people, with the evidence
-  std::string fix;           // the command that mends the file; empty: none does
+  std::string fix;           // the command that fixes the file; empty: none does
   double rmse_before_s = 0,
          rmse_after_s = 0;  // of the model as it was given, on the file as it is and would be
 };

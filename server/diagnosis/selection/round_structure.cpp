@@ -17,8 +17,8 @@ namespace {
 constexpr int kMaxRounds = 40;
 constexpr int kPoseValues = 6;
 constexpr double kRoundP = 1e-6;
-constexpr double kNegligibleRounds = 0.05;  // share of the floor
-constexpr double kMinCosine = 0.1;          // beyond, a contact's place is no function of the pose
+constexpr double kNegligibleRounds = 0.015;  // share of the floor
+constexpr double kMinCosine = 0.1;           // beyond, a contact's place is no function of the pose
 constexpr double kMinRoundDegrees = 8;
 
 // The touches of one object with all their fingers, each with its pose and round.

@@ -9,7 +9,9 @@
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
@@ -21,6 +23,7 @@ constexpr int kPasses = 3;
 constexpr double kSameLikelihoodNats = 1;  // less is no difference
 constexpr double kAlike = 0.03;            // share of a response that another effect may leave out
 constexpr double kBoundTolerance = 1e-6;   // of the typical size
+constexpr double kWorthSayingNats = 5;     // a curve that is not farther behind is named beside the effect
 
 std::string FormulaName(const FormulaTerm& term) {
   std::string name = "rest_" + term.covariate;
@@ -154,11 +157,12 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<CompetingFit> competing,
                                 search.CompetingFits(whole, index));
     const std::string own = inference::NameOf(*result->fit.model.base().effects[index].effect);
+    const std::string own_object = result->fit.model.OnlyObject(index);
     // Log evidence over the step's own: that nothing takes its place, what else could, what is equivalent.
     std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
     for (const CompetingFit& competitor : competing) {
       const double evidence = competitor.fit.log_evidence - result->fit.log_evidence;
-      const bool same = competitor.name == own;
+      const bool same = competitor.name == own && competitor.object == own_object;
       const bool declared =
           IsDeclaredConfounded(*result->fit.model.base().effects[index].effect, competitor.name);
       // Equivalent: as probable, or as likely with no more parameters, whatever rigs usually show; with more of them
@@ -174,14 +178,15 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
       all.push_back(evidence);
       if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (same) continue;
-      step.competing.push_back({competitor.name, competitor.per_object, evidence, equivalent, stopped,
-                                competitor.fit.model.base()});
+      step.competing.push_back({competitor.name, competitor.per_object, competitor.object, evidence,
+                                equivalent, stopped, competitor.fit.model.base()});
     }
     // A curve without a name may say the same as an effect of time.
-    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end())
-      all.push_back(rival->second);
-    step.probability =
-        std::min(kMaxProbability, std::exp(inference::LogSum(same_or_equivalent) - inference::LogSum(all)));
+    if (const auto rival = result->curve_rivals.find(own); rival != result->curve_rivals.end()) {
+      all.push_back(rival->second.ahead_nats);
+      if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
+    }
+    step.probability = ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     result->steps.push_back(std::move(step));
   }
   return absl::OkStatus();
@@ -220,8 +225,12 @@ std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const in
   return residuals;
 }
 
+double ProbabilityOfShare(double log_share) {
+  return std::min(kMaxProbability, std::exp(log_share));
+}
+
 double ProbabilityOf(double log_odds) {
-  return std::min(kMaxProbability, 1 / (1 + std::exp(-log_odds)));
+  return ProbabilityOfShare(-std::log1p(std::exp(-log_odds)));
 }
 
 double SurfaceErrorNats(const Workspace& workspace, const inference::Fit& fit) {
@@ -257,8 +266,11 @@ absl::StatusOr<inference::NoiseFindings> NoiseOf(const Workspace& workspace, con
   }
   const double surface_dof =
       workspace.thinned ? 0 : workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof;
+  inference::DeclaredNoise declared = DeclaredNoiseOf(*workspace.input.model);
+  // Tails may stand for the outliers that were left out.
+  if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
   return inference::FindNoise(touches::MakeNoiseSample(o, residuals, tangents, expected),
-                              fit.model.size() + surface_dof);
+                              fit.model.size() + surface_dof, declared);
 }
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
@@ -300,7 +312,13 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (!revised) break;
   }
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
+  TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool dropped, DropImprobable(*workspace, &result));
+  if (dropped) {
+    result.steps.clear();
+    TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
+  }
   if (result.formula >= 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const touches::Prediction details,

@@ -14,6 +14,7 @@
 #include "server/diagnosis/selection/formula_terms.h"
 #include "server/diagnosis/selection/nameless_curve.h"
 #include "server/diagnosis/selection/noise_memory.h"
+#include "server/diagnosis/selection/partial_offset.h"
 #include "server/diagnosis/selection/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
@@ -23,10 +24,17 @@ namespace touchstone::diagnosis::selection {
 struct CompetingEffect {
   std::string name;
   bool per_object = false;
+  std::string object;                // the only one on which it acts; empty: on all
   double relative_log_evidence = 0;  // nats, over the step's own
   bool equivalent = false;           // these data cannot tell it from the step
   bool stopped = false;              // ... if its value could go beyond its bound
   model::Model model;                // the whole model with it
+};
+
+// A curve of time in the place of a named effect.
+struct CurveRival {
+  double ahead_nats = 0;  // log evidence over the effect's own
+  std::string words;      // a sentence that says what it is
 };
 
 struct SelectedStep {
@@ -34,6 +42,7 @@ struct SelectedStep {
   double gain_nats = 0;                    // over the fit without it
   double probability = 0;                  // with its equivalents, among all that could take its place
   std::vector<CompetingEffect> competing;  // best first
+  std::string words;                       // a curve that says nearly the same; empty: none does
 };
 
 // A smooth error of the surfaces, in the final fit.
@@ -54,19 +63,22 @@ struct SelectionResult {
   std::vector<FormulaTerm> terms;      // scored on what the named effects leave; empty if there is no formula
   std::vector<NamelessCurve> curves;   // over what the named effects leave, largest gain first
   std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
-  // Log evidence of a curve in the place of a named effect of time, over the effect's own, nats.
-  std::map<std::string, double> curve_rivals;
+  std::map<std::string, CurveRival> curve_rivals;  // by the effect whose place they would take
   std::vector<SelectedStep> steps;
   inference::NoiseFindings noise;
   std::optional<NoiseMemory>
       memory;  // the wander that the residuals follow, where no curve describes them better
+  std::optional<PartialOffset> partial;  // that a part of the touches has: no effect is named in its place
   SurfaceErrorFinding surface_error;
 };
 
 // Whether a value of effect `index` ended at a bound that is not the value that changes nothing.
 bool IsAtBound(const inference::Fit& fit, int index);
 
-// From a log of odds, nats, never above kMaxProbability.
+// Of an explanation whose evidence has this share, as a logarithm, of the evidence of all: the one place that keeps
+// probabilities at or below kMaxProbability.
+double ProbabilityOfShare(double log_share);
+// The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);
 
 // Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.

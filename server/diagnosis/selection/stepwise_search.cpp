@@ -15,9 +15,12 @@ namespace {
 
 constexpr double kNearPrediction = 40;  // nats: candidates this far behind the best prediction are not fitted
 constexpr double kPoorPrediction =
-    0.5;                           // ... or this share of the evidence behind the fit, for strong effects
-constexpr double kVisible = 1e-9;  // s of change at the typical size
+    0.5;  // ... or this share of the evidence behind the fit, for strong effects
 constexpr int kFormulaStarts = 8;
+
+std::string InWords(const Extension& extension) {
+  return extension.object.empty() ? extension.name : absl::StrCat(extension.name, " on ", extension.object);
+}
 
 // P(chi^2_q > x)
 double ChiSquaredTail(double x, int q) {
@@ -27,90 +30,17 @@ double ChiSquaredTail(double x, int q) {
 
 }  // namespace
 
-bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit& after,
-                             size_t extensions) const {
+bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions,
+                             bool rare) const {
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1))
     return false;
-  if (after.log_evidence - before.log_evidence < rules_.enter_nats) return false;
+  if (after.log_evidence - before.log_evidence < EnterNats(rare)) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
   return inference::HeldOutRmse(experiment_, after) <
          (1 - rules_.min_relative_cv_gain) * inference::HeldOutRmse(experiment_, before);
-}
-
-// What may extend the fit: effects of the model whose values are not free yet, and candidates that it lacks.
-std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit, int initial_effects) const {
-  std::vector<Extension> extensions;
-  const model::Model& model = fit.model.base();
-  for (int index = 0; index < initial_effects; ++index) {
-    const model::Effect& own = *model.effects[index].effect;
-    if (fit.model.IsFree(index) || own.random() || own.parameters.empty()) continue;
-    Extension extension;
-    extension.name = inference::NameOf(*model.effects[index].effect);
-    extension.start = fit.model;
-    extension.start.Free(index, true);
-    extensions.push_back(std::move(extension));
-  }
-  for (int c = 0; c < static_cast<int>(candidates_.size()); ++c) {
-    const std::string name = inference::NameOf(*candidates_[c].effect);
-    const bool present =
-        std::any_of(model.effects.begin(), model.effects.end(),
-                    [&](const model::EffectInstance& e) { return inference::NameOf(*e.effect) == name; });
-    if (present) continue;
-    Extension extension;
-    extension.candidate = c;
-    extension.name = name;
-    extension.start = fit.model;
-    extension.start.Add(candidates_[c].effect, candidates_[c].per_object);
-    extensions.push_back(std::move(extension));
-  }
-  return extensions;
-}
-
-absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const inference::Fit& fit,
-                                                             int initial_effects) const {
-  std::vector<Extension> extensions = ListExtensions(fit, initial_effects);
-  // One wide matrix: the residual, the fit's own columns, and every extension's.
-  const int own = fit.model.size();
-  std::vector<int> first_column;
-  Eigen::MatrixXd wide(fit.columns.values.rows(), 0);
-  for (Extension& extension : extensions) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const Eigen::MatrixXd columns,
-        inference::Derivatives(experiment_, extension.start, extension.start.Start(), fit.predicted, own));
-    first_column.push_back(1 + own + static_cast<int>(wide.cols()));
-    const int at = static_cast<int>(wide.cols());
-    wide.conservativeResize(Eigen::NoChange, at + columns.cols());
-    wide.rightCols(columns.cols()) = columns;
-    for (int i = 0; i < columns.cols(); ++i)
-      extension.visible |= columns.col(i).norm() * extension.start.parameters()[own + i].scale >
-                           kVisible * std::sqrt(static_cast<double>(columns.rows()));
-  }
-  const inference::Likelihood& likelihood = *experiment_.likelihood;
-  const inference::Likelihood::Columns all =
-      inference::Likelihood::Join(fit.columns, likelihood.Prepare(wide));
-  std::vector<Eigen::MatrixXd> grams(likelihood.hypotheses().size());
-  const auto gram = [&](int begin, int end) {
-    for (int s = begin; s < end; ++s) grams[s] = likelihood.Gram(all, s);
-  };
-  ParallelFor(experiment_.pool, static_cast<int>(grams.size()), 4, gram);
-
-  const auto evaluate = [&](int begin, int end) {
-    for (int m = begin; m < end; ++m) {
-      Extension& extension = extensions[m];
-      std::vector<int> members;
-      for (int i = 0; i <= own; ++i) members.push_back(i);
-      for (int i = own; i < extension.start.size(); ++i) members.push_back(first_column[m] + i - own);
-      extension.log_evidence =
-          inference::ComputeLaplaceEvidence(likelihood, grams, members, extension.start.parameters(),
-                                            extension.start.Start())
-              .log_evidence;
-    }
-  };
-  ParallelFor(experiment_.pool, static_cast<int>(extensions.size()), 1, evaluate);
-  return extensions;
 }
 
 absl::StatusOr<inference::Fit> StepwiseSearch::FitExtension(const Extension& extension) const {
@@ -155,20 +85,28 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   absl::StatusOr<inference::Fit> best = absl::NotFoundError("");
-  int fitted = 0;
+  bool best_is_rare = false;
+  int fitted = 0, fitted_rare = 0;
+  size_t rare = 0;
+  for (const Extension& extension : extensions) rare += extension.rare;
   for (const Extension& extension : extensions) {
     const bool unreached = !extension.visible && extension.start.parameters().back().reciprocal;
     const bool user = extension.candidate >= 0 && candidates_[extension.candidate].of_user;
-    const bool near = extension.visible && fitted < rules_.max_refits &&
+    const bool near = extension.visible &&
+                      (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
                       extension.log_evidence > extensions[0].log_evidence - kNearPrediction &&
                       extension.log_evidence > explanation->fit.log_evidence;
-    if (!near && !unreached && !user) continue;
-    progress_(absl::StrCat("fitting ", extension.name));
-    fitted += near;
+    if (!near && (extension.rare || (!unreached && !user))) continue;
+    progress_(absl::StrCat("fitting ", InWords(extension)));
+    (extension.rare ? fitted_rare : fitted) += near;
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
-    if (!best.ok() || fit.log_evidence > best->log_evidence) best = std::move(fit);
+    if (best.ok() && fit.log_evidence <= best->log_evidence) continue;
+    best = std::move(fit);
+    best_is_rare = extension.rare;
   }
-  if (!best.ok() || !Accepts(explanation->fit, *best, extensions.size())) return false;
+  if (!best.ok() ||
+      !Accepts(explanation->fit, *best, best_is_rare ? rare : extensions.size() - rare, best_is_rare))
+    return false;
   explanation->fit = *std::move(best);
   return true;
 }
@@ -183,7 +121,10 @@ absl::StatusOr<bool> StepwiseSearch::RemoveStep(Explanation* explanation) const 
   for (int index = static_cast<int>(explanation->fit.model.base().effects.size()) - 1;
        index >= explanation->initial_effects; --index) {
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, WithoutEffect(*explanation, index));
-    if (explanation->fit.log_evidence - fit.log_evidence >= rules_.enter_nats) continue;
+    const model::EffectInstance& instance = explanation->fit.model.base().effects[index];
+    const bool rare = !explanation->fit.model.OnlyObject(index).empty() ||
+                      (instance.per_object && !instance.effect->often_per_object);
+    if (explanation->fit.log_evidence - fit.log_evidence >= EnterNats(rare)) continue;
     explanation->fit = std::move(fit);
     return true;
   }
@@ -193,6 +134,8 @@ absl::StatusOr<bool> StepwiseSearch::RemoveStep(Explanation* explanation) const 
 absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Explanation& explanation,
                                                                         int index) const {
   const model::Effect& own = *explanation.fit.model.base().effects[index].effect;
+  const std::string own_object = explanation.fit.model.OnlyObject(index);
+  const bool own_per_object = explanation.fit.model.base().effects[index].per_object;
   // The other effects stay where they are: what takes this one's place finds them so.
   TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without,
                               inference::FitModel(experiment_, explanation.fit.model.Without(index), 0));
@@ -200,29 +143,31 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<CompetingFit> competing;
-  competing.push_back(
-      {inference::NameOf(own), explanation.fit.model.base().effects[index].per_object, explanation.fit});
+  competing.push_back({inference::NameOf(own), own_per_object, own_object, explanation.fit});
   // The linearised prediction is good to about a share of what there is to explain.
   const double near =
       std::max(kNearPrediction, kPoorPrediction * (explanation.fit.log_evidence - without.log_evidence));
-  int fitted = 0;
+  int fitted = 0, fitted_rare = 0;
   for (const Extension& extension : extensions) {
     // A value of the model that is set free competes like any effect.
     const bool given = extension.candidate < 0;
     const bool per_object = !given && candidates_[extension.candidate].per_object;
     if (!extension.visible) continue;
-    if (extension.name == inference::NameOf(own) &&
-        per_object == explanation.fit.model.base().effects[index].per_object)
+    if (extension.name == inference::NameOf(own) && extension.object == own_object &&
+        per_object == own_per_object)
       continue;
     const bool likely =
-        fitted < rules_.max_refits && extension.log_evidence > explanation.fit.log_evidence - near;
-    // What is known to resemble this effect is tried whatever the prediction says.
-    if (!likely && !IsDeclaredConfounded(own, extension.name)) continue;
-    progress_(absl::StrCat("trying ", extension.name, " instead of ", inference::NameOf(own)));
-    fitted += likely;
+        (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
+        extension.log_evidence > explanation.fit.log_evidence - near;
+    // What is known to resemble this effect, and acts where it does, is tried whatever the prediction says.
+    const bool alike =
+        given || (extension.object == own_object && (!extension.rare || per_object == own_per_object));
+    if (!likely && !(alike && IsDeclaredConfounded(own, extension.name))) continue;
+    progress_(absl::StrCat("trying ", InWords(extension), " instead of ", inference::NameOf(own)));
+    (extension.rare ? fitted_rare : fitted) += likely;
     TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit, FitExtension(extension));
-    competing.push_back(
-        {given ? absl::StrCat(kGivenPrefix, extension.name) : extension.name, per_object, std::move(fit)});
+    competing.push_back({given ? absl::StrCat(kGivenPrefix, extension.name) : extension.name, per_object,
+                         extension.object, std::move(fit)});
   }
   std::sort(competing.begin() + 1, competing.end(), [](const CompetingFit& a, const CompetingFit& b) {
     return a.fit.log_evidence > b.fit.log_evidence;
@@ -236,7 +181,9 @@ absl::StatusOr<bool> StepwiseSearch::SwapStep(Explanation* explanation) const {
     const model::Effect& effect = *explanation->fit.model.base().effects[index].effect;
     if (effect.formula != nullptr || effect.lookup != nullptr) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<CompetingFit> competing, CompetingFits(*explanation, index));
-    if (competing.size() < 2 || competing[1].fit.log_evidence <= explanation->fit.log_evidence + 0.5)
+    if (competing.size() < 2) continue;
+    const bool larger = competing[1].fit.model.size() > explanation->fit.model.size();
+    if (competing[1].fit.log_evidence <= explanation->fit.log_evidence + (larger ? rules_.swap_nats : 0.5))
       continue;
     explanation->fit = std::move(competing[1].fit);
     return true;

@@ -16,19 +16,24 @@ namespace touchstone::diagnosis::selection {
 // Thresholds, chosen on the tuning seeds of tests/hidden_effects.
 struct SearchRules {
   double enter_nats = 4.5;              // gain in log evidence that a step needs
-  double family_wise_p = 2e-3;          // of the likelihood ratio, over all extensions
+  double family_wise_p = 2e-3;          // of the likelihood ratio, over all extensions of the rig
+  double enter_rare_nats = 9;           // ... that an effect needs which does not act on all objects alike
+  double swap_nats = 4;                 // that a swap to an effect of more values needs
   double min_relative_cv_gain = 0.003;  // share by which the held-out error must fall
   double equivalent_nats = 3;           // explanations as near as this are named together
   double complexity_penalty_nats = 11;  // of a formula term that was picked from a dictionary
   int min_rows_per_parameter = 8;       // that each fitted value needs
   int max_steps = 6;
-  int max_refits = 6;  // candidates that are fitted in full per step
+  int max_refits = 6;       // candidates that are fitted in full per step
+  int max_rare_refits = 4;  // ... of those that do not act on all objects alike
 };
 
 // One way to extend a fit.
 struct Extension {
   int candidate = -1;       // index into the candidates; -1: sets an effect of the model free
   std::string name;         // of the effect
+  std::string object;       // the only one on which it acts; empty: on all
+  bool rare = false;        // Candidate::rare
   bool visible = false;     // false: this experiment cannot see it
   double log_evidence = 0;  // linearised prediction, nats
   inference::Parameterization start;
@@ -38,6 +43,7 @@ struct Extension {
 struct CompetingFit {
   std::string name;  // "given:finger_length": another value of an effect that the model has
   bool per_object = false;
+  std::string object;  // the only one on which it acts; empty: on all
   inference::Fit fit;
 };
 
@@ -59,7 +65,8 @@ class StepwiseSearch {
   // From a start (the initial model, perhaps with a formula), the best explanation.
   absl::StatusOr<Explanation> Run(inference::Parameterization start, int initial_effects) const;
 
-  // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts.
+  // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts. Of effects on one
+  // object that are far behind, only an estimate (candidate_scores.cpp).
   absl::StatusOr<std::vector<Extension>> Score(const inference::Fit& fit, int initial_effects) const;
 
   // The fits in which other effects, or other values of the model's own, take the place of effect `index`, best first;
@@ -81,7 +88,8 @@ class StepwiseSearch {
   absl::StatusOr<bool> AddStep(Explanation* explanation) const;
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
-  bool Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions) const;
+  bool Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions, bool rare) const;
+  double EnterNats(bool rare) const { return rare ? rules_.enter_rare_nats : rules_.enter_nats; }
 
   const inference::Experiment& experiment_;
   std::vector<Candidate> candidates_;

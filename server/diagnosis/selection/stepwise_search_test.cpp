@@ -97,6 +97,63 @@ TEST_F(StepwiseSearchTest, AnEffectWithTheSameColumnCompetesWithEqualEvidence) {
   EXPECT_NEAR(competing[1].fit.log_likelihood, competing[0].fit.log_likelihood, 0.1);
 }
 
+// The test's effects, each also on one group and with a value for every group.
+std::vector<Candidate> WithGroups(const std::vector<Candidate>& candidates,
+                                  const std::vector<std::string>& groups) {
+  std::vector<Candidate> all;
+  for (const Candidate& candidate : candidates) {
+    all.push_back(candidate);
+    Candidate other = candidate;
+    other.per_object = other.rare = true;
+    all.push_back(other);
+    for (const std::string& group : groups) {
+      other.object = group;
+      all.push_back(other);
+    }
+  }
+  return all;
+}
+
+TEST_F(StepwiseSearchTest, FindsAnEffectThatActsOnOneGroupOnly) {
+  rows.measured.segment(50, 50) += kPushM * rows.columns["oblique_slip"].segment(50, 50);
+  candidates = WithGroups(candidates, rows.groups());
+  const Explanation explanation = *Search().Run(Nominal(), 0);
+  ASSERT_EQ(Names(explanation.fit), std::vector<std::string>{"oblique_slip"});
+  EXPECT_EQ(explanation.fit.model.OnlyObject(0), "b");
+  EXPECT_NEAR(explanation.fit.point[0], kPushM, 4 * std::sqrt(explanation.fit.covariance(0, 0)));
+}
+
+TEST_F(StepwiseSearchTest, AnEffectOfEveryGroupIsNotCalledOneOfASingleGroup) {
+  rows.measured += kPushM * rows.columns["oblique_slip"];
+  candidates = WithGroups(candidates, rows.groups());
+  const Explanation explanation = *Search().Run(Nominal(), 0);
+  ASSERT_EQ(Names(explanation.fit), std::vector<std::string>{"oblique_slip"});
+  EXPECT_FALSE(explanation.fit.model.base().effects[0].per_object);
+}
+
+TEST_F(StepwiseSearchTest, FindsAnEffectThatDiffersFromGroupToGroup) {
+  const double values_m[] = {0.4e-3, 2e-3, 0.2e-3, 3e-3};
+  for (int g = 0; g < 4; ++g)
+    rows.measured.segment(50 * g, 50) += values_m[g] * rows.columns["oblique_slip"].segment(50 * g, 50);
+  candidates = WithGroups(candidates, rows.groups());
+  const Explanation explanation = *Search().Run(Nominal(), 0);
+  ASSERT_EQ(Names(explanation.fit), std::vector<std::string>{"oblique_slip"});
+  ASSERT_EQ(explanation.fit.model.size(), 4);
+  for (int g = 0; g < 4; ++g)
+    EXPECT_NEAR(explanation.fit.point[g], values_m[g], 4 * std::sqrt(explanation.fit.covariance(g, g)));
+}
+
+TEST_F(StepwiseSearchTest, ScoresEffectsByGroupAsAFitFindsThem) {
+  rows.measured.segment(100, 50) += kPushM * rows.columns["gravity_sag"].segment(100, 50);
+  candidates = WithGroups(candidates, rows.groups());
+  const StepwiseSearch search = Search();
+  const std::vector<Extension> extensions = *search.Score(*inference::FitModel(experiment, Nominal()), 0);
+  ASSERT_EQ(extensions.size(), 18u);
+  for (const Extension& extension : extensions)
+    EXPECT_NEAR(extension.log_evidence, search.FitExtension(extension)->log_evidence, 0.1)
+        << extension.name << " " << extension.object;
+}
+
 TEST_F(StepwiseSearchTest, SetsAValueOfTheInitialModelFreeWhereItIsWrong) {
   rows.measured += kPushM * rows.columns["object_push"];
   const model::Model model =

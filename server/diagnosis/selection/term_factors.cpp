@@ -73,6 +73,19 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
   if (!d.curvature_per_m.empty())
     with_square("curvature_per_m", true, [&d, at](int k, int i) { return d.curvature_per_m[at(k, i)]; });
 
+  // Pauses, about their mean: what they do is put to zero somewhere in the middle.
+  const auto add_pause = [&] {
+    double sum = 0, min = INFINITY, max = 0;
+    for (int k = 0; k < o.size(); ++k) {
+      const double pause_s = touches::PauseS(o, k);
+      sum += pause_s, min = std::min(min, pause_s), max = std::max(max, pause_s);
+    }
+    const double mean = ThreeDigits(sum / std::max(o.size(), 1));
+    if (!(max > min) || mean == 0) return;
+    add("pause_s", absl::StrCat("(pause_s - ", ShortestNumber(mean), ")"), false, kSimpleNats,
+        [&o, mean](int k, int) { return touches::PauseS(o, k) - mean; });
+  };
+
   // What happens only when a certain finger is first.
   const double middle = 0.5 * (o.fingers - 1);
   for (int finger = 0; finger < o.fingers; ++finger)
@@ -80,6 +93,7 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
         kSimpleNats, [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
   add("first_finger", "first_finger", false, kSimpleNats,
       [&d, middle](int k, int) { return d.first_finger[k] - middle; });
+  if (set.has_session_time) add_pause();
   with_square("previous_press_mm", true,
               [&d, at](int k, int i) { return d.previous_press_m[at(k, i)] * kMillimetresPerMetre; });
   const auto varies = [&](const std::vector<double>& column) {

@@ -86,7 +86,8 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
   rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                               workspace.predictor->Run(fit.model.base(), false, false));
-  const Quality quality = QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality,
+                              QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with)));
   rest->rmse_s = quality.rmse_s;
   rest->heldout_rmse_s = quality.heldout_rmse_s;
   const double before = std::pow(final.heldout_rmse_s, 2) - floor_s * floor_s;
@@ -135,6 +136,18 @@ void AddCurves(const SelectionResult& selection, std::vector<CovariateTest>* tes
   if (tests->size() > kMaxCovariates) tests->resize(kMaxCovariates);
 }
 
+// The term of the curve's covariate that gains most, and how much of the curve's gain that is.
+void AddNearestFormula(const std::vector<FormulaTerm>& terms, const NamelessCurve& curve,
+                       UnexplainedRest* rest) {
+  const FormulaTerm* nearest = nullptr;
+  for (const FormulaTerm& term : terms)
+    if (term.covariate == curve.covariate && (nearest == nullptr || term.gain_nats > nearest->gain_nats))
+      nearest = &term;
+  if (nearest == nullptr || !(nearest->gain_nats > 0) || !(curve.gain_nats > 0)) return;
+  rest->nearest_formula = nearest->expression;
+  rest->nearest_formula_share = std::min(1.0, nearest->gain_nats / curve.gain_nats);
+}
+
 // What of the catalogue looks most like the formula.
 absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult& selection,
                                UnexplainedRest* rest) {
@@ -146,11 +159,14 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
   for (int i = 0; i < fit.model.size(); ++i)
     if (fit.model.parameters()[i].effect == selection.formula && column.size() == 0)
       column = fit.columns.values.col(1 + i);
+  // A curve has no parameter: what it takes off the residuals stands for it.
+  if (fit.model.base().effects[selection.formula].effect->lookup != nullptr)
+    column = without.columns.values.col(0) - fit.columns.values.col(0);
   if (column.size() == 0) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
                               selection.search->Score(without, selection.initial_effects));
   for (const Extension& extension : extensions) {
-    if (extension.candidate < 0 || !extension.visible) continue;
+    if (extension.candidate < 0 || !extension.visible || !extension.object.empty()) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
                                 inference::Derivatives(workspace.experiment, extension.start,
                                                        extension.start.Start(), without.predicted, own));
@@ -180,11 +196,16 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
   AddCurves(selection, &rest.covariates);
   if (selection.curve) {
     const auto effect = MakeCurveEffect(*selection.curve);
-    if (effect.ok()) rest.lookup_yaml = EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
+    if (effect.ok()) {
+      rest.lookup_yaml = EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
+      rest.lookup = *effect;
+      AddNearestFormula(terms, *selection.curve, &rest);
+    }
   }
   if (!has_formula) return rest;
   if (selection.fit.model.base().effects[selection.formula].effect->lookup != nullptr) {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeCurve(workspace, selection, final, floor_s, &rest));
+    TOUCHSTONE_RETURN_IF_ERROR(FindNearestEffect(workspace, selection, &rest));
     return rest;
   }
   TOUCHSTONE_RETURN_IF_ERROR(DescribeFormula(workspace, selection, final, floor_s, &rest));

@@ -46,9 +46,8 @@ absl::Status CheckMeshes(const touches::Observations& o, const touches::Predicti
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * kMillimetresPerMetre;
     const std::string text = absl::StrFormat(
         "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
-        "far behind the target. The mesh "
-        "measures "
-        "%.4g x %.4g x %.4g mm, and targets lie up to %.3g mm outside of it",
+        "far behind the target. The mesh measures %.4g x %.4g x %.4g mm, and targets lie up to %.3g mm "
+        "outside of it",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
         off_m[object] * kMillimetresPerMetre);
     if (missed[object] > kMaxMissed * touches[object])
@@ -84,8 +83,8 @@ absl::Status CheckUnits(const touches::Observations& o, const touches::Predictio
   const double speed_mm_s = o.set->speed_m_s[0] * kMillimetresPerMetre;
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g "
-      "us: no "
-      "effect makes a factor of %.3g. t_*_us are microseconds, speed_mm_s is mm/s; does the file have %s?",
+      "us: no effect makes a factor of %.3g. t_*_us are microseconds, speed_mm_s is mm/s; does the file have "
+      "%s?",
       o.set->origin, m * kMicrosecondsPerSecond, speed_mm_s, p * kMicrosecondsPerSecond,
       m > p ? m / p : p / m,
       m < p ? "milliseconds (multiply by 1000) or seconds" : "nanoseconds, or speeds in m/s"));

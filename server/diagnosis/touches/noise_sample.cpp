@@ -22,10 +22,49 @@ std::vector<inference::ReadingGroup> GroupsOf(const Observations& o, const std::
       if (std::isnan(residuals_s[e]) || std::isnan(tan_incidence[e])) continue;
       group.residual_s.push_back(residuals_s[e]);
       group.growth.push_back(std::min(tan_incidence[e], kMaxTangent));
+      group.channel.push_back(i);
     }
     if (group.residual_s.size() >= 2) groups.push_back(std::move(group));
   }
   return groups;
+}
+
+// Sets the slowness of every group; returns what it is relative to.
+double SetSlowness(const Observations& o, std::vector<inference::ReadingGroup>* groups) {
+  double squares = 0;
+  for (inference::ReadingGroup& group : *groups) {
+    group.slowness = 1 / o.set->speed_m_s[o.row[group.index]];
+    squares += group.slowness * group.slowness;
+  }
+  const double root_mean_square = std::sqrt(squares / std::max<size_t>(groups->size(), 1));
+  for (inference::ReadingGroup& group : *groups) group.slowness /= root_mean_square;
+  return root_mean_square;
+}
+
+// Residuals of repeats (one pose, the same fingers) less their mean, enlarged by what the mean has followed.
+std::vector<inference::ReadingGroup> RepeatsOf(const Observations& o,
+                                               const std::vector<inference::ReadingGroup>& groups) {
+  struct Mean {
+    double touches = 0;
+    std::vector<double> sum_s;
+  };
+  std::map<std::pair<int, std::vector<int>>, Mean> means;
+  for (const inference::ReadingGroup& group : groups) {
+    Mean& mean = means[{o.pose[group.index], group.channel}];
+    mean.sum_s.resize(group.residual_s.size());
+    ++mean.touches;
+    for (size_t i = 0; i < group.residual_s.size(); ++i) mean.sum_s[i] += group.residual_s[i];
+  }
+  std::vector<inference::ReadingGroup> repeats;
+  for (const inference::ReadingGroup& group : groups) {
+    const Mean& mean = means[{o.pose[group.index], group.channel}];
+    if (mean.touches < 2) continue;
+    repeats.push_back(group);
+    const double enlarge = std::sqrt(mean.touches / (mean.touches - 1));
+    for (size_t i = 0; i < group.residual_s.size(); ++i)
+      repeats.back().residual_s[i] = enlarge * (group.residual_s[i] - mean.sum_s[i] / mean.touches);
+  }
+  return repeats;
 }
 
 // Times after the touch's first finger.
@@ -70,6 +109,9 @@ inference::NoiseSample MakeNoiseSample(const Observations& observations,
                                        const std::vector<char>& expected) {
   inference::NoiseSample sample;
   sample.groups = GroupsOf(observations, residuals_s, tan_incidence);
+  sample.rms_slowness_s_per_m = SetSlowness(observations, &sample.groups);
+  sample.repeats = RepeatsOf(observations, sample.groups);
+  sample.channels = observations.fingers;
   sample.delays_s = DelaysOf(observations);
   sample.repeated = RepeatedOf(observations, expected);
   sample.size = observations.size();

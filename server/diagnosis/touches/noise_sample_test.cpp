@@ -98,5 +98,186 @@ TEST(FindNoise, AFingerThatIsSilentInEveryRepeatIsOutOfReachAndNoChance) {
   EXPECT_EQ(found.missed_probability.gain_nats, 0) << found.missed_probability.value;
 }
 
+// Noise drawn by touch and finger, at 10 mm/s in every other round and at 20 mm/s in the rest.
+template <typename Draw>
+inference::NoiseFindings FindAtTwoSpeeds(Draw draw, const inference::DeclaredNoise& declared = {}) {
+  SyntheticSet set(5, 48, 4, 0, 3);
+  auto with_speeds = std::make_shared<session::MeasurementSet>(*set.observations.set);
+  for (int k = 0; k < set.observations.size(); ++k)
+    with_speeds->speed_m_s[k] = set.observations.set->round[k] % 2 == 0 ? 0.01 : 0.02;
+  set.observations.set = with_speeds;
+  std::vector<double> tangents(set.observations.time_s.size(), 0.1);
+  for (size_t e = 0; e < tangents.size(); ++e)
+    set.observations.time_s[e] += draw(with_speeds->speed_m_s[e / 3], static_cast<int>(e % 3));
+  set.Finish();
+  return inference::FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0,
+      declared);
+}
+
+TEST(FindNoise, ANoiseOfLengthsAtTwoSpeedsIsNoHeavyTail) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal(0, 0.1e-3);
+  const inference::NoiseFindings found =
+      FindAtTwoSpeeds([&](double speed_m_s, int) { return normal(random) / speed_m_s; });
+  EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
+  EXPECT_GT(found.length_sigma_m.gain_nats, 0);
+  EXPECT_NEAR(found.length_sigma_m.value, 0.1e-3, 4 * found.length_sigma_m.std_error);
+  EXPECT_TRUE(found.sigma_s.absent) << found.sigma_s.value;
+}
+
+TEST(FindNoise, TellsANoiseOfLengthsFromOneOfTimesBesideIt) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal(0, 1);
+  const inference::NoiseFindings found = FindAtTwoSpeeds(
+      [&](double speed_m_s, int) { return 0.08e-3 * normal(random) / speed_m_s + 0.004 * normal(random); });
+  EXPECT_NEAR(found.length_sigma_m.value, 0.08e-3, 4 * found.length_sigma_m.std_error);
+  EXPECT_LT(found.length_sigma_m.std_error, 0.01e-3);
+  EXPECT_NEAR(found.sigma_s.value, 0.004, 4 * found.sigma_s.std_error);
+  EXPECT_FALSE(found.sigma_s.absent);
+  EXPECT_FALSE(found.weights.empty());
+}
+
+TEST(FindNoise, OneLoudFingerIsNoHeavyTail) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal(0, kSigma);
+  const inference::NoiseFindings found =
+      FindAtTwoSpeeds([&](double, int finger) { return (finger == 2 ? 2 : 1) * normal(random); });
+  EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
+  EXPECT_EQ(found.length_sigma_m.gain_nats, 0);
+  ASSERT_EQ(found.channel_sigma_s.size(), 3u);
+  EXPECT_NEAR(found.sigma_s.value, kSigma, 4 * found.sigma_s.std_error);
+  const inference::NoiseEstimate& loud = found.channel_sigma_s[2];
+  EXPECT_NEAR(loud.value, std::sqrt(3) * kSigma, 4 * loud.std_error);
+  EXPECT_LT(loud.std_error, 0.1 * kSigma);
+}
+
+TEST(FindNoise, HeavyTailsAreNoLoudFinger) {
+  for (const uint64_t seed : {10, 11, 12}) {
+    std::mt19937_64 random(seed);
+    std::student_t_distribution<double> student(2.5);
+    const inference::NoiseFindings found =
+        FindAtTwoSpeeds([&](double, int) { return kSigma * student(random); });
+    EXPECT_GT(found.degrees_of_freedom.gain_nats, 0);
+    EXPECT_TRUE(found.channel_sigma_s.empty());
+    EXPECT_EQ(found.length_sigma_m.gain_nats, 0);
+  }
+}
+
+// Gaussian noise, under a model that says more of it.
+inference::NoiseFindings FindInPlainNoise(const inference::DeclaredNoise& declared) {
+  std::mt19937_64 random(13);
+  std::normal_distribution<double> normal(0, kSigma);
+  return FindAtTwoSpeeds([&](double, int) { return normal(random); }, declared);
+}
+
+TEST(FindNoise, SaysThatDeclaredKindsAreNotThere) {
+  inference::DeclaredNoise declared;
+  declared.sigma_s = kSigma;
+  declared.slope = 3;
+  declared.degrees_of_freedom = 8;
+  declared.poll_interval_s = 0.010;
+  declared.missed_probability = 0.01;
+  declared.length_sigma_m = 0.05e-3;
+  declared.channel_sigma_s = {0, 0, kSigma};
+  const inference::NoiseFindings found = FindInPlainNoise(declared);
+  EXPECT_TRUE(found.degrees_of_freedom.absent);
+  EXPECT_TRUE(found.poll_interval_s.absent);
+  EXPECT_TRUE(found.missed_probability.absent);
+  EXPECT_TRUE(found.length_sigma_m.absent);
+  EXPECT_TRUE(found.channels_absent);
+  // Every incidence is the same here: a slope is only another sigma.
+  EXPECT_FALSE(found.slope.absent);
+}
+
+TEST(FindNoise, ASlopeThatIsNotThereIsAbsent) {
+  std::mt19937_64 random(14);
+  std::normal_distribution<double> normal(0, kSigma);
+  SyntheticSet set(5, 48, 4, 0, 3);
+  std::vector<double> tangents(set.observations.time_s.size());
+  for (size_t e = 0; e < tangents.size(); ++e) {
+    tangents[e] =
+        std::tan(set.IncidenceDeg(static_cast<int>(e / 3), static_cast<int>(e % 3)) * kRadiansPerDegree);
+    set.observations.time_s[e] += normal(random);
+  }
+  set.Finish();
+  inference::DeclaredNoise declared;
+  declared.slope = 1;
+  EXPECT_TRUE(inference::FindNoise(MakeNoiseSample(set.observations, set.residuals, tangents,
+                                                   std::vector<char>(tangents.size(), 1)),
+                                   0, declared)
+                  .slope.absent);
+}
+
+TEST(FindNoise, KeepsDeclaredKindsThatAreThere) {
+  std::mt19937_64 random(15);
+  std::student_t_distribution<double> student(8);
+  inference::DeclaredNoise declared;
+  declared.degrees_of_freedom = 8;
+  const inference::NoiseFindings found =
+      FindAtTwoSpeeds([&](double, int) { return kSigma * student(random); }, declared);
+  EXPECT_FALSE(found.degrees_of_freedom.absent);
+}
+
+TEST(FindNoise, CannotSayThatTicksFinerThanTheFileAreNotThere) {
+  inference::DeclaredNoise declared;
+  declared.poll_interval_s = 2e-6;
+  EXPECT_FALSE(FindInPlainNoise(declared).poll_interval_s.absent);
+}
+
+// A sigma from a part of the readings with the error of all of them refits models that are right.
+TEST(FindNoise, TheErrorOfSigmaIsThatOfTheReadingsItComesFrom) {
+  double squares = 0;
+  constexpr int kSets = 12;
+  for (int j = 0; j < kSets; ++j) {
+    std::mt19937_64 random(100 + j);
+    std::normal_distribution<double> normal(0, kSigma);
+    SyntheticSet set(5, 600, 4, 0, 3);
+    for (double& time_s : set.observations.time_s) time_s += normal(random);
+    set.Finish();
+    const std::vector<double> tangents(set.residuals.size(), 0.1);
+    const inference::NoiseFindings found = inference::FindNoise(
+        MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
+    squares += std::pow((found.sigma_s.value - kSigma) / found.sigma_s.std_error, 2);
+  }
+  EXPECT_LT(squares / kSets, 2.2);  // chi-squared of 12: one in a hundred
+  EXPECT_GT(squares / kSets, 0.25);
+}
+
+TEST(FindNoise, FrequentSilenceIsNotTakenForReach) {
+  std::mt19937_64 random(16);
+  for (const double probability : {0.3, 0.7}) {
+    double sum = 0;
+    for (int j = 0; j < 8; ++j) {
+      SyntheticSet set(3, 40, 4, kSigma, 6 + j);
+      for (double& time_s : set.observations.time_s)
+        if (std::uniform_real_distribution<double>()(random) < probability) time_s = NAN;
+      set.Finish();
+      const std::vector<double> tangents(set.residuals.size(), 0.1);
+      const inference::NoiseFindings found = inference::FindNoise(
+          MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)),
+          0);
+      sum += found.missed_probability.value;
+    }
+    EXPECT_NEAR(sum / 8, probability, 0.02);
+  }
+}
+
+TEST(FindNoise, SilenceIsCountedBesideFingersOutOfReach) {
+  std::mt19937_64 random(17);
+  SyntheticSet set(5, 48, 4, kSigma, 6);
+  const Observations& o = set.observations;
+  for (size_t e = 0; e < set.observations.time_s.size(); ++e) {
+    const bool out_of_reach = e % 3 == 2 && o.pose[e / 3] % 5 == 0;
+    if (out_of_reach || std::uniform_real_distribution<double>()(random) < 0.4)
+      set.observations.time_s[e] = NAN;
+  }
+  set.Finish();
+  const std::vector<double> tangents(set.residuals.size(), 0.1);
+  const inference::NoiseFindings found = inference::FindNoise(
+      MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
+  EXPECT_NEAR(found.missed_probability.value, 0.4, 0.04);
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis::touches

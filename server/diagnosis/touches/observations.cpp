@@ -119,4 +119,9 @@ void LeaveOut(Observations* observations, int k, const std::string& reason) {
     unused.examples.push_back(observations->set->touch[observations->row[k]]);
 }
 
+double PauseS(const Observations& o, int k) {
+  if (!o.set->has_session_time || o.previous[k] < 0) return 0;
+  return o.set->session_time_s[o.row[k]] - o.set->session_time_s[o.row[o.previous[k]]];
+}
+
 }  // namespace touchstone::diagnosis::touches

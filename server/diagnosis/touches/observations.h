@@ -40,6 +40,9 @@ struct Observations {
 // Checks that set, model and surfaces belong together. Errors name what is missing.
 absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input);
 
+// Time since the session's previous touch; 0 for the first and without session times.
+double PauseS(const Observations& observations, int k);
+
 // The reason of touches with a finger whose time no noise explains.
 inline constexpr char kOutlierReason[] =
     "an outlier: one finger's time is far from what all other touches allow";

@@ -22,7 +22,8 @@ struct Prediction {
   std::vector<double> previous_press_m;
   std::vector<double> press_m;
   std::vector<Eigen::Vector3d> contact_m, normal;
-  std::vector<int> first_finger;  // a touch; -1: none
+  std::vector<Eigen::Vector3d> contact_in_mesh_m;  // in the frame of the mesh, which moves with the object
+  std::vector<int> first_finger;                   // a touch; -1: none
 };
 
 // Deterministic part of the model (noise effects, polling, dropouts and surface_error left out) at every

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "server/base/status.h"
+#include "server/effects/surface_departure.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::diagnosis::touches {
@@ -69,6 +70,7 @@ void Predictor::Fill(const Block& block, const touch::TouchSimulator& simulator,
     const touch::TouchPose pose = {set.target_m[row], set.approach[row], set.lateral[row],
                                    set.standoff_m[row]};
     touch::SetTouch(pose, set.speed_m_s[row], set.session_time_s[row], row, t, batch);
+    batch->pause_s[t] = PauseS(observations_, block.touches[t]);
   }
   for (const std::string& name : simulator.needed_covariates()) {
     const auto found = set.covariates.find(name);
@@ -136,6 +138,7 @@ class Predictor::Task {
       column->assign(entries, NAN);
     for (auto* column : {&p_.previous_press_m, &p_.press_m}) column->assign(entries, 0);
     p_.contact_m.assign(entries, Eigen::Vector3d::Constant(NAN));
+    p_.contact_in_mesh_m = p_.contact_m;
     p_.normal.assign(entries, Eigen::Vector3d::Zero());
     p_.first_finger.assign(o_.size(), -1);
     if (curvature_) p_.curvature_per_m.assign(entries, NAN);
@@ -197,6 +200,7 @@ class Predictor::Task {
       p_.inverse_speed_s_per_m[to] = batch.time_per_travel_s_m[from];
       p_.cos_incidence[to] = batch.cos_incidence[from];
       p_.contact_m[to] = batch.contact_m[from];
+      p_.contact_in_mesh_m[to] = effects::ContactInMesh(batch, from);
       p_.normal[to] = batch.normal[from];
       if (curvature_) p_.curvature_per_m[to] = batch.curvature_per_m[from];
     }
@@ -211,7 +215,7 @@ class Predictor::Task {
       copy(p_.time_s);
       if (!details_) continue;
       copy(p_.travel_m), copy(p_.inverse_speed_s_per_m), copy(p_.cos_incidence), copy(p_.contact_m),
-          copy(p_.normal);
+          copy(p_.contact_in_mesh_m), copy(p_.normal);
       if (curvature_) copy(p_.curvature_per_m);
       p_.first_finger[k] = p_.first_finger[first];
     }

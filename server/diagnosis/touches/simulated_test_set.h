@@ -27,6 +27,7 @@ struct HiddenRig {
   // Effects that the model has, as the model has them.
   std::vector<std::pair<std::string, std::vector<std::string>>> known;
   uint64_t seed = 1;
+  uint64_t pose_seed = 0;  // of the poses alone; 0: seed
 };
 
 inline model::Model WithEffects(
@@ -68,7 +69,8 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
     const auto surface = TestSurface(rig.objects[object]);
     input.surfaces[rig.objects[object]] = surface;
     set->objects.push_back(rig.objects[object]);
-    const auto generator = touch::MakePoseGenerator(plan, surface->bounds(), rig.seed + 17 * object);
+    const auto generator = touch::MakePoseGenerator(
+        plan, surface->bounds(), (rig.pose_seed != 0 ? rig.pose_seed : rig.seed) + 17 * object);
     touch::TouchWorkspace workspace;
     for (uint64_t number = 0; number < generator->Count(); ++number) {
       const touch::CommandedTouch touch = touch::TouchOfPlan(plan, *generator, number, 0);

@@ -14,6 +14,12 @@ constexpr double kMinCosine = 0.1;
 
 }  // namespace
 
+double TouchObservationModel::TimeOfRow(int row) const {
+  const int in_set = observations_.row[TouchOfRow(row)];
+  const session::MeasurementSet& set = *observations_.set;
+  return set.has_session_time ? set.session_time_s[in_set] : in_set;
+}
+
 absl::StatusOr<std::vector<double>> TouchObservationModel::Predict(const model::Model& model) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(Prediction prediction, predictor_.Run(model, false, false));
   return std::move(prediction.time_s);

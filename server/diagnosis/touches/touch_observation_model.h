@@ -27,6 +27,7 @@ class TouchObservationModel : public inference::ObservationModel {
   int FirstRowOfGroup(int group) const override { return contrasts_.FirstRowOfObject(group); }
   int GroupOfRow(int row) const override { return observations_.object[TouchOfRow(row)]; }
   int BlockOfRow(int row) const override { return observations_.pose[TouchOfRow(row)]; }
+  double TimeOfRow(int row) const override;
 
   // Reported times, s, [k * fingers + finger].
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override;

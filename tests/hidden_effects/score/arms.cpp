@@ -124,6 +124,8 @@ Scenario NoiseMissing(const TestObjects& objects) {
   return scenario;
 }
 
+constexpr int kCopies = 1;  // per set: the sets are many
+
 std::vector<Arm> MakeArms() {
   using W = const TestObjects&;
   std::vector<Arm> arms = {
@@ -139,7 +141,14 @@ std::vector<Arm> MakeArms() {
        [](W w, uint64_t s) { return Bumpy(w, s, 0.5); },
        {"surface_error"}},
       {"one weak", Kind::kEffects, 200, Weak, {}},
-      {"one", Kind::kEffects, 200, [](W w, uint64_t s) { return Realistic(FullSet(w), s, 1); }, {}},
+      {"one",
+       Kind::kEffects,
+       200,
+       [](W w, uint64_t s) { return Realistic(FullSet(w), s, 1); },
+       {},
+       Strength::kNone,
+       false,
+       kCopies},
       {"two", Kind::kEffects, 100, [](W w, uint64_t s) { return Realistic(FullSet(w), s, 2); }, {}},
       {"three", Kind::kEffects, 60, [](W w, uint64_t s) { return Realistic(FullSet(w), s, 3); }, {}},
       {"latency or length, one speed",

@@ -40,6 +40,7 @@ struct Arm {
   std::vector<std::string> tolerated;
   Strength strength = Strength::kNone;
   bool depends_on_time = false;  // the cause does, and nothing else tells it
+  int copies = 0;                // of the fitted model that are simulated and fitted again, per set
 
   // Whether the catalogue holds the truth as it stands, and the file is what it says.
   bool listed() const { return strength == Strength::kNone && kind != Kind::kUnlisted; }

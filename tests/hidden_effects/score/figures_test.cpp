@@ -247,7 +247,7 @@ TEST(Figures, ACurveMustHalveTheMisfitWhereThereIsOne) {
   EXPECT_EQ(FigureOf(measure, "session wave, weak", Wave(), report, {NAN, NAN, 0.3}), true);
   EXPECT_EQ(FigureOf(measure, "session wave, weak", Wave(), report, {NAN, NAN, 0.7}), false);
   EXPECT_EQ(FigureOf(measure, "session wave, weak", Wave(), report), false);
-  // Nobody can foretell a walk.
+  // Nobody can predict a walk.
   EXPECT_EQ(FigureOf(measure, "random walk, weak", Causing({CauseKind::kRandomWalk, 5000, {}, {}}), report),
             std::nullopt);
 }

@@ -45,8 +45,7 @@ TEST(OutsideTheCatalogue, ACouplingBetweenFingersIsNoBadPrint) {
   ExpectHonest("finger coupling, strong");
 }
 
-// Not met yet: only poses and scales may differ by object, so the verdict is UNEXPLAINED and does not name the object.
-TEST(OutsideTheCatalogue, DISABLED_AnEffectOnOneObjectIsSaidToBeThere) {
+TEST(OutsideTheCatalogue, AnEffectOnOneObjectIsSaidToBeThere) {
   ExpectRight("slip on one object, strong");
   ExpectRight("push on one object, strong");
 }
@@ -94,6 +93,11 @@ TEST(OutsideTheCatalogue, CopiesUnderNewNumbersAreAMistakeInTheFile) {
 
 TEST(OutsideTheCatalogue, AValueBeyondItsBoundIsNoBadPrint) {
   ExpectHonest("beyond its bound, realistic");
+}
+
+TEST(OutsideTheCatalogue, AValueBeyondWhatRigsShowIsSaidToBeThat) {
+  ExpectRight("beyond its bound, weak");
+  ExpectRight("beyond its bound, strong");
 }
 
 TEST(OutsideTheCatalogue, AnOldValueCompetesWithANewEffect) {

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "tests/hidden_effects/score/verify.h"
+
 namespace touchstone::hidden {
 namespace {
 
@@ -28,6 +30,7 @@ constexpr Row kRows[] = {
     {"one", "rmse at the floor", Is::kAtLeast, 0.99, 0},
     {"one", "within 3 standard errors", Is::kAtLeast, 0.95, 0},
     {"one", "interval covers", Is::kBetween, 0.92, 0.98},
+    {"one", kCopyCovers, Is::kBetween, 0.92, 0.98},
     {"two", "all found, none added", Is::kAtLeast, 0.90, 0},
     {"three", "all found, none added", Is::kAtLeast, 0.90, 0},
     {"latency or length, one speed", "said so, with what decides", Is::kAtLeast, 1, 0},

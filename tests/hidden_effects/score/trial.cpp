@@ -99,6 +99,11 @@ Outcome RunOne(const Arm& arm, uint64_t seed, const TestObjects& objects, bool b
     out.timed_out = absl::IsCancelled(diagnosis.status());
   }
   JudgeOutcome(objects, &out);
+  if (diagnosis.ok() && arm.copies > 0) {
+    const std::vector<Mark> covered =
+        CoverageOfCopies(arm, out.set.truth, out.report, seed, arm.copies, objects);
+    out.marks.insert(out.marks.end(), covered.begin(), covered.end());
+  }
   if (baselines && arm.strength == Strength::kNone) {
     const auto others = RunBaselines(*input);
     if (others.ok() && arm.kind != Kind::kNoPoses) {

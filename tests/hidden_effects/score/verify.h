@@ -1,9 +1,13 @@
-// What a report claims, tried again: the final error by Compare with the saved model, what is suggested on fresh touches.
+// What a report claims, tried again: the final error by Compare with the saved model, what is suggested on
+// fresh touches, intervals on copies of the set.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "server/diagnosis/report/write_report.h"
+#include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/test_objects.h"
 
 namespace touchstone::hidden {
@@ -20,5 +24,16 @@ std::string WithEffect(const std::string& model_yaml, const std::string& effect_
 // and without noise, as a share: infinite if it cannot be added, NaN if there is none.
 double CutsTo(const Scenario& truth, uint64_t seed, const std::string& effect_yaml,
               const TestObjects& objects);
+
+// The scenario with the values that the report gives to its one hidden effect, and the noise that it finds: what a copy
+// of the set is drawn from, that is fitted anew to see whether intervals hold the values. Nothing where the effect was
+// not named, or other values belong to it.
+std::optional<Scenario> FittedCopy(const Scenario& truth, const v1::Report& report);
+
+inline constexpr char kCopyCovers[] = "interval covers, simulated copies";
+
+// A mark kCopyCovers for each value of `copies` sets drawn from the fitted copy and diagnosed again.
+std::vector<Mark> CoverageOfCopies(const Arm& arm, const Scenario& truth, const v1::Report& report,
+                                   uint64_t seed, int copies, const TestObjects& objects);
 
 }  // namespace touchstone::hidden

@@ -1,0 +1,66 @@
+#include "server/diagnosis/selection/unsupported_steps.h"
+
+#include "server/base/status.h"
+#include "server/diagnosis/inference/held_out.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr double kImprobable = 0.05;  // of a step, with its equivalents
+
+bool HasOwnValues(const inference::Fit& fit, int index) {
+  return fit.model.base().effects[index].per_object;
+}
+
+double UnseenError(const Workspace& workspace, const inference::Fit& fit, bool by_block) {
+  return by_block ? inference::HeldOutRmseByBlock(workspace.experiment, fit)
+                  : inference::HeldOutRmse(workspace.experiment, fit);
+}
+
+// The explanation without effect `index`, everything else fitted anew.
+absl::Status TakeOut(const Workspace& workspace, int index, inference::Fit without, SelectionResult* result) {
+  result->fit = std::move(without);
+  if (result->formula < 0) {
+    result->without_formula = result->fit;
+    return absl::OkStatus();
+  }
+  if (index < result->formula) --result->formula;
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      result->without_formula,
+      inference::FitModel(workspace.experiment, result->fit.model.Without(result->formula)));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
+  for (int index = static_cast<int>(result->fit.model.base().effects.size()) - 1;
+       index >= result->initial_effects; --index) {
+    if (index == result->formula) continue;
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
+                                inference::FitModel(workspace.experiment, result->fit.model.Without(index)));
+    // Values of single objects cannot be predicted from other objects.
+    bool by_block = false;
+    for (int other = 0; other < static_cast<int>(result->fit.model.base().effects.size()); ++other)
+      by_block |= HasOwnValues(result->fit, other);
+    if (UnseenError(workspace, without, by_block) > UnseenError(workspace, result->fit, by_block)) continue;
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, index, std::move(without), result));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult* result) {
+  if (result->formula < 0 && !result->curve) return false;
+  bool dropped = false;
+  for (auto step = result->steps.rbegin(); step != result->steps.rend(); ++step) {
+    if (step->probability >= kImprobable) continue;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        inference::Fit without,
+        inference::FitModel(workspace.experiment, result->fit.model.Without(step->effect)));
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, step->effect, std::move(without), result));
+    dropped = true;
+  }
+  return dropped;
+}
+
+}  // namespace touchstone::diagnosis::selection

@@ -1,0 +1,111 @@
+// A surface that a diagnosis has found: the map in its model predicts touches that it has not seen.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/effects/surface_map.h"
+
+namespace touchstone::diagnosis {
+namespace {
+
+touches::HiddenRig BumpyRig() {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 16;
+  rig.rounds = 2;
+  rig.hidden = {{"surface_error", {"rms_mm=0.3", "length_mm=40"}}};
+  return rig;
+}
+
+report::Diagnosis DiagnoseWithMap(DiagnosisInput input) {
+  input.with_surface_map = true;
+  const absl::StatusOr<report::Diagnosis> diagnosis = Diagnose(input, {});
+  EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
+  return diagnosis.ok() ? *diagnosis : report::Diagnosis();
+}
+
+// What a comparison of the rig's touches with this model finds, s.
+double ComparedRmse(const touches::HiddenRig& rig, const std::string& model_yaml) {
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  const auto model = model::ParseModel(model_yaml, "improved.yaml", effects::Catalogue());
+  EXPECT_TRUE(model.ok()) << model.status();
+  if (!model.ok()) return NAN;
+  input.model = std::make_shared<const model::Model>(*model);
+  const absl::StatusOr<report::Diagnosis> report = Compare(input, {});
+  EXPECT_TRUE(report.ok()) << report.status();
+  return report.ok() ? report->initial->rmse_s : NAN;
+}
+
+TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
+  const touches::HiddenRig rig = BumpyRig();
+  const report::Diagnosis report = DiagnoseWithMap(touches::MakeTestInput(rig));
+  ASSERT_EQ(report.steps.size(), 1u) << report.summary;
+  EXPECT_EQ(report.steps[0].effect, "surface_map");
+  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects) << report.summary;
+  // On the same touches: what the report gives as the error.
+  EXPECT_NEAR(ComparedRmse(rig, report.improved_model_yaml), report.final->rmse_s,
+              0.01 * report.final->rmse_s);
+  // On other touches of the same objects: what it gives as the error on unseen ones, and not what the same touches have.
+  touches::HiddenRig others = rig;
+  others.pose_seed = 77;
+  const double unseen_s = ComparedRmse(others, report.improved_model_yaml);
+  EXPECT_NEAR(unseen_s, report.final->heldout_rmse_s, 0.15 * unseen_s);
+  EXPECT_GT(report.final->heldout_rmse_s, 1.05 * report.final->rmse_s);
+  EXPECT_LT(report.final->heldout_rmse_s, 0.6 * report.initial->rmse_s);
+}
+
+TEST(SurfaceMapOfADiagnosis, IsClaimedOnlyWhereItIsAskedFor) {
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(touches::MakeTestInput(BumpyRig()), {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  ASSERT_EQ(report->steps.size(), 1u) << report->summary;
+  EXPECT_EQ(report->steps[0].effect, "surface_error");
+  EXPECT_EQ(report->final->rmse_s, report->initial->rmse_s);
+}
+
+TEST(SurfaceMapOfADiagnosis, KnowsTheSurfaceWithinItsStandardDeviation) {
+  const DiagnosisInput input = touches::MakeTestInput(BumpyRig());
+  const report::Diagnosis report = DiagnoseWithMap(input);
+  const auto model = model::ParseModel(report.improved_model_yaml, "improved.yaml", effects::Catalogue());
+  ASSERT_TRUE(model.ok()) << model.status();
+  const auto& spec = model->effects.back().effect->surface_map;
+  ASSERT_NE(spec, nullptr) << report.improved_model_yaml;
+  // The truth at the map's points, from the effect that hid it.
+  const auto hidden = effects::Catalogue().Find("surface_error");
+  double squares = 0, count = 0;
+  for (const auto& [name, object] : spec->objects) {
+    effects::TouchBatch batch;
+    batch.Reset(static_cast<int>(object.points.size()), 1);
+    batch.surface = input.surfaces.at(name);
+    batch.seed = BumpyRig().seed;
+    for (int i = 0; i < batch.size(); ++i) {
+      const auto& mm = object.points[i].position_mm;
+      batch.contact_m[i] = Eigen::Vector3d(mm[0], mm[1], mm[2]) * 1e-3;
+      batch.cos_incidence[i] = 1;
+      batch.travel_m[i] = 0;
+      batch.approach[i] = Eigen::Vector3d::UnitZ();
+    }
+    hidden->apply({0.3e-3, 40e-3}, batch);
+    for (int i = 0; i < batch.size(); ++i) {
+      const double z =
+          (object.points[i].departure_mm + 1e3 * batch.travel_m[i]) / object.points[i].std_dev_mm;
+      squares += z * z, ++count;
+    }
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_GT(std::sqrt(squares / count), 0.5);
+  EXPECT_LT(std::sqrt(squares / count), 1.5);
+}
+
+TEST(SurfaceMapOfADiagnosis, LeavesNothingToFindOnItsOwnTouches) {
+  DiagnosisInput input = touches::MakeTestInput(BumpyRig());
+  const report::Diagnosis report = DiagnoseWithMap(input);
+  input.model = std::make_shared<const model::Model>(
+      *model::ParseModel(report.improved_model_yaml, "improved.yaml", effects::Catalogue()));
+  const report::Diagnosis again = DiagnoseWithMap(input);
+  EXPECT_EQ(again.verdict, selection::Verdict::kAdequate) << again.summary;
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis
