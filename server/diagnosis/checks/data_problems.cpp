@@ -28,6 +28,11 @@ namespace touchstone::diagnosis::checks {
 namespace {
 
 constexpr int kMinTouches = 12;
+constexpr double kMinSpeedMS = 1e-6;
+constexpr char kFixedFile[] = "fixed.csv";
+constexpr int kMaxParts = 4;            // with mistakes of their own
+constexpr int kMinWrong = 4;            // touches that are off by kMinMisfitM, for a mistake to be looked for
+constexpr double kMinMisfit = 0.15;     // relative: the mildest factor of times or speeds leaves more
 constexpr double kSortedMisfit = 0.15;  // relative, over all touches, from which a sorted column is one
 
 // What `compare` finds for this input; where it refuses, the error over all touches that can be compared.
@@ -53,11 +58,12 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
 }
 
 // The command that fixes the file. The server may not know the file's name.
-std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set) {
+std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set,
+                       const std::string& output = kFixedFile) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
                      set.origin.find_first_of(" '\"$\\`;&|<>()*?!") == std::string::npos;
   return absl::StrCat("touchstone session fix ", plain ? set.origin : "SET.csv", " ",
-                      session::FixOptions(fix, set.fingers), " -o fixed.csv");
+                      session::FixOptions(fix, set.fingers), " -o ", output);
 }
 
 // Problems are rare, and so is the error of the whole file as it stands: computed where one is told.
@@ -79,6 +85,11 @@ class ProblemList {
     const session::MeasurementFix both = Together(one.fix, other.fix);
     Add(one, both, absl::StrCat("It looks as if there are two mistakes: ", one.words, "; and ", other.words));
     Add(other, both, absl::StrCat("It is the second of two mistakes: ", other.words));
+  }
+  // One more, of the file that the fixes before have left.
+  void AddFurther(const Mistake& mistake, const DiagnosisInput& fixed, const std::string& output) {
+    Add(mistake, mistake.fix, absl::StrCat("Besides, in the file that is fixed so far, ", mistake.words),
+        fixed, output);
   }
   void AddMeshUnit(const MeshUnit& wrong);
   void AddDuplicates(const touches::Observations& o);
@@ -102,6 +113,10 @@ class ProblemList {
     return *before_s_;
   }
   void Add(const Mistake& mistake, const session::MeasurementFix& fix, const std::string& sentence) {
+    Add(mistake, fix, sentence, input_, kFixedFile);
+  }
+  void Add(const Mistake& mistake, const session::MeasurementFix& fix, const std::string& sentence,
+           const DiagnosisInput& input, const std::string& output) {
     selection::DataProblem problem;
     problem.kind = mistake.kind;
     problem.detail = mistake.detail;
@@ -111,8 +126,8 @@ class ProblemList {
     // Touches too scattered to be listed in a command.
     const bool in_part = mistake.part && fix.touches.empty();
     if (!in_part) {
-      problem.fix = FixCommand(fix, *input_.set);
-      problem.rmse_after_s = RmseAfter(input_, fix, pool_);
+      problem.fix = FixCommand(fix, *input.set, output);
+      problem.rmse_after_s = RmseAfter(input, fix, pool_);
       absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
                       TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
     }
@@ -174,10 +189,73 @@ void ProblemList::AddSortedColumn(const TrialResult& before) {
        "", BeforeS(), NAN});
 }
 
+// Most files fit: no mistake that could be claimed leaves so little.
+bool NothingToExplain(const TrialResult& before) {
+  const double coarse_s = kMinMisfitM / std::max(before.speed_m_s, kMinSpeedMS);
+  const auto wrong = std::count_if(before.touches.begin(), before.touches.end(), [&](const auto& touch) {
+    return touch && touch->error_s2 > coarse_s * coarse_s;
+  });
+  return wrong < kMinWrong && before.Relative({}) < kMinMisfit;
+}
+
 std::vector<Mistake> MistakesOf(const std::vector<Tried>& tried) {
   std::vector<Mistake> mistakes;
   for (const Tried& one : tried) mistakes.push_back(one.mistake);
   return mistakes;
+}
+
+// Parts with mistakes of their own: names that were exchanged in one round are two. Each is looked for in the file
+// that the fixes before have left.
+void AddFurtherParts(const DiagnosisInput& input, const Mistake& first, ThreadPool* pool,
+                     ProblemList* problems) {
+  DiagnosisInput fixed = input;
+  Mistake last = first;
+  for (int further = 2; further <= kMaxParts && last.part && !last.fix.touches.empty(); ++further) {
+    auto set = std::make_shared<session::MeasurementSet>(*fixed.set);
+    if (!session::ApplyFix(last.fix, set.get()).ok()) return;
+    set->origin = further == 2 ? kFixedFile : absl::StrCat("fixed", further - 1, ".csv");
+    fixed.set = set;
+    const absl::StatusOr<touches::Observations> o = touches::MakeObservations(fixed);
+    if (!o.ok()) return;
+    const Trial trial(fixed, SampleRows(*o));
+    const absl::StatusOr<TrialResult> before = trial.Run({});
+    if (!before.ok() || NothingToExplain(*before)) return;
+    const std::vector<Mistake> parts =
+        PartMistakes(trial, *before, TryAll(trial, AllMistakes(trial, *before), pool));
+    if (parts.empty()) return;
+    last = parts[0];
+    problems->AddFurther(last, fixed, absl::StrCat("fixed", further, ".csv"));
+  }
+}
+
+absl::Status LookForMistakes(const DiagnosisInput& input, const DiagnosisContext& context, const Trial& trial,
+                             const TrialResult& before, ProblemList* problems) {
+  std::vector<Tried> tried = TryAll(trial, AllMistakes(trial, before), context.pool);
+  std::vector<Mistake> best = MistakesOf(Convincing(tried, before));
+  // What takes more trials is looked for only where no single mistake of the whole file explains the misfit: a part
+  // of the file, a mesh in another unit, a height to be fitted, two mistakes at once.
+  if (best.empty()) best = PartMistakes(trial, before, tried);
+  std::optional<MeshUnit> mesh_unit;
+  if (best.empty()) mesh_unit = WrongMeshUnit(trial, before);
+  if (best.empty() && !mesh_unit && before.ErrorM({}) >= kMinMisfitM) {
+    for (Tried& one : TryAll(trial, OffsetOrigins(trial, before), context.pool))
+      tried.push_back(std::move(one));
+    best = MistakesOf(Convincing(tried, before));
+  }
+  problems->AddAlternatives(best);
+  if (!best.empty()) AddFurtherParts(input, best[0], context.pool, problems);
+  if (mesh_unit) {
+    problems->AddMeshUnit(*mesh_unit);
+  } else if (best.empty()) {
+    if (context.progress && !context.progress("checking the data", 0.02))
+      return absl::CancelledError("the diagnosis was cancelled");
+    const std::vector<Mistake> two = TwoMistakes(input, trial.rows(), before, context.pool);
+    if (two.size() == 2)
+      problems->AddBoth(two[0], two[1]);
+    else
+      problems->AddSortedColumn(before);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -194,30 +272,10 @@ absl::StatusOr<std::vector<selection::DataProblem>> FindDataProblems(const Diagn
   const absl::StatusOr<TrialResult> before = trial.Run({});
   if (!before.ok() || before->objects.empty()) return none;
 
-  std::vector<Tried> tried = TryAll(trial, AllMistakes(trial, *before), context.pool);
-  std::vector<Mistake> best = MistakesOf(Convincing(tried, *before));
-  // What takes more trials is looked for only where no single mistake of the whole file explains the misfit: a part
-  // of the file, a mesh in another unit, a height to be fitted, two mistakes at once.
-  if (best.empty()) best = PartMistakes(trial, *before, tried);
-  std::optional<MeshUnit> mesh_unit;
-  if (best.empty()) mesh_unit = WrongMeshUnit(trial, *before);
-  if (best.empty() && !mesh_unit && before->ErrorM({}) >= kMinMisfitM) {
-    for (Tried& one : TryAll(trial, OffsetOrigins(trial, *before), context.pool))
-      tried.push_back(std::move(one));
-    best = MistakesOf(Convincing(tried, *before));
-  }
   ProblemList problems(input, context.pool);
-  problems.AddAlternatives(best);
-  if (mesh_unit) {
-    problems.AddMeshUnit(*mesh_unit);
-  } else if (best.empty()) {
-    if (context.progress && !context.progress("checking the data", 0.02))
-      return absl::CancelledError("the diagnosis was cancelled");
-    const std::vector<Mistake> two = TwoMistakes(input, trial.rows(), *before, context.pool);
-    if (two.size() == 2)
-      problems.AddBoth(two[0], two[1]);
-    else
-      problems.AddSortedColumn(*before);
+  if (!NothingToExplain(*before)) {
+    const absl::Status looked = LookForMistakes(input, context, trial, *before, &problems);
+    if (!looked.ok()) return looked;
   }
   problems.AddDuplicates(*o);
   return problems.Take();

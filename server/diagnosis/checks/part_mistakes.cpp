@@ -18,7 +18,9 @@ constexpr int kMinRun = 4;              // tried touches between two changes, in
 constexpr double kMaxRestError = 0.35;  // relative: what physics may leave of the rest
 constexpr double kRestWorse = 1.5;      // what the fix makes of the rest's error at least
 constexpr double kSameGain = 0.98;      // of the best gain: as likely
-constexpr size_t kMaxRanges = 60, kRangesInWords = 4, kMaxNamed = 3;
+constexpr int kMinBlock = 10;           // rows of one object, one after the other
+constexpr double kNearlyAll = 0.9;      // of them
+constexpr size_t kMaxRanges = 60, kRangesInWords = 4, kMaxPartsNamed = 3;
 
 using Ranges = std::vector<std::pair<uint64_t, uint64_t>>;
 
@@ -84,7 +86,21 @@ Part Divide(const TrialResult& before, const Candidate& candidate) {
   return part;
 }
 
-double Relative(const ObjectError& error) {
+// Rows of one object that follow each other were touched in one go: where nearly all of them are wrong, those that
+// cannot be told are too, and where hardly any is, none is. `part`: of all rows of the set.
+void RoundToBlocks(const session::MeasurementSet& set, Part* part) {
+  for (int begin = 0, end = 0; begin < set.size(); begin = end) {
+    for (end = begin; end < set.size() && set.object[end] == set.object[begin];) ++end;
+    const auto first = part->wrong.begin() + begin, last = part->wrong.begin() + end;
+    const auto wrong = std::count(first, last, 1);
+    if (end - begin < kMinBlock || wrong == 0) continue;
+    if (wrong >= kNearlyAll * (end - begin)) std::fill(first, last, 1);
+    if (wrong <= (1 - kNearlyAll) * (end - begin)) std::fill(first, last, 0);
+  }
+  part->count = static_cast<int>(std::count(part->wrong.begin(), part->wrong.end(), 1));
+}
+
+double RelativeOf(const ObjectError& error) {
   return error.spread_s2 > 0 ? std::sqrt(error.error_s2 / error.spread_s2) : 0;
 }
 
@@ -97,7 +113,7 @@ bool ScaleOfPartIsRight(const Mistake& mistake, const std::vector<TouchError>& p
                       std::sqrt(error_s2 / static_cast<double>(part.size()) / square));
 }
 
-bool Claimable(const TrialResult& before, const Candidate& candidate, const Part& part) {
+bool PartIsClaimable(const TrialResult& before, const Candidate& candidate, const Part& part) {
   std::vector<TouchError> part_before, part_after, rest_before, rest_after, others;
   for (size_t row = 0; row < before.touches.size(); ++row) {
     if (!before.touches[row]) continue;
@@ -119,14 +135,14 @@ bool Claimable(const TrialResult& before, const Candidate& candidate, const Part
   const ObjectError was = RobustError(part_before), is = RobustError(part_after);
   const double misfit_m = std::sqrt(was.error_s2) * before.speed_m_s;
   if (!ChangesScale(candidate.mistake) && misfit_m < kMinMisfitM) return false;
-  if (Relative(is) > kMaxRelative || Relative(is) > kMaxRatio * std::min(Relative(was), kMaxBefore))
+  if (RelativeOf(is) > kMaxRelative || RelativeOf(is) > kMaxRatio * std::min(RelativeOf(was), kMaxBefore))
     return false;
   // Where the touches of the same object are right as they stand, the fix must make them worse.
   if (static_cast<int>(rest_before.size()) >= kMinPart &&
-      Relative(RobustError(rest_after)) < kRestWorse * Relative(RobustError(rest_before)))
+      RelativeOf(RobustError(rest_after)) < kRestWorse * RelativeOf(RobustError(rest_before)))
     return false;
   rest_before.insert(rest_before.end(), others.begin(), others.end());
-  return Relative(RobustError(rest_before)) <= kMaxRestError;
+  return RelativeOf(RobustError(rest_before)) <= kMaxRestError;
 }
 
 // The touches of these rows as ranges of their numbers, none of which holds another touch.
@@ -201,8 +217,9 @@ bool Complete(const Trial& trial, Candidate candidate, Mistake* mistake) {
   const absl::StatusOr<TrialResult> before = whole.Run({}), after = whole.Run(candidate.mistake.fix);
   if (!before.ok() || !after.ok()) return false;
   candidate.after = &*after;
-  const Part part = Divide(*before, candidate);
-  if (!Claimable(*before, candidate, part)) return false;
+  Part part = Divide(*before, candidate);
+  if (!PartIsClaimable(*before, candidate, part)) return false;
+  RoundToBlocks(set, &part);
   *mistake = candidate.mistake;
   mistake->part = true;
   const Ranges ranges = RangesOf(set, part.wrong);
@@ -235,14 +252,14 @@ std::vector<Mistake> PartMistakes(const Trial& trial, const TrialResult& before,
   std::vector<std::pair<double, Candidate>> claimable;
   for (const Candidate& candidate : Candidates(trial, tried, &renamed)) {
     const Part part = Divide(before, candidate);
-    if (part.count < kMinPart || !Claimable(before, candidate, part)) continue;
+    if (part.count < kMinPart || !PartIsClaimable(before, candidate, part)) continue;
     claimable.emplace_back(part.gain_nats, candidate);
   }
   std::stable_sort(claimable.begin(), claimable.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<Mistake> found;
   for (const auto& [gain_nats, candidate] : claimable) {
-    if (gain_nats < kSameGain * claimable[0].first || found.size() == kMaxNamed) break;
+    if (gain_nats < kSameGain * claimable[0].first || found.size() == kMaxPartsNamed) break;
     const bool again = std::any_of(found.begin(), found.end(),
                                    [kind = candidate.mistake.kind](const auto& m) { return m.kind == kind; });
     Mistake mistake;

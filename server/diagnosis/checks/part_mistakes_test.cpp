@@ -70,6 +70,23 @@ TEST(PartMistakes, TimesThatAreOneRowOffFromSomewhereOnAreTold) {
   EXPECT_THAT(problems[0].fix, HasSubstr("--shift-rows=-1"));
 }
 
+TEST(PartMistakes, NamesExchangedInOneRoundAreTwoPartsFixedOneAfterTheOther) {
+  // lat10 holds touches 96 to 191, lat20 those from 192 on, 24 per round.
+  DiagnosisInput input = Spoilt(FileOfRounds(1), With([](auto* f) {
+                                  f->touches = {{120, 143}, {216, 239}};
+                                  f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
+                                }));
+  const auto problems = ProblemsOf(input);
+  ASSERT_EQ(problems.size(), 2u);
+  for (const auto& problem : problems) EXPECT_EQ(problem.kind, "object_names");
+  EXPECT_THAT(problems[0].fix, ::testing::StartsWith("touchstone session fix set.csv --touches "));
+  EXPECT_THAT(problems[1].fix, ::testing::StartsWith("touchstone session fix fixed.csv --touches "));
+  EXPECT_THAT(problems[1].fix, ::testing::EndsWith("-o fixed2.csv"));
+  EXPECT_THAT(problems[0].fix + problems[1].fix, HasSubstr("--touches 120-143 --rename-object lat20=lat10"));
+  EXPECT_THAT(problems[0].fix + problems[1].fix, HasSubstr("--touches 216-239 --rename-object lat10=lat20"));
+  EXPECT_LT(problems[1].rmse_after_s, 0.03);
+}
+
 TEST(TwoMistakes, BothAreToldWithOneCommand) {
   struct Pair {
     const char *name, *kinds[2], *options[2];
