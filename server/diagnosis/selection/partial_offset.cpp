@@ -17,6 +17,8 @@ constexpr int kMinTouches = 60;
 constexpr int kIterations = 80;
 constexpr double kMinShare = 0.04;      // fewer are outliers
 constexpr double kMinPartialNats = 12;  // over each single distribution
+constexpr double kMinSeparation =
+    2;  // of the groups over their scatter: ticks alone look like two that overlap
 constexpr double kMaxAutocorrelation = 0.25;
 constexpr double kMinWithinPoses = 0.6;  // variance of who has it within poses, over all of it
 constexpr double kNoTails = 1e3;
@@ -157,7 +159,8 @@ std::optional<PartialOffset> FindPartialOffset(const touches::Observations& o,
   PartialOffset found;
   found.gain_nats =
       best.log_likelihood - more - std::max(GaussianLogLikelihood(cloud.y), StudentLogLikelihood(cloud.y));
-  if (found.gain_nats < kMinPartialNats) return std::nullopt;
+  if (found.gain_nats < kMinPartialNats || best.offset.norm() < kMinSeparation * std::sqrt(best.variance))
+    return std::nullopt;
   if (best.share > 0.5) best.share = 1 - best.share, best.offset = -best.offset;
   if (best.share < kMinShare || !IsAtRandom(o, cloud, best.has)) return std::nullopt;
   found.share = best.share;
