@@ -25,6 +25,10 @@ function(touchstone_header_set name)
   add_library(${target} OBJECT ${source})
   target_link_libraries(${target} PRIVATE touchstone_flags Eigen3::Eigen absl::statusor absl::strings)
   target_precompile_headers(${target} PRIVATE ${ARGN})
+  if(CCACHE)
+    set_target_properties(${target} PROPERTIES
+      CXX_COMPILER_LAUNCHER "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/compile-header-set;${CCACHE}")
+  endif()
 endfunction()
 
 # touchstone_links_to(RESULT TARGET WANTED...): whether TARGET links, directly or through others, to one of WANTED.

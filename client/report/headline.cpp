@@ -1,4 +1,5 @@
 // The verdict in one sentence.
+#include <algorithm>
 #include <map>
 
 #include <absl/strings/match.h>
@@ -92,10 +93,44 @@ std::string TooLittle(const v1::Report& report) {
                       report.touches() == 1 ? " touch; " : " touches; ", needed);
 }
 
+std::string WrongValues(const v1::Report& report) {
+  std::vector<std::string> names;
+  // Noise is estimated anew whatever the verdict: it has its say where nothing else has.
+  for (const v1::Refit& refit : report.refitted())
+    if (!absl::StrContains(refit.effect(), "noise")) names.push_back(refit.effect());
+  const std::vector<std::string> superfluous(report.superfluous().begin(), report.superfluous().end());
+  std::string what = "No effect is missing";
+  if (!names.empty()) absl::StrAppend(&what, ", but the values of ", Join(names, "and"), " are off");
+  if (!superfluous.empty())
+    absl::StrAppend(&what, names.empty() ? ", but " : ", and ", "the data do without ",
+                    Join(superfluous, "and"));
+  if (names.empty() && superfluous.empty()) what += ", but the noise is not what the model says";
+  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
+  return absl::StrCat(what, FallsAtAll(from, to) ? absl::StrCat(": put right, ", Falls(from, to)) : "", ".");
+}
+
+std::string MissingEffects(const v1::Report& report) {
+  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
+  const std::string lacks = absl::StrCat("The model lacks ", Steps(report), "; ");
+  // A map of the surface is made from these very touches: what it does for others is what it is worth.
+  const bool maps = std::any_of(report.steps().begin(), report.steps().end(),
+                                [](const v1::Step& step) { return step.effect() == "surface_map"; });
+  if (maps) {
+    const double unseen = report.final().heldout_rmse_us();
+    return absl::StrCat(lacks, "on unseen touches the error ",
+                        FallsAtAll(from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
+                        Time(unseen), ".");
+  }
+  if (!FallsAtAll(from, to)) return absl::StrCat(lacks, "the error stays ", Time(to), ".");
+  const Floor floor = NoiseFloorOf(report);
+  const bool reached = floor.sigma_us > 0 && to <= 1.05 * floor.sigma_us;
+  return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(from, to),
+                      reached ? ", the noise floor." : ".");
+}
+
 }  // namespace
 
 std::string Headline(const v1::Report& report) {
-  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
   const std::string model = report.model_name().empty() ? "the model" : report.model_name();
   if (report.has_distributions()) return Compared(report);
   switch (report.verdict()) {
@@ -105,26 +140,10 @@ std::string Headline(const v1::Report& report) {
                             FingerScatterWords(report), ".");
       return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(report.touches()),
                           " touches can tell.");
-    case v1::Report::WRONG_VALUES: {
-      std::vector<std::string> names;
-      // Noise alone changes no verdict, so the headline leaves it out.
-      for (const v1::Refit& refit : report.refitted()) {
-        if (!absl::StrContains(refit.effect(), "noise")) names.push_back(refit.effect());
-      }
-      if (names.empty())
-        return absl::StrCat("No effect is missing, but values must change: ", Falls(from, to), ".");
-      return absl::StrCat("No effect is missing, but the values of ", Join(names, "and"),
-                          " are off: put right, ", Falls(from, to), ".");
-    }
-    case v1::Report::MISSING_EFFECTS: {
-      const Floor floor = NoiseFloorOf(report);
-      const bool reached = floor.sigma_us > 0 && to <= 1.05 * floor.sigma_us;
-      if (!FallsAtAll(from, to))
-        return absl::StrCat("The model lacks ", Steps(report), "; the error stays ", Time(to), ".");
-      return absl::StrCat("The model lacks ", Steps(report), "; with ",
-                          report.steps_size() > 1 ? "them " : "it ", Falls(from, to),
-                          reached ? ", the noise floor." : ".");
-    }
+    case v1::Report::WRONG_VALUES:
+      return WrongValues(report);
+    case v1::Report::MISSING_EFFECTS:
+      return MissingEffects(report);
     case v1::Report::UNEXPLAINED:
       return Unexplained(report);
     case v1::Report::CHECK_DATA:

@@ -94,6 +94,27 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "Measured and simulated touches differ as distributions (p = 0.0005).");
 }
 
+TEST(Headline, NamesWhatTheDataDoWithout) {
+  v1::Report report;
+  report.set_verdict(v1::Report::WRONG_VALUES);
+  report.mutable_initial()->set_rmse_us(5000);
+  report.mutable_final()->set_rmse_us(5000);
+  EXPECT_EQ(Headline(report), "No effect is missing, but the noise is not what the model says.");
+  report.add_superfluous("poll_interval");
+  EXPECT_EQ(Headline(report), "No effect is missing, but the data do without poll_interval.");
+}
+
+TEST(Headline, OfAMapOfTheSurfaceSaysWhatItIsWorthOnUnseenTouches) {
+  v1::Report report;
+  report.set_verdict(v1::Report::MISSING_EFFECTS);
+  report.add_steps()->set_effect("surface_map");
+  report.mutable_initial()->set_rmse_us(5510);
+  report.mutable_final()->set_rmse_us(4600);
+  report.mutable_final()->set_heldout_rmse_us(5450);
+  EXPECT_EQ(Headline(report),
+            "The model lacks surface_map; on unseen touches the error falls from 5.51 ms to 5.45 ms.");
+}
+
 TEST(Headline, TellsOfDistributionsWithNoiseThatTheModelLacks) {
   v1::Report report = WithoutPosesReport();
   report.set_verdict(v1::Report::MISSING_EFFECTS);

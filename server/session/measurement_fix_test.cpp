@@ -58,31 +58,31 @@ TEST(MeasurementFix, FixesTheTouchesThatAreNamedAndNoOther) {
   const std::string rows =
       row(3, "cup", "5,0,7.0") + row(4, "cup", "6,0,8") + row(5, "jug", "0,1,9") + row(9, "cup", "2,3,0");
   EXPECT_EQ(
-      Mended(rows,
-             [](auto* f) {
-               f->touches = {{4, 5}};
-               f->finger_order = {1, 0, 2};
-             }),
+      FixedText(rows,
+                [](auto* f) {
+                  f->touches = {{4, 5}};
+                  f->finger_order = {1, 0, 2};
+                }),
       row(3, "cup", "5,0,7.0") + row(4, "cup", "0,6,8") + row(5, "jug", "1,0,9") + row(9, "cup", "2,3,0"));
   EXPECT_EQ(
-      Mended(rows,
-             [](auto* f) {
-               f->touches = {{3, 3}, {9, 9}};
-               f->rename_objects = {{"cup", "jug"}};
-             }),
+      FixedText(rows,
+                [](auto* f) {
+                  f->touches = {{3, 3}, {9, 9}};
+                  f->rename_objects = {{"cup", "jug"}};
+                }),
       row(3, "jug", "5,0,7.0") + row(4, "cup", "6,0,8") + row(5, "jug", "0,1,9") + row(9, "jug", "2,3,0"));
   // The last of them gets no times, and none come from or go to the others.
-  EXPECT_EQ(Mended(rows,
-                   [](auto* f) {
-                     f->touches = {{4, 9}};
-                     f->shift_rows = -1;
-                   }),
+  EXPECT_EQ(FixedText(rows,
+                      [](auto* f) {
+                        f->touches = {{4, 9}};
+                        f->shift_rows = -1;
+                      }),
             row(3, "cup", "5,0,7.0") + row(4, "cup", "0,1,9") + row(5, "jug", "2,3,0"));
-  EXPECT_THAT(Mended(rows,
-                     [](auto* f) {
-                       f->touches = {{6, 8}};
-                       f->scale_times = 10;
-                     }),
+  EXPECT_THAT(FixedText(rows,
+                        [](auto* f) {
+                          f->touches = {{6, 8}};
+                          f->scale_times = 10;
+                        }),
               HasSubstr("has none of these touches"));
 }
 
