@@ -66,6 +66,10 @@ std::vector<OutputCase> Cases() {
        ".yaml",
        {"./tips.yaml"}},
       {"MeshImport", {"mesh", "import", "mine.off", "-o", "OUT"}, ".off", {"mine.off"}},
+      {"MeshCorrect",
+       {"mesh", "correct", "mine.off", "--map", "map.csv", "-o", "OUT"},
+       ".off",
+       {"mine.off", "map.csv"}},
       {"MeshSupershape", {"mesh", "supershape", "lat20", "--triangles", "200", "-o", "OUT"}, ".off", {}},
       {"CompareAsJson",
        {"compare", "set.csv", "--model", "./model.yaml", "--json", "OUT"},
@@ -125,6 +129,8 @@ class OutputCommandTest : public RealBinaryTest, public ::testing::WithParamInte
     ASSERT_EQ(Run({"model", "new", "-o", "model.yaml"}).exit_code, 0);
     ASSERT_EQ(Run({"model", "add", "model.yaml", "tip_radius", "radius_mm=3", "-o", "tips.yaml"}).exit_code,
               0);
+    Write("map.csv",
+          "object,x_mm,y_mm,z_mm,departure_mm,std_dev_mm,length_mm,rms_mm\nmine,50,0,0,0.1,0.02,22,0.3\n");
     Write("also.yaml", "not read before the outputs are checked");
     ASSERT_EQ(Run({"mesh", "supershape", "lat20", "--triangles", "200", "-o", "mine.off"}).exit_code, 0);
     ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o",

@@ -30,8 +30,7 @@ std::vector<double> RandomValues(const model::Effect& effect, int fingers, Rando
   std::vector<double> values;
   for (const model::ParameterInfo& p : effect.parameters) {
     const int count = p.Count(fingers);
-    for (int i = 0; i < count; ++i)
-      values.push_back(p.sum_zero ? 0.0 : RandomSi(p, random));
+    for (int i = 0; i < count; ++i) values.push_back(p.sum_zero ? 0.0 : RandomSi(p, random));
     // Pairs of opposite values sum to 0 exactly.
     if (p.sum_zero && count > 1) {
       const double value = 0.1 * RandomSi(p, random);

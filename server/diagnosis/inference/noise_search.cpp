@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <utility>
 
 namespace touchstone::diagnosis::inference {
@@ -139,40 +138,35 @@ NoiseSearch::Description NoiseSearch::Fit(Kind kind, const Description& from) co
   return trial;
 }
 
-// One channel after the other in ever smaller ranges; the quietest gets scale 1.
+// One channel after the other in ever smaller ranges; where one channel that differs from all others says nearly as
+// much, it is that one. The quietest gets scale 1.
 void NoiseSearch::FitChannels(Description* trial) const {
   std::vector<double>& scales = trial->model.channel_scale;
-  scales.assign(sample_.channels, 1.0);
-  for (const double range : {std::log(kMaxScale), 0.3, 0.05})
-    for (double& scale : scales) {
-      const double centre = std::log(scale);
-      const auto at = [&](double log_scale) {
-        scale = std::exp(log_scale);
-        return ProfileSigma(sample_.groups, &trial->model);
-      };
-      at(Maximise(at, centre - range, centre + range, 10, &trial->log_likelihood));
-    }
-  const double quietest = *std::min_element(scales.begin(), scales.end());
-  for (double& scale : scales) scale /= quietest;
-  trial->log_likelihood = ProfileSigma(sample_.groups, &trial->model);
-  // Whoever may be as quiet as the quietest is: the least of several is not to make the others loud.
-  std::vector<size_t> order(scales.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return scales[a] < scales[b]; });
-  for (const size_t channel : order) {
-    const double loud = std::exchange(scales[channel], 1.0);
-    const double alike = ProfileSigma(sample_.groups, &trial->model);
-    if (alike >= trial->log_likelihood - kAlreadyNats) {
-      trial->log_likelihood = std::max(alike, trial->log_likelihood);
-      continue;
-    }
-    scales[channel] = loud;
+  const auto climb = [&](size_t channel, double range) {
+    const double centre = std::log(scales[channel]);
     const auto at = [&](double log_scale) {
       scales[channel] = std::exp(log_scale);
       return ProfileSigma(sample_.groups, &trial->model);
     };
-    at(Maximise(at, std::log(loud) - 0.3, std::log(loud) + 0.1, 10, &trial->log_likelihood));
+    at(Maximise(at, centre - range, centre + range, 10, &trial->log_likelihood));
+  };
+  const std::vector<double> alike(sample_.channels, 1.0);
+  std::vector<double> one;
+  double one_log_likelihood = -INFINITY;
+  for (size_t channel = 0; channel < alike.size(); ++channel) {
+    scales = alike;
+    for (const double range : {std::log(kMaxScale), 0.3, 0.05}) climb(channel, range);
+    if (trial->log_likelihood <= one_log_likelihood) continue;
+    one_log_likelihood = trial->log_likelihood;
+    one = scales;
   }
+  // From the best single one on, so that all of them are never worse.
+  scales = one;
+  for (const double range : {std::log(kMaxScale), 0.3, 0.05})
+    for (size_t channel = 0; channel < alike.size(); ++channel) climb(channel, range);
+  if (trial->log_likelihood < one_log_likelihood + kAlreadyNats) scales = one;
+  const double quietest = *std::min_element(scales.begin(), scales.end());
+  for (double& scale : scales) scale /= quietest;
   trial->log_likelihood = ProfileSigma(sample_.groups, &trial->model);
 }
 

@@ -86,7 +86,8 @@ class LadderBuilder {
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
     const size_t steps = ladder_.steps.size();
-    if (!doubts_.remounted && !selection_.partial) AddNoiseSteps(selection_.noise, &ladder_);
+    if (!doubts_.remounted && !selection_.partial)
+      AddNoiseSteps(selection_.noise, selection_.memory.has_value(), &ladder_);
     if (rounds_.p < kRoundsPossibleP)
       for (size_t j = steps; j < ladder_.steps.size(); ++j) {
         ladder_.steps[j].probability = std::min(ladder_.steps[j].probability, 0.5);

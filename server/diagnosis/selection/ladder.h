@@ -38,8 +38,9 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
 void AddTexts(const model::Effect& effect, LadderStep* step);
 
 // The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
-// noise floor and final errors, which noise does not change.
-void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder);
+// noise floor and final errors, which noise does not change. Where the noise `wanders`, or repeats share a course in
+// time, only its level, ticks and dropouts are judged: a wander by itself makes fingers differ and tails heavy.
+void AddNoiseSteps(inference::NoiseFindings noise, bool wanders, Ladder* ladder);
 
 // A wander of the fingers, as a step or a refit.
 void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);

@@ -200,8 +200,13 @@ inference::NoiseEstimate SigmaOf(const inference::NoiseFindings& noise, const No
 
 }  // namespace
 
-void AddNoiseSteps(const inference::NoiseFindings& noise, Ladder* ladder) {
+void AddNoiseSteps(inference::NoiseFindings noise, bool wanders, Ladder* ladder) {
   NoiseStepWriter writer(ladder);
+  if (wanders || SharesTime(ladder->noise_floor)) {
+    noise.slope = noise.degrees_of_freedom = noise.length_sigma_m = {};
+    noise.channel_sigma_s.clear();
+    noise.channels_absent = false;
+  }
   const model::Model given = ladder->improved;
   const bool has_sigma = std::any_of(
       given.effects.begin(), given.effects.end(),

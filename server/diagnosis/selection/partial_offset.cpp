@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 
@@ -49,6 +51,17 @@ Cloud CloudOf(const touches::Observations& o, const std::vector<double>& residua
         cloud.basis * Eigen::Map<const Eigen::VectorXd>(
                           &residuals[static_cast<size_t>(cloud.touch[t]) * o.fingers], o.fingers);
   return cloud;
+}
+
+// The touches with unit covariance, and the log of the volume's change, which likelihoods of them lack: a finger that
+// scatters more than the others makes a cloud long, and not two clouds.
+std::pair<Eigen::MatrixXd, double> Whitened(const Eigen::MatrixXd& y) {
+  const Eigen::MatrixXd apart = y.colwise() - y.rowwise().mean().eval();
+  const Eigen::LLT<Eigen::MatrixXd> root(apart * apart.transpose() / static_cast<double>(y.cols()));
+  if (root.info() != Eigen::Success) return {y, 0};
+  const Eigen::MatrixXd lower = root.matrixL();
+  return {lower.triangularView<Eigen::Lower>().solve(y),
+          -static_cast<double>(y.cols()) * lower.diagonal().array().log().sum()};
 }
 
 double GaussianLogLikelihood(const Eigen::MatrixXd& y) {
@@ -157,8 +170,9 @@ std::optional<PartialOffset> FindPartialOffset(const touches::Observations& o,
   const double count = static_cast<double>(cloud.y.size());
   const double more = 0.5 * static_cast<double>(o.fingers) * std::log(count);  // values beyond one Gaussian's
   PartialOffset found;
-  found.gain_nats =
-      best.log_likelihood - more - std::max(GaussianLogLikelihood(cloud.y), StudentLogLikelihood(cloud.y));
+  const auto [white, log_volume] = Whitened(cloud.y);
+  const double single = log_volume + std::max(GaussianLogLikelihood(white), StudentLogLikelihood(white));
+  found.gain_nats = best.log_likelihood - more - single;
   if (found.gain_nats < kMinPartialNats || best.offset.norm() < kMinSeparation * std::sqrt(best.variance))
     return std::nullopt;
   if (best.share > 0.5) best.share = 1 - best.share, best.offset = -best.offset;
@@ -173,8 +187,7 @@ std::optional<PartialOffset> FindPartialOffset(const touches::Observations& o,
   const double later_s = offset[finger] * o.fingers / (o.fingers - 1.0);
   found.words = absl::StrFormat(
       "In %.0f %% of the touches finger %s reports %s %s than in the others, beside the other fingers; "
-      "neither the pose "
-      "nor the time says in which.",
+      "neither the pose nor the time says in which.",
       100 * found.share, model::FingerName(finger, o.fingers), TimeInWords(std::abs(later_s)),
       later_s > 0 ? "later" : "earlier");
   return found;
