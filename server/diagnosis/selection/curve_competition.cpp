@@ -17,7 +17,7 @@ constexpr double kSimplerNats = 3;    // an effect must be worth this much besid
 constexpr double kFormulaNats = 5;    // a formula this near says the same in fewer words
 constexpr double kMemoryNats = 10;    // a wander must be this much better than a curve and than one step
 constexpr double kRougherNats = 3;    // ... and than a course without corners
-constexpr double kOvertakenNats = 1;  // a curve alone that is this much better takes a named effect's place
+constexpr double kOvertakenNats = 3;  // a curve alone that is this much better takes a named effect's place
 
 constexpr double kBeyondWanderNats = 60;  // an effect worth as much is no mean or trend of a wander
 constexpr double kWorthUnderMemoryNats = 10;

@@ -24,7 +24,7 @@ constexpr double kMisfitP = 1e-2;
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
 constexpr double kRoundsPossibleP =
-    1e-3;                          // of agreement within rounds, for a doubt of what scatter looks like
+    0.05;                          // of agreement within rounds, for a doubt of what scatter looks like
 constexpr double kZeroErrors = 2;  // standard errors of a value that may be zero
 constexpr double kZero = 1e-6;     // ... or this share of the typical size
 constexpr double kSameSurface =

@@ -3,11 +3,13 @@
 #include <absl/strings/str_format.h>
 #include <Eigen/QR>
 #include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/random.h"
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
 
@@ -17,6 +19,8 @@ namespace {
 constexpr int kMaxRounds = 40;
 constexpr int kPoseValues = 6;
 constexpr double kRoundP = 1e-6;
+constexpr double kPermutedBelowP = 0.01;
+constexpr int kPermutations = 199;
 constexpr double kNegligibleRounds = 0.015;  // share of the floor
 constexpr double kMinCosine = 0.1;           // beyond, a contact's place is no function of the pose
 constexpr double kMinRoundDegrees = 8;
@@ -82,10 +86,18 @@ int CentrePoses(const ObjectRounds& object, int fingers, Eigen::MatrixXd* rows) 
   return repeats;
 }
 
+// What a pose in every round explains of the residuals of one object, repeats centred.
+struct ObjectFit {
+  const ObjectRounds* rounds = nullptr;
+  Eigen::MatrixXd basis;  // orthonormal
+  Eigen::VectorXd residuals;
+};
+
 struct Squares {
   double all = 0, explained = 0, all_dof = 0, explained_dof = 0;
   double translation_m2 = 0;
   int translations = 0;
+  std::vector<ObjectFit> fits;
 };
 
 void AddObject(const touches::Observations& o, const touches::Prediction& d,
@@ -104,14 +116,51 @@ void AddObject(const touches::Observations& o, const touches::Prediction& d,
   const double dof = static_cast<double>(repeats) * (o.fingers - 1);
   if (dof < static_cast<double>(solver.rank()) + kMinRoundDegrees) return;
   const Eigen::VectorXd moved = solver.solve(rows.col(0));  // the least: about the mean of the rounds
+  const Eigen::MatrixXd basis = solver.householderQ() * Eigen::MatrixXd::Identity(n, solver.rank());
+  squares->fits.push_back({&object, basis, rows.col(0)});
   squares->all += rows.col(0).squaredNorm();
-  squares->explained +=
-      rows.col(0).squaredNorm() - (rows.col(0) - rows.rightCols(values) * moved).squaredNorm();
+  squares->explained += (basis.transpose() * rows.col(0)).squaredNorm();
   squares->all_dof += dof;
   squares->explained_dof += static_cast<double>(solver.rank());
   for (int round = 0; round < object.rounds; ++round)
     squares->translation_m2 += moved.segment<3>(round * kPoseValues).squaredNorm();
   squares->translations += 3 * object.rounds;
+}
+
+// What the rounds explain once the repeats of each pose have changed places: noise that grows on slopes or has tails
+// stays with its poses, and what the rounds share is gone.
+double ExplainedInOtherOrder(const std::vector<ObjectFit>& fits, int fingers, RandomStream* random) {
+  double explained = 0;
+  for (const ObjectFit& fit : fits) {
+    std::map<int, std::vector<int>> poses;
+    for (int t = 0; t < static_cast<int>(fit.rounds->pose.size()); ++t)
+      poses[fit.rounds->pose[t]].push_back(t);
+    Eigen::VectorXd residuals(fit.residuals.size());
+    for (const auto& [pose, members] : poses) {
+      std::vector<int> from = members;
+      for (size_t left = from.size(); left > 1; --left) std::swap(from[left - 1], from[random->Below(left)]);
+      for (size_t m = 0; m < members.size(); ++m)
+        residuals.segment(members[m] * fingers, fingers) = fit.residuals.segment(from[m] * fingers, fingers);
+    }
+    explained += (fit.basis.transpose() * residuals).squaredNorm();
+  }
+  return explained;
+}
+
+// Of so much agreement within rounds by chance: the tail of a gamma distribution with the mean and the variance of what
+// other orders explain.
+double PermutedP(const Squares& squares, int fingers) {
+  RandomStream random(0, RandomDomain::kDiagnosis);
+  double sum = 0, sum2 = 0;
+  for (int n = 0; n < kPermutations; ++n) {
+    const double explained = ExplainedInOtherOrder(squares.fits, fingers, &random);
+    sum += explained, sum2 += explained * explained;
+  }
+  const double mean = sum / kPermutations;
+  const double variance = (sum2 - sum * mean) / (kPermutations - 1);
+  if (!(mean > 0) || !(variance > 0)) return 1;
+  const boost::math::gamma_distribution<> chance(mean * mean / variance, variance / mean);
+  return boost::math::cdf(boost::math::complement(chance, std::max(squares.explained, 0.0)));
 }
 
 }  // namespace
@@ -124,7 +173,8 @@ RoundStructure FindRoundStructure(const touches::Observations& o, const touches:
                            d.cos_incidence.size() == residuals.size();
   if (o.fingers < 2 || !has_details || o.set->round.empty()) return found;
   Squares squares;
-  for (const ObjectRounds& object : RoundsOf(o, d, residuals))
+  const std::vector<ObjectRounds> objects = RoundsOf(o, d, residuals);
+  for (const ObjectRounds& object : objects)
     if (object.rounds >= 2 && object.rounds <= kMaxRounds) AddObject(o, d, residuals, object, &squares);
   const double rest_dof = squares.all_dof - squares.explained_dof;
   const double rest = squares.all - squares.explained;
@@ -136,6 +186,8 @@ RoundStructure FindRoundStructure(const touches::Observations& o, const touches:
   const double f = std::max(squares.explained / squares.explained_dof / (rest / rest_dof), 0.0);
   found.p =
       boost::math::cdf(boost::math::complement(boost::math::fisher_f(squares.explained_dof, rest_dof), f));
+  // The F test takes noise of one size for granted.
+  if (found.p < kPermutedBelowP) found.p = std::max(found.p, PermutedP(squares, o.fingers));
   return found;
 }
 
@@ -146,8 +198,7 @@ bool SharesRounds(const RoundStructure& rounds, double sigma_s) {
 std::string RoundsInWords(const RoundStructure& rounds, double sigma_s) {
   return absl::StrFormat(
       "In every round the object lay elsewhere, by about %.2g mm: repeats differ by %s, but only by %s once "
-      "each round has "
-      "a pose of the object of its own. Fix the object, or register it anew after each round.",
+      "each round has a pose of the object of its own. Fix the object, or register it anew after each round.",
       rounds.translation_m * kMillimetresPerMetre, TimeInWords(sigma_s), TimeInWords(rounds.sigma_s));
 }
 

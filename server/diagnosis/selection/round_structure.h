@@ -12,7 +12,7 @@
 namespace touchstone::diagnosis::selection {
 
 struct RoundStructure {
-  double p = 1;          // of so much agreement within rounds if there were none (F test)
+  double p = 1;          // of so much agreement within rounds if there were none (F test, permutations)
   double sigma_s = 0;    // of repeats, less what a pose per object and round explains; 0: not tested
   double gain_nats = 0;  // of a pose per object and round over none (BIC)
   double translation_m =
