@@ -11,11 +11,20 @@
 namespace touchstone::client {
 namespace {
 
-// The curve over its covariate, a dot at each knot.
-std::string CurvePicture(const v1::UnexplainedCurve& curve) {
+// The curve over its covariate, a dot at each knot. It is drawn over all of the data, where it is constant beyond its
+// knots: a step of two knots next to each other would look like a slope.
+std::string CurvePicture(const v1::Report& report) {
+  const v1::UnexplainedCurve& curve = report.unexplained().curve();
   RangeFinder x, y;
   y.Add(0);
-  for (const double knot : curve.knots()) x.Add(knot);
+  double first = *curve.knots().begin(), last = *curve.knots().rbegin();
+  for (const v1::CovariateCurve& residuals : report.curves())
+    for (const v1::CurveBin& bin : residuals.bins()) {
+      if (residuals.covariate() != curve.covariate()) continue;
+      first = std::min(first, bin.centre());
+      last = std::max(last, bin.centre());
+    }
+  x.Add(first), x.Add(last);
   for (const v1::FingerCurve& finger : curve.curves())
     for (const double value : finger.values()) y.Add(value);
   const std::string axis = Covariate(curve.covariate(), curve.covariate_unit());
@@ -30,7 +39,11 @@ std::string CurvePicture(const v1::UnexplainedCurve& curve) {
     for (int j = 0; j < std::min(curve.knots_size(), finger.values_size()); ++j)
       points.push_back({curve.knots(j), finger.values(j)});
     const std::string css = curve.curves_size() == 1 ? "better" : absl::StrCat("f", f % 6);
-    chart.Line(points, css);
+    if (points.empty()) continue;
+    std::vector<ChartPoint> line = points;
+    line.insert(line.begin(), {first, points.front().y});
+    line.push_back({last, points.back().y});
+    chart.Line(line, css);
     chart.Dots(points, absl::StrCat("knots ", css));
     keys.push_back(
         {css, finger.finger().empty() ? "every finger" : absl::StrCat("finger ", finger.finger())});
@@ -57,7 +70,7 @@ std::string LookupCurve(const v1::Report& report) {
     add("Nearest effect", Typeset(NearestEffectWords(rest)));
   return absl::StrCat(
       "<h3>The curve that fits, without a name</h3>\n",
-      Figure(CurvePicture(rest.curve()),
+      Figure(CurvePicture(report),
              Typeset(absl::StrCat(
                  "Linear between its ", rest.curve().knots_size(),
                  " knots (dots), constant beyond them. A penalty keeps it as straight as the data "
@@ -78,9 +91,10 @@ std::string LookupCurve(const v1::Report& report) {
 std::string HtmlUnexplained(const v1::Report& report) {
   const v1::Unexplained& rest = report.unexplained();
   std::string body;
+  if (!rest.words().empty()) body = absl::StrCat("<p>", Typeset(rest.words()), "</p>\n");
   if (!rest.covariates().empty()) {
-    body = absl::StrCat(
-        "<div class=\"scroll\"><table class=\"narrow\">",
+    absl::StrAppend(
+        &body, "<div class=\"scroll\"><table class=\"narrow\">",
         HeaderRow({rest.covariates_size() > 1 ? "The rest depends, on each alone, on" : "The rest depends on",
                    ">p", ">gain in log evidence (nats)"}),
         "<tbody>");

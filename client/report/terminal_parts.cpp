@@ -182,8 +182,9 @@ void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
 
 void AddUnexplained(const v1::Report& report, TextLayout* out) {
   const v1::Unexplained& rest = report.unexplained();
-  if (rest.covariates().empty() && rest.formula().empty()) return;
+  if (rest.covariates().empty() && rest.formula().empty() && rest.words().empty()) return;
   out->Label("Unexplained");
+  if (!rest.words().empty()) out->Paragraph(rest.words());
   if (!rest.covariates().empty()) {
     std::vector<std::string> names;
     for (int i = 0; i < std::min(rest.covariates_size(), 4); ++i) {

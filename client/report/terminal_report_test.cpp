@@ -109,6 +109,15 @@ TEST(TerminalReport, NamesWhatTheDataCannotTellApartAndWhatWouldDecide) {
   EXPECT_THAT(text, HasSubstr("channel_latency or finger_length: these data cannot tell them apart."));
 }
 
+TEST(TerminalReport, SaysWhatIsKnownOfARestWithoutAFormula) {
+  v1::Report report = UnexplainedReport();
+  report.mutable_unexplained()->Clear();
+  const std::string words = "In 30 % of the touches finger l reports 20 ms later.";
+  report.mutable_unexplained()->set_words(words);
+  EXPECT_THAT(TerminalReport(report, 120, false), HasSubstr(words));
+  EXPECT_THAT(HtmlReport(report), HasSubstr("In 30"));
+}
+
 TEST(TerminalReport, ShowsMistakesOfTheFileAndTheCommandInOnePiece) {
   const std::string text = TerminalReport(CheckDataReport(), 100, false);
   EXPECT_THAT(

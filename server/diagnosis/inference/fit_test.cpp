@@ -150,6 +150,14 @@ TEST_F(FitTest, RefittedHeldOutErrorSeesThatTimesDisagree) {
   EXPECT_GT(*HeldOutRmseRefitted(experiment, fit), 2 * kSigma);
 }
 
+// Each group has a stretch of time to itself: left out whole, nothing would be known of its values.
+TEST_F(FitTest, RefittedHeldOutErrorOfOwnValuesLeavesOutPartsOfEachGroup) {
+  for (int row = 0; row < rows.rows(); ++row)
+    rows.measured[row] += rows.columns["object_push"][row] * kPushM * (1 + rows.GroupOfRow(row));
+  const Fit fit = *FitModel(experiment, Free({"object_push"}, true));
+  EXPECT_LT(*HeldOutRmseRefitted(experiment, fit), 1.2 * kSigma);
+}
+
 TEST_F(FitTest, RefittedHeldOutErrorEndsWhenItIsCancelled) {
   const Fit fit = *FitModel(experiment, Free({"object_push"}));
   experiment.cancelled = [] { return true; };

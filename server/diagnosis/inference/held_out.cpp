@@ -17,11 +17,14 @@ constexpr int kRefitIterations = 4;   // a fit without a part begins where the w
 
 using Folds = std::vector<std::vector<int>>;  // the rows of each part that is left out
 
+bool HasOwnValues(const Parameterization& model) {
+  return std::any_of(model.parameters().begin(), model.parameters().end(),
+                     [](const FreeParameter& c) { return !c.object.empty(); });
+}
+
 // Empty: a group's own values cannot be learned from other groups, and two groups say too little of a third.
 Folds GroupFolds(const ObservationModel& observations, const Parameterization& model) {
-  const bool own_values = std::any_of(model.parameters().begin(), model.parameters().end(),
-                                      [](const FreeParameter& c) { return !c.object.empty(); });
-  if (observations.groups().size() < 3 || own_values) return {};
+  if (observations.groups().size() < 3 || HasOwnValues(model)) return {};
   Folds folds(observations.groups().size());
   for (int row = 0; row < observations.rows(); ++row) folds[observations.GroupOfRow(row)].push_back(row);
   return folds;
@@ -34,15 +37,22 @@ Folds BlockFolds(const ObservationModel& observations) {
   return folds;
 }
 
-// Stretches of time with as many rows each.
-Folds TimeFolds(const ObservationModel& observations) {
-  std::vector<int> order(observations.rows());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return observations.TimeOfRow(a) < observations.TimeOfRow(b); });
+// Stretches of time with as many rows each; of each group's own time where groups have values of their own, since the
+// rest of the session may say nothing of them.
+Folds TimeFolds(const ObservationModel& observations, bool own_values) {
   Folds folds(kFolds);
-  for (size_t place = 0; place < order.size(); ++place)
-    folds[place * kFolds / order.size()].push_back(order[place]);
+  const auto divide = [&](int begin, int end) {
+    std::vector<int> order(end - begin);
+    std::iota(order.begin(), order.end(), begin);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return observations.TimeOfRow(a) < observations.TimeOfRow(b); });
+    for (size_t place = 0; place < order.size(); ++place)
+      folds[place * kFolds / order.size()].push_back(order[place]);
+  };
+  const int groups = static_cast<int>(observations.groups().size());
+  if (!own_values) divide(0, observations.rows());
+  for (int group = 0; own_values && group < groups; ++group)
+    divide(observations.FirstRowOfGroup(group), observations.FirstRowOfGroup(group + 1));
   return folds;
 }
 
@@ -194,8 +204,8 @@ absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const F
   Experiment without_surface = experiment;
   without_surface.likelihood = &plain;
   double largest = 0;
-  for (const Folds& folds :
-       {GroupFolds(observations, fit.model), BlockFolds(observations), TimeFolds(observations)}) {
+  for (const Folds& folds : {GroupFolds(observations, fit.model), BlockFolds(observations),
+                             TimeFolds(observations, HasOwnValues(fit.model))}) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, RefittedSquares(without_surface, fit, folds));
     largest = std::max(largest, squares);
   }

@@ -14,7 +14,8 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit);
 double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit);
 
 // The same with every value fitted anew, by the simulator and not by a linear step, to what is left: without a group,
-// without a fifth of the blocks, without a fifth of the time. Of the three the largest, since a model must hold on
+// without a fifth of the blocks, without a fifth of the time (of
+// each group's own time where groups have values of their own). Of the three the largest, since a model must hold on
 // other objects, at other places and at other times. A smooth error takes no part: nothing of it is known where a
 // group is left out. Error: CANCELLED, or what the simulator says.
 absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit);

@@ -15,6 +15,7 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
+constexpr double kNearShare = 0.5;  // of the curve's gain, for a formula that comes near it
 constexpr size_t kMaxCovariates = 6;
 constexpr double kCovariateP = 0.01;
 constexpr int kMaxSpan = 8;  // columns: effects with more of them look like anything
@@ -136,14 +137,15 @@ void AddCurves(const SelectionResult& selection, std::vector<CovariateTest>* tes
   if (tests->size() > kMaxCovariates) tests->resize(kMaxCovariates);
 }
 
-// The term of the curve's covariate that gains most, and how much of the curve's gain that is.
+// The term of the curve's covariate that gains most, if it is worth a look, and how much of the curve's gain that is.
 void AddNearestFormula(const std::vector<FormulaTerm>& terms, const NamelessCurve& curve,
                        UnexplainedRest* rest) {
   const FormulaTerm* nearest = nullptr;
   for (const FormulaTerm& term : terms)
     if (term.covariate == curve.covariate && (nearest == nullptr || term.gain_nats > nearest->gain_nats))
       nearest = &term;
-  if (nearest == nullptr || !(nearest->gain_nats > 0) || !(curve.gain_nats > 0)) return;
+  if (nearest == nullptr || !(curve.gain_nats > 0) || nearest->gain_nats < kNearShare * curve.gain_nats)
+    return;
   rest->nearest_formula = nearest->expression;
   rest->nearest_formula_share = std::min(1.0, nearest->gain_nats / curve.gain_nats);
 }
