@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_flag("--listed", only_listed, "only arms that the catalogue lists");
   app.add_flag("--outside", only_outside, "only the others");
-  app.add_option("--threads", options.threads, "sets at once")->check(CLI::Range(1, 64));
+  app.add_option("--threads", options.threads, "sets at once")->check(CLI::Range(1, 64))->take_last();
   app.add_option("--meshes", meshes, "folder with lat00.off ...; missing ones are made");
   app.add_option("--dump", options.dump_folder, "write sets that were judged wrong there");
   app.add_flag("--verbose", verbose, "a line per set: truth, verdict, steps, values");
