@@ -165,8 +165,7 @@ std::string SurfaceSupport::Words(double rmse_s) const {
 
 std::string SurfaceSupport::WordsOfMap(double heldout_s) const {
   return absl::StrFormat(
-      "%s The model holds a map of them, found on these touches: at poses that it has not seen it leaves %s. "
-      "`touchstone mesh correct` writes the meshes as they were measured.",
+      "%s The model holds a map of them, found on these touches: at poses that it has not seen it leaves %s.",
       SizeInWords(), TimeInWords(heldout_s));
 }
 
