@@ -24,7 +24,7 @@ constexpr char kQuietModel[] =
 
 class SurfaceMapCommandTest : public RealBinaryTest {
  protected:
-  // Touches of two printed objects, in a file; the bumps hang on the model's seed alone, poses on the plan's.
+  // Touches of two printed objects, in a file; the bumps depend on the model's seed alone, poses on the plan's.
   void MakeBumpySet(const std::string& name, const std::string& plan_seed) {
     Write("nominal.yaml", kQuietModel);
     Write("bumpy.yaml", absl::StrCat(kQuietModel, "  - surface_error: {rms_mm: 0.3, length_mm: 40}\n"));

@@ -69,9 +69,9 @@ void ClipPresses(RepeatedTouches* data) {
     for (const double press_s : touch.press_s) sizes.push_back(std::abs(press_s));
   if (sizes.empty()) return;
   std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  const double most_s = kMaxPress * sizes[sizes.size() / 2];
+  const double limit_s = kMaxPress * sizes[sizes.size() / 2];
   for (RepeatedTouch& touch : data->touches)
-    for (double& press_s : touch.press_s) press_s = std::clamp(press_s, -most_s, most_s);
+    for (double& press_s : touch.press_s) press_s = std::clamp(press_s, -limit_s, limit_s);
 }
 
 // Complete touches of objects that go in rounds, poses with two of them at least.

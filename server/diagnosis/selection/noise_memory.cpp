@@ -45,17 +45,17 @@ struct WanderLikelihood {
   double white_s = 0;
 };
 
-// Variance ratio wander / white, and correlation time; the white noise is profiled.
-WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
+// Of a level that moves between touches, seen through white noise of unit variance, whose size is profiled (Kalman
+// filter). `variance`: of the level before the first touch; `move(gap_s, &mean, &variance)`: what a pause does to it.
+template <typename Move>
+WanderLikelihood FilterLevel(const Course& course, double variance, const Move& move) {
   const int n = course.touches(), channels = course.channels;
   std::vector<double> mean(channels, 0.0);
-  double variance = ratio, squares = 0, logs = 0;
+  double squares = 0, logs = 0;
   for (int k = 0; k < n; ++k) {
-    const double rho = std::exp(-course.gap_s[k] / time_s);
-    variance = rho * rho * variance + (1 - rho * rho) * ratio;
+    move(course.gap_s[k], &mean, &variance);
     const double innovation = variance + 1, gain = variance / innovation;
     for (int c = 0; c < channels; ++c) {
-      mean[c] *= rho;
       const double apart = course.value[static_cast<size_t>(k) * channels + c] - mean[c];
       squares += apart * apart / innovation;
       mean[c] += gain * apart;
@@ -68,29 +68,26 @@ WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
   return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
 }
 
+// Variance ratio wander / white, and correlation time; the white noise is profiled.
+WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
+  return FilterLevel(course, ratio, [&](double gap_s, std::vector<double>* mean, double* variance) {
+    const double rho = std::exp(-gap_s / time_s);
+    *variance = rho * rho * *variance + (1 - rho * rho) * ratio;
+    for (double& level : *mean) level *= rho;
+  });
+}
+
 // The same of a walk, which remembers for ever: its variance grows by `rate` of the white noise's a second from `start`.
 double WalkLogLikelihood(const Course& course, double start, double rate) {
-  const int n = course.touches(), channels = course.channels;
-  std::vector<double> mean(channels, 0.0);
-  double variance = start, squares = 0, logs = 0;
-  for (int k = 0; k < n; ++k) {
-    if (std::isfinite(course.gap_s[k])) {
-      variance += rate * course.gap_s[k];
-    } else {
-      variance = start;
-      std::fill(mean.begin(), mean.end(), 0.0);
+  const auto move = [&](double gap_s, std::vector<double>* mean, double* variance) {
+    if (std::isfinite(gap_s)) {
+      *variance += rate * gap_s;
+      return;
     }
-    const double innovation = variance + 1, gain = variance / innovation;
-    for (int c = 0; c < channels; ++c) {
-      const double apart = course.value[static_cast<size_t>(k) * channels + c] - mean[c];
-      squares += apart * apart / innovation;
-      mean[c] += gain * apart;
-    }
-    logs += channels * std::log(innovation);
-    variance *= 1 - gain;
-  }
-  const double count = static_cast<double>(n) * channels;
-  return -0.5 * count * std::log(std::max(squares / count, 1e-30)) - 0.5 * logs;
+    *variance = start;
+    std::fill(mean->begin(), mean->end(), 0.0);
+  };
+  return FilterLevel(course, start, move).log_likelihood;
 }
 
 // The best walk: a wander spreads at first by 2 variance / time a second.
