@@ -76,7 +76,10 @@ struct ArmState {
   SafetyMode safety_mode = SafetyMode::kUnspecified;
   RuntimeState runtime_state = RuntimeState::kStopping;
   uint32_t robot_status_bits = 0, safety_status_bits = 0;
-  double speed_scaling = 0;
+  // The speed is the commanded one times both: what the controller's limiter leaves of it, and the pendant's slider.
+  double speed_scaling = 0, target_speed_fraction = 0;
+  Eigen::Vector3d tip_force_n =
+      Eigen::Vector3d::Zero();             // base frame's axes, as the controller estimates or measures it
   uint32_t program_id = 0;                 // of this gateway's program that runs or ran last
   MotionPhase phase = MotionPhase::kNone;  // of that program
 };

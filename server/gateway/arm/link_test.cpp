@@ -42,8 +42,8 @@ bool Negotiate(FakeServer::Connection& connection, const Script& script) {
       if (type == RtdeType::kInputs) reply = "\2" + script.input_types;
       if (type == RtdeType::kOutputs) {
         reply =
-            "\1DOUBLE,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,INT32,INT32,UINT32,UINT32,UINT32,DOUBLE,INT32,"
-            "INT32";
+            "\1DOUBLE,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,INT32,INT32,UINT32,UINT32,UINT32,DOUBLE,"
+            "DOUBLE,INT32,INT32";
         if (absl::StrContains((*message)->payload, "tcp_offset"))
           reply += script.knows_tcp_offset ? ",VECTOR6D,INT32" : ",NOT_FOUND,NOT_FOUND";
       }
@@ -56,8 +56,8 @@ bool Negotiate(FakeServer::Connection& connection, const Script& script) {
 std::string Data(double timestamp_s, bool with_tcp_offset = true) {
   BigEndianWriter writer;
   writer.U8(1).F64(timestamp_s);
-  for (int i = 0; i < 24; ++i) writer.F64(0);
-  writer.I32(7).I32(1).U32(1).U32(1).U32(1).F64(1).I32(0).I32(0);
+  for (int i = 0; i < 30; ++i) writer.F64(0);
+  writer.I32(7).I32(1).U32(1).U32(1).U32(1).F64(1).F64(1).I32(0).I32(0);
   for (int i = 0; with_tcp_offset && i < 6; ++i) writer.F64(0);
   if (with_tcp_offset) writer.I32(0);
   return EncodeRtde(RtdeType::kData, writer.bytes());

@@ -24,12 +24,14 @@ std::vector<Field> OutputFields(bool with_tcp_offset) {
                                {"actual_qd", "VECTOR6D"},
                                {"actual_TCP_pose", "VECTOR6D"},
                                {"actual_TCP_speed", "VECTOR6D"},
+                               {"actual_TCP_force", "VECTOR6D"},
                                {"robot_mode", "INT32"},
                                {"safety_mode", "INT32"},
                                {"runtime_state", "UINT32"},
                                {"robot_status_bits", "UINT32"},
                                {"safety_status_bits", "UINT32"},
                                {"speed_scaling", "DOUBLE"},
+                               {"target_speed_fraction", "DOUBLE"},
                                {absl::StrCat("output_int_register_", kProgramRegister), "INT32"},
                                {absl::StrCat("output_int_register_", kPhaseRegister), "INT32"}};
   // Newer controllers tell these too: the tool, and our own heartbeat as it has arrived.
@@ -138,12 +140,14 @@ absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe
   sample.actual_qd_rad_s = Vector6(&reader);
   sample.actual_tcp_pose = Vector6(&reader);
   sample.actual_tcp_speed = Vector6(&reader);
+  sample.actual_tcp_force = Vector6(&reader);
   sample.robot_mode = reader.I32();
   sample.safety_mode = reader.I32();
   sample.runtime_state = reader.U32();
   sample.robot_status_bits = reader.U32();
   sample.safety_status_bits = reader.U32();
   sample.speed_scaling = reader.F64();
+  sample.target_speed_fraction = reader.F64();
   sample.program_register = reader.I32();
   sample.phase_register = reader.I32();
   sample.has_tcp_offset = with_tcp_offset;
@@ -158,7 +162,8 @@ absl::StatusOr<RtdeSample> ParseSample(absl::string_view payload, uint8_t recipe
     return absl::DataLossError(absl::StrCat("RTDE: a data package of recipe ", int{its_recipe}, "; ",
                                             int{recipe}, " was agreed on"));
   if (!std::isfinite(sample.timestamp_s) || !Finite(sample.actual_q_rad) || !Finite(sample.actual_qd_rad_s) ||
-      !Finite(sample.actual_tcp_pose) || !Finite(sample.actual_tcp_speed) || !Finite(sample.tcp_offset))
+      !Finite(sample.actual_tcp_pose) || !Finite(sample.actual_tcp_speed) ||
+      !Finite(sample.actual_tcp_force) || !Finite(sample.tcp_offset))
     return absl::DataLossError("RTDE: a data package has numbers that are not finite");
   return sample;
 }

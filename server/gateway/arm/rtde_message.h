@@ -51,9 +51,11 @@ struct RtdeSample {
   std::array<double, 6> actual_q_rad{}, actual_qd_rad_s{};
   std::array<double, 6> actual_tcp_pose{};   // m, rotation vector
   std::array<double, 6> actual_tcp_speed{};  // m/s, rad/s
+  std::array<double, 6> actual_tcp_force{};  // N, N m, base frame's axes, at the tool
   int32_t robot_mode = -1, safety_mode = 0;
   uint32_t runtime_state = 0, robot_status_bits = 0, safety_status_bits = 0;
-  double speed_scaling = 0;
+  double speed_scaling = 0;          // of the trajectory limiter alone
+  double target_speed_fraction = 0;  // the pendant's slider; the true speed is their product
   int32_t program_register = 0, phase_register = 0;
   std::array<double, 6> tcp_offset{};  // of the tool that actual_tcp_pose is of
   int32_t heartbeat_echo = 0;          // the newest heartbeat that the controller has got

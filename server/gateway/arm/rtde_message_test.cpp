@@ -17,8 +17,8 @@ using ::testing::HasSubstr;
 std::string SamplePayload(double timestamp_s, bool with_tcp_offset = true) {
   BigEndianWriter writer;
   writer.U8(1).F64(timestamp_s);
-  for (int i = 0; i < 24; ++i) writer.F64(0.125 * i);
-  writer.I32(7).I32(3).U32(2).U32(3).U32(4).F64(0.75).I32(17).I32(-1);
+  for (int i = 0; i < 30; ++i) writer.F64(0.125 * i);
+  writer.I32(7).I32(3).U32(2).U32(3).U32(4).F64(0.75).F64(0.5).I32(17).I32(-1);
   for (int i = 0; with_tcp_offset && i < 6; ++i) writer.F64(0.5 * i);
   if (with_tcp_offset) writer.I32(123);
   return writer.bytes();
@@ -35,9 +35,11 @@ TEST(RtdeMessage, SampleIsReadInTheOrderOfItsNames) {
   EXPECT_EQ(sample->timestamp_s, 41.5);
   EXPECT_EQ(sample->actual_q_rad[5], 0.125 * 5);
   EXPECT_EQ(sample->actual_tcp_speed[5], 0.125 * 23);
+  EXPECT_EQ(sample->actual_tcp_force[5], 0.125 * 29);
   EXPECT_EQ(sample->robot_mode, 7);
   EXPECT_EQ(sample->safety_mode, 3);
   EXPECT_EQ(sample->speed_scaling, 0.75);
+  EXPECT_EQ(sample->target_speed_fraction, 0.5);
   EXPECT_EQ(sample->program_register, 17);
   EXPECT_EQ(sample->phase_register, -1);
   EXPECT_EQ(sample->tcp_offset[5], 2.5);

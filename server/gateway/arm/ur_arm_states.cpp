@@ -26,6 +26,8 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
   state.robot_status_bits = sample.robot_status_bits;
   state.safety_status_bits = sample.safety_status_bits;
   state.speed_scaling = sample.speed_scaling;
+  state.target_speed_fraction = sample.target_speed_fraction;
+  state.tip_force_n << sample.actual_tcp_force[0], sample.actual_tcp_force[1], sample.actual_tcp_force[2];
   state.program_id = static_cast<uint32_t>(sample.program_register);
   state.phase = static_cast<MotionPhase>(sample.phase_register);
 
