@@ -27,8 +27,8 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
   v1::StopRequest request;
-  request.set_reason(options.reason.empty() ? "touchstone rig stop by " + client::LeaseHolder()
-                                            : options.reason);
+  request.set_reason(options.reason);
+  request.set_holder(client::LeaseHolder());
   v1::StopResponse response;
   const absl::Status status = client::FromGrpc(connection->control().Stop(&context, request, &response));
   if (!status.ok())
