@@ -103,6 +103,7 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   EXPECT_EQ(RigState().interrupted_touches(), 1u);
   EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   UnlockByHand();
+  EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(0.0005), "killed");
   KillGatewayProcess();
   ExpectEveryResultIsItsOwnTouch();
@@ -122,6 +123,9 @@ TEST_F(Safety, AFrozenControllerIsNoticed) {
   WaitUntil([&] { return State() != v1::SOURCE_STATE_DISCONNECTED; }, "the controller is back");
   if (State() == v1::SOURCE_STATE_PROTECTIVE_STOP)  // it thawed with its watchdog overdue
     UnlockByHand();
+  if (State() == v1::SOURCE_STATE_STOPPED) {
+    EXPECT_TRUE(Reset().ok());
+  }
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "frozen");
   ExpectEveryResultIsItsOwnTouch();
 }
@@ -156,6 +160,7 @@ TEST_F(Safety, AProtectiveStopIsNeverUnlockedByItself) {
   for (int k = 0; k < 3; ++k) EXPECT_FALSE(Touch(lease.token(), FromAbove(), "more").status.ok());
   EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   UnlockByHand();
+  EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
   ExpectEveryResultIsItsOwnTouch();
 }
