@@ -45,6 +45,11 @@ class Latch : public Safety {
     WaitUntil([&] { return emulator_->clock().NowS() >= until_s; }, "the rig's time passes");
   }
 
+  // The command line, beside this program.
+  static std::string Touchstone() {
+    return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone";
+  }
+
   // Every kind of motion and power, again and again: refused, and nothing reaches the controller.
   void ExpectNothingMovesUntilReset(const std::string& because) {
     const size_t commands = CommandCount();
@@ -90,12 +95,14 @@ class ProcessGroup {
     if (!Ended()) kill(-pid_, SIGKILL), waitpid(pid_, nullptr, 0);
   }
   bool Ended() {
-    if (!ended_) ended_ = waitpid(pid_, nullptr, WNOHANG) == pid_;
+    if (!ended_) ended_ = waitpid(pid_, &status_, WNOHANG) == pid_;
     return ended_;
   }
+  int exit_code() const { return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1; }
 
  private:
   pid_t pid_ = 0;
+  int status_ = 0;
   bool ended_ = false;
 };
 
@@ -106,12 +113,11 @@ TEST_F(Latch, AShellLoopAroundTheCommandMovesNothingAfterAStop) {
   std::ofstream(plan) << "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,"
                          "approach_y,approach_z,lateral_x,lateral_y,lateral_z\n"
                          "0,lat00,2.5,50,0,0,70,0,0,-1,1,0,0\n1,lat00,20,50,10,0,70,0,0,-1,1,0,0\n";
-  const std::string touchstone = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone";
   ProcessGroup loop(
       {"sh", "-c",
        "while ! \"$1\" rig run \"$2\" -o \"$3\" --session test --server \"$4\" -q 2>>\"$5\"; do "
        "echo retry >>\"$5\"; sleep .2; done",
-       "loop", touchstone, plan, folder_.Path("run.db"), "127.0.0.1:" + std::to_string(gateway_->port()),
+       "loop", Touchstone(), plan, folder_.Path("run.db"), "127.0.0.1:" + std::to_string(gateway_->port()),
        tries});
   const auto retries = [&] {
     std::ifstream file(tries);
@@ -288,6 +294,31 @@ TEST_F(Latch, NothingThatCouldMoveTheArmIsSentAfterAStopAtAnyMoment) {
   }
   EXPECT_GT(while_powering, 3) << "too few stops came while the arm was powered up";
   ExpectEveryResultIsItsOwnTouch();
+}
+
+TEST_F(Latch, EveryCommandThatRepeatsMotionsEndsWithAStop) {
+  StartRig();
+  StartGateway();
+  const std::vector<std::vector<std::string>> commands = {
+      {"calibrate", "flat", "lat00", "--touches", "20", "-o", folder_.Path("model.yaml")},
+      {"calibrate", "object", "lat00", "--calibration", emulator_->calibration_path(), "-o",
+       folder_.Path("new.yaml")},
+      {"photos", "lat00", "-o", folder_.Path("photos")}};
+  for (const std::vector<std::string>& command : commands) {
+    std::vector<std::string> words = {Touchstone(), "rig"};
+    words.insert(words.end(), command.begin(), command.end());
+    words.insert(words.end(), {"-q", "--server", "127.0.0.1:" + std::to_string(gateway_->port())});
+    ProcessGroup process(words);
+    WaitUntil([&] { return emulator_->controller().Moving() || process.Ended(); }, "the arm moves");
+    ASSERT_FALSE(process.Ended()) << command[0] << " " << command[1];
+    Stop("in the middle of it");
+    const size_t sent = CommandCount();
+    WaitUntil([&] { return process.Ended(); }, "the command ends");
+    WaitForRest();
+    EXPECT_NE(process.exit_code(), 0);
+    EXPECT_THAT(CommandsSince(sent), Each("program stop_motion")) << command[0] << " " << command[1];
+    ASSERT_TRUE(Reset().ok());
+  }
 }
 
 // --- The serial line

@@ -54,8 +54,10 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
   if (program_id == 0 || program_id >= 1u << 28)
     return absl::InvalidArgumentError(
         absl::StrCat("program id ", program_id, ": must be from 1 to ", (1u << 28) - 1));
-  uint64_t stops = stop_count_;
+  bool permitted = false;
+  uint64_t stops = 0;
   const absl::Status sent = SendStart(guard, [&] {
+    permitted = true;
     stops = stop_count_;
     withhold_heartbeats_ = false;
     {
@@ -66,6 +68,7 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
     // A stop that did not wait until the program had gone out must reach the controller behind it.
     return programs_.Send(program, [&] { return stop_count_ != stops ? StopProgram() : std::string(); });
   });
+  if (!permitted) return sent;
   if (stop_count_ != stops) {
     SendStop().IgnoreError();
     return absl::AbortedError(absl::StrCat("program ", program_id, " was stopped before it began"));
