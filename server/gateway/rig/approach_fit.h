@@ -39,7 +39,7 @@ struct ApproachFit {
   int states = 0;  // that were used
 };
 
-inline constexpr int kMinApproachStates = 8;
+inline constexpr int kMinApproachStates = 5;
 // Share by which the measured speed may differ from the commanded one: 1 % of 60 mm at 20 mm/s are 30 ms.
 inline constexpr double kMaxSpeedDeviation = 0.01;
 

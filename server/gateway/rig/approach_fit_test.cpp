@@ -105,6 +105,15 @@ TEST(ApproachFit, TwentyStatesTellItAndSayHowWell) {
   EXPECT_LT(figures.p99_us, 250);
 }
 
+TEST(ApproachFit, FiveStatesAreEnoughForAnHonestAnswer) {
+  Draw draw;
+  draw.from_s = 0.1;
+  for (const int states : {5, 6, 8, 12}) {
+    draw.states = states;
+    ExpectHonest(FiguresOf(draw));
+  }
+}
+
 TEST(ApproachFit, StatesOfTheLastMomentsAreNotExtrapolated) {
   Draw draw;
   draw.from_s = 2.8, draw.states = 100;
@@ -176,7 +185,7 @@ TEST(ApproachFit, AnApproachThatNeverReachedItsSpeedIsRefused) {
 
 TEST(ApproachFit, TooFewStatesAreRefused) {
   Draw draw;
-  for (const int states : {0, 1, 7}) {
+  for (const int states : {0, 1, 4}) {
     draw.states = states;
     EXPECT_EQ(FitApproach(Recording(draw, 1), kProfile).status().code(), absl::StatusCode::kUnavailable)
         << states;
