@@ -58,7 +58,7 @@ TEST_F(ImageSetTest, CameraIsAnIdealPinhole) {
   // 240 / tan(22.5 deg)
   EXPECT_EQ(
       Text("camera.yaml"),
-      "{width_px: 640, height_px: 480, fx_px: 579.4112550, fy_px: 579.4112550, cx_px: 320, cy_px: 240}\n");
+      "{width_px: 640, height_px: 480, fx_px: 579.411255, fy_px: 579.411255, cx_px: 320, cy_px: 240}\n");
 }
 
 TEST_F(ImageSetTest, IsResumedWithItsRows) {

@@ -113,6 +113,17 @@ TEST_F(Truth, APictureAfterAFreshJournalIsTakenFromItsOwnPose) {
   EXPECT_NE(RigState().arm().program_id(), last);
 }
 
+TEST_F(Truth, TheSameViewCanBePhotographedAgain) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  for (int k = 0; k < 3; ++k) {
+    v1::CaptureResponse response;
+    const grpc::Status status = Capture(lease.token(), ViewFrom(0.03), &response);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+}
+
 TEST_F(Truth, FreshJournalsBeginAtProgramIdsOfTheirOwn) {
   StartRig();
   std::set<uint32_t> ids;

@@ -79,7 +79,13 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   image.unix_s = timing::UnixNowS() - (timing::HostNowS() - frame->host_time_s);
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(command.session, image));
+  // A view that was taken before is a repeat, under a name of its own.
+  absl::Status added = journal().AddImage(command.session, image);
+  for (int repeat = 2; absl::IsAlreadyExists(added); ++repeat) {
+    image.id = absl::StrCat(source::ViewId(command), " #", repeat);
+    added = journal().AddImage(command.session, image);
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(added);
   std::lock_guard<std::mutex> status_lock(status_mutex_);
   ++status_.images;
   status_.image_width = frame->width, status_.image_height = frame->height;
