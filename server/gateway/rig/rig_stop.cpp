@@ -40,7 +40,7 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
     // A reset that was under way may have released it since.
     stopped_ = true;
     stop_reason_ = absl::StrCat("by ", who, " (", reason, ")");
-    const absl::Status kept = journal().SetMetadata(kStopKey, stop_reason_);
+    const absl::Status kept = unwritten_.SetFacts({{kStopKey, stop_reason_}}, true);
     if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
   }
   audit()
@@ -63,7 +63,7 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
     std::lock_guard<std::mutex> lock(stop_mutex_);
     if (stops_ != stops) return absl::AbortedError("the rig was stopped again meanwhile: the stop holds");
     // On the disk before anything may move.
-    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kStopKey, ""));
+    TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kStopKey, ""}}, false));
     stop_reason_.clear();
     stopped_ = false;
   }
