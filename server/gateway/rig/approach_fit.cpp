@@ -15,8 +15,8 @@ namespace {
 constexpr double kOutlier = 6;            // standard deviations, from the median deviation
 constexpr double kMinDeviationM = 1e-10;  // states without any noise
 constexpr int kFewestWithOutliers = 12;   // states among which an outlier can be told
-constexpr double kDisagree = 3;   // standard errors between ramp and level part
-constexpr double kSpeedSure = 4;  // standard errors
+constexpr double kDisagree = 3;           // standard errors between ramp and level part
+constexpr double kSpeedSure = 4;          // standard errors
 
 // By how much the 4-sigma quantile of Student's t is wider than the normal one, within 3 % from 4 degrees of freedom on:
 // 3.26 at 4, 1.55 at 10, 1.24 at 20, 1.04 at 100.
@@ -148,9 +148,8 @@ void Fitter::MeasureSpeed(double began_s) {
   const double freedom = std::max<double>(1, static_cast<double>(level.size()) - 2);
   fit_.speed_m_s = slope;
   fit_.speed_uncertainty_m_s =
-      squares > 0
-          ? std::sqrt(sum / freedom / squares * CorrelationFactor(residuals)) * Widening(freedom)
-          : profile_.speed_m_s;
+      squares > 0 ? std::sqrt(sum / freedom / squares * CorrelationFactor(residuals)) * Widening(freedom)
+                  : profile_.speed_m_s;
 }
 
 // How much later than `began_s` these states say that it began.

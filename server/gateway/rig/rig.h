@@ -73,6 +73,10 @@ class Rig : public source::RigDevice {
   // show meanwhile.
   absl::StatusOr<source::Photograph> Photograph(const source::ViewCommand& command,
                                                 const source::MotionGuard& guard) override;
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                               const std::string& id) const override {
+    return parts_.journal->Series(session, id);
+  }
   bool has_camera() const override { return parts_.camera != nullptr; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
@@ -142,7 +146,7 @@ class Rig : public source::RigDevice {
                            const source::MotionGuard& guard);
   // Another one than the controller's registers show.
   uint32_t NextProgramId();
-  // The states that have arrived since.
+  // The states that have arrived since, and the next one.
   std::vector<arm::ArmState> StatesSince(double host_s) const;
   absl::Status EnsureSession(const std::string& name);
   // Rig seconds since the session's first touch began.
@@ -151,7 +155,8 @@ class Rig : public source::RigDevice {
   // touch_cycle.cpp
   absl::StatusOr<session::JournalResult> MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                    const source::TouchCommand& command,
-                                                   const source::MotionGuard& guard);
+                                                   const source::MotionGuard& guard,
+                                                   std::optional<session::JournalSeries>* series);
   // Sends heartbeats and watches until `done` says so; stops the arm and returns why on anything else.
   // `limit_s`: host time.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,

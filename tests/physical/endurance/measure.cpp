@@ -185,15 +185,17 @@ int Bench::Clock(int touches, double speedup, double warm_up_s) {
       "us of the rig's time\n\n",
       speedup, warm_up_s, touches);
   std::printf(
-      "| error against the truth | mean | deviation | median size | 99 %% | most | stated (1 sigma) | within 1 | "
+      "| error against the truth | mean | deviation | median size | 99 %% | most | stated (1 sigma) | within "
+      "1 | "
       "within 2 | most over stated |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   print("differences between fingers", difference_us, difference_share, stated_difference_us);
   print("since the approach began", absolute_us, absolute_share, stated_us);
   const v1::RigState state = RigState();
-  std::printf("\n%.0f states a second arrived; clocks state %.1f us (controller) and %.1f us (end effector)\n",
-              state.arm().rate_hz(), 1e6 * state.arm().clock_uncertainty_s(),
-              1e6 * state.effector().clock_uncertainty_s());
+  std::printf(
+      "\n%.0f states a second arrived; clocks state %.1f us (controller) and %.1f us (end effector)\n",
+      state.arm().rate_hz(), 1e6 * state.arm().clock_uncertainty_s(),
+      1e6 * state.effector().clock_uncertainty_s());
   return 0;
 }
 
