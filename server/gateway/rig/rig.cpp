@@ -47,11 +47,20 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Metadata(kStopKey));
   rig->stopped_ = !rig->stop_reason_.empty();
   if (rig->stopped_) spdlog::warn("still stopped {}; touchstone rig reset releases it", rig->stop_reason_);
+  rig->heartbeats_ = std::make_unique<Heartbeats>([arm = rig->parts_.arm.get()] { arm->SendHeartbeat(); });
+  TOUCHSTONE_RETURN_IF_ERROR(rig->LatchInterruption());
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
+  rig->safety_thread_ = std::thread([&rig = *rig] { rig.WatchSafety(); });
   return rig;
 }
 
 Rig::~Rig() {
+  {
+    std::lock_guard<std::mutex> lock(watch_mutex_);
+    ending_ = true;
+  }
+  watch_ends_.notify_all();
+  if (safety_thread_.joinable()) safety_thread_.join();
   if (motions_ > 0) parts_.arm->Stop().IgnoreError();
 }
 

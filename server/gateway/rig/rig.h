@@ -7,12 +7,14 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -24,6 +26,7 @@
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
 #include "server/gateway/rig/camera_pose.h"
+#include "server/gateway/rig/heartbeats.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
 #include "server/source/rig_device.h"
@@ -106,11 +109,15 @@ class Rig : public source::RigDevice {
 
   // Stops everything, now; never waits for anything. Returns how many motions were under way. Every motion is
   // refused (ABORTED) from now on, also by the next process on this journal, until Reset.
+  //
+  // The same latch closes by itself: after a protective or emergency stop, a violation, a fault or recovery of the
+  // controller, after a safeguard stop that interrupted or refused a motion, and when a program ended that this
+  // gateway had neither stopped nor seen done (a watchdog, somebody at the teach pendant), also before its start.
   uint32_t Stop(const std::string& reason, const std::string& who);
   // Releases a stop, moving nothing; without a stop it does nothing. FAILED_PRECONDITION while the controller's
   // own safety mode forbids motion, UNAVAILABLE while it cannot be asked: the stop holds then.
   absl::Status Reset(const std::string& reason, const std::string& who);
-  // Who stopped it and why, for people; empty: it is not stopped.
+  // Who or what stopped it and why, for people: "by ana@lab rig-stop 4711 (cable caught)"; empty: it is not stopped.
   std::string StopReason() const;
 
   source::SourceState State() const override;
@@ -157,15 +164,29 @@ class Rig : public source::RigDevice {
                                                    const source::TouchCommand& command,
                                                    const source::MotionGuard& guard,
                                                    std::optional<session::JournalSeries>* series);
-  // Sends heartbeats and watches until `done` says so; stops the arm and returns why on anything else.
-  // `limit_s`: host time.
+  // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
+  // motion may not go on (the controller's safety mode, its guard).
+  absl::Status MayGoOn(const source::MotionGuard& guard);
+  // Watches until `done` says so; stops the arm and returns why on anything else. `limit_s`: host time.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,
                          const source::MotionGuard& guard,
                          const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done);
   void Remember(const absl::Status& status);
 
+  // rig_safety.cpp
+  // Closes the latch of Stop; `what` is "by WHOM (WHY)", and is added to what closed it before.
+  void Latch(const std::string& what);
+  // Latches what the controller's states since the last look tell; `refused`: a motion is being asked for now.
+  void LookAtSafety(bool refused = false);
+  void WatchSafety();  // the thread
+  // Before anything else at the start: latches if a motion was under way when the process before this one ended.
+  absl::Status LatchInterruption();
+  absl::Status LatchUnlessItEnded(uint32_t program_id, const std::string& what);
+
   // The journal's record of who stopped the rig and why; "" once it was reset.
   static constexpr char kStopKey[] = "stop";
+  // Of the last motion that is no touch: its program's id and what it was; "" once it has failed.
+  static constexpr char kMotionKey[] = "motion_under_way";
 
   const RigOptions options_;
   RigParts parts_;
@@ -175,13 +196,22 @@ class Rig : public source::RigDevice {
   mutable std::mutex stop_mutex_;     // of the reason, and of what the journal keeps of it
   std::string stop_reason_;
   std::atomic<uint32_t> motions_{0};  // under way
-  std::atomic<double> last_heartbeat_s_{0};
   mutable std::mutex status_mutex_;
   source::SourceStatus status_;
   std::optional<calibration::UpFace> up_face_;  // of the object on the fixture
   std::mutex sessions_mutex_;
   std::set<std::string> sessions_;  // known to be in the journal
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
+
+  std::mutex safety_mutex_;    // of what LookAtSafety knows
+  double safety_seen_s_ = -1;  // controller time of the last state that it has seen; below 0: none yet
+  std::optional<arm::SafetyMode> latched_safety_;  // that it latched last, while it lasts
+  std::mutex watch_mutex_;
+  std::condition_variable watch_ends_;
+  bool ending_ = false;
+  // Last: their threads use what stands above.
+  std::unique_ptr<Heartbeats> heartbeats_;
+  std::thread safety_thread_;
 };
 
 }  // namespace touchstone::gateway

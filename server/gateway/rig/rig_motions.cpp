@@ -14,6 +14,8 @@
 namespace touchstone::gateway {
 absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   constexpr double kPatienceS = 10;
+  LookAtSafety(/*refused=*/true);
+  TOUCHSTONE_RETURN_IF_ERROR(guard());
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
   if (state.robot_mode == arm::RobotMode::kRunning || !arm::SafetyPermitsMotion(state.safety_mode).ok())
     return parts_.arm->Ready();
@@ -123,15 +125,22 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
                               const source::MotionGuard& guard) {
   const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
   ++motions_;
-  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
+  const HeartbeatScope beating(heartbeats_.get());
+  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints, guard);
   if (status.ok())
     status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
                        [](const arm::ArmState& state) -> absl::StatusOr<bool> {
                          return state.phase == arm::MotionPhase::kDone;
                        });
   --motions_;
-  if (!status.ok()) Remember(status);
+  if (!status.ok()) {
+    Remember(status);
+    // This process knows how it ended: no riddle for the next one.
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
+  }
   return status;
 }
 
