@@ -131,6 +131,11 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
         return false;
       }));
 
+  // The arm's states are kept for half a minute only, and a line that loses frames may take its time below.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
+  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
+  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+
   // A finger without contact is certain only after the capture has ended and the device's record was read.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
@@ -139,9 +144,6 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
   record.unix_minus_host_s = timing::UnixNowS() - timing::HostNowS();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
-  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
-  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
   if (command.series) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchSeries states, SeriesOf(record));
     *series = session::JournalSeries{session::kSeriesEncoding, states.SerializeAsString()};
