@@ -15,6 +15,8 @@ namespace touchstone::gateway {
 namespace {
 
 constexpr double kLookPeriodS = 0.01;  // host time; how soon a lost lease is noticed
+constexpr double kHungS = 0.4;         // host time between two looks in which heartbeats may have ceased
+constexpr double kAfterHangS = 1;      // host time after it in which a failure may come of it
 constexpr double kProgramStartsS = 2;  // host time that a program may take until its phase is reported
 
 }  // namespace
@@ -25,9 +27,19 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
+  double looked_s = began_s, hung_s = 0, hung_at_s = 0;
+  const auto look_for_hang = [&](double now_s) {
+    if (now_s - looked_s > kHungS) hung_s = now_s - looked_s, hung_at_s = now_s;
+    looked_s = now_s;
+  };
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
+    look_for_hang(timing::HostNowS());
     const absl::Status stop = parts_.arm->Stop();
+    // Whether the watchdog had ended the program before cannot be told any more.
+    if (hung_s > 0 && timing::HostNowS() - hung_at_s < kAfterHangS)
+      Latch(absl::StrCat("by the gateway (it hung for ", ShortestNumber(std::round(10 * hung_s) / 10),
+                         " s during ", what, ", program ", program_id, ")"));
     if (!stop.ok())
       status = absl::Status(status.code(), absl::StrCat(status.message(), " (and: ", stop.message(), ")"));
     return status;
@@ -35,6 +47,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   for (;;) {
     const uint64_t changes = parts_.changes->count();
     const double now_s = timing::HostNowS();
+    look_for_hang(now_s);
     if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
