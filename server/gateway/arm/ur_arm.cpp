@@ -183,12 +183,22 @@ absl::Status UrArmOnTcp::Stop() {
 
 absl::Status UrArmOnTcp::DemandPower(const std::string& command, const std::string& expected,
                                      const StartGuard& guard, bool* sent) {
-  return dashboard_.Demand(command, expected, kDashboardS, [&](const std::function<absl::Status()>& send) {
-    return SendStart(guard, [&] {
-      *sent = true;  // a demand without an answer may have been heard
-      return send();
-    });
-  });
+  bool reached = false;
+  absl::Status status =
+      dashboard_.Demand(command, expected, kDashboardS, [&](const std::function<absl::Status()>& send) {
+        reached = true;
+        return SendStart(guard, [&] {
+          *sent = true;  // a demand without an answer may have been heard
+          return send();
+        });
+      });
+  if (!status.ok() && !reached)
+    status = absl::Status(status.code(),
+                          absl::StrCat(status.message(),
+                                       "; enable the dashboard server (PolyScope 5.10 and later: Settings, "
+                                       "Security, Services), or power the arm on at the teach pendant "
+                                       "(PolyScope X has no dashboard server)"));
+  return status;
 }
 
 absl::Status UrArmOnTcp::PowerOffAgain(const absl::Status& why) {
