@@ -240,8 +240,10 @@ TEST_F(Latch, AGatewayThatHungFindsItsProgramEndedAndWaitsForAPerson) {
   // Shortly, and for longer than a lease lasts.
   for (const double hung_s : {0.0, 3.0}) {
     const uint64_t watchdog_stops = emulator_->controller().Count("watchdog_stops");
+    const uint32_t before = RigState().arm().program_id();
     KeptLease lease(control_.get(), "before", true);
     auto touch = TouchLater(lease.token(), FromAbove(0.0005), "hung");
+    WaitUntil([&] { return RigState().arm().program_id() != before; }, "the program begins");
     WaitUntilApproaching();
     ASSERT_EQ(kill(gateway_process(), SIGSTOP), 0);
     const auto since = std::chrono::steady_clock::now();
