@@ -68,6 +68,11 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
   if (program_id == 0 || program_id >= 1u << 28)
     return absl::InvalidArgumentError(
         absl::StrCat("program id ", program_id, ": must be from 1 to ", (1u << 28) - 1));
+  // The registers keep what the last program wrote, also one of another gateway: its "done" is not this one's.
+  if (const absl::StatusOr<ArmState> now = State(); now.ok() && now->program_id == program_id)
+    return absl::FailedPreconditionError(absl::StrCat("the controller's registers show program ", program_id,
+                                                      " already, so the end of a new one of that id could "
+                                                      "not be told from the old one's: take another id"));
   bool permitted = false;
   uint64_t stops = 0;
   const absl::Status sent = SendStart(guard, [&] {

@@ -25,6 +25,7 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
+#include "server/gateway/rig/camera_pose.h"
 #include "server/gateway/rig/heartbeats.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
@@ -43,6 +44,7 @@ struct RigOptions {
   double mount_timeout_s = 120;
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
+  CameraPoseTolerance camera_tolerance;  // of photographs
 };
 
 struct RigParts {
@@ -70,9 +72,10 @@ class Rig : public source::RigDevice {
   // The journalled touch of that id, if it is done.
   absl::StatusOr<std::optional<session::JournalTouch>> FindDone(const source::TouchCommand& command) const;
 
-  // Moves the camera there and takes a picture, which is journalled as it came.
-  absl::StatusOr<image::Frame> Photograph(const source::ViewCommand& command,
-                                          const source::MotionGuard& guard) override;
+  // Moves the camera there and takes a picture, which is journalled as it came, with the pose that the arm's states
+  // show meanwhile.
+  absl::StatusOr<source::Photograph> Photograph(const source::ViewCommand& command,
+                                                const source::MotionGuard& guard) override;
   bool has_camera() const override { return parts_.camera != nullptr; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
@@ -95,6 +98,10 @@ class Rig : public source::RigDevice {
   absl::StatusOr<arm::PlannedTouch> Check(const std::string& object, const geometry::Bounds& bounds,
                                           const touch::CommandedTouch& touch, const arm::ArmState* from,
                                           const std::string& where) const;
+
+  // The same of a photograph.
+  absl::StatusOr<arm::PlannedTouch> CheckView(const source::ViewCommand& command, const arm::ArmState* from,
+                                              const std::string& where) const;
 
   // Stops everything, now; never waits for anything. Returns how many motions were under way. Every motion is
   // refused (ABORTED) from now on, also by the next process on this journal, until Reset.
@@ -140,7 +147,10 @@ class Rig : public source::RigDevice {
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
                            const source::MotionGuard& guard);
+  // Another one than the controller's registers show.
   uint32_t NextProgramId();
+  // The states that have arrived since.
+  std::vector<arm::ArmState> StatesSince(double host_s) const;
   absl::Status EnsureSession(const std::string& name);
   // Rig seconds since the session's first touch began.
   absl::StatusOr<double> SessionTimeS(const std::string& session, double unix_s);
