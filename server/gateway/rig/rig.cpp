@@ -169,7 +169,8 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
                                command.bytes, program_id, parts_.effector->State().boot_id));
   if (intent.stage == session::TouchStage::kDone) return intent;
   ++motions_;
-  absl::StatusOr<session::JournalResult> result = MakeTouch(plan, program_id, command, guard);
+  std::optional<session::JournalSeries> series;
+  absl::StatusOr<session::JournalResult> result = MakeTouch(plan, program_id, command, guard, &series);
   --motions_;
   if (!result.ok()) {
     Remember(result.status());
@@ -185,9 +186,10 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
     return result.status();
   }
 
-  result->start_unix_s = began_unix_s;
+  if (result->start_unix_s == 0) result->start_unix_s = began_unix_s;
   result->session_time_s = session_time_s;
-  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.Done(command.session, command.id, *result));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      unwritten_.Done(command.session, command.id, *result, series.has_value() ? &*series : nullptr));
   {
     std::lock_guard<std::mutex> status_lock(status_mutex_);
     const double took_s = timing::HostNowS() - began_s;

@@ -77,6 +77,10 @@ class Rig : public source::RigDevice {
   // show meanwhile.
   absl::StatusOr<source::Photograph> Photograph(const source::ViewCommand& command,
                                                 const source::MotionGuard& guard) override;
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                               const std::string& id) const override {
+    return parts_.journal->Series(session, id);
+  }
   bool has_camera() const override { return parts_.camera != nullptr; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
@@ -153,17 +157,18 @@ class Rig : public source::RigDevice {
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
                            const source::MotionGuard& guard);
-  // Another one than the controller's registers show. Refused where it could be used again after a restart: the
-  // journal must know of it.
+  // Another one than the controller's registers show. Refused where it could be used again after a restart: the journal
+  // must know of it.
   absl::StatusOr<uint32_t> NextProgramId();
-  // The states that have arrived since.
+  // The states that have arrived since, and the next one.
   std::vector<arm::ArmState> StatesSince(double host_s) const;
   absl::Status EnsureSession(const std::string& name);
 
   // touch_cycle.cpp
   absl::StatusOr<session::JournalResult> MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                    const source::TouchCommand& command,
-                                                   const source::MotionGuard& guard);
+                                                   const source::MotionGuard& guard,
+                                                   std::optional<session::JournalSeries>* series);
   // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
   // motion may not go on (the controller's safety mode, its guard).
   absl::Status MayGoOn(const source::MotionGuard& guard);

@@ -79,6 +79,8 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
   image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
   image.unix_s = timing::UnixNowS() - (timing::HostNowS() - frame->host_time_s);
+  image.measured_base_from_camera = geometry::PoseVectorOf(measured->base_from_camera);
+  image.measured_unix_s = image.unix_s;
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
   // A view that was taken before is a repeat, under a name of its own.
@@ -100,7 +102,15 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
 }
 
 std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
-  const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  constexpr double kNextStateS = 0.5;  // host time
+  const double called_s = timing::HostNowS();
+  uint64_t changes = parts_.changes->count();
+  absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  while (now.ok() && now->host_time_s < called_s && timing::HostNowS() < called_s + kNextStateS) {
+    parts_.changes->WaitForChange(changes, 0.01);
+    changes = parts_.changes->count();
+    now = parts_.arm->State();
+  }
   if (!now.ok()) return {};
   const double since_rig_s = (timing::HostNowS() - host_s + 1) * options_.time_scale;
   std::vector<arm::ArmState> states =

@@ -10,6 +10,8 @@
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
+#include "server/gateway/rig/touch_series.h"
+#include "server/session/touch_series.h"
 
 namespace touchstone::gateway {
 namespace {
@@ -80,7 +82,8 @@ absl::Status Rig::MayGoOn(const source::MotionGuard& guard) {
 
 absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                       const source::TouchCommand& command,
-                                                      const source::MotionGuard& guard) {
+                                                      const source::MotionGuard& guard,
+                                                      std::optional<session::JournalSeries>* series) {
   TouchRecording record;
   record.motion = plan.motion;
   record.motion.program_id = program_id;
@@ -128,6 +131,11 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
         return false;
       }));
 
+  // The arm's states are kept for half a minute only, and a line that loses frames may take its time below.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
+  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
+  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+
   // A finger without contact is certain only after the capture has ended and the device's record was read.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
@@ -135,9 +143,11 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
-  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
-  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+  record.unix_minus_host_s = timing::UnixNowS() - timing::HostNowS();
+  if (command.series) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchSeries states, SeriesOf(record));
+    *series = session::JournalSeries{session::kSeriesEncoding, states.SerializeAsString()};
+  }
   return ResultOf(record);
 }
 
