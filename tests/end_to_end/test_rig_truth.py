@@ -56,7 +56,7 @@ def test_photos_are_an_image_set_with_both_poses(rig, tmp_path):
     # (From where the arm is now it may reach more of the views than then.)
     assert again["kept"] == len(rows) - 1 and set(first["files"]) <= set(again["files"])
     assert len(rows_of(folder / "images.csv")) == len(again["files"])
-    assert "another size" in touchstone(*command[:-1], "32x32", server=rig, code=2)
+    assert "another size" in touchstone(*command[:-1], "32x32", server=rig, code=4)
 
 
 def test_a_run_with_series_becomes_hdf5_and_mcap(rig, tmp_path):
