@@ -25,7 +25,7 @@ struct Raw {
   double vertical_fov_deg = 45;
   double max_speed_mm_s = 100, transit_speed_mm_s = 150, acceleration_mm_s2 = 1200;
   double max_standoff_mm = 150, stroke_beyond_target_mm = 30, max_tilt_deg = 60, clearance_mm = 50;
-  std::vector<double> box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
+  std::vector<double> payload_cog_mm, box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
 };
 
 std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
@@ -99,6 +99,9 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.joint_max_deg", "Six joints", &raw->joint_max_deg},
       {"limits.home_deg", "Six joints", &raw->home_deg},
       {"limits.payload_kg", "Of the end effector", &o.limits.payload_kg},
+      {"limits.payload_cog_mm",
+       "Its centre of gravity, flange frame; none: that of the controller's installation stays",
+       &raw->payload_cog_mm},
       {"max_batch_size", "Limit: samples a batch", &o.common.max_batch_size},
       {"max_touches_per_request", "Limit: explicit touches per request", &o.common.max_touches_per_request},
       {"max_images_per_request", "Limit: photographs a request", &o.common.max_images_per_request},
@@ -167,6 +170,9 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
   limits.stroke_beyond_target_m = raw.stroke_beyond_target_mm / 1000;
   limits.max_tilt_rad = raw.max_tilt_deg * kRadiansPerDegree;
   limits.clearance_m = raw.clearance_mm / 1000;
+  if (!raw.payload_cog_mm.empty())
+    TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.payload_cog_mm, 1e-3, "limits.payload_cog_mm",
+                                        &limits.payload_cog_m.emplace(Eigen::Vector3d::Zero())));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_min_mm, 1e-3, "limits.box_min_mm", &limits.box_min_m));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_max_mm, 1e-3, "limits.box_max_mm", &limits.box_max_m));
   TOUCHSTONE_RETURN_IF_ERROR(

@@ -1,6 +1,7 @@
 #include "server/service/gateway_server.h"
 
 #include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -40,6 +41,14 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   arm.frozen_after_s = options.arm.silence_s;
   arm.script.flange_from_tip = calibration.flange_from_tip;
   arm.script.payload_kg = options.limits.payload_kg;
+  arm.script.payload_cog_m = options.limits.payload_cog_m;
+  if (!options.limits.payload_cog_m.has_value())
+    spdlog::warn(
+        "limits.payload_cog_mm is not given: the arm takes the centre of gravity of its installation "
+        "(PolyScope, "
+        "Payload) for that of {} kg; make sure that it is right, or give it, or the arm may stop "
+        "protectively",
+        options.limits.payload_kg);
   arm.script.transit_speed_m_s = options.limits.transit_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;

@@ -76,6 +76,7 @@ class TipListener {
 //               emergency_stop    1: pressed; 0: released
 //               speed_scaling     0 to 1: what the trajectory limiter leaves of the commanded speed
 //               speed_slider      0 to 1: the pendant's slider; moved when this number changes
+//               local_control     1: the e-Series robot is in local control
 //   camera      stale_frame       1: repeats the last picture
 //               camera_unplug     seconds of host time
 class Faults {

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -10,6 +11,7 @@
 namespace touchstone::gateway::arm {
 namespace {
 
+constexpr double kMaxCogM = 0.5;     // payload diagrams of the arms end before
 constexpr double kMaxTiltRad = 1.4;  // a start must lie below the clearance plane's point of entry
 
 absl::Status Invalid(const std::string& what, double value, const std::string& right) {
@@ -34,6 +36,11 @@ absl::Status CheckMotionLimits(const MotionLimits& limits) {
   if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.max_payload_kg))
     return Invalid("payload_kg", limits.payload_kg,
                    absl::StrCat("from 0 to max_payload_kg = ", ShortestNumber(limits.max_payload_kg)));
+  if (limits.payload_cog_m.has_value())
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(std::abs((*limits.payload_cog_m)[axis]) <= kMaxCogM))
+        return Invalid(absl::StrCat("payload_cog_m[", axis, "]"), (*limits.payload_cog_m)[axis],
+                       "within 0.5 m of the flange");
   for (int axis = 0; axis < 3; ++axis)
     if (!(limits.box_min_m[axis] < limits.box_max_m[axis]))
       return Invalid(absl::StrCat("box_min_m[", axis, "]"), limits.box_min_m[axis], "below box_max_m");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include <absl/status/status.h>
 #include <Eigen/Core>
@@ -23,6 +24,8 @@ struct MotionLimits {
   std::array<double, 6> joint_min_rad{{-6.2832, -6.2832, -6.2832, -6.2832, -6.2832, -6.2832}};
   std::array<double, 6> joint_max_rad{{6.2832, 6.2832, 6.2832, 6.2832, 6.2832, 6.2832}};
   double payload_kg = 0.5, max_payload_kg = 3.0;
+  // Centre of gravity of the payload, flange frame; none: the controller keeps that of its installation.
+  std::optional<Eigen::Vector3d> payload_cog_m;
   double outermost_finger_m =
       0.03;  // tip of the outermost finger from the middle one's, along x of the tip frame
   // The tool looks down, high above what lies on the fixture: the arm crosses to it at its tip's height.

@@ -215,6 +215,10 @@ TEST(MotionPlanner, LimitsThatMakeNoSenseAreRefused) {
   EXPECT_THAT(std::string(MotionPlanner::Create("ur3", limits, Fixture()).status().message()),
               HasSubstr("payload_kg = 4"));
   limits = MotionLimits();
+  limits.payload_cog_m = Eigen::Vector3d(0, 0, 40);  // millimetres where metres are meant
+  EXPECT_THAT(std::string(MotionPlanner::Create("ur3", limits, Fixture()).status().message()),
+              HasSubstr("payload_cog_m[2] = 40"));
+  limits = MotionLimits();
   limits.box_min_m.z() = 1;
   EXPECT_FALSE(MotionPlanner::Create("ur3", limits, Fixture()).ok());
   EXPECT_FALSE(MotionPlanner::Create("ur10", MotionLimits(), Fixture()).ok());

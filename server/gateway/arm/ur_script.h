@@ -1,6 +1,7 @@
 // The programs of this gateway, as text for the controller. See ../registers.h for what they read and write.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace touchstone::gateway::arm {
 struct ScriptOptions {
   Eigen::Isometry3d flange_from_tip = Eigen::Isometry3d::Identity();
   double payload_kg = 0.5;
+  std::optional<Eigen::Vector3d> payload_cog_m;  // flange frame; none: that of the installation stays
   double transit_speed_m_s = 0.25;
   double acceleration_m_s2 = 1.2;
   double joint_speed_rad_s = 1.05, joint_acceleration_rad_s2 = 1.4;

@@ -69,6 +69,7 @@ absl::Status Overhead::Open() {
   arm.secondary_port = options.arm.secondary_port, arm.rtde_port = options.arm.rtde_port;
   arm.script.flange_from_tip = calibration->flange_from_tip;
   arm.script.payload_kg = options.limits.payload_kg;
+  arm.script.payload_cog_m = options.limits.payload_cog_m;
   arm.script.transit_speed_m_s = options.limits.transit_speed_m_s;
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;

@@ -22,8 +22,8 @@ constexpr Row kRows[] = {
     {"skip_packets", Range::kProbability, 0, false},    {"freeze", Range::kPositive, 0, true},
     {"disconnect", Range::kSwitch, 0, false},           {"protective_stop", Range::kSwitch, 0, false},
     {"emergency_stop", Range::kSwitch, 0, false},       {"speed_scaling", Range::kProbability, 1, false},
-    {"speed_slider", Range::kProbability, 1, false},    {"stale_frame", Range::kSwitch, 0, false},
-    {"camera_unplug", Range::kPositive, 0, true},
+    {"speed_slider", Range::kProbability, 1, false},    {"local_control", Range::kSwitch, 0, false},
+    {"stale_frame", Range::kSwitch, 0, false},          {"camera_unplug", Range::kPositive, 0, true},
 };
 
 const Row* Find(const std::string& name) {

@@ -93,7 +93,7 @@ RobotState Machine::State() {
   state.digital_inputs = digital_inputs();
   state.digital_outputs = digital_outputs_;
   state.payload_kg = payload_kg_;
-  state.payload_cog_m = payload_cog_m_;
+  state.payload_cog_m = PayloadCog();
   // The elbow: where the upper arm ends.
   const double lift = state.target_q[1], turn = state.target_q[0];
   state.elbow_m << geometry_.a_m[1] * std::cos(lift) * std::cos(turn),
