@@ -17,6 +17,7 @@ struct ControllerOptions {
   // 0: any free port, told by ports()
   int dashboard_port = 0, primary_port = 0, secondary_port = 0, rtde_port = 0;
   std::array<double, 6> joints_rad{{0, -1.5708, -1.5708, -1.5708, 1.5708, 0}};
+  bool calibrated = false;       // a delta of its own in every row of its kinematics, as real arms have
   bool powered = false;          // begins with power off, as a controller that was just switched on
   double finger_give_m = 0.050;  // pushed further than this beyond a contact: protective stop (C153)
   double position_noise_m = 5e-6, joint_noise_rad = 2e-5;  // of what it reports
