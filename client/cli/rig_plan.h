@@ -20,6 +20,7 @@ struct PlannedRow {
   std::string reason;   // why not
   std::string up_face;  // of the object, that it needs
   double duration_s = 0;
+  std::vector<std::string> notes;  // what does not forbid it: a singularity that it comes near to
 };
 
 // Rows (by index) that need the same object lying the same way.
