@@ -40,6 +40,8 @@ struct RigOptions {
   double mount_timeout_s = 120;
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
+  // The box of an object by its name, object frame; none: not known. Null: none is.
+  std::function<std::optional<geometry::Bounds>(const std::string&)> bounds_of;
 };
 
 struct RigParts {

@@ -8,6 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/force_guard.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
 
@@ -25,6 +26,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
+  ForceGuard force(*parts_.arm, parts_.planner->limits().max_force_n, what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
     const absl::Status stop = parts_.arm->Stop();
@@ -44,6 +46,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (!state.ok()) return give_up(state.status());
     if (const absl::Status safety = arm::SafetyPermitsMotion(state->safety_mode); !safety.ok())
       return give_up(safety);
+    if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     seen = seen || state->program_id == program_id;
     if (seen) {
       const absl::StatusOr<bool> over = done(*state);
