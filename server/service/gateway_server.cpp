@@ -16,15 +16,17 @@
 namespace touchstone::service {
 namespace {
 
-absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& options) {
+absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& options,
+                                                      const source::ObjectStore& objects) {
   gateway::RigParts parts;
   parts.changes = std::make_unique<gateway::timing::ChangeNotifier>();
   TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::calibration::Calibration calibration,
                               gateway::calibration::ReadCalibration(options.calibration));
   gateway::arm::MotionLimits limits = options.limits;
   limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner,
-                              gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration));
+  // Before anything is connected: that the limits make sense.
+  TOUCHSTONE_RETURN_IF_ERROR(
+      gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration).status());
   TOUCHSTONE_ASSIGN_OR_RETURN(
       parts.journal, session::Journal::Open(options.journal, session::Journal::Mode::kCreateOrReadWrite));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, gateway::audit::AuditLog::Open(options.audit_log));
@@ -43,7 +45,16 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
   arm.script.watchdog_hz = options.arm.watchdog_hz;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, gateway::arm::ConnectUrArm(arm, parts.changes.get()));
+  arm.body_limits = limits;
+  arm.calibration = calibration;
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::arm::UrArm> connected,
+                              gateway::arm::ConnectUrArm(arm, parts.changes.get()));
+  // The rig lets go of its planner before its arm.
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      parts.planner,
+      gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration,
+                                          [ur = connected.get()] { return ur->CalibratedKinematics(); }));
+  parts.arm = std::move(connected);
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector,
                               gateway::effector::Effector::Open(options.effector, parts.changes.get()));
   if (!options.camera.uri.empty()) {
@@ -64,6 +75,11 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   rig.mount_timeout_s = options.mount_timeout_s;
   rig.provenance_note = options.provenance_note;
   rig.effector_port = options.effector.port;
+  rig.bounds_of = [&objects](const std::string& name) -> std::optional<geometry::Bounds> {
+    const absl::StatusOr<const source::ServedObject*> object = objects.Find(name, "object");
+    if (!object.ok()) return std::nullopt;
+    return (*object)->surface->bounds();
+  };
   return gateway::Rig::Create(std::move(rig), std::move(parts));
 }
 
@@ -98,7 +114,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   session::Journal* journal = nullptr;
   std::unique_ptr<source::RigDevice> device;
   if (options.replay.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::Rig> rig, OpenRig(options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::Rig> rig, OpenRig(options, resources.objects));
     parts.rig = rig.get();
     journal = &rig->journal();
     device = std::move(rig);

@@ -17,10 +17,6 @@ constexpr double kStopConnectS = 0.3, kStopDashboardS = 0.5;  // host time
 constexpr double kDashboardS = 2;                             // host time
 constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;       // the controller boots its arm in rig time
 
-double RateOf(const std::string& model) {
-  return model == "ur3" ? 125 : 500;
-}
-
 }  // namespace
 
 UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
@@ -28,8 +24,9 @@ UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
     : options_(options),
       changes_(changes),
       nominal_(nominal),
+      body_(options.body_limits, options.calibration),
       tip_from_flange_(options.script.flange_from_tip.inverse()),
-      history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * RateOf(options.model))),
+      history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * nominal.model().rtde_hz)),
       clock_(options.script.time_scale),
       dashboard_(options.address, options.dashboard_port),
       primary_(options.address, options.primary_port,
@@ -37,7 +34,7 @@ UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
       programs_(options.address, options.secondary_port, nullptr),
       stops_(options.address, options.secondary_port, nullptr),
       rtde_(
-          {options.address, options.rtde_port, RateOf(options.model), 4 * options.frozen_after_s + 1},
+          {options.address, options.rtde_port, nominal.model().rtde_hz, 4 * options.frozen_after_s + 1},
           [this](const RtdeSample& sample, double host_s) { OnSample(sample, host_s); },
           [this] { changes_->Notify(); }) {}
 
@@ -66,14 +63,23 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program) 
   return sent;
 }
 
-std::vector<double> UrArmOnTcp::Speeds(const ArmState& from,
-                                       const std::vector<Eigen::Isometry3d>& path) const {
+UrKinematics UrArmOnTcp::Kinematics() const {
+  const std::optional<DhTable> own = CalibratedKinematics();
+  if (!own.has_value()) return nominal_;
+  absl::StatusOr<UrKinematics> calibrated = nominal_.Calibrated(*own);
+  return calibrated.ok() ? *calibrated
+                         : nominal_;  // nothing is planned, and so sent, with those of another arm
+}
+
+std::vector<double> UrArmOnTcp::Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path,
+                                       Joints* joints) const {
+  const UrKinematics kinematics = Kinematics();
   std::vector<double> speeds_m_s;
-  Joints joints = from.joints_rad;
+  *joints = from.joints_rad;
   Eigen::Isometry3d at = from.base_from_tip;
   for (const Eigen::Isometry3d& pose : path) {
-    speeds_m_s.push_back(LimitedCartesianSpeed(nominal_, tip_from_flange_, at, pose,
-                                               options_.script.transit_speed_m_s, &joints));
+    speeds_m_s.push_back(LimitedCartesianSpeed(kinematics, body_, tip_from_flange_, at, pose,
+                                               options_.script.transit_speed_m_s, joints));
     at = pose;
   }
   return speeds_m_s;
@@ -86,14 +92,23 @@ absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
   std::vector<Eigen::Isometry3d> path = touch.transit;
   path.push_back(touch.end);  // the speed of the retract
-  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path), options_.script));
+  Joints joints;
+  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path, &joints), options_.script));
 }
 
 absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                                      const std::vector<std::array<double, 6>>& joints) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
-  return Begin(program_id, MoveProgram(program_id, poses, Speeds(now, poses), joints, options_.script));
+  Joints at;
+  const std::vector<double> speeds_m_s = Speeds(now, poses, &at);
+  std::vector<double> speeds_rad_s;
+  for (const Joints& next : joints) {
+    speeds_rad_s.push_back(
+        LimitedJointSpeed(Kinematics(), body_, at, next, options_.script.joint_speed_rad_s));
+    at = next;
+  }
+  return Begin(program_id, MoveProgram(program_id, poses, speeds_m_s, joints, speeds_rad_s, options_.script));
 }
 
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/gateway/arm/arm_body.h"
 #include "server/gateway/arm/dashboard_client.h"
 #include "server/gateway/arm/registers.h"
 #include "server/gateway/arm/rtde_client.h"
@@ -98,13 +99,18 @@ class UrArmOnTcp final : public UrArm {
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
   // The tip's speed on each line of a path, m/s.
-  std::vector<double> Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path) const;
+  // *joints become those of its end.
+  std::vector<double> Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path,
+                             Joints* joints) const;
+  // Its own, once the controller has sent them.
+  UrKinematics Kinematics() const;
   // Why the program that was sent last has not begun, if it should have by now. With mutex_ held.
   absl::Status StartFailure() const;
 
   const UrArmOptions options_;
   timing::ChangeNotifier* const changes_;
   const UrKinematics nominal_;
+  const ArmBody body_;
   const Eigen::Isometry3d tip_from_flange_;
 
   mutable std::mutex mutex_;  // of what follows

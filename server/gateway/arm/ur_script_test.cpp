@@ -79,12 +79,11 @@ TEST(TouchProgram, WatchdogIsSlowerOnAnAcceleratedClock) {
 
 TEST(MoveProgram, EndsWithTheJoints) {
   const std::string text =
-      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, ScriptOptions());
+      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, {0.8}, ScriptOptions());
   EXPECT_THAT(text, HasSubstr("def move_5():\n"));
   EXPECT_THAT(
       text,
-      HasSubstr(
-          "  movej([0,-1.5,0.25,0,1,0], a=1.4, v=1.05)\n  write_output_integer_register(25, 5)\nend\n"));
+      HasSubstr("  movej([0,-1.5,0.25,0,1,0], a=1.4, v=0.8)\n  write_output_integer_register(25, 5)\nend\n"));
 }
 
 TEST(LineSpeed, IsSlowerWhereTheToolTurnsMuchOnAShortWay) {
