@@ -52,26 +52,36 @@ absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path) {
   return session::SessionMeasurementSet(*journal, found.name, path);
 }
 
-absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> touches,
-                              TouchesOf(*journal, found.name));
+namespace {
+
+absl::StatusOr<std::string> CsvOf(const session::Journal& journal, const std::string& path,
+                                  const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> touches, TouchesOf(journal, session));
   if (touches.empty())
     return absl::FailedPreconditionError(
-        absl::StrCat(path, ": session '", found.name, "' has no touch that is done"));
+        absl::StrCat(path, ": session '", session, "' has no touch that is done"));
   return client::FormatMeasurements(touches);
 }
 
-absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
-                               bool force) {
+}  // namespace
+
+absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
+  return CsvOf(*journal, path, found.name);
+}
+
+absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
+                               bool force, session::Journal::SkipDamaged skip_damaged) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const auto journal,
+      session::Journal::Open(path, session::Journal::Mode::kReadOnly, std::move(skip_damaged)));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
     return WriteOutputFileBy(output, force, [&](const std::string& free_path) {
       return session::ExportSessionHdf5(*journal, found.name, free_path);
     });
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, JournalCsv(path, found.name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, CsvOf(*journal, path, found.name));
   return WriteOutputFile(output, csv, force);
 }
 

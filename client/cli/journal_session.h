@@ -31,9 +31,10 @@ absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path);
 // The measurement file of a session.
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session);
 
-// Writes it to a file (.csv, .h5) or to stdout (empty, "-": CSV); an existing file with `force` only.
+// Writes it to a file (.csv, .h5) or to stdout (empty, "-": CSV); an existing file with `force` only. Touches that
+// are damaged are left out where `skip_damaged` is given, which is told each.
 absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
-                               bool force);
+                               bool force, session::Journal::SkipDamaged skip_damaged = nullptr);
 
 // Makes a session out of a measurement file (.csv) or of what was exported (.h5), in a journal that may have
 // others. Returns its number of touches.

@@ -1,4 +1,4 @@
-// touchstone session create|list|show|export|import|fix|delete: measured sets that a server keeps, or that
+// touchstone session create|list|show|export|import|fix|delete|restore: measured sets that a server keeps, or that
 // a journal holds.
 #include <absl/strings/str_join.h>
 
@@ -11,6 +11,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/journal_session.h"
 #include "client/cli/session_fix.h"
+#include "client/cli/session_trash.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -25,6 +26,7 @@ struct SessionOptions {
   std::string name, file, output;
   std::string in_journal;  // the session's name where NAME is a journal
   bool check = false;
+  bool deleted = false, skip_damaged = false;
 };
 
 absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServer(const Cli& cli) {
@@ -63,6 +65,8 @@ Json JournalSessionJson(const session::JournalSession& session) {
           {"done", session.done},
           {"failed", session.failed},
           {"images", session.images},
+          {"deleted_unix_s", session.deleted_unix_s},
+          {"deleted_by", session.deleted_by},
           {"objects", session.objects}};
 }
 
@@ -75,25 +79,42 @@ std::string UtcText(double unix_s) {
   return text;
 }
 
-absl::Status ListJournal(const Cli& cli, const std::string& path) {
+std::string DeletedText(double unix_s, const std::string& by) {
+  return absl::StrCat(UtcText(unix_s), by.empty() ? "" : " by ", by);
+}
+
+// What is read without checksums cannot be told from what has changed on the disk.
+void SayIfUnchecked(const Cli& cli, const session::Journal& journal, const std::string& path) {
+  if (!journal.has_checksums())
+    cli.Log(absl::StrCat(path,
+                         " is of version 1, whose rows have no checksums: damage to its numbers would not be "
+                         "noticed (opened for writing, it gets them)"));
+}
+
+absl::Status ListJournal(const Cli& cli, const std::string& path, bool deleted) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions, journal->Sessions());
+  SayIfUnchecked(cli, *journal, path);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions,
+                              deleted ? journal->DeletedSessions() : journal->Sessions());
   if (cli.output().json) {
     Json list = Json::array();
     for (const session::JournalSession& session : sessions) list.push_back(JournalSessionJson(session));
     PrintJson({{"sessions", list}});
     return absl::OkStatus();
   }
-  Table table({"SESSION", "TOUCHES", "DONE", "PICTURES", "CREATED", "OBJECTS"});
+  Table table({"SESSION", "TOUCHES", "DONE", "PICTURES", deleted ? "DELETED" : "CREATED", "OBJECTS"});
   for (const session::JournalSession& session : sessions)
-    table.Add({session.name, std::to_string(session.touches), std::to_string(session.done),
-               std::to_string(session.images), UtcText(session.created_unix_s),
-               absl::StrJoin(session.objects, ", ")});
+    table.Add(
+        {session.name, std::to_string(session.touches), std::to_string(session.done),
+         std::to_string(session.images),
+         deleted ? DeletedText(session.deleted_unix_s, session.deleted_by) : UtcText(session.created_unix_s),
+         absl::StrJoin(session.objects, ", ")});
   return cli.Print(table.Text());
 }
 
 absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
+  SayIfUnchecked(cli, *journal, options.name);
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
                               FindSession(*journal, options.name, options.in_journal));
   if (cli.output().json) {
@@ -105,27 +126,6 @@ absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
       session.failed, " failed, ", Counted(session.images, "picture", "pictures"), ", ",
       Counted(session.fingers, "finger", "fingers"), "\n  Objects   ", absl::StrJoin(session.objects, ", "),
       "\n  Source    ", session.provenance, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
-}
-
-absl::Status DeleteFromJournal(const Cli& cli, const SessionOptions& options) {
-  if (options.in_journal.empty())
-    return absl::InvalidArgumentError(
-        absl::StrCat(options.name, ": which session? touchstone session delete ", options.name,
-                     " SESSION (touchstone session list ", options.name, " lists them)"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal,
-                              session::Journal::Open(options.name, session::Journal::Mode::kReadWrite));
-  TOUCHSTONE_RETURN_IF_ERROR(FindSession(*journal, options.name, options.in_journal).status());
-  TOUCHSTONE_RETURN_IF_ERROR(journal->DeleteSession(options.in_journal));
-  cli.Log(absl::StrCat("deleted ", options.in_journal, " from ", options.name));
-  return absl::OkStatus();
-}
-
-// A word after the name is a session of a journal, and of nothing else.
-absl::Status CheckInJournal(const SessionOptions& options) {
-  if (options.in_journal.empty() || IsJournalPath(options.name)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("'", options.in_journal, "' is one argument too many: '",
-                                                 options.name,
-                                                 "' is no journal (.db), but a server's session"));
 }
 
 absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
@@ -175,19 +175,29 @@ absl::Status RunCreate(const Cli& cli, const SessionOptions& options) {
 
 absl::Status RunList(const Cli& cli, const SessionOptions& options) {
   if (!options.file.empty()) {
-    if (IsJournalPath(options.file)) return ListJournal(cli, options.file);
+    if (IsJournalPath(options.file)) return ListJournal(cli, options.file, options.deleted);
     return absl::InvalidArgumentError(
         absl::StrCat("'", options.file, "' is no journal; its name ends in .db"));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListSessionsResponse response,
-                              client::Connection::Call(&v1::Sessions::Stub::ListSessions,
-                                                       connection->sessions(), v1::ListSessionsRequest()));
+  v1::ListSessionsRequest request;
+  request.set_deleted(options.deleted);
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::ListSessionsResponse response,
+      client::Connection::Call(&v1::Sessions::Stub::ListSessions, connection->sessions(), request));
   if (cli.output().json) {
     Json list = Json::array();
     for (const v1::Session& session : response.sessions()) list.push_back(SessionJson(session));
     PrintJson({{"sessions", list}});
     return absl::OkStatus();
+  }
+  if (options.deleted) {
+    Table table({"SESSION", "TOUCHES", "DELETED", "OBJECTS"});
+    for (const v1::Session& session : response.sessions())
+      table.Add({session.name(), std::to_string(session.touches()),
+                 DeletedText(session.deleted_unix_s(), session.deleted_by()),
+                 absl::StrJoin(session.objects(), ", ")});
+    return cli.Print(table.Text());
   }
   if (response.sessions().empty()) {
     cli.Log("The server keeps no session; touchstone session create NAME FILE stores one.");
@@ -203,7 +213,7 @@ absl::Status RunList(const Cli& cli, const SessionOptions& options) {
 }
 
 absl::Status RunShow(const Cli& cli, const SessionOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options.name, options.in_journal));
   if (IsJournalPath(options.name)) return ShowJournal(cli, options);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   v1::GetSessionRequest request;
@@ -220,10 +230,31 @@ absl::Status RunShow(const Cli& cli, const SessionOptions& options) {
                                 " bytes\n"));
 }
 
+absl::Status ExportJournal(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
+  SayIfUnchecked(cli, *journal, options.name);
+  size_t damaged = 0;
+  session::Journal::SkipDamaged skip;
+  if (options.skip_damaged)
+    skip = [&](const absl::Status& damage) {
+      ++damaged;
+      cli.Log(absl::StrCat("left out: ", damage.message()));
+    };
+  TOUCHSTONE_RETURN_IF_ERROR(ExportFromJournal(options.name, options.in_journal, options.output,
+                                               cli.output().force, std::move(skip)));
+  if (options.skip_damaged)
+    cli.Log(damaged == 0 ? "nothing was damaged"
+                         : "what was damaged is not in this export: see the lines above");
+  return absl::OkStatus();
+}
+
 absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
-  if (IsJournalPath(options.name))
-    return ExportFromJournal(options.name, options.in_journal, options.output, cli.output().force);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options.name, options.in_journal));
+  if (IsJournalPath(options.name)) return ExportJournal(cli, options);
+  if (options.skip_damaged)
+    return absl::InvalidArgumentError(
+        "--skip-damaged is for a journal (.db): copy the rig's with sqlite3 rig.db '.backup copy.db', and "
+        "export that");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
@@ -235,18 +266,6 @@ absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
   while (reader->Read(&response)) csv += response.csv();
   TOUCHSTONE_RETURN_IF_ERROR(client::FromGrpc(reader->Finish()));
   return cli.Write(options.output, csv);
-}
-
-absl::Status RunDelete(const Cli& cli, const SessionOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options));
-  if (IsJournalPath(options.name)) return DeleteFromJournal(cli, options);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
-  v1::DeleteSessionRequest request;
-  request.set_name(options.name);
-  TOUCHSTONE_RETURN_IF_ERROR(
-      client::Connection::Call(&v1::Sessions::Stub::DeleteSession, connection->sessions(), request).status());
-  cli.Log("deleted " + options.name);
-  return absl::OkStatus();
 }
 
 }  // namespace
@@ -293,9 +312,11 @@ void AddSession(Cli* cli) {
 
   CLI::App* list =
       cli->AddCommand(group, "list", "Lists the stored sessions.",
-                      "touchstone session list" + server + "\ntouchstone session list session.db",
+                      "touchstone session list" + server + "\ntouchstone session list session.db\n" +
+                          "touchstone session list session.db --deleted",
                       [cli, options] { return RunList(*cli, *options); });
   list->add_option("JOURNAL", options->file, "A journal (.db). Default: those of --server")->type_name("");
+  list->add_flag("--deleted", options->deleted, "Those in the trash of a rig or of a journal");
   cli->AddSourceOptions(list);
 
   CLI::App* show = cli->AddCommand(
@@ -313,6 +334,10 @@ void AddSession(Cli* cli) {
   add_place(out);
   cli->AddOutput(out, "-o,--output", &options->output,
                  "The file to write; from a journal also .h5, with poses and pictures. Default: stdout");
+  out->add_flag(
+      "--skip-damaged", options->skip_damaged,
+      "Leave out touches and pictures of a journal that differ from their checksums, naming each; else one "
+      "of them is an error");
   cli->AddSourceOptions(out);
 
   CLI::App* in = cli->AddCommand(group, "import", "Puts a measurement file into a journal.",
@@ -332,12 +357,7 @@ void AddSession(Cli* cli) {
 
   AddSessionFix(cli, group);
 
-  CLI::App* remove = cli->AddCommand(
-      group, "delete", "Deletes a session.",
-      "touchstone session delete monday" + server + "\ntouchstone session delete session.db monday",
-      [cli, options] { return RunDelete(*cli, *options); });
-  add_place(remove);
-  cli->AddSourceOptions(remove);
+  AddSessionTrash(cli, group);
 }
 
 }  // namespace touchstone::cli

@@ -129,7 +129,8 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
                                                           std::move(device), gateway::camera::Rectify);
   parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
-  parts.sessions = std::make_unique<JournalSessionsService>(journal, moves);
+  parts.sessions = std::make_unique<JournalSessionsService>(
+      journal, parts.leases.get(), parts.rig == nullptr ? nullptr : &parts.rig->audit());
   std::vector<ServedService> services = {{"touchstone.v1.Source", parts.source_service.get()},
                                          {"touchstone.v1.Sessions", parts.sessions.get()}};
   if (parts.rig != nullptr) {

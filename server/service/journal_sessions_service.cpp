@@ -1,5 +1,7 @@
 #include "server/service/journal_sessions_service.h"
 
+#include <spdlog/spdlog.h>
+
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
@@ -18,6 +20,8 @@ v1::Session SessionToProto(const session::JournalSession& session) {
   message.set_fingers(session.fingers);
   for (const std::string& object : session.objects) message.add_objects(object);
   message.set_has_poses(true);
+  message.set_deleted_unix_s(session.deleted_unix_s);
+  message.set_deleted_by(session.deleted_by);
   return message;
 }
 
@@ -38,9 +42,10 @@ grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
       "from a file, which touchstone-gateway --replay serves");
 }
 
-grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
+grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*,
+                                                  const v1::ListSessionsRequest* request,
                                                   v1::ListSessionsResponse* response) {
-  const auto sessions = journal_->Sessions();
+  const auto sessions = request->deleted() ? journal_->DeletedSessions() : journal_->Sessions();
   if (!sessions.ok()) return ToGrpc(sessions.status());
   for (const session::JournalSession& session : *sessions)
     *response->add_sessions() = SessionToProto(session);
@@ -72,11 +77,36 @@ grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*,
   return grpc::Status::OK;
 }
 
+absl::Status JournalSessionsService::Admit(const std::string& lease_token, const char* event,
+                                           const std::string& session) {
+  if (audit_ == nullptr) return absl::FailedPreconditionError("a recorded session is served read-only");
+  TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(lease_token));
+  return audit_->Write(event, {{"who", leases_->Holder()}, {"session", session}});
+}
+
 grpc::Status JournalSessionsService::DeleteSession(grpc::ServerContext*,
                                                    const v1::DeleteSessionRequest* request,
                                                    v1::DeleteSessionResponse*) {
-  if (!writable_) return grpc::Status(grpc::FAILED_PRECONDITION, "a recorded session is served read-only");
-  return ToGrpc(journal_->DeleteSession(request->name()));
+  const std::string& name = request->name();
+  const char* const event = request->purge() ? "purge_session" : "delete_session";
+  absl::Status status = Admit(request->lease_token(), event, name);
+  if (status.ok())
+    status =
+        request->purge() ? journal_->PurgeSession(name) : journal_->DeleteSession(name, leases_->Holder());
+  if (status.ok()) spdlog::info("{} '{}' by {}", event, name, leases_->Holder());
+  return ToGrpc(status);
+}
+
+grpc::Status JournalSessionsService::RestoreSession(grpc::ServerContext*,
+                                                    const v1::RestoreSessionRequest* request,
+                                                    v1::Session* response) {
+  absl::Status status = Admit(request->lease_token(), "restore_session", request->name());
+  if (status.ok()) status = journal_->RestoreSession(request->name());
+  if (!status.ok()) return ToGrpc(status);
+  const auto session = journal_->Session(request->name());
+  if (!session.ok()) return ToGrpc(session.status());
+  *response = SessionToProto(*session);
+  return grpc::Status::OK;
 }
 
 }  // namespace touchstone::service

@@ -1,6 +1,8 @@
 // touchstone.v1.Sessions over a journal: its sessions as measurement files.
 #pragma once
 
+#include "server/gateway/audit/audit_log.h"
+#include "server/service/lease_book.h"
 #include "server/session/journal.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
@@ -8,7 +10,9 @@ namespace touchstone::service {
 
 class JournalSessionsService final : public v1::Sessions::Service {
  public:
-  JournalSessionsService(session::Journal* journal, bool writable) : journal_(journal), writable_(writable) {}
+  // `audit` may be null: a recorded session is served, which nobody deletes.
+  JournalSessionsService(session::Journal* journal, const LeaseBook* leases, gateway::audit::AuditLog* audit)
+      : journal_(journal), leases_(leases), audit_(audit) {}
 
   // A rig's sessions come from touching; UNIMPLEMENTED says so.
   grpc::Status CreateSession(grpc::ServerContext*, grpc::ServerReader<v1::CreateSessionRequest>*,
@@ -21,10 +25,15 @@ class JournalSessionsService final : public v1::Sessions::Service {
                              grpc::ServerWriter<v1::ExportSessionResponse>*) override;
   grpc::Status DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest*,
                              v1::DeleteSessionResponse*) override;
+  grpc::Status RestoreSession(grpc::ServerContext*, const v1::RestoreSessionRequest*, v1::Session*) override;
 
  private:
-  session::Journal* journal_;
-  const bool writable_;
+  // That the caller may change sessions; then a line of the audit log says who does it, before it is done.
+  absl::Status Admit(const std::string& lease_token, const char* event, const std::string& session);
+
+  session::Journal* const journal_;
+  const LeaseBook* const leases_;
+  gateway::audit::AuditLog* const audit_;
 };
 
 }  // namespace touchstone::service

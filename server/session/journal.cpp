@@ -34,10 +34,18 @@ absl::Status JournalFile::EnsureSession(const JournalSession& session) {
 }
 
 absl::StatusOr<std::vector<JournalSession>> JournalFile::Sessions() const {
+  return SessionsWhere(
+      "SELECT session_id FROM session NOT INDEXED WHERE deleted_unix_s IS NULL ORDER BY session_id");
+}
+
+absl::StatusOr<std::vector<JournalSession>> JournalFile::SessionsWhere(const char* query) const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  const SqliteSnapshot snapshot(file_.get());
+  const absl::Status counted = CheckSessionCount(file_.get());
+  if (!counted.ok() && !Skipped(counted)) return counted;
   std::vector<int64_t> ids;
   {
-    SqliteStatement row = file_->Prepare("SELECT session_id FROM session ORDER BY session_id");
+    SqliteStatement row = file_->Prepare(query);
     while (true) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
       if (!found) break;
@@ -46,38 +54,55 @@ absl::StatusOr<std::vector<JournalSession>> JournalFile::Sessions() const {
   }
   std::vector<JournalSession> sessions;
   for (const int64_t id : ids) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(sessions.emplace_back(), ReadSession(file_.get(), id));
+    TOUCHSTONE_ASSIGN_OR_RETURN(sessions.emplace_back(), CheckedSession(id));
   }
   return sessions;
 }
 
-absl::StatusOr<JournalSession> JournalFile::Session(const std::string& name) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(name));
-  return ReadSession(file_.get(), known.session_id);
+absl::StatusOr<JournalSession> JournalFile::CheckedSession(int64_t session_id) const {
+  const absl::Status whole = CheckSession(file_.get(), session_id);
+  if (!whole.ok() && !Skipped(whole)) return whole;
+  return ReadSession(file_.get(), session_id);
 }
 
-absl::Status JournalFile::DeleteSession(const std::string& name) {
+absl::StatusOr<JournalSession> JournalFile::Session(const std::string& name) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const SqliteSnapshot snapshot(file_.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(name));
+  return CheckedSession(known.session_id);
+}
+
+absl::StatusOr<bool> JournalFile::HasSession(const std::string& name) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(name));
+  return known.has_value();
+}
+
+absl::Status JournalFile::SetSessionClock(const std::string& name, const JournalClock& clock) {
   const std::lock_guard<std::mutex> lock(mutex_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(name));
   return Write([&]() -> absl::Status {
-    {
-      SqliteStatement executing =
-          file_->Prepare("SELECT id FROM touch WHERE session_id = ? AND stage = 2 LIMIT 1");
-      executing.Bind(known.session_id);
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, executing.Step());
-      if (found)
-        return absl::FailedPreconditionError(
-            absl::StrCat(Called(), "session '", name, "' cannot be deleted: its touch '", executing.Text(0),
-                         "' is executing; wait until it has ended"));
-    }
-    for (const char* sql :
-         {"DELETE FROM touch_finger WHERE touch_id IN (SELECT touch_id FROM touch WHERE session_id = ?)",
-          "DELETE FROM touch WHERE session_id = ?", "DELETE FROM image WHERE session_id = ?",
-          "DELETE FROM session_object WHERE session_id = ?", "DELETE FROM session WHERE session_id = ?"})
-      TOUCHSTONE_RETURN_IF_ERROR(file_->Prepare(sql).Bind(known.session_id).Run());
-    return absl::OkStatus();
+    TOUCHSTONE_RETURN_IF_ERROR(CheckSession(file_.get(), known.session_id));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        file_->Prepare("UPDATE session SET clock_boot_id = ?, clock_origin_s = ? WHERE session_id = ?")
+            .Bind(clock.boot_id)
+            .Bind(clock.origin_s)
+            .Bind(known.session_id)
+            .Run());
+    return SealSession(file_.get(), known.session_id);
   });
+}
+
+absl::StatusOr<JournalClock> JournalFile::SessionClock(const std::string& name) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const SqliteSnapshot snapshot(file_.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(name));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSession(file_.get(), known.session_id));
+  SqliteStatement row =
+      file_->Prepare("SELECT clock_boot_id, clock_origin_s FROM session WHERE session_id = ?");
+  row.Bind(known.session_id);
+  TOUCHSTONE_RETURN_IF_ERROR(row.Step().status());
+  return JournalClock{row.Text(0), row.Double(1)};
 }
 
 absl::Status JournalFile::AddImage(const std::string& session, const JournalImage& given) {
@@ -85,6 +110,7 @@ absl::Status JournalFile::AddImage(const std::string& session, const JournalImag
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
     JournalImage image = given;
+    TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
     {
       SqliteStatement next =
           file_->Prepare("SELECT coalesce(max(number) + 1, 0) FROM image WHERE session_id = ?");
@@ -102,13 +128,14 @@ absl::Status JournalFile::AddImage(const std::string& session, const JournalImag
         return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a picture '",
                                                      image.id, "' already; give this one an id of its own"));
     }
-    return InsertImage(file_.get(), known.session_id, image);
+    TOUCHSTONE_RETURN_IF_ERROR(InsertImage(file_.get(), known.session_id, image, &tally));
+    return WriteTally(file_.get(), known.session_id, tally);
   });
 }
 
 absl::Status JournalFile::ForEachImage(const std::string& session,
                                        const std::function<bool(const JournalImage&)>& each) const {
-  return ForEach<JournalImage>(session, ImageIds, ReadImage, each);
+  return ForEach<JournalImage>(session, ReadImageIds, ReadImage, each);
 }
 
 absl::Status JournalFile::CopySession(const std::string& name, Journal* to) const {
@@ -123,41 +150,39 @@ absl::Status JournalFile::CopySession(const std::string& name, Journal* to) cons
     return absl::AlreadyExistsError(
         absl::StrCat(target->Called(), "has a session '", name, "' already; name another file"));
   return target->Write([&]() -> absl::Status {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session, ReadSession(file_.get(), known.session_id));
+    const SqliteSnapshot snapshot(file_.get());
+    TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession session, CheckedSession(known.session_id));
     TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t session_id, InsertSession(target->file_.get(), session));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int64_t> touches, TouchIds(file_.get(), known.session_id));
-    for (const int64_t id : touches) {
+    SessionTally tally;
+    std::vector<int64_t> ids;
+    TOUCHSTONE_RETURN_IF_ERROR(ReadTouchIds(file_.get(), known.session_id, &ids));
+    for (const int64_t id : ids) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const JournalTouch touch, ReadTouch(file_.get(), id));
-      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(target->file_.get(), session_id, touch));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalSeries> series, ReadSeries(file_.get(), id));
+      TOUCHSTONE_RETURN_IF_ERROR(
+          InsertTouch(target->file_.get(), session_id, touch, series ? &*series : nullptr, &tally));
     }
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int64_t> images, ImageIds(file_.get(), known.session_id));
-    for (const int64_t id : images) {
+    ids.clear();
+    TOUCHSTONE_RETURN_IF_ERROR(ReadImageIds(file_.get(), known.session_id, &ids));
+    for (const int64_t id : ids) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const JournalImage image, ReadImage(file_.get(), id));
-      TOUCHSTONE_RETURN_IF_ERROR(InsertImage(target->file_.get(), session_id, image));
+      TOUCHSTONE_RETURN_IF_ERROR(InsertImage(target->file_.get(), session_id, image, &tally));
     }
-    return absl::OkStatus();
+    return WriteTally(target->file_.get(), session_id, tally);
   });
 }
 
-absl::Status JournalFile::SetMetadata(const std::string& key, const std::string& value) {
+absl::Status JournalFile::SetMetadata(const std::vector<std::pair<std::string, std::string>>& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return Write([&] {
-    return file_
-        ->Prepare(
-            "INSERT INTO fact(key, value) VALUES(?, ?) ON CONFLICT(key) DO UPDATE SET value = "
-            "excluded.value")
-        .Bind(key)
-        .Bind(value)
-        .Run();
+  return Write([&]() -> absl::Status {
+    for (const auto& [key, value] : values) TOUCHSTONE_RETURN_IF_ERROR(WriteFact(file_.get(), key, value));
+    return absl::OkStatus();
   });
 }
 
 absl::StatusOr<std::string> JournalFile::Metadata(const std::string& key) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  SqliteStatement row = file_->Prepare("SELECT value FROM fact WHERE key = ?");
-  row.Bind(key);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-  return found ? row.Text(0) : std::string();
+  return ReadFact(file_.get(), key);
 }
 
 absl::Status JournalFile::Wrong(absl::string_view what) const {
@@ -173,7 +198,8 @@ absl::Status JournalFile::CheckName(absl::string_view what, const std::string& n
 }
 
 absl::StatusOr<std::optional<JournalFile::Known>> JournalFile::FindSession(const std::string& name) const {
-  SqliteStatement row = file_->Prepare("SELECT session_id, fingers, spacing_m FROM session WHERE name = ?");
+  SqliteStatement row = file_->Prepare(
+      "SELECT session_id, fingers, spacing_m FROM session WHERE name = ? AND deleted_unix_s IS NULL");
   row.Bind(name);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return std::optional<Known>();
@@ -184,7 +210,8 @@ absl::StatusOr<JournalFile::Known> JournalFile::WantSession(const std::string& n
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(name));
   if (known) return *known;
   std::vector<std::string> names;
-  SqliteStatement row = file_->Prepare("SELECT name FROM session ORDER BY session_id DESC LIMIT 100");
+  SqliteStatement row = file_->Prepare(
+      "SELECT name FROM session WHERE deleted_unix_s IS NULL ORDER BY session_id DESC LIMIT 100");
   while (true) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
     if (!found) break;
@@ -194,8 +221,13 @@ absl::StatusOr<JournalFile::Known> JournalFile::WantSession(const std::string& n
                                           names.empty() ? "; it has none" : DidYouMean(name, names)));
 }
 
-absl::StatusOr<std::unique_ptr<Journal>> Journal::Open(const std::string& path, Mode mode) {
+absl::StatusOr<std::unique_ptr<Journal>> Journal::Open(const std::string& path, Mode mode,
+                                                       SkipDamaged skip_damaged) {
   TOUCHSTONE_ASSIGN_OR_RETURN(OpenedJournal opened, OpenJournalFile(path, mode));
+  if (skip_damaged != nullptr && mode != Mode::kReadOnly)
+    return absl::InvalidArgumentError(
+        absl::StrCat("journal ", path, ": damage can be left out in reading only, never in writing"));
+  opened.skip_damaged = std::move(skip_damaged);
   return std::unique_ptr<Journal>(new JournalFile(std::move(opened)));
 }
 

@@ -11,11 +11,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
+
+#include "server/base/nan.h"
 
 namespace touchstone::session {
 
@@ -61,11 +64,26 @@ struct JournalImage {
   std::string id;  // the client's, or made
   uint64_t number = 0;
   std::string object;
-  std::string up_face;  // face of the object's box that pointed up: "+z"
-  std::array<double, 6> base_from_camera{};
+  std::string up_face;                       // face of the object's box that pointed up: "+z"
+  std::array<double, 6> base_from_camera{};  // as commanded: position (m) and rotation vector (rad)
+  // As the arm measured it, and when; NaN: unknown.
+  std::array<double, 6> measured_base_from_camera = {kNaN, kNaN, kNaN, kNaN, kNaN, kNaN};
+  double measured_unix_s = kNaN;
   double unix_s = 0;
   int width = 0, height = 0;
   std::string png;
+};
+
+// What was recorded during a touch: the bytes of its columns, and how they stand there.
+struct JournalSeries {
+  std::string encoding;
+  std::string columns;
+};
+
+// Where a session's time began, on the clock of one boot of a host; rig/session_clock.h.
+struct JournalClock {
+  std::string boot_id;  // empty: none was written
+  double origin_s = 0;
 };
 
 struct JournalSession {
@@ -78,6 +96,8 @@ struct JournalSession {
   double spacing_m = 0.03;
   uint64_t touches = 0, done = 0, failed = 0, images = 0;
   std::vector<std::string> objects;  // of the touches, in order of appearance
+  double deleted_unix_s = 0;         // when it was moved to the trash; 0: it was not
+  std::string deleted_by;
 };
 
 // One connection, guarded by a mutex: all functions may be called from any thread.
@@ -86,15 +106,34 @@ class Journal {
   enum class Mode { kReadWrite, kCreateOrReadWrite, kReadOnly };
   // Errors say whether the file is missing, is no journal, or is of another version. Another process that has
   // it open for writing is an error too (one gateway per journal).
-  static absl::StatusOr<std::unique_ptr<Journal>> Open(const std::string& path, Mode mode);
+  // A journal of version 1 has no checksums: it is read as it is, and gets them when it is opened for writing.
+  // Every other row is checked when it is read; DATA_LOSS names the touch that is damaged. With `skip_damaged`, for
+  // reading only, a touch or picture that is damaged or missing is told to it and left out.
+  using SkipDamaged = std::function<void(const absl::Status&)>;
+  static absl::StatusOr<std::unique_ptr<Journal>> Open(const std::string& path, Mode mode,
+                                                       SkipDamaged skip_damaged = nullptr);
   virtual ~Journal() = default;
+
+  virtual bool has_checksums() const = 0;
 
   // Makes the session, or does nothing if it is there with the same fingers and spacing.
   virtual absl::Status EnsureSession(const JournalSession& session) = 0;
   virtual absl::StatusOr<std::vector<JournalSession>> Sessions() const = 0;
   virtual absl::StatusOr<JournalSession> Session(const std::string& name) const = 0;
-  // With all its touches and images. No touch of it may be executing.
-  virtual absl::Status DeleteSession(const std::string& name) = 0;
+  virtual absl::StatusOr<bool> HasSession(const std::string& name) const = 0;
+  virtual absl::Status SetSessionClock(const std::string& name, const JournalClock& clock) = 0;
+  virtual absl::StatusOr<JournalClock> SessionClock(const std::string& name) const = 0;
+
+  // Moves it to the trash; its name is free then. No touch of it may be executing.
+  virtual absl::Status DeleteSession(const std::string& name, const std::string& by) = 0;
+  // Those in the trash, the one deleted last first.
+  virtual absl::StatusOr<std::vector<JournalSession>> DeletedSessions() const = 0;
+  // The one of that name that was deleted last. ALREADY_EXISTS if there is one of that name again.
+  virtual absl::Status RestoreSession(const std::string& name) = 0;
+  // Ends every session of that name in the trash, for good, with its touches and images.
+  virtual absl::Status PurgeSession(const std::string& name) = 0;
+  // Ends a session at once and for good: to undo an import. No touch of it may be executing.
+  virtual absl::Status EraseSession(const std::string& name) = 0;
 
   // Begins a touch: writes the intent and returns it. If the id is there with the same object and command:
   // the touch as it stands, kDone ones without change, kFailed ones as a new intent with attempt + 1. Another
@@ -103,10 +142,16 @@ class Journal {
   virtual absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
                                              const std::string& object, const std::string& up_face,
                                              const std::string& command) = 0;
+  // Begin and Executing in one step, that is one commit: nothing can come between the two, and nothing may be sent
+  // to the arm before it is done.
+  virtual absl::StatusOr<JournalTouch> BeginExecuting(const std::string& session, const std::string& id,
+                                                      const std::string& object, const std::string& up_face,
+                                                      const std::string& command, uint32_t program_id,
+                                                      uint32_t boot_id) = 0;
   virtual absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                                  uint32_t boot_id) = 0;
-  virtual absl::Status Done(const std::string& session, const std::string& id,
-                            const JournalResult& result) = 0;
+  virtual absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result,
+                            const JournalSeries* series = nullptr) = 0;
   virtual absl::Status Failed(const std::string& session, const std::string& id,
                               const std::string& error) = 0;
 
@@ -116,6 +161,11 @@ class Journal {
 
   virtual absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
                                                            const std::string& id) const = 0;
+  // What was recorded during it; none: that was not asked for.
+  virtual absl::StatusOr<std::optional<JournalSeries>> Series(const std::string& session,
+                                                              const std::string& id) const = 0;
+  // The touch that is done with the highest number.
+  virtual absl::StatusOr<std::optional<JournalTouch>> LastDone(const std::string& session) const = 0;
   // In the order of their approaches (number of the intent of the attempt that was done); `each` returns
   // false to end.
   virtual absl::Status ForEachTouch(const std::string& session,
@@ -130,8 +180,11 @@ class Journal {
   // Copies a session with all that it has into another journal (which must not have one of that name).
   virtual absl::Status CopySession(const std::string& name, Journal* to) const = 0;
 
-  // What a rig remembers beyond its process: "mounted_object", "next_program_id".
-  virtual absl::Status SetMetadata(const std::string& key, const std::string& value) = 0;
+  // What a rig remembers beyond its process: "mounted_object", "next_program_id". Several in one step, or none.
+  virtual absl::Status SetMetadata(const std::vector<std::pair<std::string, std::string>>& values) = 0;
+  absl::Status SetMetadata(const std::string& key, const std::string& value) {
+    return SetMetadata({{key, value}});
+  }
   virtual absl::StatusOr<std::string> Metadata(const std::string& key) const = 0;  // "" if it is not there
 };
 

@@ -199,11 +199,11 @@ TEST_F(JournalDamage, OtherFilesAreNoJournalsAndStayAsTheyAre) {
 
 TEST_F(JournalDamage, AnotherVersionIsNamed) {
   Make(1);
-  Sql("PRAGMA user_version = 2");
+  Sql("PRAGMA user_version = 3");
   const absl::Status status = Opened(Mode::kReadWrite);
   EXPECT_TRUE(absl::IsFailedPrecondition(status));
   EXPECT_THAT(Message(status),
-              HasSubstr("is of version 2; this program reads version 1: use the newer program"));
+              HasSubstr("is of version 3; this program reads versions 1 to 2: use the newer program"));
 }
 
 TEST_F(JournalDamage, ADamagedFileIsNotWrittenTo) {
@@ -243,7 +243,7 @@ TEST_F(JournalDamage, AReaderWritesNothing) {
   EXPECT_TRUE(absl::IsFailedPrecondition(status));
   EXPECT_THAT(Message(status), HasSubstr("was opened for reading only"));
   EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->SetMetadata("a", "b")));
-  EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->DeleteSession("s")));
+  EXPECT_TRUE(absl::IsFailedPrecondition((*reader)->DeleteSession("s", "ana")));
   EXPECT_EQ((*reader)->Session("s")->touches, 1u);
 }
 

@@ -1,4 +1,5 @@
-// The journal in its SQLite file: journal.cpp for sessions and images, journal_touches.cpp for touches.
+// The journal in its SQLite file: journal.cpp for sessions and images, journal_trash.cpp for deleting them,
+// journal_touches.cpp for touches.
 #pragma once
 
 #include <absl/strings/str_cat.h>
@@ -14,6 +15,7 @@
 #include "server/base/status.h"
 #include "server/session/journal.h"
 #include "server/session/journal_open.h"
+#include "server/session/journal_seal.h"
 #include "server/session/sqlite_file.h"
 
 namespace touchstone::session {
@@ -24,22 +26,42 @@ const char* StageInWords(TouchStage stage);
 class JournalFile : public Journal {
  public:
   explicit JournalFile(OpenedJournal opened)
-      : lock_(std::move(opened.lock)), file_(std::move(opened.file)), read_only_(lock_ == nullptr) {}
+      : lock_(std::move(opened.lock)),
+        file_(std::move(opened.file)),
+        skip_damaged_(std::move(opened.skip_damaged)),
+        read_only_(lock_ == nullptr) {}
+
+  bool has_checksums() const override { return file_->has_checksums(); }
 
   absl::Status EnsureSession(const JournalSession& session) override;
   absl::StatusOr<std::vector<JournalSession>> Sessions() const override;
   absl::StatusOr<JournalSession> Session(const std::string& name) const override;
-  absl::Status DeleteSession(const std::string& name) override;
+  absl::StatusOr<bool> HasSession(const std::string& name) const override;
+  absl::Status SetSessionClock(const std::string& name, const JournalClock& clock) override;
+  absl::StatusOr<JournalClock> SessionClock(const std::string& name) const override;
+  absl::Status DeleteSession(const std::string& name, const std::string& by) override;
+  absl::StatusOr<std::vector<JournalSession>> DeletedSessions() const override;
+  absl::Status RestoreSession(const std::string& name) override;
+  absl::Status PurgeSession(const std::string& name) override;
+  absl::Status EraseSession(const std::string& name) override;
   absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
                                      const std::string& object, const std::string& up_face,
                                      const std::string& command) override;
+  absl::StatusOr<JournalTouch> BeginExecuting(const std::string& session, const std::string& id,
+                                              const std::string& object, const std::string& up_face,
+                                              const std::string& command, uint32_t program_id,
+                                              uint32_t boot_id) override;
   absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                          uint32_t boot_id) override;
-  absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result) override;
+  absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result,
+                    const JournalSeries* series) override;
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override;
   absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) override;
   absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
                                                    const std::string& id) const override;
+  absl::StatusOr<std::optional<JournalSeries>> Series(const std::string& session,
+                                                      const std::string& id) const override;
+  absl::StatusOr<std::optional<JournalTouch>> LastDone(const std::string& session) const override;
   absl::Status ForEachTouch(const std::string& session,
                             const std::function<bool(const JournalTouch&)>& each) const override;
   absl::StatusOr<std::vector<std::pair<std::string, JournalTouch>>> Unfinished() const override;
@@ -47,7 +69,7 @@ class JournalFile : public Journal {
   absl::Status ForEachImage(const std::string& session,
                             const std::function<bool(const JournalImage&)>& each) const override;
   absl::Status CopySession(const std::string& name, Journal* to) const override;
-  absl::Status SetMetadata(const std::string& key, const std::string& value) override;
+  absl::Status SetMetadata(const std::vector<std::pair<std::string, std::string>>& values) override;
   absl::StatusOr<std::string> Metadata(const std::string& key) const override;
 
  private:
@@ -72,6 +94,20 @@ class JournalFile : public Journal {
     return file_->Transact(work);
   }
 
+  // Whether this is damage that may be left out; it was told then.
+  bool Skipped(const absl::Status& status) const {
+    if (!absl::IsDataLoss(status) || skip_damaged_ == nullptr) return false;
+    skip_damaged_(status);
+    return true;
+  }
+
+  absl::StatusOr<JournalTouch> BeginAs(const std::string& session, JournalTouch touch);
+  absl::StatusOr<std::vector<JournalSession>> SessionsWhere(const char* query) const;
+  absl::StatusOr<JournalSession> CheckedSession(int64_t session_id) const;
+  // journal_trash.cpp; within a transaction.
+  absl::Status WantNothingExecuting(int64_t session_id, const std::string& name) const;
+  absl::Status Erase(int64_t session_id);
+
   absl::StatusOr<std::optional<Known>> FindSession(const std::string& name) const;
   absl::StatusOr<Known> WantSession(const std::string& name) const;
 
@@ -89,17 +125,17 @@ class JournalFile : public Journal {
     if (touch_id == 0)
       return absl::NotFoundError(
           absl::StrCat(Called(), "session '", session, "' has no touch '", id, "'; begin it first"));
-    TouchStage stage;
-    {
-      SqliteStatement row = file_->Prepare("SELECT stage FROM touch WHERE touch_id = ?");
-      row.Bind(touch_id);
-      TOUCHSTONE_RETURN_IF_ERROR(row.Step().status());
-      stage = static_cast<TouchStage>(row.Integer(0));
-    }
-    if (std::find(from.begin(), from.end(), stage) == from.end())
+    TOUCHSTONE_ASSIGN_OR_RETURN(const TouchSeal before, CheckTouch(file_.get(), touch_id));
+    if (std::find(from.begin(), from.end(), before.stage) == from.end())
       return absl::FailedPreconditionError(absl::StrCat(Called(), "touch '", id, "' of session '", session,
-                                                        "' cannot ", what, ": it is ", StageInWords(stage)));
-    return Write([&] { return step(known, touch_id); });
+                                                        "' cannot ", what, ": it is ",
+                                                        StageInWords(before.stage)));
+    return Write([&]() -> absl::Status {
+      TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
+      TOUCHSTONE_RETURN_IF_ERROR(step(known, touch_id));
+      TOUCHSTONE_RETURN_IF_ERROR(SealTouch(file_.get(), touch_id, &before, &tally));
+      return WriteTally(file_.get(), known.session_id, tally);
+    });
   }
 
   // Without the mutex while `each` runs: it may use this journal. What was there at the call is passed on as it is
@@ -109,8 +145,12 @@ class JournalFile : public Journal {
     std::vector<int64_t> ids;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
+      const SqliteSnapshot snapshot(file_.get());
       TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
-      TOUCHSTONE_ASSIGN_OR_RETURN(ids, ids_of(file_.get(), known.session_id));
+      absl::Status status = CheckSession(file_.get(), known.session_id);
+      if (!status.ok() && !Skipped(status)) return status;
+      status = ids_of(file_.get(), known.session_id, &ids);
+      if (!status.ok() && !Skipped(status)) return status;
     }
     for (const int64_t id : ids) {
       absl::StatusOr<Row> row;
@@ -118,6 +158,7 @@ class JournalFile : public Journal {
         const std::lock_guard<std::mutex> lock(mutex_);
         row = read(file_.get(), id);
       }
+      if (!row.ok() && Skipped(row.status())) continue;
       if (!row.ok()) return row.status();
       if (!each(*row)) break;
     }
@@ -126,6 +167,7 @@ class JournalFile : public Journal {
 
   const std::unique_ptr<WriterLock> lock_;  // released last
   const std::unique_ptr<SqliteFile> file_;
+  const Journal::SkipDamaged skip_damaged_;
   const bool read_only_;
   mutable std::mutex mutex_;
 };

@@ -9,9 +9,12 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
 
 #include "server/base/status.h"
 #include "server/session/journal_schema.h"
+#include "server/session/journal_seal.h"
+#include "server/session/journal_version1.h"
 
 namespace touchstone::session {
 namespace {
@@ -52,32 +55,64 @@ absl::StatusOr<std::unique_ptr<SqliteFile>> OpenForReading(const std::string& pa
   return SqliteFile::Open(path, ImmutableUri(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
 }
 
-// Whether the file is a journal of this version; an empty one may become one.
-absl::Status CheckIdentity(SqliteFile* file, bool may_create) {
+absl::Status MakeTables(SqliteFile* file) {
+  return file->Transact([&]() -> absl::Status {
+    TOUCHSTONE_RETURN_IF_ERROR(file->Run(kJournalSchema));
+    TOUCHSTONE_RETURN_IF_ERROR(InsertHead(file));
+    static const std::string identity = absl::StrCat("PRAGMA application_id = ", kJournalApplicationId,
+                                                     "; PRAGMA user_version = ", kJournalVersion);
+    return file->Run(identity.c_str());
+  });
+}
+
+// Whether the file is a journal of a version that can be read, which is returned; an empty one may become one.
+absl::StatusOr<int64_t> CheckIdentity(SqliteFile* file, bool may_create) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t application, file->Number("PRAGMA application_id"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t version, file->Number("PRAGMA user_version"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t tables, file->Number("SELECT count(*) FROM sqlite_master"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t tables, file->Number("SELECT count(*) FROM main.sqlite_master"));
   const std::string& path = file->path();
   if (application == 0 && version == 0 && tables == 0) {
     if (!may_create)
       return absl::InvalidArgumentError(
           absl::StrCat("journal ", path, " is empty; name one that a gateway or an export has written"));
-    return file->Transact([&] {
-      TOUCHSTONE_RETURN_IF_ERROR(file->Run(kJournalSchema));
-      static const std::string identity = absl::StrCat("PRAGMA application_id = ", kJournalApplicationId,
-                                                       "; PRAGMA user_version = ", kJournalVersion);
-      return file->Run(identity.c_str());
-    });
+    TOUCHSTONE_RETURN_IF_ERROR(MakeTables(file));
+    return kJournalVersion;
   }
   if (application != kJournalApplicationId)
     return absl::InvalidArgumentError(absl::StrCat(
         "journal ", path, " is no journal but another program's SQLite file; name another file"));
-  if (version != kJournalVersion)
+  if (version < 1 || version > kJournalVersion)
     return absl::FailedPreconditionError(absl::StrCat(
-        "journal ", path, " is of version ", version, "; this program reads version ", kJournalVersion,
+        "journal ", path, " is of version ", version, "; this program reads versions 1 to ", kJournalVersion,
         version > kJournalVersion ? ": use the newer program that wrote it"
-                                  : ": export it with the older program that wrote it"));
-  return absl::OkStatus();
+                                  : ": there was none, so its beginning is damaged; keep a copy"));
+  return version;
+}
+
+// The tables are those that a journal of this version has: a damaged schema could exchange columns.
+absl::Status CheckTables(SqliteFile* file) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const std::unique_ptr<SqliteFile> whole,
+      SqliteFile::Open("schema", ":memory:", SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE));
+  TOUCHSTONE_RETURN_IF_ERROR(whole->Run(kJournalSchema));
+  const char* const query = "SELECT name, sql FROM main.sqlite_master WHERE sql IS NOT NULL";
+  std::map<std::string, std::string> found;
+  SqliteStatement rows = file->Prepare(query);
+  while (true) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, rows.Step());
+    if (!more) break;
+    found[rows.Text(0)] = rows.Text(1);
+  }
+  SqliteStatement expected = whole->Prepare(query);
+  while (true) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, expected.Step());
+    if (!more) return absl::OkStatus();
+    if (found[expected.Text(0)] != expected.Text(1))
+      return absl::DataLossError(
+          absl::StrCat("journal ", file->path(), " is damaged: its table '", expected.Text(0),
+                       "' is not that of version ", kJournalVersion,
+                       "; keep a copy, then rescue what is whole with: sqlite3 FILE .recover | sqlite3 NEW"));
+  }
 }
 
 }  // namespace
@@ -118,7 +153,9 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   OpenedJournal opened;
   if (mode == Journal::Mode::kReadOnly) {
     TOUCHSTONE_ASSIGN_OR_RETURN(opened.file, OpenForReading(path));
-    TOUCHSTONE_RETURN_IF_ERROR(CheckIdentity(opened.file.get(), false));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t version, CheckIdentity(opened.file.get(), false));
+    TOUCHSTONE_RETURN_IF_ERROR(version == 1 ? ReadAsVersion1(opened.file.get())
+                                            : CheckTables(opened.file.get()));
     return opened;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(opened.lock, WriterLock::Take(path));
@@ -129,19 +166,27 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   // Before the first write: another program's file is left as it is. SQLite opens a write-protected file all
   // the same.
   TOUCHSTONE_RETURN_IF_ERROR(file.Number("PRAGMA schema_version").status());
-  TOUCHSTONE_RETURN_IF_ERROR(CheckIdentity(&file, may_create));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t version, CheckIdentity(&file, may_create));
   if (access(path.c_str(), W_OK) != 0)
     return absl::PermissionDeniedError(
         absl::StrCat("journal ", path, " may not be written (", std::strerror(errno),
                      "); change its permissions, or open it for reading only"));
   TOUCHSTONE_RETURN_IF_ERROR(file.Run("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
-  SqliteStatement check = file.Prepare("PRAGMA quick_check(1)");
-  TOUCHSTONE_ASSIGN_OR_RETURN(const bool has_row, check.Step());
-  if (has_row && check.Text(0) != "ok")
-    return absl::DataLossError(
-        absl::StrCat("journal ", path, " is damaged (", check.Text(0),
-                     "); keep a copy, then rescue what is whole with: sqlite3 FILE .recover | "
-                     "sqlite3 NEW; work on with NEW"));
+  {
+    // With the indices: a touch that they have lost would be made again under its id.
+    SqliteStatement check = file.Prepare("PRAGMA integrity_check(1)");
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool has_row, check.Step());
+    if (has_row && check.Text(0) != "ok")
+      return absl::DataLossError(
+          absl::StrCat("journal ", path, " is damaged (", check.Text(0),
+                       "); keep a copy, then rescue what is whole with: sqlite3 FILE .recover | "
+                       "sqlite3 NEW; work on with NEW"));
+  }
+  if (version == 1) {
+    TOUCHSTONE_RETURN_IF_ERROR(MigrateFromVersion1(&file));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTables(&file));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSessionCount(&file));
   return opened;
 }
 

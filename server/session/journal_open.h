@@ -26,6 +26,7 @@ class WriterLock {
 struct OpenedJournal {
   std::unique_ptr<WriterLock> lock;  // null: for reading only
   std::unique_ptr<SqliteFile> file;  // closed first
+  Journal::SkipDamaged skip_damaged;
 };
 
 absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::Mode mode);

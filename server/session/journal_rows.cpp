@@ -43,15 +43,6 @@ void BindCommand(const std::string& bytes, SqliteStatement* statement) {
   statement->Bind(command->standoff_m()).Bind(command->speed_m_s());
 }
 
-absl::StatusOr<std::vector<int64_t>> Numbers(SqliteStatement statement) {
-  std::vector<int64_t> numbers;
-  while (true) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool row, statement.Step());
-    if (!row) return numbers;
-    numbers.push_back(statement.Integer(0));
-  }
-}
-
 absl::Status Gone(const SqliteFile& file, absl::string_view what) {
   return absl::InternalError(absl::StrCat("journal ", file.path(), ": a ", what, " has gone; read it again"));
 }
@@ -60,25 +51,37 @@ absl::Status Gone(const SqliteFile& file, absl::string_view what) {
 
 absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& session) {
   SqliteStatement insert = file->Prepare(
-      "INSERT INTO session(name, created_unix_s, source, calibration, fingers, spacing_m) VALUES(?, ?, ?, ?, "
-      "?, ?)");
+      "INSERT INTO session(name, created_unix_s, source, calibration, fingers, spacing_m, checksum) "
+      "VALUES(?, ?, ?, ?, ?, ?, 0)");
   insert.Bind(session.name).Bind(session.created_unix_s).Bind(session.provenance).Bind(session.calibration);
   insert.Bind(int64_t{session.fingers}).Bind(session.spacing_m);
   TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
-  return file->Number("SELECT last_insert_rowid()");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t session_id, file->Number("SELECT last_insert_rowid()"));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteTally(file, session_id, SessionTally()));
+  TOUCHSTONE_RETURN_IF_ERROR(AddToSessionCount(file, 1));
+  TOUCHSTONE_RETURN_IF_ERROR(SealSession(file, session_id));
+  return session_id;
 }
 
 absl::Status InsertObject(SqliteFile* file, int64_t session_id, const std::string& object) {
-  return file
-      ->Prepare(
-          "INSERT OR IGNORE INTO session_object(session_id, position, name) "
-          "SELECT ?1, count(*), ?2 FROM session_object WHERE session_id = ?1")
-      .Bind(session_id)
-      .Bind(object)
-      .Run();
+  {
+    SqliteStatement row = file->Prepare("SELECT 1 FROM session_object WHERE session_id = ? AND name = ?");
+    row.Bind(session_id).Bind(object);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (found) return absl::OkStatus();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSession(file, session_id));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      file->Prepare("INSERT INTO session_object(session_id, position, name) "
+                    "SELECT ?1, count(*), ?2 FROM session_object WHERE session_id = ?1")
+          .Bind(session_id)
+          .Bind(object)
+          .Run());
+  return SealSession(file, session_id);
 }
 
-absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouch& touch) {
+absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouch& touch,
+                         const JournalSeries* series, SessionTally* tally) {
   TOUCHSTONE_RETURN_IF_ERROR(InsertObject(file, session_id, touch.object));
   int64_t touch_id = 0;
   {
@@ -88,9 +91,10 @@ absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouc
         "round, face, command, target_x_m, target_y_m, target_z_m, approach_x, approach_y, approach_z, "
         "lateral_x, lateral_y, lateral_z, standoff_m, commanded_speed_m_s, measured_speed_m_s, "
         "session_time_s, "
-        "start_unix_s, time_uncertainty_s, synchronisation_uncertainty_s, effector_drift, recovered) "
+        "start_unix_s, time_uncertainty_s, synchronisation_uncertainty_s, effector_drift, recovered, "
+        "checksum) "
         "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
-        "?)");
+        "?, 0)");
     insert.Bind(session_id).Bind(touch.id).Bind(static_cast<int64_t>(touch.number));
     insert.Bind(touch.object).Bind(touch.up_face).Bind(static_cast<int64_t>(touch.stage));
     insert.Bind(int64_t{touch.attempt}).Bind(int64_t{touch.program_id}).Bind(int64_t{touch.boot_id});
@@ -112,8 +116,44 @@ absl::Status InsertTouch(SqliteFile* file, int64_t session_id, const JournalTouc
     TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
     TOUCHSTONE_ASSIGN_OR_RETURN(touch_id, file->Number("SELECT last_insert_rowid()"));
   }
-  if (touch.stage != TouchStage::kDone) return absl::OkStatus();
-  return InsertFingers(file, touch_id, touch.result.fingers);
+  if (touch.stage == TouchStage::kDone) {
+    TOUCHSTONE_RETURN_IF_ERROR(InsertFingers(file, touch_id, touch.result.fingers));
+    if (series != nullptr) TOUCHSTONE_RETURN_IF_ERROR(InsertSeries(file, touch_id, *series));
+  }
+  return SealTouch(file, touch_id, nullptr, tally);
+}
+
+absl::Status InsertSeries(SqliteFile* file, int64_t touch_id, const JournalSeries& series) {
+  TOUCHSTONE_RETURN_IF_ERROR(
+      file->Prepare("INSERT OR REPLACE INTO touch_series(touch_id, encoding, columns) VALUES(?, ?, ?)")
+          .Bind(touch_id)
+          .Bind(series.encoding)
+          .BindBlob(series.columns)
+          .Run());
+  return file->Prepare("UPDATE touch SET series_checksum = ? WHERE touch_id = ?")
+      .Bind(static_cast<int64_t>(SeriesChecksum(series)))
+      .Bind(touch_id)
+      .Run();
+}
+
+absl::StatusOr<std::optional<JournalSeries>> ReadSeries(SqliteFile* file, int64_t touch_id) {
+  const SqliteSnapshot snapshot(file);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(file, touch_id).status());
+  SqliteStatement touch = file->Prepare("SELECT series_checksum, number, id FROM touch WHERE touch_id = ?");
+  touch.Bind(touch_id);
+  TOUCHSTONE_RETURN_IF_ERROR(touch.Step().status());
+  if (touch.IsNull(0)) return std::optional<JournalSeries>();
+  SqliteStatement row = file->Prepare("SELECT encoding, columns FROM touch_series WHERE touch_id = ?");
+  row.Bind(touch_id);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+  JournalSeries series;
+  if (found) series.encoding = row.Text(0), series.columns = row.Text(1);
+  if (found && SeriesChecksum(series) == static_cast<uint64_t>(touch.Integer(0)))
+    return std::optional<JournalSeries>(std::move(series));
+  return absl::DataLossError(absl::StrCat(
+      "journal ", file->path(), ": the time series of touch ", touch.Integer(1), " ('", touch.Text(2),
+      "') is ", found ? "damaged: what is stored differs from its checksum" : "lost",
+      "; keep a copy, and export without it (--skip-damaged)"));
 }
 
 absl::Status InsertFingers(SqliteFile* file, int64_t touch_id, const std::vector<JournalFinger>& fingers) {
@@ -130,20 +170,29 @@ absl::Status InsertFingers(SqliteFile* file, int64_t touch_id, const std::vector
   return absl::OkStatus();
 }
 
-absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImage& image) {
+absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImage& image,
+                         SessionTally* tally) {
   SqliteStatement insert = file->Prepare(
       "INSERT INTO image(session_id, id, number, object, placement, x_m, y_m, z_m, rotation_x_rad, "
       "rotation_y_rad, "
-      "rotation_z_rad, unix_s, width_px, height_px, png) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
-      "?)");
+      "rotation_z_rad, measured_x_m, measured_y_m, measured_z_m, measured_rotation_x_rad, "
+      "measured_rotation_y_rad, measured_rotation_z_rad, measured_unix_s, unix_s, width_px, height_px, png, "
+      "checksum) "
+      "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0)");
   insert.Bind(session_id).Bind(image.id).Bind(static_cast<int64_t>(image.number));
   insert.Bind(image.object).Bind(image.up_face);
   BindPose(image.base_from_camera, &insert);
+  BindPose(image.measured_base_from_camera, &insert);
+  insert.Bind(image.measured_unix_s);
   insert.Bind(image.unix_s).Bind(int64_t{image.width}).Bind(int64_t{image.height}).BindBlob(image.png);
-  return insert.Run();
+  TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t image_id, file->Number("SELECT last_insert_rowid()"));
+  return SealNewImage(file, image_id, tally);
 }
 
 absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id) {
+  const SqliteSnapshot snapshot(file);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(file, touch_id).status());
   JournalTouch touch;
   {
     SqliteStatement row = file->Prepare(
@@ -191,10 +240,13 @@ absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id) {
 }
 
 absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
+  const SqliteSnapshot snapshot(file);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckImage(file, image_id));
   SqliteStatement row = file->Prepare(
       "SELECT id, number, object, placement, x_m, y_m, z_m, rotation_x_rad, rotation_y_rad, rotation_z_rad, "
       "unix_s, "
-      "width_px, height_px, png FROM image WHERE image_id = ?");
+      "width_px, height_px, png, measured_x_m, measured_y_m, measured_z_m, measured_rotation_x_rad, "
+      "measured_rotation_y_rad, measured_rotation_z_rad, measured_unix_s FROM image WHERE image_id = ?");
   row.Bind(image_id);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found) return Gone(*file, "picture");
@@ -208,27 +260,18 @@ absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
   image.width = static_cast<int>(row.Integer(11));
   image.height = static_cast<int>(row.Integer(12));
   image.png = row.Text(13);
+  image.measured_base_from_camera = ReadPose(row, 14);
+  image.measured_unix_s = row.Double(20);
   return image;
 }
 
-absl::StatusOr<std::vector<int64_t>> TouchIds(SqliteFile* file, int64_t session_id) {
-  SqliteStatement rows = file->Prepare("SELECT touch_id FROM touch WHERE session_id = ? ORDER BY number");
-  rows.Bind(session_id);
-  return Numbers(std::move(rows));
-}
-
-absl::StatusOr<std::vector<int64_t>> ImageIds(SqliteFile* file, int64_t session_id) {
-  SqliteStatement rows = file->Prepare("SELECT image_id FROM image WHERE session_id = ? ORDER BY number");
-  rows.Bind(session_id);
-  return Numbers(std::move(rows));
-}
-
 absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id) {
+  const SqliteSnapshot snapshot(file);
   JournalSession session;
   {
     SqliteStatement row = file->Prepare(
-        "SELECT name, created_unix_s, source, calibration, fingers, spacing_m, "
-        "(SELECT count(*) FROM image WHERE session_id = ?1) FROM session WHERE session_id = ?1");
+        "SELECT name, created_unix_s, source, calibration, fingers, spacing_m, deleted_unix_s, deleted_by "
+        "FROM session WHERE session_id = ?");
     row.Bind(session_id);
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
     if (!found) return Gone(*file, "session");
@@ -238,22 +281,14 @@ absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id)
     session.calibration = row.Text(3);
     session.fingers = static_cast<int>(row.Integer(4));
     session.spacing_m = row.Double(5);
-    session.images = static_cast<uint64_t>(row.Integer(6));
+    if (!row.IsNull(6)) session.deleted_unix_s = row.Double(6);
+    session.deleted_by = row.Text(7);
   }
-  {
-    SqliteStatement row =
-        file->Prepare("SELECT stage, count(*) FROM touch WHERE session_id = ? GROUP BY stage");
-    row.Bind(session_id);
-    while (true) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-      if (!found) break;
-      const auto stage = static_cast<TouchStage>(row.Integer(0));
-      const uint64_t count = static_cast<uint64_t>(row.Integer(1));
-      session.touches += count;
-      if (stage == TouchStage::kDone) session.done = count;
-      if (stage == TouchStage::kFailed) session.failed = count;
-    }
-  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const SessionTally tally, ReadTally(file, session_id));
+  session.touches = static_cast<uint64_t>(tally.touches);
+  session.done = static_cast<uint64_t>(tally.done);
+  session.failed = static_cast<uint64_t>(tally.failed);
+  session.images = static_cast<uint64_t>(tally.images);
   SqliteStatement row =
       file->Prepare("SELECT name FROM session_object WHERE session_id = ? ORDER BY position");
   row.Bind(session_id);

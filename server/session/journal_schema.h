@@ -5,17 +5,35 @@ namespace touchstone::session {
 
 inline constexpr int kJournalApplicationId =
     0x54736A31;                            // "Tsj1": distinguishes a journal from other SQLite files
-inline constexpr int kJournalVersion = 1;  // PRAGMA user_version
+inline constexpr int kJournalVersion = 2;  // PRAGMA user_version; 1 had no checksums (journal_version1.h)
 
 inline constexpr char kJournalSchema[] = R"sql(
+CREATE TABLE head(                      -- one row: what the other tables must add up to
+  head_id INTEGER PRIMARY KEY CHECK(head_id = 1),
+  sessions INTEGER NOT NULL,            -- with those in the trash
+  fact_digest INTEGER NOT NULL,         -- sum of the facts' checksums, modulo 2^64
+  checksum INTEGER NOT NULL);
 CREATE TABLE session(
   session_id INTEGER PRIMARY KEY,
-  name TEXT NOT NULL UNIQUE,
+  name TEXT NOT NULL,
   created_unix_s REAL NOT NULL,
   source TEXT NOT NULL,
   calibration TEXT NOT NULL,            -- the calibration file, whole
   fingers INTEGER NOT NULL,
-  spacing_m REAL NOT NULL);
+  spacing_m REAL NOT NULL,
+  deleted_unix_s REAL,                  -- when it was moved to the trash; NULL: it was not
+  deleted_by TEXT NOT NULL DEFAULT '',
+  -- Where its time began on the clock of a host's boot (CLOCK_BOOTTIME): session_clock.h of the rig.
+  clock_boot_id TEXT NOT NULL DEFAULT '',
+  clock_origin_s REAL,
+  checksum INTEGER NOT NULL);           -- of this row and its objects
+CREATE UNIQUE INDEX session_name ON session(name) WHERE deleted_unix_s IS NULL;
+CREATE TABLE session_tally(             -- what a session's rows must add up to
+  session_id INTEGER PRIMARY KEY REFERENCES session,
+  touches INTEGER NOT NULL, done INTEGER NOT NULL, failed INTEGER NOT NULL,
+  touch_digest INTEGER NOT NULL,        -- sum of its touches' checksums, modulo 2^64
+  images INTEGER NOT NULL, image_digest INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
 CREATE TABLE session_object(            -- in order of appearance
   session_id INTEGER NOT NULL REFERENCES session,
   position INTEGER NOT NULL,
@@ -48,9 +66,10 @@ CREATE TABLE touch(
   synchronisation_uncertainty_s REAL,
   effector_drift REAL,
   recovered INTEGER NOT NULL DEFAULT 0,
+  series_checksum INTEGER,              -- of its row of touch_series; NULL: it has none
+  checksum INTEGER NOT NULL,            -- of this row and its fingers
   UNIQUE(session_id, id),
   UNIQUE(session_id, number));
-CREATE INDEX touch_stage ON touch(session_id, stage);
 CREATE INDEX touch_unfinished ON touch(stage) WHERE stage < 3;
 CREATE TABLE touch_finger(              -- one row a finger of every touch that is done
   touch_id INTEGER NOT NULL REFERENCES touch,
@@ -60,6 +79,10 @@ CREATE TABLE touch_finger(              -- one row a finger of every touch that 
   rotation_x_rad REAL, rotation_y_rad REAL, rotation_z_rad REAL,
   ticks INTEGER NOT NULL,               -- of the end effector's clock
   PRIMARY KEY(touch_id, finger)) WITHOUT ROWID;
+CREATE TABLE touch_series(              -- what was recorded during a touch, if that was asked for
+  touch_id INTEGER PRIMARY KEY REFERENCES touch,
+  encoding TEXT NOT NULL,               -- how the columns stand in the bytes
+  columns BLOB NOT NULL);
 CREATE TABLE image(
   image_id INTEGER PRIMARY KEY,
   session_id INTEGER NOT NULL REFERENCES session,
@@ -67,14 +90,19 @@ CREATE TABLE image(
   number INTEGER NOT NULL,
   object TEXT NOT NULL,
   placement TEXT NOT NULL,
-  x_m REAL, y_m REAL, z_m REAL,         -- base_from_camera
+  x_m REAL, y_m REAL, z_m REAL,         -- base_from_camera as it was commanded
   rotation_x_rad REAL, rotation_y_rad REAL, rotation_z_rad REAL,
+  -- base_from_camera as it was measured, and when; NULL: unknown.
+  measured_x_m REAL, measured_y_m REAL, measured_z_m REAL,
+  measured_rotation_x_rad REAL, measured_rotation_y_rad REAL, measured_rotation_z_rad REAL,
+  measured_unix_s REAL,
   unix_s REAL,
   width_px INTEGER NOT NULL, height_px INTEGER NOT NULL,
   png BLOB NOT NULL,
+  checksum INTEGER NOT NULL,
   UNIQUE(session_id, id),
   UNIQUE(session_id, number));
-CREATE TABLE fact(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE fact(key TEXT PRIMARY KEY, value TEXT NOT NULL, checksum INTEGER NOT NULL) WITHOUT ROWID;
 )sql";
 
 }  // namespace touchstone::session

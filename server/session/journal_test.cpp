@@ -249,9 +249,9 @@ TEST_F(JournalTest, ADeletedSessionIsGoneButNoneThatMoves) {
   auto journal = OpenWithSession();
   ASSERT_TRUE(journal->Begin("s", "a", "cup", "+z", "1").ok());
   ASSERT_TRUE(journal->Executing("s", "a", 1, 1).ok());
-  EXPECT_TRUE(absl::IsFailedPrecondition(journal->DeleteSession("s")));
+  EXPECT_TRUE(absl::IsFailedPrecondition(journal->DeleteSession("s", "ana")));
   ASSERT_TRUE(journal->Done("s", "a", ResultOf(1)).ok());
-  ASSERT_TRUE(journal->DeleteSession("s").ok());
+  ASSERT_TRUE(journal->DeleteSession("s", "ana").ok());
   EXPECT_TRUE(absl::IsNotFound(journal->Session("s").status()));
   ASSERT_TRUE(journal->EnsureSession(SessionNamed("s")).ok());
   EXPECT_EQ(journal->Session("s")->touches, 0u);

@@ -25,45 +25,68 @@ const char* StageInWords(TouchStage stage) {
 absl::StatusOr<JournalTouch> JournalFile::Begin(const std::string& session, const std::string& id,
                                                 const std::string& object, const std::string& up_face,
                                                 const std::string& command) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", id));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t touch_id, FindTouch(known.session_id, id));
   JournalTouch touch;
+  touch.id = id, touch.object = object, touch.up_face = up_face, touch.command = command;
+  return BeginAs(session, std::move(touch));
+}
+
+absl::StatusOr<JournalTouch> JournalFile::BeginExecuting(const std::string& session, const std::string& id,
+                                                         const std::string& object,
+                                                         const std::string& up_face,
+                                                         const std::string& command, uint32_t program_id,
+                                                         uint32_t boot_id) {
+  JournalTouch touch;
+  touch.id = id, touch.object = object, touch.up_face = up_face, touch.command = command;
+  touch.stage = TouchStage::kExecuting;
+  touch.program_id = program_id, touch.boot_id = boot_id;
+  return BeginAs(session, std::move(touch));
+}
+
+absl::StatusOr<JournalTouch> JournalFile::BeginAs(const std::string& session, JournalTouch touch) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", touch.id));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t touch_id, FindTouch(known.session_id, touch.id));
   if (touch_id != 0) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(touch, ReadTouch(file_.get(), touch_id));
-    if (touch.object != object || !SameCommand(touch.command, command))
+    TOUCHSTONE_ASSIGN_OR_RETURN(const JournalTouch before, ReadTouch(file_.get(), touch_id));
+    if (before.object != touch.object || !SameCommand(before.command, touch.command))
       return absl::AlreadyExistsError(absl::StrCat(
-          Called(), "touch id '", id, "' of session '", session, "' stands for another touch",
-          touch.object == object ? "" : absl::StrCat(" (of '", touch.object, "', not '", object, "')"),
+          Called(), "touch id '", touch.id, "' of session '", session, "' stands for another touch",
+          before.object == touch.object
+              ? ""
+              : absl::StrCat(" (of '", before.object, "', not '", touch.object, "')"),
           "; give this one an id of its own"));
-    if (touch.stage == TouchStage::kDone) return touch;
-    if (touch.stage != TouchStage::kFailed)
-      return absl::AbortedError(absl::StrCat(Called(), "touch '", id, "' of session '", session, "' is ",
-                                             StageInWords(touch.stage),
+    if (before.stage == TouchStage::kDone) return before;
+    if (before.stage != TouchStage::kFailed)
+      return absl::AbortedError(absl::StrCat(Called(), "touch '", touch.id, "' of session '", session,
+                                             "' is ", StageInWords(before.stage),
                                              ": it is under way, or an interruption left it and it is not "
                                              "yet reconciled; wait, then ask again"));
+    touch.command = before.command;
+    touch.attempt = before.attempt + 1;
   }
-  const JournalTouch before = touch;
-  touch = JournalTouch{};
-  touch.id = id;
-  touch.object = object;
-  touch.up_face = up_face;
-  touch.command = touch_id == 0 ? command : before.command;
-  touch.attempt = touch_id == 0 ? 1 : before.attempt + 1;
   TOUCHSTONE_RETURN_IF_ERROR(Write([&]() -> absl::Status {
+    TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
     TOUCHSTONE_ASSIGN_OR_RETURN(touch.number, NextNumber(known.session_id));
-    if (touch_id == 0) return InsertTouch(file_.get(), known.session_id, touch);
-    return file_
-        ->Prepare(
-            "UPDATE touch SET number = ?, placement = ?, stage = 1, attempt = ?, program_id = 0, boot_id = "
-            "0, "
-            "error = '', round = NULL, face = NULL WHERE touch_id = ?")
-        .Bind(static_cast<int64_t>(touch.number))
-        .Bind(up_face)
-        .Bind(int64_t{touch.attempt})
-        .Bind(touch_id)
-        .Run();
+    if (touch_id == 0) {
+      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch, nullptr, &tally));
+      return WriteTally(file_.get(), known.session_id, tally);
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(const TouchSeal before, CheckTouch(file_.get(), touch_id));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        file_
+            ->Prepare("UPDATE touch SET number = ?, placement = ?, stage = ?, attempt = ?, program_id = ?, "
+                      "boot_id = ?, error = '', round = NULL, face = NULL WHERE touch_id = ?")
+            .Bind(static_cast<int64_t>(touch.number))
+            .Bind(touch.up_face)
+            .Bind(static_cast<int64_t>(touch.stage))
+            .Bind(int64_t{touch.attempt})
+            .Bind(int64_t{touch.program_id})
+            .Bind(int64_t{touch.boot_id})
+            .Bind(touch_id)
+            .Run());
+    TOUCHSTONE_RETURN_IF_ERROR(SealTouch(file_.get(), touch_id, &before, &tally));
+    return WriteTally(file_.get(), known.session_id, tally);
   }));
   return touch;
 }
@@ -79,8 +102,8 @@ absl::Status JournalFile::Executing(const std::string& session, const std::strin
   });
 }
 
-absl::Status JournalFile::Done(const std::string& session, const std::string& id,
-                               const JournalResult& result) {
+absl::Status JournalFile::Done(const std::string& session, const std::string& id, const JournalResult& result,
+                               const JournalSeries* series) {
   return Advance(
       session, id, "be done", {TouchStage::kExecuting},
       [&](const Known& known, int64_t touch_id) -> absl::Status {
@@ -93,6 +116,7 @@ absl::Status JournalFile::Done(const std::string& session, const std::string& id
         update.Bind(result.time_uncertainty_s).Bind(result.synchronisation_uncertainty_s);
         update.Bind(result.effector_drift).Bind(int64_t{result.recovered}).Bind(touch_id);
         TOUCHSTONE_RETURN_IF_ERROR(update.Run());
+        if (series != nullptr) TOUCHSTONE_RETURN_IF_ERROR(InsertSeries(file_.get(), touch_id, *series));
         return InsertFingers(file_.get(), touch_id, result.fingers);
       });
 }
@@ -112,6 +136,7 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
   const std::lock_guard<std::mutex> lock(mutex_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
+    TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
     TOUCHSTONE_ASSIGN_OR_RETURN(uint64_t number, NextNumber(known.session_id));
     for (JournalTouch touch : touches) {
       TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", touch.id));
@@ -126,9 +151,9 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
                                                      touch.id,
                                                      "' already; add to a session of another name"));
       touch.number = number++;
-      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch));
+      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch, nullptr, &tally));
     }
-    return absl::OkStatus();
+    return WriteTally(file_.get(), known.session_id, tally);
   });
 }
 
@@ -142,9 +167,36 @@ absl::StatusOr<std::optional<JournalTouch>> JournalFile::Find(const std::string&
   return std::optional<JournalTouch>(std::move(touch));
 }
 
+absl::StatusOr<std::optional<JournalSeries>> JournalFile::Series(const std::string& session,
+                                                                 const std::string& id) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t touch_id, FindTouch(known.session_id, id));
+  if (touch_id == 0) return std::optional<JournalSeries>();
+  absl::StatusOr<std::optional<JournalSeries>> series = ReadSeries(file_.get(), touch_id);
+  if (Skipped(series.status())) return std::optional<JournalSeries>();
+  return series;
+}
+
+absl::StatusOr<std::optional<JournalTouch>> JournalFile::LastDone(const std::string& session) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
+  int64_t touch_id = 0;
+  {
+    SqliteStatement row = file_->Prepare(
+        "SELECT touch_id FROM touch WHERE session_id = ? AND stage = 3 ORDER BY number DESC LIMIT 1");
+    row.Bind(known.session_id);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+    if (!found) return std::optional<JournalTouch>();
+    touch_id = row.Integer(0);
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(JournalTouch touch, ReadTouch(file_.get(), touch_id));
+  return std::optional<JournalTouch>(std::move(touch));
+}
+
 absl::Status JournalFile::ForEachTouch(const std::string& session,
                                        const std::function<bool(const JournalTouch&)>& each) const {
-  return ForEach<JournalTouch>(session, TouchIds, ReadTouch, each);
+  return ForEach<JournalTouch>(session, ReadTouchIds, ReadTouch, each);
 }
 
 absl::StatusOr<std::vector<std::pair<std::string, JournalTouch>>> JournalFile::Unfinished() const {
@@ -153,7 +205,7 @@ absl::StatusOr<std::vector<std::pair<std::string, JournalTouch>>> JournalFile::U
   {
     SqliteStatement row = file_->Prepare(
         "SELECT session.name, touch_id FROM touch JOIN session USING(session_id) WHERE stage < 3 "
-        "ORDER BY session_id, number");
+        "AND deleted_unix_s IS NULL ORDER BY session_id, number");
     while (true) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, row.Step());
       if (!more) break;

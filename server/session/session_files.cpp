@@ -57,7 +57,7 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
   session.spacing_m = options.spacing_m;
   TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
   const absl::Status added = journal->AddFinished(options.session, touches);
-  if (!added.ok()) (void)journal->DeleteSession(options.session);
+  if (!added.ok()) (void)journal->EraseSession(options.session);
   return added;
 }
 

@@ -243,7 +243,7 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
   TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
   absl::Status added = journal->AddFinished(session.name, touches);
   for (size_t k = 0; k < images.size() && added.ok(); ++k) added = journal->AddImage(session.name, images[k]);
-  if (!added.ok()) (void)journal->DeleteSession(session.name);
+  if (!added.ok()) (void)journal->EraseSession(session.name);
   return added;
 }
 

@@ -77,6 +77,32 @@ std::string SqliteStatement::Text(int column) const {
              : std::string(static_cast<const char*>(bytes), sqlite3_column_bytes(statement_, column));
 }
 
+void SqliteStatement::AppendRow(absl::string_view except, std::string* bytes) const {
+  const auto append = [&](const auto& value) {
+    bytes->append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  const int columns = sqlite3_column_count(statement_);
+  for (int i = 0; i < columns; ++i) {
+    if (except == sqlite3_column_name(statement_, i)) continue;
+    const int type = sqlite3_column_type(statement_, i);
+    bytes->push_back(static_cast<char>(type));
+    if (type == SQLITE_INTEGER) append(sqlite3_column_int64(statement_, i));
+    if (type == SQLITE_FLOAT) append(sqlite3_column_double(statement_, i));
+    if (type != SQLITE_TEXT && type != SQLITE_BLOB) continue;
+    const void* text = sqlite3_column_blob(statement_, i);
+    const int64_t size = sqlite3_column_bytes(statement_, i);
+    append(size);
+    if (text != nullptr) bytes->append(static_cast<const char*>(text), static_cast<size_t>(size));
+  }
+}
+
+SqliteSnapshot::SqliteSnapshot(SqliteFile* file)
+    : file_(file), own_(sqlite3_get_autocommit(file->database_) != 0 && file->Run("BEGIN").ok()) {}
+
+SqliteSnapshot::~SqliteSnapshot() {
+  if (own_) sqlite3_exec(file_->database_, "COMMIT", nullptr, nullptr, nullptr);
+}
+
 absl::StatusOr<std::unique_ptr<SqliteFile>> SqliteFile::Open(const std::string& path, const std::string& name,
                                                              int flags) {
   sqlite3* database = nullptr;

@@ -40,6 +40,8 @@ class SqliteStatement {
   int64_t Integer(int column) const { return sqlite3_column_int64(statement_, column); }
   bool IsNull(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
   std::string Text(int column) const;  // or a blob
+  // The row's types and values, but for the column of this name: equal rows give equal bytes.
+  void AppendRow(absl::string_view except, std::string* bytes) const;
 
  private:
   friend class SqliteFile;
@@ -82,16 +84,35 @@ class SqliteFile {
     return status;
   }
 
+  // Whether its rows carry checksums; true unless said otherwise.
+  bool has_checksums() const { return has_checksums_; }
+  void set_has_checksums(bool has) { has_checksums_ = has; }
+
   // The error of the call that just failed.
   absl::Status Error(int result) const;
   const std::string& path() const { return path_; }
 
  private:
+  friend class SqliteSnapshot;
   SqliteFile(std::string path, sqlite3* database) : path_(std::move(path)), database_(database) {}
 
   const std::string path_;
   sqlite3* database_;
   std::map<const char*, sqlite3_stmt*> prepared_;
+  bool has_checksums_ = true;
+};
+
+// While it lives, everything is read as it stood at the first reading; within a transaction it changes nothing.
+class SqliteSnapshot {
+ public:
+  explicit SqliteSnapshot(SqliteFile* file);
+  ~SqliteSnapshot();
+  SqliteSnapshot(const SqliteSnapshot&) = delete;
+  SqliteSnapshot& operator=(const SqliteSnapshot&) = delete;
+
+ private:
+  SqliteFile* const file_;
+  const bool own_;
 };
 
 }  // namespace touchstone::session

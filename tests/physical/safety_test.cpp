@@ -91,18 +91,22 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
     EXPECT_FALSE(touch.get().status.ok());
   }
   WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > 0; },
-            "the watchdog stops the arm");
-  EXPECT_FALSE(emulator_->controller().Moving());
+            "the watchdog ends the program");
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  EXPECT_EQ(emulator_->controller().Count("protective_stops"), 0u);
   const auto before = Journalled();
   ASSERT_EQ(before.size(), 2u);
   EXPECT_EQ(before[1].stage, session::TouchStage::kExecuting)
       << "an interrupted touch is unknown until it is reconciled";
 
-  // A trip is a protective stop: a person looks, and unlocks it at the pendant.
+  // On a UR a watchdog ends the program and nothing else: no protective stop keeps the arm from moving again.
+  const uint64_t motions = emulator_->controller().Count("motions");
   StartGatewayProcess();
   EXPECT_EQ(RigState().interrupted_touches(), 1u);
-  EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
-  UnlockByHand();
+  EXPECT_EQ(emulator_->controller().Count("motions"), motions) << "it moved before anybody had asked it to";
+  if (State() == v1::SOURCE_STATE_STOPPED) {
+    EXPECT_TRUE(Reset().ok());
+  }
   ExpectTheTouchCanBeMade(FromAbove(0.0005), "killed");
   KillGatewayProcess();
   ExpectEveryResultIsItsOwnTouch();
@@ -120,8 +124,11 @@ TEST_F(Safety, AFrozenControllerIsNoticed) {
   const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::UNAVAILABLE) << answer.status.error_message();
   WaitUntil([&] { return State() != v1::SOURCE_STATE_DISCONNECTED; }, "the controller is back");
-  if (State() == v1::SOURCE_STATE_PROTECTIVE_STOP)  // it thawed with its watchdog overdue
-    UnlockByHand();
+  // It may have thawed with its watchdog overdue.
+  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  if (State() == v1::SOURCE_STATE_STOPPED) {
+    EXPECT_TRUE(Reset().ok());
+  }
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "frozen");
   ExpectEveryResultIsItsOwnTouch();
 }

@@ -21,6 +21,9 @@ struct ControllerOptions {
   bool powered = false;          // begins with power off, as a controller that was just switched on
   double finger_give_m = 0.050;  // pushed further than this beyond a contact: protective stop (C153)
   double position_noise_m = 5e-6, joint_noise_rad = 2e-5;  // of what it reports
+  // The arm is where its target was so long ago (README.md: the log that this is from). Contacts happen where
+  // the arm is.
+  double following_lag_s = 4.8e-4;
   uint64_t seed = 1;
 };
 
@@ -38,7 +41,8 @@ class Controller {
   virtual Eigen::Isometry3d BaseFromTip() const = 0;
   virtual Eigen::Isometry3d BaseFromFlange() const = 0;
   virtual bool Moving() const = 0;
-  // How often each kind of program was begun: "programs", "motions", "protective_stops", "watchdog_stops".
+  // How often something happened: "programs" and "motions" that began, "protective_stops", "watchdog_stops"
+  // (programs that a watchdog ended or paused).
   virtual uint64_t Count(const std::string& what) const = 0;
 };
 

@@ -35,7 +35,7 @@ class SimClock {
 // SI, simulated time.
 struct StraightMotion {
   uint64_t number = 0;  // counts all straight motions
-  double start_s = 0;
+  double start_s = 0;   // when the arm begins to move: it follows its target by the controller's lag
   Eigen::Isometry3d from = Eigen::Isometry3d::Identity();  // base_from_tip
   Eigen::Isometry3d to = Eigen::Isometry3d::Identity();
   double speed_m_s = 0, acceleration_m_s2 = 0;
@@ -76,7 +76,8 @@ class TipListener {
 //               disconnect        1: closes every connection once
 //               protective_stop   1: now
 //               emergency_stop    1: pressed; 0: released
-//               speed_scaling     0 to 1
+//               speed_scaling     0 to 1: what the trajectory limiter leaves of the commanded speed
+//               speed_slider      0 to 1: the pendant's slider; moved when this number changes
 //               finger_stiffness  N per mm of every finger's indentation, on the tip
 //               force_offset_n    N downwards that a payload which is set wrong pretends
 //   camera      stale_frame       1: repeats the last picture

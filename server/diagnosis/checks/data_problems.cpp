@@ -52,9 +52,9 @@ double RmseOf(const DiagnosisInput& input, ThreadPool* pool) {
 double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix, ThreadPool* pool) {
   auto set = std::make_shared<session::MeasurementSet>(*input.set);
   if (!session::ApplyFix(fix, set.get()).ok()) return NAN;
-  DiagnosisInput mended = input;
-  mended.set = set;
-  return RmseOf(mended, pool);
+  DiagnosisInput corrected = input;
+  corrected.set = set;
+  return RmseOf(corrected, pool);
 }
 
 // The command that fixes the file. The server may not know the file's name.

@@ -1,21 +1,17 @@
 #include "server/diagnosis/selection/time_course.h"
 
-#include <absl/strings/str_cat.h>
-#include <absl/strings/str_format.h>
-
 #include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <string>
 #include <utility>
 
 #include "server/base/units.h"
 #include "server/diagnosis/inference/laplace_evidence.h"
+#include "server/diagnosis/selection/candidate_course.h"
 #include "server/diagnosis/selection/held_out_curve.h"
 #include "server/diagnosis/selection/session_slots.h"
-#include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -25,34 +21,11 @@ constexpr int kMinTouchesPerSlot = 3;
 constexpr int kFineSlots = 12;  // in place of each slot round the best step's beginning
 constexpr int kWarmUps = 8;     // time constants, from the first to the second share of the session
 constexpr double kShortestWarmUp = 0.015, kLongestWarmUp = 0.5;
-constexpr int kWarmUpKnots = 16;
 constexpr int kMaxCycles = 16, kFrequenciesPerCycle = 2,
-              kPhases = 6;      // of waves; more cycles: a smooth curve's
-constexpr int kFinerWaves = 4;  // between two frequencies or phases
-constexpr int kKnotsPerCycle = 12;
+              kPhases = 6;              // of waves; more cycles: a smooth curve's
+constexpr int kFinerWaves = 4;          // between two frequencies or phases
 constexpr double kVisibleShare = 1e-6;  // of a column's square that the fit's own columns leave
 constexpr double kWorthRefiningNats = 3;
-
-enum class CourseKind { kStep, kStretch, kWarmUp, kWave, kConstant, kLine };
-
-// What one course explains, and how probable it is.
-struct CandidateCourse {
-  CourseKind kind = CourseKind::kStep;
-  int begin = 0, end = 0;  // slots [begin, end)
-  double constant = 0;     // time constant or period, in units of the covariate
-  double phase = 0;        // of a wave at the first touch, rad
-  int finger = -1;         // -1: each has a value of its own
-  Eigen::VectorXd values;  // of the fingers, mm, relative to each other
-  double log_evidence = -INFINITY;
-};
-
-// Where the values of a course stand in its curve.
-bool IsRising(const std::vector<double>& knots) {
-  const double finest = 1e-5 * (knots.back() - knots.front());  // what a file keeps of them
-  for (size_t j = 1; j < knots.size(); ++j)
-    if (!(knots[j] - knots[j - 1] > finest)) return false;
-  return true;
-}
 
 class CourseScorer {
  public:
@@ -69,6 +42,8 @@ class CourseScorer {
     return fingers_ >= 2 && slots_.touches() >= kEvenSlots * kMinTouchesPerSlot &&
            slots_.last() > slots_.first();
   }
+
+  const SessionSlots& slots() const { return slots_; }
 
   void DivideEvenly() {
     std::vector<int> begins;
@@ -182,44 +157,6 @@ class CourseScorer {
     return inference::LogSum(logs) - slots_.base_log();
   }
 
-  NamelessCurve Describe(const CandidateCourse& course) const {
-    NamelessCurve curve;
-    curve.covariate = covariate_.name;
-    curve.of_time = curve.per_finger = true;
-    curve.effective_dof = course.finger >= 0 ? 1 : fingers_ - 1;
-    std::vector<double> shares;
-    const auto edge = [&](int place, bool rises) {
-      curve.knots.push_back(slots_.At(place - 1)), shares.push_back(rises ? 0 : 1);
-      curve.knots.push_back(slots_.At(place)), shares.push_back(rises ? 1 : 0);
-    };
-    if (course.kind == CourseKind::kWave) {
-      const double step = course.constant / kKnotsPerCycle;
-      for (double x = slots_.first(); x < slots_.last() + step; x += step)
-        curve.knots.push_back(x), shares.push_back(WaveAt(course, x));
-    } else if (course.kind == CourseKind::kWarmUp) {
-      for (int j = 0; j <= kWarmUpKnots; ++j) {
-        // Even steps of what is left to rise, to three time constants; then one to the end.
-        const double x = -course.constant * std::log(1 - 0.95 * j / kWarmUpKnots);
-        if (x >= slots_.last()) break;
-        curve.knots.push_back(x), shares.push_back(1 - std::exp(-x / course.constant));
-      }
-      curve.knots.push_back(slots_.last()), shares.push_back(1 - std::exp(-slots_.last() / course.constant));
-    } else {
-      edge(slots_.Begin(course.begin), true);
-      // One touch alone is a peak of three knots.
-      if (course.end < slots_.slots() && slots_.Begin(course.end) - slots_.Begin(course.begin) > 1)
-        edge(slots_.Begin(course.end), false);
-      else if (course.end < slots_.slots())
-        curve.knots.push_back(slots_.At(slots_.Begin(course.end))), shares.push_back(0);
-    }
-    for (int i = 0; i < fingers_; ++i) {
-      curve.values.emplace_back();
-      for (const double share : shares) curve.values.back().push_back(share * course.values[i]);
-    }
-    curve.words = Words(course);
-    return curve;
-  }
-
   void HoldOut(const CandidateCourse& course, NamelessCurve* curve) const {
     Eigen::MatrixXd columns = slots_.Columns(WeightsOf(course));
     if (course.finger >= 0) columns = (columns * Direction(course.finger)).eval();
@@ -248,25 +185,6 @@ class CourseScorer {
     return std::log(finger < 0 ? 0.5 : 0.5 / fingers_);
   }
 
-  double WaveAt(const CandidateCourse& course, double x) const {
-    return std::sin(2 * kPi * (x - slots_.first()) / course.constant + course.phase);
-  }
-
-  // Of the course at one place, for a value of 1.
-  double ShareAt(const CandidateCourse& course, int place) const {
-    const double x = slots_.At(place);
-    switch (course.kind) {
-      case CourseKind::kWarmUp:
-        return 1 - std::exp(-std::max(x, 0.0) / course.constant);
-      case CourseKind::kWave:
-        return WaveAt(course, x);
-      case CourseKind::kLine:
-        return x / slots_.last();
-      default:
-        return 1;
-    }
-  }
-
   // The course's mean over each slot.
   Eigen::VectorXd WeightsOf(const CandidateCourse& course) const {
     Eigen::VectorXd weights = Eigen::VectorXd::Zero(slots_.slots());
@@ -276,7 +194,7 @@ class CourseScorer {
     }
     for (int slot = 0; slot < slots_.slots(); ++slot)
       for (int place = slots_.Begin(slot); place < slots_.Begin(slot + 1); ++place)
-        weights[slot] += ShareAt(course, place) / (slots_.Begin(slot + 1) - slots_.Begin(slot));
+        weights[slot] += ShareAt(course, slots_, place) / (slots_.Begin(slot + 1) - slots_.Begin(slot));
     return weights;
   }
 
@@ -312,47 +230,6 @@ class CourseScorer {
     course->log_evidence = inference::LogSum(logs) + LogShare(course->finger);
   }
 
-  // Touches have an order of their own where several sessions are one set.
-  std::string TouchWord(int place) const {
-    if (!slots_.InSessionOrder()) return absl::StrFormat("%.5g s of each session", slots_.At(place));
-    return absl::StrCat("touch ", slots_.TouchNumber(place));
-  }
-
-  // "finger l travels 0.25 mm farther".
-  std::string ValuesInWords(const CandidateCourse& course) const {
-    const auto name = [&](int finger) { return model::FingerName(finger, fingers_); };
-    if (course.finger >= 0) {
-      const double value = course.values[course.finger];
-      return absl::StrFormat("finger %s travels %.2g mm %s", name(course.finger), std::abs(value),
-                             value > 0 ? "farther" : "less far");
-    }
-    std::string words = "the fingers travel farther by";
-    for (int i = 0; i < fingers_; ++i)
-      absl::StrAppendFormat(&words, "%s %s %.2g mm", i > 0 ? "," : "", name(i), course.values[i]);
-    return words;
-  }
-
-  std::string Words(const CandidateCourse& course) const {
-    const std::string what = ValuesInWords(course);
-    const char* unit = covariate_.name == "session_time_s" ? "s" : "touches";
-    switch (course.kind) {
-      case CourseKind::kStep:
-        return absl::StrCat("from ", TouchWord(slots_.Begin(course.begin)), " on ", what);
-      case CourseKind::kStretch:
-        return absl::StrCat("from ", TouchWord(slots_.Begin(course.begin)), " to ",
-                            TouchWord(slots_.Begin(course.end) - 1), " ", what);
-      case CourseKind::kConstant:
-      case CourseKind::kLine:
-        return what;
-      case CourseKind::kWave:
-        return absl::StrFormat("%s and back in waves with a period of %.3g %s", what, course.constant, unit);
-      case CourseKind::kWarmUp:
-        return absl::StrFormat("%s with a time constant of %.2g %s, and then no more", what, course.constant,
-                               unit);
-    }
-    return what;
-  }
-
   const inference::Experiment& experiment_;
   const touches::TouchObservationModel& touches_;
   const inference::Fit& fit_;
@@ -386,10 +263,10 @@ TimeCourses ScoreTimeCourses(const inference::Experiment& experiment,
       gain_nats = std::max(gain_nats, refined_nats);
       best = refined;
     }
-    NamelessCurve curve = scorer.Describe(best);
+    NamelessCurve curve = CurveOf(best, scorer.slots(), covariate);
     curve.gain_nats = gain_nats;
     scorer.HoldOut(best, &curve);
-    if (IsRising(curve.knots)) courses.curves.push_back(std::move(curve));
+    if (HasRisingKnots(curve)) courses.curves.push_back(std::move(curve));
     if (finer && kind != CourseKind::kWave) scorer.DivideEvenly();
   }
   return courses;

@@ -206,6 +206,30 @@ TEST(UrArm, StopGoesOverTheDashboardWhereNoProgramCanBeSent) {
   EXPECT_TRUE(stopped);
 }
 
+// A controller on which nothing runs answers "Failed to execute: stop"; so may one that would not stop.
+TEST(UrArm, StopThatTheDashboardFailsIsDoneOnlyWhereNothingRuns) {
+  for (const bool running : {false, true}) {
+    FakeServer dashboard([&](FakeServer::Connection& connection, int) {
+      connection.Send("Connected: Universal Robots Dashboard Server\n");
+      for (std::string line = connection.Receive(); !line.empty(); line = connection.Receive())
+        connection.Send(line == "stop\n" ? "Failed to execute: stop\n"
+                        : line == "running\n"
+                            ? (running ? "Program running: true\n" : "Program running: false\n")
+                            : "could not understand\n");
+    });
+    UrArmOptions options = Nowhere();
+    options.dashboard_port = dashboard.port();
+    timing::ChangeNotifier changes;
+    const auto arm = ConnectUrArm(options, &changes);
+    ASSERT_TRUE(arm.ok());
+    const absl::Status stopped = (*arm)->Stop();
+    EXPECT_EQ(stopped.ok(), !running) << stopped;
+    if (running) {
+      EXPECT_THAT(std::string(stopped.message()), HasSubstr("Program running: true"));
+    }
+  }
+}
+
 // A stop needs nothing but the program port: no state, no dashboard.
 TEST(UrArm, StopIsSentOverTheProgramPortAlone) {
   std::mutex mutex;

@@ -111,22 +111,48 @@ class StampedJournal : public session::Journal {
   absl::StatusOr<session::JournalSession> Session(const std::string& name) const override {
     return journal_->Session(name);
   }
-  absl::Status DeleteSession(const std::string& name) override { return journal_->DeleteSession(name); }
+  bool has_checksums() const override { return journal_->has_checksums(); }
+  absl::StatusOr<bool> HasSession(const std::string& name) const override {
+    return journal_->HasSession(name);
+  }
+  absl::Status SetSessionClock(const std::string& name, const session::JournalClock& clock) override {
+    const Timed timed(stamps_);
+    return journal_->SetSessionClock(name, clock);
+  }
+  absl::StatusOr<session::JournalClock> SessionClock(const std::string& name) const override {
+    return journal_->SessionClock(name);
+  }
+  absl::Status DeleteSession(const std::string& name, const std::string& by) override {
+    return journal_->DeleteSession(name, by);
+  }
+  absl::StatusOr<std::vector<session::JournalSession>> DeletedSessions() const override {
+    return journal_->DeletedSessions();
+  }
+  absl::Status RestoreSession(const std::string& name) override { return journal_->RestoreSession(name); }
+  absl::Status PurgeSession(const std::string& name) override { return journal_->PurgeSession(name); }
+  absl::Status EraseSession(const std::string& name) override { return journal_->EraseSession(name); }
   absl::StatusOr<session::JournalTouch> Begin(const std::string& session, const std::string& id,
                                               const std::string& object, const std::string& up_face,
                                               const std::string& command) override {
     const Timed timed(stamps_);
     return journal_->Begin(session, id, object, up_face, command);
   }
+  absl::StatusOr<session::JournalTouch> BeginExecuting(const std::string& session, const std::string& id,
+                                                       const std::string& object, const std::string& up_face,
+                                                       const std::string& command, uint32_t program_id,
+                                                       uint32_t boot_id) override {
+    const Timed timed(stamps_);
+    return journal_->BeginExecuting(session, id, object, up_face, command, program_id, boot_id);
+  }
   absl::Status Executing(const std::string& session, const std::string& id, uint32_t program_id,
                          uint32_t boot_id) override {
     const Timed timed(stamps_);
     return journal_->Executing(session, id, program_id, boot_id);
   }
-  absl::Status Done(const std::string& session, const std::string& id,
-                    const session::JournalResult& result) override {
+  absl::Status Done(const std::string& session, const std::string& id, const session::JournalResult& result,
+                    const session::JournalSeries* series) override {
     const Timed timed(stamps_);
-    return journal_->Done(session, id, result);
+    return journal_->Done(session, id, result, series);
   }
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override {
     return journal_->Failed(session, id, error);
@@ -138,6 +164,13 @@ class StampedJournal : public session::Journal {
   absl::StatusOr<std::optional<session::JournalTouch>> Find(const std::string& session,
                                                             const std::string& id) const override {
     return journal_->Find(session, id);
+  }
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                               const std::string& id) const override {
+    return journal_->Series(session, id);
+  }
+  absl::StatusOr<std::optional<session::JournalTouch>> LastDone(const std::string& session) const override {
+    return journal_->LastDone(session);
   }
   absl::Status ForEachTouch(const std::string& session,
                             const std::function<bool(const session::JournalTouch&)>& each) const override {
@@ -156,9 +189,9 @@ class StampedJournal : public session::Journal {
   absl::Status CopySession(const std::string& name, session::Journal* to) const override {
     return journal_->CopySession(name, to);
   }
-  absl::Status SetMetadata(const std::string& key, const std::string& value) override {
+  absl::Status SetMetadata(const std::vector<std::pair<std::string, std::string>>& values) override {
     const Timed timed(stamps_);
-    return journal_->SetMetadata(key, value);
+    return journal_->SetMetadata(values);
   }
   absl::StatusOr<std::string> Metadata(const std::string& key) const override {
     return journal_->Metadata(key);

@@ -28,6 +28,8 @@ constexpr double kStateEveryS = 0.1;  // primary and secondary, host time
 constexpr double kMinCycleS = 0.001;  // of the control loop, host time
 constexpr double kMaxIdleS = 0.005;   // between two looks at the faults, host time
 constexpr size_t kMaxConnections = 64, kMaxLine = 65536;
+constexpr double kRoundingS = 1e-9;  // of the times of cycles
+constexpr int kMaxLateData = 50;     // packages that a late host makes up for
 
 enum Port { kDashboard, kPrimary, kSecondary, kRtde, kPorts };
 
@@ -38,7 +40,8 @@ struct Client {
   std::string received;
   ProgramReader programs;
   std::unique_ptr<RtdeSession> rtde;
-  double next_data_s = 0;
+  double next_data_s = 0;    // simulated time at which the next package is due
+  double data_cycle_s = -1;  // that of the last one
 };
 
 // One thread serves the sockets and moves the arm.
@@ -82,11 +85,11 @@ class EmulatedController : public Controller {
 
   Eigen::Isometry3d BaseFromTip() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
-    return machine_.FlangeAt(clock_->NowS()) * machine_.flange_from_tip();
+    return machine_.ActualFlangeAt(clock_->NowS()) * machine_.flange_from_tip();
   }
   Eigen::Isometry3d BaseFromFlange() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
-    return machine_.FlangeAt(clock_->NowS());
+    return machine_.ActualFlangeAt(clock_->NowS());
   }
   bool Moving() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
@@ -141,7 +144,8 @@ class EmulatedController : public Controller {
         next = std::min(next, host_s + (machine_.NextCycleS() - sim_s) / clock_->speedup());
     }
     for (const Client& client : clients_) {
-      if (client.rtde && client.rtde->started()) next = std::min(next, client.next_data_s);
+      if (client.rtde && client.rtde->started())
+        next = std::min(next, host_s + (client.next_data_s - sim_s) / clock_->speedup());
       next = std::min(next, client.connection.NextReleaseS());
     }
     return next;
@@ -165,6 +169,7 @@ class EmulatedController : public Controller {
     const auto changed = [this] {
       if (clock_->speedup() > 1) SendData(true);
     };
+    SendDueData(clock_->NowS(), changed);
     machine_.Advance(clock_->NowS(), changed);
     input_came_ = false;
     for (Client& client : clients_) Receive(&client);
@@ -175,7 +180,6 @@ class EmulatedController : public Controller {
       for (Client& client : clients_)
         if (client.port == kPrimary || client.port == kSecondary) client.connection.Send(packet);
     }
-    SendData(false);
     SendStates();
     const double host_s = HostNowS();
     for (auto client = clients_.begin(); client != clients_.end();) {
@@ -216,7 +220,8 @@ class EmulatedController : public Controller {
         const bool was_started = client->rtde->started();
         client->connection.Send(client->rtde->Receive(&client->received));
         input_came_ = true;
-        if (!was_started && client->rtde->started()) client->next_data_s = HostNowS();
+        if (!was_started && client->rtde->started())
+          client->next_data_s = machine_.now_s() + CycleBoundaryIn(machine_.now_s());
         if (client->rtde->broken()) client->connection.CloseWhenSent();
       }
     }
@@ -237,19 +242,39 @@ class EmulatedController : public Controller {
     if (client->received.size() > kMaxLine) client->connection.Close();
   }
 
-  // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest
-  // once it does.
+  // Every package that has become due by `now_s`, made at its own cycle, before anything that has come since is
+  // read: as a controller sends them, whose clock waits for nobody. What is late by more than kMaxLateData is
+  // skipped.
+  void SendDueData(double now_s, const std::function<void()>& changed) {
+    for (int count = 0;; ++count) {
+      double due_s = std::numeric_limits<double>::infinity();
+      for (const Client& client : clients_)
+        if (client.rtde && client.rtde->started()) due_s = std::min(due_s, client.next_data_s);
+      if (due_s > now_s) return;
+      const bool late = count >= kMaxLateData;
+      machine_.Advance(late ? now_s : due_s + kRoundingS, changed);
+      SendData(false);
+      if (late) return;
+    }
+  }
+
+  // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest once it does.
+  // No cycle is sent twice to anybody.
   void SendData(bool all) {
-    const double host_s = HostNowS();
+    const double host_s = HostNowS(), now_s = machine_.now_s();
+    const double cycle_s = std::floor(now_s / machine_.cycle_s() + 1e-6) * machine_.cycle_s();
     std::optional<RobotState> state;
     for (Client& client : clients_) {
       if (!client.rtde || !client.rtde->started()) continue;
       if (!all) {
-        if (client.next_data_s > host_s) continue;
-        const double period_s = 1 / client.rtde->rate_hz();
-        client.next_data_s += period_s;
-        if (client.next_data_s <= host_s) client.next_data_s = host_s + period_s;  // late: skips
+        if (client.next_data_s > now_s) continue;
+        // The rate is one of host time: an accelerated rig sends no more packages than another.
+        const double period_s = clock_->speedup() / client.rtde->rate_hz();
+        client.next_data_s = machine_.CycleAtOrAfter(client.next_data_s + period_s);
+        if (client.next_data_s <= now_s) client.next_data_s = machine_.CycleAtOrAfter(now_s + period_s);
       }
+      if (cycle_s <= client.data_cycle_s) continue;
+      client.data_cycle_s = cycle_s;
       if (client.connection.Busy()) continue;
       double release_s = 0;
       if (faults_) {

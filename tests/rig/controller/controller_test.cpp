@@ -150,7 +150,7 @@ TEST(Controller, StopsProtectivelyWhereAFingerIsPushedTooFar) {
   EXPECT_EQ(controller->Count("programs"), 1u);
 }
 
-TEST(Controller, StopsWhenNobodyFeedsTheWatchdog) {
+TEST(Controller, EndsTheProgramWhoseWatchdogNobodyFeeds) {
   SimClock clock(10);
   Faults faults;
   const auto controller = Controller::Start(Powered(), &clock, &faults, nullptr);
@@ -165,9 +165,10 @@ TEST(Controller, StopsWhenNobodyFeedsTheWatchdog) {
   touch.Until([&] { return touch.timestamp_s > fed_until_s; });
   EXPECT_EQ(touch.safety_mode, 1);
   EXPECT_EQ(touch.runtime_state, 2u);
-  touch.Until([&] { return touch.safety_mode == 3; }, false);
+  touch.Until([&] { return touch.runtime_state == 1; }, false);
   EXPECT_EQ(controller->Count("watchdog_stops"), 1u);
-  EXPECT_EQ(touch.runtime_state, 1u);
+  EXPECT_EQ(controller->Count("protective_stops"), 0u);
+  EXPECT_EQ(touch.safety_mode, 1);
 }
 
 }  // namespace

@@ -60,13 +60,11 @@ std::string AnswerDashboard(const std::string& line, const std::string& model, M
     machine->ReleaseBrakes();
     return "Brake releasing";
   }
-  // No program was ever loaded on this controller.
-  if (lower == "play") return "Failed to execute: play";
-  if (lower == "pause") return "Failed to execute: pause";
-  if (lower == "stop") {
-    machine->StopProgram();
-    return "Stopped";
-  }
+  // No program was ever loaded on this controller: play only resumes a program that was paused.
+  if (lower == "play") return machine->ResumeProgram() ? "Starting program" : "Failed to execute: play";
+  if (lower == "pause") return machine->PauseProgram() ? "Pausing program" : "Failed to execute: pause";
+  // UR's table of dashboard commands (article 15690): "Stopped", on failure "Failed to execute: stop".
+  if (lower == "stop") return machine->StopProgram() ? "Stopped" : "Failed to execute: stop";
   if (lower == "running")
     return std::string("Program running: ") + (machine->program_running() ? "true" : "false");
   if (lower == "programstate") return "STOPPED";

@@ -30,6 +30,7 @@ constexpr Row kRows[] = {
     {"protective_stop", Range::kSwitch, 0, false},
     {"emergency_stop", Range::kSwitch, 0, false},
     {"speed_scaling", Range::kProbability, 1, false},
+    {"speed_slider", Range::kProbability, 1, false},
     {"stale_frame", Range::kSwitch, 0, false},
     {"camera_unplug", Range::kPositive, 0, true},
     {"finger_stiffness", Range::kPositive, 0.05, false},

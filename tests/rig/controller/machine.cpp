@@ -35,39 +35,51 @@ Machine::Machine(const ControllerOptions& options, Faults* faults, TipListener* 
 Machine::~Machine() = default;
 
 void Machine::Later(double seconds, std::function<void()> action) {
-  later_.push_back({now_s_ + seconds, std::move(action)});
+  later_.push_back({CycleAtOrAfter(now_s_ + seconds), std::move(action)});
 }
 
 double Machine::NextEventS() const {
   if (frozen_) return kNever;
-  double next = NextMotionEventS();
+  double next = std::min(NextMotionEventS(), NextScriptS());
   for (const auto& [time_s, action] : later_) next = std::min(next, time_s);
-  if (script_) {
-    next = std::min(next, script_fresh_ ? now_s_ : script_->NextWakeS());
+  if (script_ && !paused_)
     for (const Watchdog& watchdog : watchdogs_)
-      if (watchdog.trips) next = std::min(next, watchdog.fed_s + watchdog.period_s);
-  }
+      if (watchdog.action != Watchdog::kIgnore) next = std::min(next, watchdog.fed_s + watchdog.period_s);
   return next;
 }
 
 bool Machine::NeedsCycles() const {
-  return !frozen_ && (motion_ || (script_ && script_->NextCycleS() < kNever));
+  return !frozen_ && (motion_ || (script_ && !paused_ && script_->NextCycleS() < kNever));
+}
+
+double Machine::CycleAtOrAfter(double time_s) const {
+  return std::ceil(time_s / cycle_s_ - 1e-6) * cycle_s_;
+}
+
+bool Machine::OnCycle(double time_s) const {
+  const double cycles = time_s / cycle_s_;
+  return std::abs(cycles - std::round(cycles)) < 1e-5;
+}
+
+bool Machine::Moving() const {
+  if (script_ && !paused_ && (script_fresh_ || (!motion_ && script_->WaitsForRest()))) return true;
+  return motion_ && !(paused_ && !motion_->stopping && motion_->profile->SpeedAt(now_s_) == 0);
 }
 
 void Machine::Advance(double now_s, const std::function<void()>& changed) {
   if (frozen_) return;
   for (;;) {
-    double next = NextMotionEventS();
+    double next = std::min(NextMotionEventS(), NextScriptS());
     for (const auto& [time_s, action] : later_) next = std::min(next, time_s);
-    if (script_) {
-      if (script_fresh_) next = now_s_;
-      next = std::min(next, script_->NextWakeS());
+    if (script_ && !paused_) {
       const double others_s = std::min(next, now_s);
-      if (others_s - script_->NextCycleS() > kMaxCyclesAtOnce * cycle_s_) script_->SkipCyclesTo(others_s);
-      next = std::min(next, script_->NextCycleS());
+      if (others_s - script_->NextCycleS() > kMaxCyclesAtOnce * cycle_s_)
+        script_->SkipCyclesTo(CycleAtOrAfter(others_s - cycle_s_));
+      if (script_->NextCycleS() < kNever)
+        next = std::min(next, std::max(CycleAtOrAfter(std::max(script_->NextCycleS(), now_s_)), now_s_));
     }
     if (motion_ && motion_->number) {
-      const double speed = std::max(motion_->speed * scaling_ * motion_->line->MetresPerLength(), 1e-9);
+      const double speed = std::max(DrivenSpeed(*motion_) * motion_->line->MetresPerLength(), 1e-9);
       next = std::min(
           next, last_progress_s_ + std::max(kProgressEveryM / speed, (now_s - now_s_) / kMaxProgressSteps));
     }
@@ -85,6 +97,7 @@ void Machine::Advance(double now_s, const std::function<void()>& changed) {
       later_.erase(later_.begin() + i--);
       action();
     }
+    if (!OnCycle(now_s_)) continue;
     RunScript();
     Tell(changed);
   }
@@ -97,21 +110,6 @@ void Machine::Advance(double now_s, const std::function<void()>& changed) {
 void Machine::Tell(const std::function<void()>& changed) {
   if (changed_ && changed) changed();
   changed_ = false;
-}
-
-void Machine::CheckWatchdogs(const std::function<void()>& changed) {
-  if (frozen_ || !script_) return;
-  for (const Watchdog& watchdog : watchdogs_) {
-    if (!watchdog.trips || now_s_ - watchdog.fed_s < watchdog.period_s) continue;
-    ++watchdog_stops_;
-    ProtectiveStop(0, "RTDE watchdog: '" + std::string(watchdog.variable) + "' was not updated in time");
-    break;  // the program has ended, and its watchdogs with it
-  }
-  Tell(changed);
-}
-
-double Machine::NextCycleS() const {
-  return script_ && !frozen_ ? script_->NextCycleS() : kNever;
 }
 
 void Machine::Freeze(double now_s) {
@@ -128,69 +126,8 @@ void Machine::Thaw(double now_s) {
   last_progress_s_ = now_s_;
   for (Watchdog& watchdog : watchdogs_) watchdog.fed_s += now_s - frozen_at_s_;
   if (!motion_) return;
-  if (motion_->stopping)
-    motion_->profile->Stop(now_s_, motion_->acceleration);
-  else
-    motion_->profile->Cruise(now_s_, motion_->speed * scaling_, motion_->acceleration);
-}
-
-void Machine::StartProgram(const std::string& script) {
-  ScriptProgram program;
-  try {
-    program = Compile(script, Builtins());
-  } catch (const CompileError& error) {
-    Announce({Announcement::kException, "", error.what(), error.line, error.column});
-    return;
-  }
-  if (robot_mode_ != kRunning || safety_mode_ != kNormal) {
-    Announce({Announcement::kError, "",
-              "program '" + program.name + "' was not started: robot mode " + std::to_string(robot_mode_) +
-                  ", safety mode " + std::to_string(safety_mode_),
-              0, 0});
-    return;
-  }
-  if (program.secondary) {  // beside the running program, without feedback; it must not wait for anything
-    ScriptMachine machine(std::move(program), this, cycle_s_);
-    in_secondary_ = true;
-    machine.Run(now_s_);
-    in_secondary_ = false;
-    return;
-  }
-  if (script_) EndProgram();
-  ++programs_;
-  Announce({Announcement::kKey, "PROGRAM_XXX_STARTED", program.name});
-  script_ = std::make_unique<ScriptMachine>(std::move(program), this, cycle_s_);
-  script_fresh_ = true;
-  changed_ = true;
-}
-
-bool Machine::StopProgram() {
-  const bool was_running = script_ != nullptr;
-  if (script_) EndProgram();
-  Halt();
-  return was_running;
-}
-
-void Machine::RunScript() {
-  if (!script_) return;
-  script_fresh_ = false;
-  const bool goes_on = script_->Run(now_s_);
-  // A motion whose thread has ended belongs to nobody; unless stopl has taken it over, it ends now.
-  if (motion_ && motion_->thread >= 0 && !script_->Lives(motion_->thread)) motion_->thread = -1;
-  if (!goes_on) {
-    if (const auto& failure = script_->failure())
-      Announce({Announcement::kException, "", failure->what, failure->line, failure->column});
-    EndProgram();
-  }
-  if (motion_ && motion_->thread < 0) Halt();
-}
-
-void Machine::EndProgram() {
-  Announce({Announcement::kKey, "PROGRAM_XXX_STOPPED", script_->program().name});
-  script_.reset();
-  watchdogs_.clear();
-  if (motion_) motion_->thread = -1;
-  changed_ = true;
+  if (motion_->stopping) motion_->profile->Stop(now_s_, motion_->acceleration);
+  DriveOn();
 }
 
 void Machine::PowerOn() {
@@ -282,19 +219,6 @@ void Machine::LookAtFaults() {
   Rescale();
 }
 
-void Machine::InputWritten(const std::string& name) {
-  for (Watchdog& watchdog : watchdogs_)
-    if (watchdog.variable == name) watchdog.fed_s = now_s_;
-}
-
-void Machine::SetWatchdog(const std::string& variable, double min_hz, const std::string& action) {
-  watchdogs_.erase(std::remove_if(watchdogs_.begin(), watchdogs_.end(),
-                                  [&](const Watchdog& watchdog) { return watchdog.variable == variable; }),
-                   watchdogs_.end());
-  // A trip is a protective stop whether the action is "stop" or "pause"; "ignore" watches without one.
-  if (min_hz > 0) watchdogs_.push_back({variable, 1 / min_hz, action != "ignore", now_s_});
-}
-
 void Machine::WriteOutput(int index, int32_t value) {
   changed_ |= registers_.output_int[index] != value;
   registers_.output_int[index] = value;
@@ -312,11 +236,6 @@ void Machine::WriteOutput(int index, bool value) {
 
 void Machine::SetDigitalOutputs(uint32_t mask, uint32_t values) {
   digital_outputs_ = (digital_outputs_ & ~static_cast<uint64_t>(mask)) | (values & mask);
-}
-
-void Machine::SetSpeedSlider(double fraction) {
-  slider_ = std::clamp(fraction, 0.0, 1.0);
-  Rescale();
 }
 
 void Machine::SetTool(const Eigen::Isometry3d& flange_from_tip) {

@@ -20,7 +20,7 @@ namespace touchstone::rig {
 
 enum RobotMode { kPowerOff = 3, kPowerOn = 4, kIdle = 5, kRunning = 7 };
 enum SafetyMode { kNormal = 1, kProtectiveStop = 3, kRobotEmergencyStop = 7 };
-enum RuntimeState { kStopping = 0, kStopped = 1, kPlaying = 2 };
+enum RuntimeState { kStopping = 0, kStopped = 1, kPlaying = 2, kPausing = 3, kPaused = 4 };
 
 struct Registers {
   std::array<int32_t, 48> input_int{}, output_int{};
@@ -36,14 +36,16 @@ struct Announcement {
   int first = 0, second = 0;  // code and argument of an error; line and column of an exception
 };
 
-// Everything that RTDE and the primary interface tell, at one time. "actual" is the target with noise.
+// Everything that RTDE and the primary interface tell, at one time of the controller's grid of cycles. "actual" is
+// where the target was `following_lag_s` before, with noise.
 struct RobotState {
   double timestamp_s = 0;
   Joints target_q, target_qd, target_qdd, actual_q, actual_qd;
   Vector6 target_tcp_pose, target_tcp_speed, actual_tcp_pose, actual_tcp_speed, actual_tcp_force, tcp_offset;
   int robot_mode = 0, safety_mode = 0, runtime_state = 0;
   uint32_t robot_status_bits = 0, safety_status_bits = 0;
-  double speed_scaling = 0, target_speed_fraction = 0;
+  double speed_scaling = 0;          // of the trajectory limiter alone
+  double target_speed_fraction = 0;  // the slider; the arm's speed is the commanded one times both
   uint64_t digital_inputs = 0, digital_outputs = 0;
   double payload_kg = 0;
   Eigen::Vector3d payload_cog_m = Eigen::Vector3d::Zero(), elbow_m = Eigen::Vector3d::Zero();
@@ -59,6 +61,7 @@ class Machine : public ScriptHost {
 
   double cycle_s() const { return cycle_s_; }
   double now_s() const { return now_s_; }
+  double CycleAtOrAfter(double time_s) const;
 
   // Lets everything happen up to then, each thing at its own time. `changed` is called whenever output
   // registers or a mode have changed, at the time when they did.
@@ -74,10 +77,13 @@ class Machine : public ScriptHost {
   void Freeze(double now_s);
   void Thaw(double now_s);
 
-  // Programs. Errors become announcements.
+  // Programs. Errors become announcements. Like everything else that the controller does by itself, programs run at
+  // the cycles of its clock.
   void StartProgram(const std::string& script);
-  bool StopProgram();
-  bool program_running() const { return script_ != nullptr; }
+  bool StopProgram();    // false: none ran
+  bool PauseProgram();   // likewise
+  bool ResumeProgram();  // false: none was paused
+  bool program_running() const { return script_ != nullptr && !paused_; }
 
   // Dashboard.
   void PowerOn();
@@ -98,9 +104,14 @@ class Machine : public ScriptHost {
   std::vector<Announcement> TakeAnnouncements();
   void Announce(Announcement announcement);
 
+  // Of the target, now or up to one motion before; of the arm that follows it.
   Eigen::Isometry3d FlangeAt(double time_s) const;
+  Eigen::Isometry3d ActualFlangeAt(double time_s) const {
+    return FlangeAt(time_s - options_.following_lag_s);
+  }
   const Eigen::Isometry3d& flange_from_tip() const { return flange_from_tip_; }
-  bool Moving() const { return motion_ != nullptr; }
+  // Or about to: a program begins, or goes on after a motion, at the next cycle.
+  bool Moving() const;
   uint64_t Count(const std::string& what) const;
   const ArmGeometry& geometry() const { return geometry_; }
 
@@ -122,10 +133,12 @@ class Machine : public ScriptHost {
   uint64_t digital_inputs() const { return 0; }
   uint64_t digital_outputs() const { return digital_outputs_; }
   Joints JointsAt(double time_s) const;
-  double scaling() const { return scaling_; }
 
  private:
   struct Motion;
+  struct JointMotion;
+  JointMotion TargetAt(double time_s) const;
+  Vector6 TipSpeed(const JointMotion& joints) const;
   Outcome Begin(std::unique_ptr<Motion> motion, double speed, double acceleration, double duration_s,
                 double first_speed);
   // Empty: the thread may begin a motion now. Otherwise it has to wait.
@@ -141,6 +154,10 @@ class Machine : public ScriptHost {
   void EmergencyStop(bool pressed);
   void LookAtFaults();
   void Rescale();
+  double DrivenSpeed(const Motion& motion) const;  // as commanded, times limiter and slider; 0 while paused
+  void DriveOn();                                  // the motion goes on at the speed that holds now
+  bool OnCycle(double time_s) const;
+  double NextScriptS() const;  // when the program wants to go on, beside the cycles that it waits for
   void SetSafety(int mode);
   double NextMotionEventS() const;
   void Later(double seconds, std::function<void()> action);
@@ -157,7 +174,8 @@ class Machine : public ScriptHost {
   Eigen::Isometry3d flange_from_tip_ = Eigen::Isometry3d::Identity();
   double payload_kg_ = 0;
   Eigen::Vector3d payload_cog_m_ = Eigen::Vector3d::Zero();
-  std::unique_ptr<Motion> motion_;
+  std::unique_ptr<Motion> motion_, past_;  // past_: the one before, which ended at past_end_s_
+  double past_end_s_ = 0;
   uint64_t straight_motions_ = 0;
   double last_progress_s_ = 0;
 
@@ -167,7 +185,7 @@ class Machine : public ScriptHost {
   double frozen_at_s_ = 0;
   std::vector<std::pair<double, int>> safety_history_;
   std::vector<std::pair<double, std::function<void()>>> later_;
-  double slider_ = 1, scaling_ = 1;
+  double slider_ = 1, slider_fault_ = 1, limiter_ = 1;
 
   Registers registers_;
   uint64_t digital_outputs_ = 0;
@@ -175,11 +193,12 @@ class Machine : public ScriptHost {
   std::vector<Announcement> announcements_;
 
   std::unique_ptr<ScriptMachine> script_;
-  bool script_fresh_ = false, in_secondary_ = false;
+  bool script_fresh_ = false, in_secondary_ = false, paused_ = false;
+  double script_due_s_ = 0;  // the cycle at which it begins, or goes on after a motion
   struct Watchdog {
     std::string variable;
     double period_s;
-    bool trips;
+    enum Action { kIgnore, kPause, kStop } action;
     double fed_s;
   };
   std::vector<Watchdog> watchdogs_;

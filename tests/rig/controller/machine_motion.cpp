@@ -4,18 +4,12 @@
 #include <cmath>
 
 #include "tests/rig/controller/never.h"
-// Noise. In the log of a UR5e in motion that the project's shared data hold (125 samples a second), a joint
-// that stands still scatters by 2.3e-5 rad about its target; moving joints lag by 2e-4 to 4e-4 rad and their
-// speeds scatter by 2e-3 to 4e-3 rad/s. Speeds are trapezoids: level at the commanded 60 deg/s between
-// straight ramps. Here "actual" is the target with independent normal noise (options; speeds 50 times as much
-// while it moves), without lag, so that a test knows the truth.
 
 namespace touchstone::rig {
 namespace {
 
 constexpr double kHaltLine = 5, kHaltJoints = 10;  // m/s^2, rad/s^2, of stops that nobody gave a number for
 constexpr double kFarM = 2;                        // speedl goes on so far at most: beyond any reach
-constexpr double kFirstTimestampS = 60;            // some clients wait for a time stamp of 40 s
 
 }  // namespace
 
@@ -39,7 +33,9 @@ void Machine::FinishMotion(double time_s) {
   const double length = motion_->profile->EndLength();
   joints_ = motion_->path->JointsAt(length);
   const uint64_t number = motion_->number;
-  motion_.reset();
+  past_ = std::move(motion_);
+  past_end_s_ = time_s;
+  script_due_s_ = CycleAtOrAfter(time_s);
   if (number && tip_) tip_->OnMotionEnded(number, time_s);
   changed_ = true;
 }
@@ -51,12 +47,29 @@ void Machine::Halt() {
   motion_->profile->Stop(now_s_, motion_->acceleration);
 }
 
-void Machine::Rescale() {
-  const double scaling = slider_ * (faults_ ? faults_->Get("speed_scaling") : 1);
-  if (scaling == scaling_) return;
-  scaling_ = scaling;
+double Machine::DrivenSpeed(const Motion& motion) const {
+  return paused_ ? 0 : motion.speed * limiter_ * slider_;
+}
+
+void Machine::DriveOn() {
   if (motion_ && !motion_->stopping)
-    motion_->profile->Cruise(now_s_, motion_->speed * scaling_, motion_->acceleration);
+    motion_->profile->Cruise(now_s_, DrivenSpeed(*motion_), motion_->acceleration);
+}
+
+void Machine::Rescale() {
+  const double before = limiter_ * slider_;
+  if (faults_) {
+    limiter_ = faults_->Get("speed_scaling");
+    const double slider = faults_->Get("speed_slider");
+    if (slider != slider_fault_) slider_ = slider_fault_ = slider;
+  }
+  if (limiter_ * slider_ != before) DriveOn();
+}
+
+// What a client writes and what a person sets at the pendant is one slider: the last one counts.
+void Machine::SetSpeedSlider(double fraction) {
+  slider_ = std::clamp(fraction, 0.0, 1.0);
+  DriveOn();
 }
 
 void Machine::RequireReady() const {
@@ -91,9 +104,11 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
   motion->acceleration = acceleration;
   // At a reduced speed scaling the same way is driven in stretched time: speed by s, acceleration
   // by its square.
-  const double ramp = scaling_ > 0 ? acceleration * scaling_ * scaling_ : acceleration;
-  motion->profile = std::make_unique<SpeedProfile>(now_s_, length, speed * scaling_, ramp, first_speed);
-  if (const auto obstacle = motion->path->FirstObstacle(speed * scaling_, ramp)) {
+  const double scaling = limiter_ * slider_, driven = DrivenSpeed(*motion);
+  const double ramp = scaling > 0 ? acceleration * scaling * scaling : acceleration;
+  motion->lag_s = options_.following_lag_s;
+  motion->profile = std::make_unique<SpeedProfile>(now_s_, length, driven, ramp, first_speed);
+  if (const auto obstacle = motion->path->FirstObstacle(driven, ramp)) {
     motion->obstacle_at = obstacle->length;
     motion->obstacle = obstacle->why;
   }
@@ -105,10 +120,10 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
     if (tip_) {
       StraightMotion begun;
       begun.number = motion_->number;
-      begun.start_s = now_s_;
+      begun.start_s = now_s_ + motion_->lag_s;
       begun.from = motion_->line->from();
       begun.to = motion_->line->to();
-      begun.speed_m_s = speed * scaling_ * motion_->line->MetresPerLength();
+      begun.speed_m_s = driven * motion_->line->MetresPerLength();
       begun.acceleration_m_s2 = ramp * motion_->line->MetresPerLength();
       tip_->OnMotionBegan(begun);
     }
@@ -188,83 +203,6 @@ Outcome Machine::StopMotion(double deceleration) {
     motion_->profile->Stop(now_s_, deceleration);
   }
   return {Outcome::Wait::kRest, {}, 0};
-}
-
-Joints Machine::JointsAt(double time_s) const {
-  return motion_ ? motion_->path->JointsAt(motion_->profile->LengthAt(time_s)) : joints_;
-}
-
-Eigen::Isometry3d Machine::FlangeAt(double time_s) const {
-  return BaseFromFlange(geometry_, JointsAt(time_s));
-}
-
-RobotState Machine::State() {
-  RobotState state;
-  state.timestamp_s = kFirstTimestampS + now_s_;
-  state.target_q = JointsAt(now_s_);
-  state.target_qd = state.target_qdd = Joints::Zero();
-  if (motion_) {
-    const double length = motion_->profile->LengthAt(now_s_);
-    const Joints direction = motion_->path->Direction(length);
-    state.target_qd = motion_->profile->SpeedAt(now_s_) * direction;
-    state.target_qdd = motion_->profile->AccelerationAt(now_s_) * direction;
-  }
-  const Eigen::Isometry3d flange = BaseFromFlange(geometry_, state.target_q);
-  const Eigen::Isometry3d tip = flange * flange_from_tip_;
-  state.target_tcp_pose = ToPose(tip);
-  state.tcp_offset = ToPose(flange_from_tip_);
-  Vector6 speed = Vector6::Zero();
-  if (motion_) {
-    speed = Jacobian(geometry_, state.target_q) * state.target_qd;
-    const Eigen::Vector3d turning = speed.tail<3>();
-    speed.head<3>() += turning.cross(tip.translation() - flange.translation());
-  }
-  state.target_tcp_speed = speed;
-
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) { return sigma > 0 ? sigma * normal(random_) : 0.0; };
-  state.actual_q = state.target_q;
-  state.actual_qd = state.target_qd;
-  state.actual_tcp_pose = state.target_tcp_pose;
-  state.actual_tcp_speed = speed;
-  for (int i = 0; i < 6; ++i) {
-    const double sigma = i < 3 ? options_.position_noise_m : options_.joint_noise_rad;
-    state.actual_q[i] += noise(options_.joint_noise_rad);
-    state.actual_qd[i] += motion_ ? noise(50 * options_.joint_noise_rad) : 0;
-    state.actual_tcp_pose[i] += noise(sigma);
-    state.actual_tcp_speed[i] += motion_ ? noise(50 * sigma) : 0;
-    state.actual_tcp_force[i] = noise(options_.position_noise_m > 0 ? (i < 3 ? 0.3 : 0.01) : 0);
-  }
-
-  // The fingers are springs; what they press back with acts on the tip against its axis.
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  if (tip_ && faults_)
-    force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * tip.linear().col(2);
-  if (faults_) force.z() -= faults_->Get("force_offset_n");
-  state.actual_tcp_force.head<3>() += force;
-
-  state.robot_mode = robot_mode_;
-  state.safety_mode = safety_mode_;
-  state.runtime_state = script_ ? kPlaying : motion_ ? kStopping : kStopped;
-  state.program_running = script_ != nullptr;
-  state.robot_status_bits = (robot_mode_ >= kPowerOn ? 1u : 0u) | (script_ ? 2u : 0u);
-  state.safety_status_bits = safety_mode_ == kNormal           ? 1u
-                             : safety_mode_ == kProtectiveStop ? (1u << 2) | (1u << 10)
-                                                               : (1u << 6) | (1u << 7) | (1u << 10);
-  state.speed_scaling = scaling_;
-  state.target_speed_fraction = slider_;
-  state.digital_inputs = digital_inputs();
-  state.digital_outputs = digital_outputs_;
-  state.payload_kg = payload_kg_;
-  state.payload_cog_m = payload_cog_m_;
-  // The elbow: where the upper arm ends.
-  const double lift = state.target_q[1], turn = state.target_q[0];
-  state.elbow_m << geometry_.a_m[1] * std::cos(lift) * std::cos(turn),
-      geometry_.a_m[1] * std::cos(lift) * std::sin(turn),
-      geometry_.d_m[0] + geometry_.a_m[1] * std::sin(lift);
-  state.script_line = script_ ? script_->line() : 0;
-  state.registers = registers_;
-  return state;
 }
 
 }  // namespace touchstone::rig

@@ -20,9 +20,11 @@ struct Machine::Motion {
   bool stopping = false;
   double obstacle_at = std::numeric_limits<double>::infinity();
   std::string obstacle;
+  double lag_s = 0;  // of the arm behind its target
 
+  // Of the arm, along a line.
   double TipDistance(double time_s) const {
-    return profile->LengthAt(time_s) * (line ? line->MetresPerLength() : 0);
+    return profile->LengthAt(time_s - lag_s) * (line ? line->MetresPerLength() : 0);
   }
 };
 

@@ -188,7 +188,7 @@ TEST(Dashboard, SpeaksTheTextsOfTheController) {
   machine.Advance(5, nullptr);
   EXPECT_EQ(Ask(&machine, "robotmode"), "Robotmode: RUNNING");
   EXPECT_EQ(Ask(&machine, "play"), "Failed to execute: play");
-  EXPECT_EQ(Ask(&machine, "stop"), "Stopped");
+  EXPECT_EQ(Ask(&machine, "stop"), "Failed to execute: stop");
   EXPECT_EQ(Ask(&machine, "running"), "Program running: false");
   EXPECT_EQ(Ask(&machine, "programState"), "STOPPED");
   EXPECT_EQ(Ask(&machine, "PolyscopeVersion", "ur3"), "URSoftware 3.15.8.106339 (Jun 20 2022)");
