@@ -106,6 +106,7 @@ void AddRig(Cli* cli) {
   AddRigRun(cli, group);
   AddRigPhotos(cli, group);
   AddRigCalibrate(cli, group);
+  AddRigTeach(cli, group);
 }
 
 }  // namespace touchstone::cli

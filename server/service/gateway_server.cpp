@@ -6,6 +6,7 @@
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/rig/rig.h"
+#include "server/service/freedrive_service.h"
 #include "server/service/journal_sessions_service.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
@@ -93,6 +94,7 @@ struct GatewayServer::Parts {
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<RigService> rig_service;
+  std::unique_ptr<FreedriveService> freedrive;
   std::unique_ptr<JournalSessionsService> sessions;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
@@ -137,6 +139,8 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     parts.control = std::make_unique<RigControlService>(&resources, parts.leases.get(), parts.rig);
     parts.rig_service = std::make_unique<RigService>(&resources, parts.leases.get(), parts.rig);
     services.push_back({"touchstone.v1.Rig", parts.rig_service.get()});
+    parts.freedrive = std::make_unique<FreedriveService>(&resources, parts.leases.get(), parts.rig);
+    services.push_back({"touchstone.v1.Freedrive", parts.freedrive.get()});
   } else {
     parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   }

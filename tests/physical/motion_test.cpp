@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include <Eigen/Core>
+
 #include "tests/physical/safety_fixture.h"
 
 namespace touchstone {
@@ -27,8 +29,13 @@ class Motion : public Safety {
     touch.mutable_approach()->set_x(std::sin(lean) * std::cos(towards));
     touch.mutable_approach()->set_y(std::sin(lean) * std::sin(towards));
     touch.mutable_approach()->set_z(-std::cos(lean));
-    touch.mutable_lateral()->set_x(std::cos(roll));
-    touch.mutable_lateral()->set_y(std::sin(roll));
+    // The fingers' direction, perpendicular to the approach.
+    const Eigen::Vector3d along(touch.approach().x(), touch.approach().y(), touch.approach().z());
+    Eigen::Vector3d lateral(std::cos(roll), std::sin(roll), 0);
+    lateral = (lateral - lateral.dot(along) * along).normalized();
+    touch.mutable_lateral()->set_x(lateral.x());
+    touch.mutable_lateral()->set_y(lateral.y());
+    touch.mutable_lateral()->set_z(lateral.z());
     // Another face up: x -> y -> z -> x.
     for (int turn = 0; turn < which % 4 % 3; ++turn)
       for (v1::Vector3* v : {touch.mutable_target_m(), touch.mutable_approach(), touch.mutable_lateral()}) {

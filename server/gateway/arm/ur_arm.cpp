@@ -125,6 +125,11 @@ absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eige
   return Begin(program_id, MoveProgram(program_id, poses, speeds_m_s, joints, speeds_rad_s, options_.script));
 }
 
+absl::Status UrArmOnTcp::StartFreedrive(uint32_t program_id) {
+  TOUCHSTONE_RETURN_IF_ERROR(Ready());
+  return Begin(program_id, FreedriveProgram(program_id, nominal_.model().e_series, options_.script));
+}
+
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
   std::lock_guard<std::mutex> lock(inputs_mutex_);
   command_ = CommandWord(program_id, command);

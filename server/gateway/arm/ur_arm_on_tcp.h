@@ -61,6 +61,7 @@ class UrArmOnTcp final : public UrArm {
   absl::Status StartTouch(const ArmTouch& touch) override;
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints) override;
+  absl::Status StartFreedrive(uint32_t program_id) override;
   absl::Status BeginApproach(uint32_t program_id) override { return Command(program_id, kCommandGo); }
   absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetract); }
   absl::Status Stop() override;

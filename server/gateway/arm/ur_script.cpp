@@ -123,6 +123,14 @@ std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d
   return absl::StrCat(text, Phase(MotionPhase::kDone), "end\n");
 }
 
+std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options) {
+  const std::string mode = e_series ? "freedrive_mode()\n" : "teach_mode()\n";
+  return absl::StrCat("def guide_", program_id, "():\n", Head(program_id, options), "  ", mode,
+                      Phase(MotionPhase::kReady), "  while read_input_integer_register(", kCommandRegister,
+                      ") != ", CommandWord(program_id, kCommandRetract), ":\n    sync()\n  end\n  end_", mode,
+                      Phase(MotionPhase::kDone), "end\n");
+}
+
 std::string StopProgram() {
   return "def stop_motion():\n  stopl(10)\nend\n";
 }

@@ -33,6 +33,9 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                         const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
                         const std::vector<double>& speeds_rad_s, const ScriptOptions& options);
+// Frees the arm until kCommandRetract. An e-Series calls it freedrive_mode, a CB3 teach_mode (UR's script manuals, SW 5
+// and SW 3). What ends the program ends it too: a stop, another program, the watchdog.
+std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options);
 std::string StopProgram();
 
 // What stands in the command register to command a program.

@@ -22,11 +22,12 @@ constexpr double kProgramStartsS = 2;       // host time that a program may take
 
 absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what,
                             const source::MotionGuard& guard,
-                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done) {
+                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                            std::optional<double> max_force_n) {
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
-  ForceGuard force(*parts_.arm, parts_.planner->limits().max_force_n, what);
+  ForceGuard force(*parts_.arm, max_force_n.value_or(parts_.planner->limits().max_force_n), what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
     const absl::Status stop = parts_.arm->Stop();

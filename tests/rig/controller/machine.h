@@ -125,6 +125,10 @@ class Machine : public ScriptHost {
   Outcome StopMotion(double deceleration);
   void SetTool(const Eigen::Isometry3d& flange_from_tip);
   void SetPayload(double kg, const Eigen::Vector3d& cog_m);
+  void SetFreedrive(bool on);
+  bool free() const { return free_; }
+  bool MoveByHand(const Joints& joints);  // false: it is not free
+  bool e_series() const { return options_.model != "ur3"; }
   void SetWatchdog(const std::string& variable, double min_hz, const std::string& action);
   void WriteOutput(int index, int32_t value);
   void WriteOutput(int index, double value);
@@ -182,6 +186,7 @@ class Machine : public ScriptHost {
   int robot_mode_ = kPowerOff, safety_mode_ = kNormal;
   double stopped_at_s_ = -1e9;
   bool emergency_ = false, frozen_ = false;
+  bool free_ = false;  // for a hand, while the program runs that asked for it
   double frozen_at_s_ = 0;
   std::vector<std::pair<double, int>> safety_history_;
   std::vector<std::pair<double, std::function<void()>>> later_;
