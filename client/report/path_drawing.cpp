@@ -27,7 +27,7 @@ constexpr char kStyle[] = R"(
   .object { stroke: #b45309; stroke-width: 1.2; stroke-linejoin: round; }
   .back { fill: #fef3c7; stroke-opacity: .45; } .front { fill: #fde68a; fill-opacity: .28; }
   .limits { fill: none; stroke: #64748b; stroke-width: 1; stroke-dasharray: 6 5; stroke-opacity: .8; }
-  .transit { fill: none; stroke: #94a3b8; stroke-width: 1; stroke-opacity: .45; }
+  .transit { fill: none; stroke: #64748b; stroke-width: 1; stroke-opacity: .7; }
   .approach { fill: none; stroke: #0f766e; stroke-width: 1.8; } .start { fill: #0f766e; }
   .noted { fill: #f59e0b; stroke: #92400e; stroke-width: 1; }
   .fingers { fill: none; stroke: #0f766e; stroke-width: 3; stroke-opacity: .28; stroke-linecap: round; }
