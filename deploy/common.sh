@@ -54,6 +54,14 @@ install_python_package() {
   printf '%s' "$sources" > "$stamp"
 }
 
+# What the Python tests need from PyPI, in build/venv. Nothing is done when the list is the one that was installed last.
+install_python_test_packages() {
+  local stamp=$root/build/venv/python-packages.txt
+  cmp -s deploy/python-packages.txt "$stamp" && return
+  "$python" -m pip install --quiet --disable-pip-version-check --requirement deploy/python-packages.txt || return
+  cp deploy/python-packages.txt "$stamp"
+}
+
 # What runs in the background, "PID NAME" each; stop_programs ends it.
 programs=()
 

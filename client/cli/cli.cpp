@@ -1,6 +1,7 @@
 // Parsing: the help with examples first, and usage errors that say what was probably meant.
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <utility>
@@ -8,6 +9,7 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
+#include <absl/strings/str_replace.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
 
@@ -15,6 +17,7 @@
 #include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/provenance.h"
+#include "client/source/lease_keeper.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
@@ -265,6 +268,9 @@ int Cli::Run(int argc, char** argv) {
     std::fprintf(stderr, "%s", app_.help().c_str());
     return kBadInput;
   }
+  // "rig-run": who holds a lease or stops a source is told with it.
+  client::SetHolderProgram(
+      absl::StrReplaceAll(HelpCommand().substr(std::strlen("touchstone ")), {{" ", "-"}}));
   absl::Status status = CheckFiles(app);
   if (status.ok()) status = run->second();
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) {

@@ -28,8 +28,7 @@ absl::StatusOr<std::unique_ptr<client::LeasedSource>> OpenLeased(
 class StopOnInterrupt {
  public:
   explicit StopOnInterrupt(client::LeasedSource* source)
-      : handler_(
-            [source] { source->Interrupt("interrupted at the command line of " + client::LeaseHolder()); }) {}
+      : handler_([source] { source->Interrupt("interrupted at the command line"); }) {}
 
  private:
   Interrupt::Handler handler_;

@@ -27,8 +27,8 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
   v1::StopRequest request;
-  request.set_reason(options.reason.empty() ? "touchstone rig stop by " + client::LeaseHolder()
-                                            : options.reason);
+  request.set_reason(options.reason);
+  request.set_holder(client::LeaseHolder());
   v1::StopResponse response;
   const absl::Status status = client::FromGrpc(connection->control().Stop(&context, request, &response));
   if (!status.ok())
@@ -44,6 +44,9 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
 
 absl::Status RunReset(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State before,
+                              client::Connection::Call(&v1::Control::Stub::GetState,
+                                                       rig.connection->control(), v1::GetStateRequest()));
   v1::ResetRequest request;
   request.set_holder(client::LeaseHolder());
   request.set_reason(options.reason);
@@ -51,9 +54,11 @@ absl::Status RunReset(const Cli& cli, const MotionCommandOptions& options) {
       const v1::State state,
       client::Connection::Call(&v1::Control::Stub::Reset, rig.connection->control(), request));
   const std::string word = client::SourceStateWord(state.state());
-  if (cli.output().json) PrintJson({{"state", word}});
-  cli.Log(absl::StrCat("no stop holds any more; the rig is ", word,
-                       ". Whoever moves it next acquires a new lease"));
+  if (cli.output().json) PrintJson({{"state", word}, {"released", before.stop_reason()}});
+  cli.Log(before.stop_reason().empty()
+              ? absl::StrCat("no stop held; the rig is ", word)
+              : absl::StrCat("released: the rig was stopped ", before.stop_reason(), ". It is ", word,
+                             " now; whoever moves it next acquires a new lease"));
   return absl::OkStatus();
 }
 

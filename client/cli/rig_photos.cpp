@@ -1,9 +1,10 @@
 // touchstone rig photos: the fixed sequence of camera poses, once for every way in which the object lies.
 #include <cmath>
-#include <filesystem>
 
+#include <absl/strings/str_format.h>
 #include <Eigen/Geometry>
 
+#include "client/cli/image_set.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/rig.h"
@@ -15,8 +16,6 @@
 
 namespace touchstone::cli {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr double kMargin = 1.05;  // the object's sphere fills the picture but for this
 
@@ -61,108 +60,180 @@ v1::View ViewOf(const Eigen::Vector3d& centre, double distance_m, const Eigen::V
   return view;
 }
 
-absl::Status RunPhotos(const Cli& cli, const PhotosOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("--sequence", options.sequence, {"seed", "ring"}).status());
-  if (options.turns < 1 || options.turns > static_cast<int>(Turns().size()))
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--turns: ", options.turns, " is out of range; an object can lie on 1 to 6 of its faces"));
-  v1::CaptureRequest request;
-  request.set_object(options.object);
-  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_image(), MakeImageSpec(cli, options.image, "png"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse objects,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects,
-                                                       rig.connection->source(), v1::ListObjectsRequest()));
-  std::vector<std::string> names;
-  const v1::Object* object = nullptr;
-  for (const v1::Object& known : objects.objects()) {
-    names.push_back(known.name());
-    if (known.name() == options.object) object = &known;
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(OneOf("OBJECT", options.object, names).status());
-  const Eigen::Vector3d low = service::FromProto(object->bounds_min_m()),
-                        high = service::FromProto(object->bounds_max_m());
-  const double distance_m =
-      kMargin * (high - low).norm() / 2 / std::sin(request.image().vertical_fov_rad() / 2);
+// One picture of the sequence.
+struct SequenceView {
+  std::string up_face, file;
+  v1::View view;
+  bool wanted = true;  // it does not stand already, and the rig can take it
+};
 
-  std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error)
-    return absl::InvalidArgumentError(
-        absl::StrCat("-o: ", options.folder, " cannot be made: ", error.message()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, rig.connection.get(), options.motion));
-  const StopOnInterrupt stop_on_interrupt(source.get());
-  ProgressBar bar(!cli.output().quiet);
-  Json files = Json::array();
-  size_t kept = 0, left_out = 0;
-  size_t views_a_turn = 0;
-  for (const Ring& ring : RingsOf(options.sequence)) views_a_turn += ring.views;
-  for (int turn = 0; turn < options.turns; ++turn) {
-    const auto& [face, top] = Turns()[turn];
-    bool mounted = false;
-    int number = 0;
-    for (const Ring& ring : RingsOf(options.sequence)) {
-      for (int k = 0; k < ring.views; ++k, ++number) {
-        char name[32];
-        std::snprintf(name, sizeof name, "_top%s_%02d.png", face.c_str(), number);
-        const std::string path = (fs::path(options.folder) / (options.object + name)).string();
-        files.push_back(path);
-        // A picture that stands already is not taken again.
-        if (fs::exists(path, error)) {
-          ++kept;
-          continue;
-        }
-        if (!mounted) {
-          bar.Clear();
-          TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
-          TOUCHSTONE_RETURN_IF_ERROR(MountForTouches(cli, source.get(), state, options.object, face));
-          mounted = true;
-        }
-        bar.ShowStage(absl::StrCat(options.object, ", face ", face, " up: picture ", number + 1),
-                      (turn + static_cast<double>(number) / views_a_turn) / options.turns);
-        request.clear_views();
-        *request.add_views() = ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
-                                      2 * kPi * k / ring.views);
-        const absl::StatusOr<v1::CaptureResponse> captured = source->Capture(request);
-        // Where the arm cannot take the camera there is no picture; the others stand for themselves.
-        if (absl::IsOutOfRange(captured.status()) || absl::IsInvalidArgument(captured.status())) {
-          bar.Clear();
-          cli.Log(absl::StrCat("no ", path, ": ", captured.status().message()));
-          files.erase(files.size() - 1);
-          ++left_out;
-          continue;
-        }
-        TOUCHSTONE_RETURN_IF_ERROR(captured.status());
-        const v1::CaptureResponse& response = *captured;
-        if (response.columns_size() != 1 || response.columns(0).type() != v1::DATA_TYPE_BYTES)
-          return absl::InternalError("the source did not send one encoded picture");
-        TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(response.columns(0), response.rows()));
-        TOUCHSTONE_RETURN_IF_ERROR(cli.Write(path, client::FileOf(response.columns(0), 0)));
-      }
+class Photos {
+ public:
+  Photos(const Cli& cli, const PhotosOptions& options)
+      : cli_(cli), options_(options), bar_(!cli.output().quiet) {}
+
+  absl::Status Run() {
+    TOUCHSTONE_RETURN_IF_ERROR(OneOf("--sequence", options_.sequence, {"seed", "ring"}).status());
+    if (options_.turns < 1 || options_.turns > static_cast<int>(Turns().size()))
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--turns: ", options_.turns, " is out of range; an object can lie on 1 to 6 of its faces"));
+    request_.set_object(options_.object);
+    TOUCHSTONE_ASSIGN_OR_RETURN(*request_.mutable_image(), MakeImageSpec(cli_, options_.image, "png"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(rig_, ConnectToRig(cli_));
+    TOUCHSTONE_RETURN_IF_ERROR(PlanSequence());
+    const v1::ImageSpec& image = request_.image();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        set_, ImageSet::Open(options_.folder, {static_cast<int>(image.width()),
+                                               static_cast<int>(image.height()), image.vertical_fov_rad()}));
+    for (SequenceView& view : views_) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool has, set_.Has(view.file));
+      view.wanted = !has;
+      kept_ += has;
     }
+    TOUCHSTONE_RETURN_IF_ERROR(CheckWanted());
+    return kept_ + left_out_ == views_.size() ? Finish() : TakeAll();
   }
-  bar.Clear();
-  if (cli.output().json) PrintJson({{"files", files}, {"kept", kept}, {"left_out", left_out}});
-  cli.Log(absl::StrCat(
-      options.folder, ": ", Counted(files.size(), "picture", "pictures"),
-      kept > 0 ? absl::StrCat(", ", kept, " of them stood already") : "",
-      left_out > 0 ? absl::StrCat("; ", left_out, " that the rig cannot take are left out") : ""));
-  if (files.empty()) return absl::FailedPreconditionError("the rig can take none of these pictures");
-  return absl::OkStatus();
-}
+
+ private:
+  absl::Status PlanSequence() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const v1::ListObjectsResponse objects,
+        client::Connection::Call(&v1::Source::Stub::ListObjects, rig_.connection->source(),
+                                 v1::ListObjectsRequest()));
+    std::vector<std::string> names;
+    const v1::Object* object = nullptr;
+    for (const v1::Object& known : objects.objects()) {
+      names.push_back(known.name());
+      if (known.name() == options_.object) object = &known;
+    }
+    TOUCHSTONE_RETURN_IF_ERROR(OneOf("OBJECT", options_.object, names).status());
+    const Eigen::Vector3d low = service::FromProto(object->bounds_min_m()),
+                          high = service::FromProto(object->bounds_max_m());
+    const double distance_m =
+        kMargin * (high - low).norm() / 2 / std::sin(request_.image().vertical_fov_rad() / 2);
+    for (int turn = 0; turn < options_.turns; ++turn) {
+      const auto& [face, top] = Turns()[turn];
+      int number = 0;
+      for (const Ring& ring : RingsOf(options_.sequence))
+        for (int k = 0; k < ring.views; ++k, ++number)
+          views_.push_back({face, absl::StrFormat("%s_top%s_%02d.png", options_.object, face, number),
+                            ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
+                                   2 * kPi * k / ring.views)});
+    }
+    return absl::OkStatus();
+  }
+
+  // Before anything moves: which views the rig cannot take.
+  absl::Status CheckWanted() {
+    v1::CheckViewsRequest request;
+    request.set_object(options_.object);
+    std::vector<SequenceView*> asked;
+    for (SequenceView& view : views_) {
+      if (!view.wanted) continue;
+      *request.add_views() = view.view;
+      asked.push_back(&view);
+    }
+    if (asked.empty()) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const v1::CheckTouchesResponse response,
+        client::Connection::Call(&v1::Rig::Stub::CheckViews, rig_.connection->rig(), request));
+    if (response.checks_size() != static_cast<int>(asked.size()))
+      return absl::InternalError(
+          absl::StrCat("the rig answered ", response.checks_size(), " checks of ", asked.size(), " views"));
+    Table table({"PICTURE", "WHY THE RIG CANNOT TAKE IT"});
+    for (size_t k = 0; k < asked.size(); ++k) {
+      if (response.checks(k).possible()) continue;
+      asked[k]->wanted = false;
+      table.Add({asked[k]->file, response.checks(k).reason()});
+      ++left_out_;
+    }
+    if (left_out_ > 0)
+      cli_.Log(absl::StrCat(table.Text(), "\n", left_out_, " of ", Counted(views_.size(), "view", "views"),
+                            left_out_ == 1 ? " is" : " are", " left out; nothing has moved yet"));
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeAll() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(source_, OpenLeased(cli_, rig_.connection.get(), options_.motion));
+    const StopOnInterrupt stop_on_interrupt(source_.get());
+    std::string mounted;
+    for (size_t k = 0; k < views_.size(); ++k) {
+      const SequenceView& view = views_[k];
+      if (!view.wanted) continue;
+      if (mounted != view.up_face) {
+        bar_.Clear();
+        TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig_.connection.get()));
+        TOUCHSTONE_RETURN_IF_ERROR(
+            MountForTouches(cli_, source_.get(), state, options_.object, view.up_face));
+        mounted = view.up_face;
+      }
+      bar_.ShowStage(absl::StrCat(options_.object, ", face ", view.up_face, " up: ", view.file),
+                     static_cast<double>(k) / views_.size());
+      TOUCHSTONE_RETURN_IF_ERROR(TakeOne(view));
+    }
+    bar_.Clear();
+    return Finish();
+  }
+
+  absl::Status TakeOne(const SequenceView& view) {
+    request_.clear_views();
+    *request_.add_views() = view.view;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CaptureResponse response, source_->Capture(request_));
+    if (response.columns_size() != 1 || response.columns(0).type() != v1::DATA_TYPE_BYTES ||
+        response.photographs_size() != 1)
+      return absl::InternalError("the source did not send one encoded picture with its pose");
+    TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(response.columns(0), response.rows()));
+    // The row first: interrupted in between, a row without its picture is taken again.
+    TOUCHSTONE_RETURN_IF_ERROR(
+        set_.Add({view.file, options_.object, view.view.camera(), response.photographs(0)}));
+    return cli_.Write(set_.PathOf(view.file), client::FileOf(response.columns(0), 0));
+  }
+
+  absl::Status Finish() const {
+    Json files = Json::array();
+    for (const SequenceView& view : views_)
+      if (set_.Has(view.file).value_or(false)) files.push_back(set_.PathOf(view.file));
+    if (cli_.output().json)
+      PrintJson({{"files", files},
+                 {"images", set_.PathOf("images.csv")},
+                 {"camera", set_.PathOf("camera.yaml")},
+                 {"kept", kept_},
+                 {"left_out", left_out_}});
+    cli_.Log(absl::StrCat(
+        options_.folder, ": ", Counted(files.size(), "picture", "pictures"),
+        kept_ > 0 ? absl::StrCat(", ", kept_, " of them stood already") : "",
+        left_out_ > 0 ? absl::StrCat("; ", left_out_, " that the rig cannot take are left out") : "",
+        "; poses in images.csv, intrinsics in camera.yaml"));
+    if (files.empty()) return absl::FailedPreconditionError("the rig can take none of these pictures");
+    return absl::OkStatus();
+  }
+
+  const Cli& cli_;
+  const PhotosOptions& options_;
+  ProgressBar bar_;
+  RigConnection rig_;
+  std::unique_ptr<client::LeasedSource> source_;
+  v1::CaptureRequest request_;
+  std::vector<SequenceView> views_;  // in the order in which they are taken
+  ImageSet set_;
+  size_t kept_ = 0, left_out_ = 0;
+};
 
 }  // namespace
 
 void AddRigPhotos(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<PhotosOptions>();
-  CLI::App* command = cli->AddCommand(group, "photos",
-                                      "Photographs an object in a fixed sequence of camera poses, and asks "
-                                      "for it to be turned in between. Pictures "
-                                      "that stand already are not taken again.",
-                                      "touchstone rig photos lat20 -o photos --server 127.0.0.1:50052\n"
-                                      "touchstone rig photos lat20 -o photos --sequence seed --turns 6 "
-                                      "--image 640x480 --server 127.0.0.1:50052",
-                                      [cli, options] { return RunPhotos(*cli, *options); });
+  CLI::App* command =
+      cli->AddCommand(group, "photos",
+                      "Photographs an object in a fixed sequence of camera poses, and asks "
+                      "for it to be turned in between. Pictures "
+                      "that stand already are not taken again. The folder is an image set: "
+                      "images.csv has the commanded and the measured pose of each, camera.yaml "
+                      "the intrinsics.",
+                      "touchstone rig photos lat20 -o photos --server 127.0.0.1:50052\n"
+                      "touchstone rig photos lat20 -o photos --sequence seed --turns 6 "
+                      "--image 640x480 --server 127.0.0.1:50052",
+                      [cli, options] { return Photos(*cli, *options).Run(); });
   command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
       ->type_name("")
       ->required();

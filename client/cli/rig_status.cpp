@@ -99,7 +99,9 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
       Counted(state.touches(), "touch", "touches"), ", ", Counted(state.images(), "picture", "pictures"),
       " in ", DurationInWords(state.uptime_s()), "\n");
   if (!state.stop_reason().empty())
-    text += Line("", absl::StrCat("stopped ", state.stop_reason(), "; touchstone rig reset releases it"));
+    text += Line("", Wrap(absl::StrCat("stopped ", state.stop_reason(),
+                                       "; make sure that the rig may move, then touchstone rig reset"),
+                          110, 16));
   text += absl::StrCat("Object        ",
                        rig.object().empty() ? "what lies on the fixture is unknown (touchstone rig mount)"
                                             : absl::StrCat(rig.object(), " with its face ",

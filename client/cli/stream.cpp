@@ -189,7 +189,7 @@ absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_g
   absl::Status status;
   {
     const Interrupt::Handler on_interrupt([&writer, &source] {
-      source->Interrupt("interrupted at the command line of " + client::LeaseHolder());
+      source->Interrupt("interrupted at the command line");
       writer.Cancel();
     });
     status = writer.Run();

@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <thread>
 
 #include "server/base/status.h"
@@ -20,6 +22,10 @@ constexpr double kAcquireS = 10;
 // A lease that is not renewed, because its holder was killed, has ended by then.
 constexpr std::chrono::milliseconds kHolderMayBeGone{2500};
 constexpr std::chrono::milliseconds kAskAgain{100};
+constexpr size_t kMaxHolderBytes = 256;
+
+std::mutex holder_mutex;
+std::string holder_program;  // guarded by holder_mutex; empty: not set
 
 Clock::duration Seconds(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
@@ -42,13 +48,27 @@ absl::StatusOr<Response> CallWithin(double seconds,
 
 }  // namespace
 
+void SetHolderProgram(const std::string& program) {
+  const std::lock_guard<std::mutex> lock(holder_mutex);
+  holder_program = program;
+}
+
 std::string LeaseHolder() {
   char host[256] = "";
   ::gethostname(host, sizeof host - 1);
   const char* user = std::getenv("USER");
   if (user == nullptr || *user == '\0') user = std::getenv("LOGNAME");
   const std::string who = user != nullptr && *user != '\0' ? user : absl::StrCat("uid", ::getuid());
-  return absl::StrCat(who, "@", host[0] != '\0' ? host : "localhost").substr(0, 256);
+  const std::string process = absl::StrCat(" ", ::getpid());
+  std::string program;
+  {
+    const std::lock_guard<std::mutex> lock(holder_mutex);
+    program = holder_program.empty() ? ::program_invocation_short_name : holder_program;
+  }
+  // The process tells two programs apart, so it is never cut.
+  return absl::StrCat(who, "@", host[0] != '\0' ? host : "localhost", " ", program)
+             .substr(0, kMaxHolderBytes - process.size()) +
+         process;
 }
 
 absl::StatusOr<std::unique_ptr<LeaseKeeper>> LeaseKeeper::Acquire(Connection* connection,
@@ -133,7 +153,7 @@ absl::Status LeaseKeeper::Follow(Connection* connection) {
     if (!absl::IsAborted(renewed.status())) return renewed.status();
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state, CallWithin(kAcquireS, &v1::Control::Stub::GetState,
                                                                   control.get(), v1::GetStateRequest()));
-    if (state.state() == v1::SOURCE_STATE_STOPPED)
+    if (state.state() == v1::SOURCE_STATE_STOPPED || !state.stop_reason().empty())
       return absl::FailedPreconditionError(absl::StrCat(
           "the source was stopped ", state.stop_reason(),
           " while the lease was lost: make sure that it may move, then release the stop with 'touchstone rig "

@@ -18,7 +18,7 @@
 namespace touchstone::client {
 
 struct LeaseOptions {
-  // Who asks, for people. Default (empty): "user@host".
+  // Who asks, for people. Default (empty): LeaseHolder().
   std::string holder;
   // Takes the lease from whoever holds it.
   bool take = false;
@@ -26,8 +26,11 @@ struct LeaseOptions {
   std::function<void(const absl::Status&)> on_lost;
 };
 
-// "ana@bench2", of this process.
+// Person, program and process, so that two programs of one person are told apart: "ana@lab rig-run 4711". At most 256
+// characters.
 std::string LeaseHolder();
+// What LeaseHolder calls this program from now on, without spaces: "rig-run". Default: the name of the executable.
+void SetHolderProgram(const std::string& program);
 
 class LeaseKeeper {
  public:

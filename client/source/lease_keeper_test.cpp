@@ -5,6 +5,7 @@
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -70,6 +71,24 @@ TEST_F(LeaseKeeperTest, HoldsTheLeaseUntilItGoes) {
     EXPECT_EQ(State().lease_holder(), "ana@bench2");
   }
   EXPECT_EQ(State().lease_holder(), "") << "given back, not left to run out";
+}
+
+TEST_F(LeaseKeeperTest, AHolderIsAPersonAProgramAndAProcess) {
+  const std::string process = " " + std::to_string(::getpid());
+  EXPECT_THAT(LeaseHolder(), testing::MatchesRegex("[^ ]+@[^ ]+ client_source_test" + process))
+      << "the executable";
+  SetHolderProgram("rig-run");
+  EXPECT_THAT(LeaseHolder(), testing::MatchesRegex("[^ ]+@[^ ]+ rig-run" + process));
+  {
+    const auto keeper = Acquire("");
+    ASSERT_TRUE(keeper.ok()) << keeper.status();
+    EXPECT_EQ(State().lease_holder(), LeaseHolder());
+  }
+  SetHolderProgram(std::string(1000, 'x'));
+  EXPECT_EQ(LeaseHolder().size(), 256u);
+  EXPECT_THAT(LeaseHolder(), testing::EndsWith("x" + process))
+      << "what tells two programs apart is never cut";
+  SetHolderProgram("");
 }
 
 TEST_F(LeaseKeeperTest, RefusesTellWhoHoldsItAndHowToTakeIt) {

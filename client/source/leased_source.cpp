@@ -121,7 +121,7 @@ absl::Status LeasedSource::FindAgain() {
     std::lock_guard<std::mutex> lock(mutex_);
     channel_ = connection_->channel();
   }
-  if (there && state.state() == v1::SOURCE_STATE_STOPPED)
+  if (there && (state.state() == v1::SOURCE_STATE_STOPPED || !state.stop_reason().empty()))
     return absl::FailedPreconditionError(absl::StrCat(
         "the source was stopped ", state.stop_reason(),
         ": make sure that it may move, then release the stop with 'touchstone rig reset' and run the "
@@ -155,6 +155,7 @@ void LeasedSource::Interrupt(const std::string& reason) {
     context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
     v1::StopRequest request;
     request.set_reason(reason);
+    request.set_holder(LeaseHolder());
     v1::StopResponse response;
     const grpc::Status stopped = v1::Control::NewStub(channel)->Stop(&context, request, &response);
     if (!stopped.ok() && options_.log)

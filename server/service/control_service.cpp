@@ -32,7 +32,8 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
                                   v1::StopResponse* response) {
   const uint32_t running = resources_->running_requests;
   ++resources_->stop_count;
-  spdlog::warn("stop from {}: {}; {} requests under way end", context->peer(),
+  spdlog::warn("stop from {} at {}: {}; {} requests under way end",
+               request->holder().empty() ? "somebody" : request->holder(), context->peer(),
                request->reason().empty() ? "no reason given" : request->reason(), running);
   response->set_aborted_touches(running);
   return grpc::Status::OK;

@@ -83,6 +83,9 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
        &o.camera.intrinsics},
       {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
       {"camera.timeout_s", "", &o.camera.timeout_s},
+      {"camera.pose_tolerance_mm", "A photograph from farther off its commanded pose is refused",
+       &o.pose_tolerance_mm},
+      {"camera.pose_tolerance_deg", "The same of its direction", &o.pose_tolerance_deg},
       {"limits.max_speed_mm_s", "Limit of an approach's speed", &raw->max_speed_mm_s},
       {"limits.min_speed_mm_s", "The least speed of an approach", &raw->min_speed_mm_s},
       {"limits.transit_speed_mm_s", "Speed between touches", &raw->transit_speed_mm_s,
@@ -166,6 +169,8 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
                                        absl::StrCat("effector.sensor: finger ", k + 1)));
   }
   o.effector.time_scale = o.time_scale;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.pose_tolerance_mm, 1e-3, 100, "camera.pose_tolerance_mm"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.pose_tolerance_deg, 1e-3, 90, "camera.pose_tolerance_deg"));
 
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
   gateway::arm::MotionLimits& limits = o.limits;

@@ -37,6 +37,7 @@ struct GatewayOptions {
   double spacing_mm = 30;
   double max_overtravel_mm = 45;
   gateway::camera::CameraOptions camera;
+  double pose_tolerance_mm = 0.5, pose_tolerance_deg = 0.1;  // of photographs: camera_pose.h
   gateway::arm::MotionLimits limits;
 
   GatewayOptions() { common.listen = "127.0.0.1:50061"; }

@@ -4,6 +4,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/rig/rig.h"
 #include "server/service/freedrive_service.h"
@@ -81,6 +82,8 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
     if (!object.ok()) return std::nullopt;
     return (*object)->surface->bounds();
   };
+  rig.camera_tolerance.position_m = options.pose_tolerance_mm / 1000;
+  rig.camera_tolerance.angle_rad = options.pose_tolerance_deg * kRadiansPerDegree;
   return gateway::Rig::Create(std::move(rig), std::move(parts));
 }
 

@@ -15,6 +15,8 @@
 namespace touchstone::service {
 namespace {
 
+constexpr size_t kMaxHolderBytes = 256, kMaxReasonBytes = 500;  // of a stop
+
 v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   return session::BasePoseMessage(geometry::PoseVectorOf(pose));
 }
@@ -110,12 +112,13 @@ v1::CameraStatus CameraStatusOf(const gateway::camera::CameraDevice& camera,
 
 grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
                                              const v1::AcquireLeaseRequest* request, v1::Lease* response) {
+  const std::string before = leases_->Holder();
   const grpc::Status status = ControlService::AcquireLease(context, request, response);
   if (status.ok())
     rig_->audit()
         .Write("lease_acquired", {{"holder", request->holder()},
                                   {"epoch", absl::StrCat(response->epoch())},
-                                  {"taken", request->take() ? "yes" : "no"},
+                                  {"taken_from", request->take() ? before : ""},
                                   {"peer", context->peer()}})
         .IgnoreError();
   return status;
@@ -132,10 +135,15 @@ grpc::Status RigControlService::ReleaseLease(grpc::ServerContext* context,
 
 grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::StopRequest* request,
                                      v1::StopResponse* response) {
-  // The arm first, then words.
-  response->set_aborted_touches(
-      rig_->Stop(request->reason().empty() ? "no reason given" : request->reason(), context->peer()));
-  spdlog::warn("stop from {}: {}", context->peer(), request->reason());
+  // The arm first, then words. A stop is never refused, so what is too long is cut.
+  const std::string reason =
+      request->reason().empty() ? "no reason given" : request->reason().substr(0, kMaxReasonBytes);
+  const std::string who =
+      request->holder().empty()
+          ? context->peer()
+          : absl::StrCat(request->holder().substr(0, kMaxHolderBytes), " at ", context->peer());
+  response->set_aborted_touches(rig_->Stop(reason, who));
+  spdlog::warn("stop from {}: {}", who, reason);
   return grpc::Status::OK;
 }
 

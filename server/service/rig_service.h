@@ -33,12 +33,15 @@ class RigService final : public v1::Rig::Service {
   grpc::Status GetRig(grpc::ServerContext*, const v1::GetRigRequest*, v1::RigState*) override;
   grpc::Status CheckTouches(grpc::ServerContext*, const v1::CheckTouchesRequest*,
                             v1::CheckTouchesResponse*) override;
+  grpc::Status CheckViews(grpc::ServerContext*, const v1::CheckViewsRequest*,
+                          v1::CheckTouchesResponse*) override;
   grpc::Status MountObject(grpc::ServerContext*, const v1::MountObjectRequest*, v1::RigState*) override;
   grpc::Status PowerOn(grpc::ServerContext*, const v1::PowerOnRequest*, v1::RigState*) override;
   grpc::Status Home(grpc::ServerContext*, const v1::HomeRequest*, v1::RigState*) override;
 
  private:
   absl::Status DoCheck(const v1::CheckTouchesRequest& request, v1::CheckTouchesResponse* response);
+  absl::Status DoCheck(const v1::CheckViewsRequest& request, v1::CheckTouchesResponse* response);
   absl::Status DoMount(grpc::ServerContext* context, const v1::MountObjectRequest& request);
   void Describe(v1::RigState* state) const;
 

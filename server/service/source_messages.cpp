@@ -137,6 +137,16 @@ v1::CaptureResponse ToProto(source::CaptureResults results) {
   v1::Batch batch = ToProto(std::move(results.batch), results.columns);
   message.set_rows(batch.rows());
   message.mutable_columns()->Swap(batch.mutable_columns());
+  for (const source::PhotographPose& pose : results.photographs) {
+    v1::Photograph* photograph = message.add_photographs();
+    photograph->set_unix_s(pose.unix_s);
+    photograph->set_deviation_m(pose.deviation_m);
+    photograph->set_deviation_rad(pose.deviation_rad);
+    if (!pose.measured.has_value()) continue;
+    *photograph->mutable_measured()->mutable_eye_m() = ToProto(pose.measured->eye_m);
+    *photograph->mutable_measured()->mutable_at_m() = ToProto(pose.measured->at_m);
+    *photograph->mutable_measured()->mutable_up() = ToProto(pose.measured->up);
+  }
   return message;
 }
 

@@ -121,9 +121,9 @@ absl::Status PhysicalSamples::MakeSample(uint32_t row, const MotionGuard& guard,
   const image::Camera camera =
       image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
   const ViewCommand view{request_.session, command.object, command.bounds, ObjectFromCamera(camera)};
-  TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
-                              TakePhotograph(device_, rectify_, view, specification.image, guard));
-  return columns.AppendPicture(picture, specification.image, batch);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Photograph photograph, device_->Photograph(view, guard));
+  return columns.AppendPicture(ImageOf(photograph, *device_, rectify_, specification.image),
+                               specification.image, batch);
 }
 
 }  // namespace touchstone::source

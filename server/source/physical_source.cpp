@@ -15,6 +15,20 @@ namespace {
 
 constexpr double kUsualTouchDurationS = 8;  // until a rig has measured its own
 
+// As the protocol has it, looking at what is so far away.
+PhotographPose PoseOf(const Photograph& photograph, double distance_m) {
+  PhotographPose pose;
+  pose.unix_s = photograph.unix_s;
+  pose.deviation_m = photograph.deviation_m, pose.deviation_rad = photograph.deviation_rad;
+  if (!photograph.object_from_camera.has_value()) return pose;
+  const Eigen::Isometry3d& object_from_camera = *photograph.object_from_camera;
+  image::Camera& camera = pose.measured.emplace();
+  camera.eye_m = object_from_camera.translation();
+  camera.at_m = camera.eye_m + distance_m * object_from_camera.linear().col(2);
+  camera.up = -object_from_camera.linear().col(1);
+  return pose;
+}
+
 std::string NewTouchId() {
   static std::atomic<uint64_t> count{0};
   return absl::StrCat("touch-", std::chrono::system_clock::now().time_since_epoch().count(), "-", ++count);
@@ -32,16 +46,15 @@ absl::Status CheckPhotograph(const dataset::DatasetImage& wanted) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<image::Image> TakePhotograph(RigDevice* device, const Rectifier& rectify,
-                                            const ViewCommand& command, const dataset::DatasetImage& wanted,
-                                            const MotionGuard& guard) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const image::Frame frame, device->Photograph(command, guard));
+image::Image ImageOf(const Photograph& photograph, const RigDevice& device, const Rectifier& rectify,
+                     const dataset::DatasetImage& wanted) {
+  const image::Frame& frame = photograph.frame;
   const image::ImageOptions& options = wanted.options;
   image::Image picture;
   picture.width = options.width;
   picture.height = options.height;
   picture.channels = options.format == image::PixelFormat::kRgb ? 3 : 1;
-  picture.pixels = rectify(frame, device->IntrinsicsOf(frame), options.width, options.height,
+  picture.pixels = rectify(frame, device.IntrinsicsOf(frame), options.width, options.height,
                            wanted.vertical_fov_rad, options.format == image::PixelFormat::kGrey);
   return picture;
 }
@@ -98,9 +111,9 @@ absl::Status PhysicalSource::MakePictures(const CaptureRequest& request, const S
   TOUCHSTONE_RETURN_IF_ERROR(CheckPhotograph(request.image));
   for (const image::Camera& camera : request.cameras) {
     const ViewCommand command{"default", request.object, object.surface->bounds(), ObjectFromCamera(camera)};
-    TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
-                                TakePhotograph(device_.get(), rectify_, command, request.image, guard));
-    TOUCHSTONE_RETURN_IF_ERROR(take(picture));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Photograph photograph, device_->Photograph(command, guard));
+    const PhotographPose pose = PoseOf(photograph, (camera.at_m - camera.eye_m).norm());
+    TOUCHSTONE_RETURN_IF_ERROR(take(ImageOf(photograph, *device_, rectify_, request.image), &pose));
   }
   return absl::OkStatus();
 }

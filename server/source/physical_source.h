@@ -40,10 +40,9 @@ class PhysicalSource final : public Source {
   const Rectifier rectify_;
 };
 
-// The photograph from there, as an image specification asks for it.
-absl::StatusOr<image::Image> TakePhotograph(RigDevice* device, const Rectifier& rectify,
-                                            const ViewCommand& command, const dataset::DatasetImage& wanted,
-                                            const MotionGuard& guard);
+// A photograph as an image specification asks for it.
+image::Image ImageOf(const Photograph& photograph, const RigDevice& device, const Rectifier& rectify,
+                     const dataset::DatasetImage& wanted);
 
 // INVALID_ARGUMENT for what a camera does not have: depth, mask, another shading style.
 absl::Status CheckPhotograph(const dataset::DatasetImage& wanted);

@@ -33,12 +33,15 @@ class FakeDevice final : public RigDevice {
     }
     return touch;
   }
-  absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard&) override {
+  absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command, const MotionGuard&) override {
     views.push_back(command);
-    image::Frame frame;
-    frame.width = frame.height = 2;
-    frame.rgb.assign(12, 7);
-    return frame;
+    source::Photograph photograph;
+    photograph.frame.width = photograph.frame.height = 2;
+    photograph.frame.rgb.assign(12, 7);
+    photograph.object_from_camera = command.object_from_camera * Eigen::Translation3d(0.0001, 0, 0);
+    photograph.unix_s = 1e9;
+    photograph.deviation_m = 0.0001;
+    return photograph;
   }
   bool has_camera() const override { return camera; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override {

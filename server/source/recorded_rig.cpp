@@ -42,17 +42,20 @@ absl::StatusOr<session::JournalTouch> RecordedRig::Touch(const TouchCommand& com
   return *touch;
 }
 
-absl::StatusOr<image::Frame> RecordedRig::Photograph(const ViewCommand& command, const MotionGuard& guard) {
+absl::StatusOr<source::Photograph> RecordedRig::Photograph(const ViewCommand& command,
+                                                           const MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(guard());
   const auto found = images_.find(ViewId(command));
   if (found == images_.end())
     return absl::NotFoundError(absl::StrCat("this is a recorded session, and no picture of '", command.object,
                                             "' was taken from there"));
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Image image, image::DecodePng(found->second.png));
-  image::Frame frame;
+  source::Photograph photograph;
+  image::Frame& frame = photograph.frame;
   frame.width = image.width, frame.height = image.height;
   frame.rgb = std::move(image.pixels);
-  return frame;
+  photograph.unix_s = found->second.unix_s;
+  return photograph;
 }
 
 image::Intrinsics RecordedRig::IntrinsicsOf(const image::Frame& frame) const {

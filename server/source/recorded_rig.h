@@ -20,7 +20,8 @@ class RecordedRig : public RigDevice {
   // By its id; else by its command, the repeats of it in the order in which they were made and round again.
   // NOT_FOUND: nothing like it was recorded.
   absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
-  absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) override;
+  absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command,
+                                                const MotionGuard& guard) override;
   bool has_camera() const override { return !images_.empty(); }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return touches_->fingers(); }

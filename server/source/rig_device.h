@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <absl/status/statusor.h>
@@ -33,6 +34,14 @@ struct ViewCommand {
   Eigen::Isometry3d object_from_camera = Eigen::Isometry3d::Identity();  // z looks ahead, y down
 };
 
+// A picture, and where it was taken from.
+struct Photograph {
+  image::Frame frame;
+  std::optional<Eigen::Isometry3d> object_from_camera;  // measured; none: unknown
+  double unix_s = 0;                                    // when it was taken
+  double deviation_m = 0, deviation_rad = 0;            // of the measured pose from the commanded one
+};
+
 // A view's name in the journal: the object and the pose, to the micrometre.
 std::string ViewId(const ViewCommand& command);
 
@@ -55,7 +64,9 @@ class RigDevice {
   // was another touch.
   virtual absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command,
                                                       const MotionGuard& guard) = 0;
-  virtual absl::StatusOr<image::Frame> Photograph(const ViewCommand& command, const MotionGuard& guard) = 0;
+  // FAILED_PRECONDITION if the camera was not where it was commanded to be, within the device's tolerance.
+  virtual absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command,
+                                                        const MotionGuard& guard) = 0;
   virtual bool has_camera() const = 0;
   // Of the camera that took this picture.
   virtual image::Intrinsics IntrinsicsOf(const image::Frame& frame) const = 0;

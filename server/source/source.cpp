@@ -55,11 +55,12 @@ absl::StatusOr<CaptureResults> Source::Capture(const CaptureRequest& request, co
   results.columns = dataset::ColumnsOf(images_only, request.image, 0);  // the same columns as in a dataset
   results.batch.data.resize(results.columns.size());
   results.batch.offsets.resize(results.columns.size());
-  const auto take = [&](const image::Image& picture) -> absl::Status {
+  const auto take = [&](const image::Image& picture, const PhotographPose* pose) -> absl::Status {
     for (size_t k = 0; k < results.columns.size(); ++k)
       TOUCHSTONE_RETURN_IF_ERROR(dataset::AppendPicture(picture, request.image, results.columns[k].name,
                                                         &results.batch.data[k], &results.batch.offsets[k]));
     ++results.batch.rows;
+    if (pose != nullptr) results.photographs.push_back(*pose);
     return absl::OkStatus();
   };
   TOUCHSTONE_RETURN_IF_ERROR(MakePictures(request, *object, guard, take));

@@ -82,10 +82,19 @@ struct CaptureRequest {
   dataset::DatasetImage image;         // without its renderer
 };
 
+// Where the camera of a physical source really was, object frame.
+struct PhotographPose {
+  std::optional<image::Camera> measured;  // at lies as far from the eye as commanded; none: unknown
+  double unix_s = 0;
+  double deviation_m = 0, deviation_rad = 0;  // from the commanded pose
+};
+
 // One row per photograph.
 struct CaptureResults {
   std::vector<dataset::ColumnInfo> columns;  // "image", and "depth_m", "mask" where asked for
   dataset::DatasetBatch batch;
+  // Of a physical source: where each was taken from. Empty at a virtual one.
+  std::vector<PhotographPose> photographs;
 };
 
 // A dataset, or a part of one.
@@ -143,8 +152,8 @@ class Source {
   // With requests that are checked.
   virtual absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                                    const MotionGuard& guard) = 0;
-  // Takes the pictures one after the other; take(picture) appends one to the results.
-  using TakePicture = std::function<absl::Status(const image::Image& picture)>;
+  // Takes the pictures one after the other; take(picture, pose) appends one to the results, a virtual source's with null.
+  using TakePicture = std::function<absl::Status(const image::Image& picture, const PhotographPose* pose)>;
   virtual absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,
                                     const MotionGuard& guard, const TakePicture& take) = 0;
   // specification.objects are filled in.

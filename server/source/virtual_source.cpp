@@ -125,7 +125,7 @@ absl::Status VirtualSource::MakePictures(const CaptureRequest& request, const Se
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
                                 renderer->Render(object.surface, camera, request.image.options));
-    TOUCHSTONE_RETURN_IF_ERROR(take(picture));
+    TOUCHSTONE_RETURN_IF_ERROR(take(picture, nullptr));
   }
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -195,13 +196,27 @@ void PhysicalTest::WaitUntilApproaching() {
   WaitUntil([this] { return RigState().arm().phase() == v1::MOTION_PHASE_APPROACH; }, "the arm approaches");
 }
 
-void PhysicalTest::UnlockByHand() {
+void PhysicalTest::SendToDashboard(const std::string& line) {
+  const int fd = ConnectToDashboard();
+  EXPECT_EQ(send(fd, line.data(), line.size(), MSG_NOSIGNAL), static_cast<ssize_t>(line.size()));
+  // Both the banner and the answer, or the line may be lost with the connection.
+  std::string text;
+  for (char c; std::count(text.begin(), text.end(), '\n') < 2 && recv(fd, &c, 1, 0) == 1;) text += c;
+  close(fd);
+}
+
+int PhysicalTest::ConnectToDashboard() const {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(emulator_->controller().ports().dashboard));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  ASSERT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  return fd;
+}
+
+void PhysicalTest::UnlockByHand() {
+  const int fd = ConnectToDashboard();
   const std::string line = "unlock protective stop\n";
   WaitUntil(
       [&] {

@@ -71,6 +71,8 @@ class PhysicalTest : public testing::Test {
   void WaitUntilApproaching();
   // What a person does at the teach pendant after a protective stop.
   void UnlockByHand();
+  // Likewise: one line, and whatever the answer is.
+  void SendToDashboard(const std::string& line);
   v1::SourceState State();
   // A person releases the stop.
   grpc::Status Reset();
@@ -93,6 +95,7 @@ class PhysicalTest : public testing::Test {
 
  private:
   void Connect(int port);
+  int ConnectToDashboard() const;
   pid_t process_ = 0;
 };
 

@@ -104,9 +104,8 @@ TEST_F(Safety, AKilledGatewaysArmIsStoppedByItsOwnWatchdogAndTheTouchIsReconcile
   StartGatewayProcess();
   EXPECT_EQ(RigState().interrupted_touches(), 1u);
   EXPECT_EQ(emulator_->controller().Count("motions"), motions) << "it moved before anybody had asked it to";
-  if (State() == v1::SOURCE_STATE_STOPPED) {
-    EXPECT_TRUE(Reset().ok());
-  }
+  EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED) << "a person looks first";
+  EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(0.0005), "killed");
   KillGatewayProcess();
   ExpectEveryResultIsItsOwnTouch();
@@ -163,6 +162,7 @@ TEST_F(Safety, AProtectiveStopIsNeverUnlockedByItself) {
   for (int k = 0; k < 3; ++k) EXPECT_FALSE(Touch(lease.token(), FromAbove(), "more").status.ok());
   EXPECT_EQ(State(), v1::SOURCE_STATE_PROTECTIVE_STOP);
   UnlockByHand();
+  EXPECT_TRUE(Reset().ok());
   ExpectTheTouchCanBeMade(FromAbove(kSlow), "stopped");
   ExpectEveryResultIsItsOwnTouch();
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tests/rig/world.h"
 
@@ -47,6 +48,9 @@ class Controller {
   // How often something happened: "programs" and "motions" that began, "protective_stops", "watchdog_stops"
   // (programs that a watchdog ended or paused).
   virtual uint64_t Count(const std::string& what) const = 0;
+  // What clients have sent that moves an arm or powers it, in the order in which it came: "program NAME", "power on",
+  // "power off", "brake release", "unlock protective stop", whether or not it did anything. The first 10,000.
+  virtual std::vector<std::string> Commands() const = 0;
 };
 
 }  // namespace touchstone::rig

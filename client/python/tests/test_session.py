@@ -2,6 +2,8 @@
 to end elsewhere."""
 
 import concurrent.futures
+import os
+import re
 import time
 
 import grpc
@@ -174,7 +176,7 @@ def test_a_session_holds_one_lease_and_sends_ids_that_repeat(rig, rig_client, pl
     for _ in range(2):
         with rig_client.session("monday") as session:
             rows = [session.touch(row) for row in touchstone.read_plan(plan)]
-            assert "@" in rig.holder
+            assert re.fullmatch(rf"\S+@\S+ \S+ {os.getpid()}", rig.holder), "person, program and process"
     ids = [touch[1][0] for touch in rig.touches]
     assert ids == ["monday/lat20/0", "monday/lat20/7", "monday/lat00/8"] * 2
     assert {touch[0] for touch in rig.touches} == {"monday"}

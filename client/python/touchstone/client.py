@@ -117,7 +117,7 @@ class Client:
 
     def stop(self, reason: str = "") -> int:
         """Ends every motion now; needs no lease. Not safety-rated. Returns how many touches were under way."""
-        request = control_pb2.StopRequest(reason=reason or f"client.stop() by {lease_holder()}")
+        request = control_pb2.StopRequest(reason=reason or "client.stop()", holder=lease_holder())
         return self._connection.call(_CONTROL, "Stop", request, timeout_s=5.0, repeat=False).aborted_touches
 
     def call(self, stub: type, method: str, request: Any, **how: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import getpass
 import os
 import socket
+import sys
 import threading
 import time
 from typing import Any
@@ -24,13 +25,25 @@ _HOLDER_MAY_BE_GONE_S = 2.5
 _ASK_AGAIN_S = 0.1
 
 
+def _program() -> str:
+    """The script that runs, without its folder; the package of `python -m package`; else "python"."""
+    path = sys.argv[0] if sys.argv and sys.argv[0] not in ("", "-", "-c", "-m") else "python"
+    name = os.path.basename(path)
+    if name == "__main__.py":
+        name = os.path.basename(os.path.dirname(os.path.abspath(path)))
+    return "_".join(name.split()) or "python"
+
+
 def holder() -> str:
-    """"ana@bench2", of this process."""
+    """Person, program and process, so that two programs of one person are told apart: "ana@lab train.py 4711"."""
     try:
         user = getpass.getuser()
     except (KeyError, OSError):
         user = f"uid{os.getuid()}"
-    return f"{user}@{socket.gethostname()}"[:256]
+    process = f" {os.getpid()}"
+    # Within 256 bytes of any encoding; the process is never cut.
+    who = f"{user}@{socket.gethostname()} {_program()}".encode()[:256 - len(process)].decode(errors="ignore")
+    return who + process
 
 
 class Lease:
@@ -97,7 +110,7 @@ class Lease:
         if self._thread is None:
             return self.token
         state = self._connection.call(_CONTROL, "GetState", control_pb2.GetStateRequest())
-        if state.state == control_pb2.SOURCE_STATE_STOPPED:
+        if state.state == control_pb2.SOURCE_STATE_STOPPED or state.stop_reason:
             raise errors.Refused(
                 "Somebody stopped the source: make sure that it may move, release the stop with "
                 "client.rig.reset(reason) or 'touchstone rig reset', then run the same again.",

@@ -94,6 +94,10 @@ struct ArmTouch {
   double duration_s = 0;  // expected, in all, rig seconds
 };
 
+// Asked right before something that starts motion goes out: its error keeps that from going and is returned. A stop
+// that comes later than the answer reaches the controller behind what was sent. Null: nothing forbids it.
+using StartGuard = std::function<absl::Status()>;
+
 class Arm {
  public:
   virtual ~Arm() = default;
@@ -108,25 +112,28 @@ class Arm {
   virtual absl::Status Ready() const = 0;
 
   // Sends the program of a touch; it goes to the start and waits there (kReady). The caller watches State().
-  virtual absl::Status StartTouch(const ArmTouch& touch) = 0;
+  virtual absl::Status StartTouch(const ArmTouch& touch, const StartGuard& guard = nullptr) = 0;
   // At kReady: begins the approach.
-  virtual absl::Status BeginApproach(uint32_t program_id) = 0;
+  virtual absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard = nullptr) = 0;
   // Every finger has reported: the approach stops and the tool retracts to the start (kRetract, kDone).
   virtual absl::Status EndApproach(uint32_t program_id) = 0;
   // Straight lines through these poses, then to these joints if any; kDone at the end.
   virtual absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                                   const std::vector<std::array<double, 6>>& joints) = 0;
+                                   const std::vector<std::array<double, 6>>& joints,
+                                   const StartGuard& guard = nullptr) = 0;
   // Sends a program that frees the arm for a hand to guide it (kReady while it is free), until EndApproach, or until the
   // program ends in any other way.
-  virtual absl::Status StartFreedrive(uint32_t program_id) {
+  virtual absl::Status StartFreedrive(uint32_t program_id, const StartGuard& = nullptr) {
     return absl::UnimplementedError(
         absl::StrCat("program ", program_id, ": this arm cannot be guided by hand"));
   }
   // Stops whatever moves, now, from any thread: on the wire before it returns, never queued behind anything.
   virtual absl::Status Stop() = 0;
   // Powers on and releases the brakes if they are not; never unlocks a protective stop. `guard` is asked before
-  // each step and while the controller works on it; its error ends the wait and is returned.
-  virtual absl::Status PowerOn(const std::function<absl::Status()>& guard) = 0;
+  // each step, with nothing between its answer and the step, and while the controller works on it. Its error ends the
+  // wait and is returned, and an arm that this call was powering up is powered off again: else it would release its
+  // brakes by itself.
+  virtual absl::Status PowerOn(const StartGuard& guard) = 0;
 
   // Writes the next heartbeat to the register that the running program's watchdog on the controller observes.
   // Without heartbeats that watchdog stops the arm.

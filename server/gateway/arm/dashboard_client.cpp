@@ -30,10 +30,12 @@ absl::StatusOr<std::string> DashboardClient::ReadLine(double until_host_s) {
   }
 }
 
-absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, double timeout_s) {
+absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, double timeout_s,
+                                                 const SendGate& gate) {
   std::lock_guard<std::mutex> lock(mutex_);
   const double until_s = timing::HostNowS() + timeout_s;
   // A connection that has lain idle may be gone: one more try with a new one.
+  absl::Status refused;  // by the gate
   for (int attempt = 0;; ++attempt) {
     const bool fresh = socket_ == nullptr;
     const absl::StatusOr<std::string> reply = [&]() -> absl::StatusOr<std::string> {
@@ -44,10 +46,18 @@ absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, dou
         if (!absl::StartsWith(banner, "Connected"))
           return absl::UnavailableError(absl::StrCat("dashboard: greets with '", banner.substr(0, 80), "'"));
       }
-      TOUCHSTONE_RETURN_IF_ERROR(socket_->Send(command + "\n", timeout_s));
+      bool asked = false;
+      const auto send = [&] {
+        asked = true;
+        return socket_->Send(command + "\n", timeout_s);
+      };
+      const absl::Status sent = gate == nullptr ? send() : gate(send);
+      if (!asked) refused = sent;
+      TOUCHSTONE_RETURN_IF_ERROR(sent);
       return ReadLine(until_s);
     }();
     if (reply.ok()) return reply;
+    if (!refused.ok()) return refused;
     socket_.reset();  // a late reply must not be taken for that of the next command
     if (fresh || attempt > 0 || timing::HostNowS() >= until_s)
       return absl::UnavailableError(absl::StrCat("'", command, "': ", reply.status().message()));
@@ -55,8 +65,8 @@ absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, dou
 }
 
 absl::Status DashboardClient::Demand(const std::string& command, const std::string& expected,
-                                     double timeout_s) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string reply, Ask(command, timeout_s));
+                                     double timeout_s, const SendGate& gate) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string reply, Ask(command, timeout_s, gate));
   if (absl::StartsWith(reply, expected)) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("the controller answers '", command, "' with '", reply.substr(0, 200), "'"));

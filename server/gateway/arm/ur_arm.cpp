@@ -3,6 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "server/base/status.h"
@@ -16,7 +17,9 @@ namespace {
 constexpr double kHistoryS = 30;                              // rig time
 constexpr double kStopConnectS = 0.3, kStopDashboardS = 0.5;  // host time
 constexpr double kDashboardS = 2;                             // host time
-constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;       // the controller boots its arm in rig time
+constexpr std::chrono::milliseconds kStartGoesOut{
+    5};  // what a stop waits for a start that is just being sent
+constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;  // the controller boots its arm in rig time
 
 // For when the program ports are gone. A controller on which nothing runs answers that it failed to stop; whether
 // that is why, it says itself.
@@ -52,27 +55,43 @@ UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
           [this](const RtdeSample& sample, double host_s) { OnSample(sample, host_s); },
           [this] { changes_->Notify(); }) {}
 
-absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program) {
+absl::Status UrArmOnTcp::SendStart(const StartGuard& guard, const std::function<absl::Status()>& send) {
+  std::lock_guard<std::timed_mutex> lock(start_mutex_);
+  if (guard != nullptr) TOUCHSTONE_RETURN_IF_ERROR(guard());
+  return send();
+}
+
+absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, const StartGuard& guard) {
   if (program_id == 0 || program_id >= 1u << 28)
     return absl::InvalidArgumentError(
         absl::StrCat("program id ", program_id, ": must be from 1 to ", (1u << 28) - 1));
-  const uint64_t stops = stop_count_;
-  withhold_heartbeats_ = false;
-  {
-    std::lock_guard<std::mutex> lock(mutex_);
-    start_ = Start{program_id, timing::HostNowS(), "", false};
-  }
-  SendHeartbeat();
-  // A stop that comes while the program goes out must reach the controller behind it.
-  const auto stop_behind = [&] { return stop_count_ != stops ? StopProgram() : std::string(); };
-  const absl::Status sent = programs_.Send(program, stop_behind);
+  // The registers keep what the last program wrote, also one of another gateway: its "done" is not this one's.
+  if (const absl::StatusOr<ArmState> now = State(); now.ok() && now->program_id == program_id)
+    return absl::FailedPreconditionError(absl::StrCat("the controller's registers show program ", program_id,
+                                                      " already, so the end of a new one of that id could "
+                                                      "not be told from the old one's: take another id"));
+  bool permitted = false;
+  uint64_t stops = 0;
+  const absl::Status sent = SendStart(guard, [&] {
+    permitted = true;
+    stops = stop_count_;
+    withhold_heartbeats_ = false;
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      start_ = Start{program_id, timing::HostNowS(), "", false};
+    }
+    SendHeartbeat();
+    // A stop that did not wait until the program had gone out must reach the controller behind it.
+    return programs_.Send(program, [&] { return stop_count_ != stops ? StopProgram() : std::string(); });
+  });
+  if (!permitted) return sent;
   if (stop_count_ != stops) {
     SendStop().IgnoreError();
     return absl::AbortedError(absl::StrCat("program ", program_id, " was stopped before it began"));
   }
   if (!sent.ok()) {
     std::lock_guard<std::mutex> lock(mutex_);
-    start_ = Start();
+    if (start_.program_id == program_id) start_ = Start();
   }
   return sent;
 }
@@ -99,7 +118,7 @@ std::vector<double> UrArmOnTcp::Speeds(const ArmState& from, const std::vector<E
   return speeds_m_s;
 }
 
-absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
+absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch, const StartGuard& guard) {
   if (touch.transit.empty()) return absl::InvalidArgumentError("a touch needs a start");
   if (!(touch.speed_m_s > 0)) return absl::InvalidArgumentError("a touch needs a speed above 0");
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
@@ -107,11 +126,12 @@ absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch) {
   std::vector<Eigen::Isometry3d> path = touch.transit;
   path.push_back(touch.end);  // the speed of the retract
   Joints joints;
-  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path, &joints), options_.script));
+  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path, &joints), options_.script), guard);
 }
 
 absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                                     const std::vector<std::array<double, 6>>& joints) {
+                                     const std::vector<std::array<double, 6>>& joints,
+                                     const StartGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
   Joints at;
@@ -122,12 +142,17 @@ absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eige
         LimitedJointSpeed(Kinematics(), body_, at, next, options_.script.joint_speed_rad_s));
     at = next;
   }
-  return Begin(program_id, MoveProgram(program_id, poses, speeds_m_s, joints, speeds_rad_s, options_.script));
+  return Begin(program_id, MoveProgram(program_id, poses, speeds_m_s, joints, speeds_rad_s, options_.script),
+               guard);
 }
 
-absl::Status UrArmOnTcp::StartFreedrive(uint32_t program_id) {
+absl::Status UrArmOnTcp::StartFreedrive(uint32_t program_id, const StartGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
-  return Begin(program_id, FreedriveProgram(program_id, nominal_.model().e_series, options_.script));
+  return Begin(program_id, FreedriveProgram(program_id, nominal_.model().e_series, options_.script), guard);
+}
+
+absl::Status UrArmOnTcp::BeginApproach(uint32_t program_id, const StartGuard& guard) {
+  return SendStart(guard, [&] { return Command(program_id, kCommandGo); });
 }
 
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
@@ -163,7 +188,11 @@ absl::Status UrArmOnTcp::SendStop() {
 }
 
 absl::Status UrArmOnTcp::Stop() {
-  ++stop_count_;
+  {
+    // Behind what is just going out; what was not asked for yet finds the rig stopped.
+    const std::unique_lock<std::timed_mutex> lock(start_mutex_, kStartGoesOut);
+    ++stop_count_;
+  }
   const absl::Status status = SendStop();
   {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -177,7 +206,33 @@ absl::Status UrArmOnTcp::Stop() {
       "): its watchdog stops a running program soon; press the emergency stop if anything moves"));
 }
 
-absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
+absl::Status UrArmOnTcp::DemandPower(const std::string& command, const std::string& expected,
+                                     const StartGuard& guard, bool* sent) {
+  return dashboard_.Demand(command, expected, kDashboardS, [&](const std::function<absl::Status()>& send) {
+    return SendStart(guard, [&] {
+      *sent = true;  // a demand without an answer may have been heard
+      return send();
+    });
+  });
+}
+
+absl::Status UrArmOnTcp::PowerOffAgain(const absl::Status& why) {
+  const absl::Status off = dashboard_.Demand("power off", "Powering off", kDashboardS);
+  return absl::Status(why.code(),
+                      absl::StrCat(why.message(),
+                                   off.ok() ? "; the arm, which was just being powered up, was powered off"
+                                            : "; the arm, which was just being powered up, could not be "
+                                              "powered off and may release its brakes: ",
+                                   off.ok() ? "" : off.message()));
+}
+
+absl::Status UrArmOnTcp::PowerOn(const StartGuard& guard) {
+  bool began = false;
+  const absl::Status status = TakePowerSteps(guard, &began);
+  return !status.ok() && began && !guard().ok() ? PowerOffAgain(status) : status;
+}
+
+absl::Status UrArmOnTcp::TakePowerSteps(const StartGuard& guard, bool* began) {
   const double until_s = timing::HostNowS() + kPowerOnHostS + kPowerOnRigS / options_.script.time_scale;
   bool powered = false, released = false;
   while (true) {
@@ -187,10 +242,10 @@ absl::Status UrArmOnTcp::PowerOn(const std::function<absl::Status()>& guard) {
     if (state.robot_mode == RobotMode::kRunning) return SafetyPermitsMotion(state.safety_mode);
     TOUCHSTONE_RETURN_IF_ERROR(SafetyPermitsMotion(state.safety_mode));
     if (!powered && state.robot_mode < RobotMode::kIdle) {
-      TOUCHSTONE_RETURN_IF_ERROR(dashboard_.Demand("power on", "Powering on", kDashboardS));
+      TOUCHSTONE_RETURN_IF_ERROR(DemandPower("power on", "Powering on", guard, began));
       powered = true;
     } else if (!released && state.robot_mode == RobotMode::kIdle) {
-      TOUCHSTONE_RETURN_IF_ERROR(dashboard_.Demand("brake release", "Brake releasing", kDashboardS));
+      TOUCHSTONE_RETURN_IF_ERROR(DemandPower("brake release", "Brake releasing", guard, began));
       released = true;
     }
     if (timing::HostNowS() > until_s)

@@ -58,14 +58,15 @@ class UrArmOnTcp final : public UrArm {
     return history_.Between(from_controller_s, to_controller_s);
   }
   absl::Status Ready() const override;
-  absl::Status StartTouch(const ArmTouch& touch) override;
+  absl::Status StartTouch(const ArmTouch& touch, const StartGuard& guard) override;
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                           const std::vector<std::array<double, 6>>& joints) override;
-  absl::Status StartFreedrive(uint32_t program_id) override;
-  absl::Status BeginApproach(uint32_t program_id) override { return Command(program_id, kCommandGo); }
+                           const std::vector<std::array<double, 6>>& joints,
+                           const StartGuard& guard) override;
+  absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard) override;
+  absl::Status StartFreedrive(uint32_t program_id, const StartGuard& guard) override;
   absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetract); }
   absl::Status Stop() override;
-  absl::Status PowerOn(const std::function<absl::Status()>& guard) override;
+  absl::Status PowerOn(const StartGuard& guard) override;
   void SendHeartbeat() override;
   absl::Status WriteHeartbeat();  // inputs_mutex_ is held
 
@@ -96,7 +97,13 @@ class UrArmOnTcp final : public UrArm {
 
   void OnSample(const RtdeSample& sample, double host_s);
   void OnPrimary(const PrimaryUpdate& update);
-  absl::Status Begin(uint32_t program_id, const std::string& program);
+  absl::Status Begin(uint32_t program_id, const std::string& program, const StartGuard& guard);
+  // Sends what starts motion, unless the guard forbids it; a stop waits for it, or comes before the guard is asked.
+  absl::Status SendStart(const StartGuard& guard, const std::function<absl::Status()>& send);
+  absl::Status TakePowerSteps(const StartGuard& guard, bool* began);
+  absl::Status DemandPower(const std::string& command, const std::string& expected, const StartGuard& guard,
+                           bool* sent);
+  absl::Status PowerOffAgain(const absl::Status& why);
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
   // The tip's speed on each line of a path, m/s.
@@ -124,6 +131,7 @@ class UrArmOnTcp final : public UrArm {
   std::mutex inputs_mutex_;                   // of the registers
   int32_t heartbeat_ = 0, command_ = 0;
   SentHeartbeats sent_heartbeats_;
+  std::timed_mutex start_mutex_;  // held while something that starts motion goes out
   std::atomic<uint64_t> stop_count_{0};
   std::atomic<bool> withhold_heartbeats_{false};
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +32,7 @@ struct EffectorOptions {
   std::string port;  // "/dev/ttyACM0"
   int baud = 115200;
   std::vector<EffectorFinger> fingers = std::vector<EffectorFinger>(3);
-  double reply_timeout_s = 0.25;  // of one try; a request is tried 8 times
+  double reply_timeout_s = 0.05;  // of one try, well within the period of the arm's watchdog; tried 20 times
   double silence_s = 1.0;         // without a heartbeat: the line is lost
   double clock_query_s =
       0.05;  // between two queries of its clock; the shorter, the sooner the least delay is found
@@ -67,8 +68,9 @@ class Effector {
   virtual ~Effector() = default;
 
   // Starts the capture of a touch's contacts (id above 0) and returns once the device has confirmed it.
-  // FAILED_PRECONDITION names the fingers that are pressed already; UNAVAILABLE: the line is lost.
-  virtual absl::Status StartCapture(uint32_t touch) = 0;
+  // FAILED_PRECONDITION names the fingers that are pressed already; UNAVAILABLE: the line is lost. `guard` (null: none)
+  // is asked every 10 ms meanwhile, from this thread; its error ends the wait, and is returned.
+  virtual absl::Status StartCapture(uint32_t touch, const std::function<absl::Status()>& guard = nullptr) = 0;
   // Ends it, and waits until the device's record of the touch is known.
   virtual absl::Status EndCapture() = 0;
   // The contacts of the current or last capture; changes->Notify() after every change. UNAVAILABLE if the line

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,8 @@
 
 namespace touchstone::gateway::effector {
 namespace {
+
+constexpr std::chrono::milliseconds kGuardPeriod{10};
 
 absl::Status CheckOptions(const EffectorOptions& options) {
   const auto wrong = [](const std::string& text) {
@@ -149,23 +152,36 @@ void SerialEffector::WaitAwake(double seconds) {
   changed_.wait_for(lock, std::chrono::duration<double>(seconds), [this] { return stopping_; });
 }
 
-absl::Status SerialEffector::Request(std::function<absl::Status()> work) {
+absl::Status SerialEffector::Request(std::function<absl::Status()> work,
+                                     const std::function<absl::Status()>& guard) {
   std::lock_guard<std::mutex> one(request_mutex_);
   std::unique_lock<std::mutex> lock(mutex_);
+  const auto wait_for_work = [&]() -> absl::Status {
+    const auto over = [this] { return work_ == nullptr || work_done_; };
+    if (guard == nullptr) changed_.wait(lock, over);
+    while (!changed_.wait_for(lock, kGuardPeriod, over)) {
+      lock.unlock();  // the guard looks at other parts
+      const absl::Status allowed = guard();
+      lock.lock();
+      TOUCHSTONE_RETURN_IF_ERROR(allowed);
+    }
+    return absl::OkStatus();
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(wait_for_work());  // of a request that its guard has ended
   if (!state_.connected)
     return absl::UnavailableError(absl::StrCat("end effector: no connection: ", state_.why));
   work_ = std::move(work);
   work_done_ = false;
   Wake();
-  changed_.wait(lock, [this] { return work_done_; });
+  TOUCHSTONE_RETURN_IF_ERROR(wait_for_work());
   work_ = nullptr;
   return work_status_;
 }
 
-absl::Status SerialEffector::StartCapture(uint32_t touch) {
+absl::Status SerialEffector::StartCapture(uint32_t touch, const std::function<absl::Status()>& guard) {
   if (touch == firmware::kNoTouch)
     return absl::InvalidArgumentError("end effector: a touch's id is 0; right is above 0");
-  return Request([this, touch] { return StartCaptureOnDevice(touch); });
+  return Request([this, touch] { return StartCaptureOnDevice(touch); }, guard);
 }
 
 absl::Status SerialEffector::EndCapture() {

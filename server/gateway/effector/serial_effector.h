@@ -30,7 +30,7 @@ class SerialEffector : public Effector {
   // Starts the thread and waits for the first session to begin or fail.
   absl::Status Start();
 
-  absl::Status StartCapture(uint32_t touch) override;
+  absl::Status StartCapture(uint32_t touch, const std::function<absl::Status()>& guard) override;
   absl::Status EndCapture() override;
   absl::StatusOr<EffectorTouch> Touch() const override;
   absl::StatusOr<EffectorTouch> Recall(uint32_t touch) override;
@@ -92,9 +92,11 @@ class SerialEffector : public Effector {
   void WaitAwake(double seconds);
 
   // The other threads.
-  absl::Status Request(std::function<absl::Status()> work);
+  // `work` is what the thread does, and may outlive this call if the guard ends it.
+  absl::Status Request(std::function<absl::Status()> work,
+                       const std::function<absl::Status()>& guard = nullptr);
 
-  static constexpr int kTries = 8;           // of a request
+  static constexpr int kTries = 20;          // of a request
   static constexpr double kClockSlackS = 1;  // by which a device time may seem wrong, in host seconds
 
   const EffectorOptions options_;

@@ -26,15 +26,15 @@ class StatesOnly : public arm::Arm {
     return found;
   }
   absl::Status Ready() const override { return absl::OkStatus(); }
-  absl::Status StartTouch(const arm::ArmTouch&) override { return absl::OkStatus(); }
-  absl::Status BeginApproach(uint32_t) override { return absl::OkStatus(); }
+  absl::Status StartTouch(const arm::ArmTouch&, const arm::StartGuard&) override { return absl::OkStatus(); }
+  absl::Status BeginApproach(uint32_t, const arm::StartGuard&) override { return absl::OkStatus(); }
   absl::Status EndApproach(uint32_t) override { return absl::OkStatus(); }
   absl::Status MoveThrough(uint32_t, const std::vector<Eigen::Isometry3d>&,
-                           const std::vector<std::array<double, 6>>&) override {
+                           const std::vector<std::array<double, 6>>&, const arm::StartGuard&) override {
     return absl::OkStatus();
   }
   absl::Status Stop() override { return absl::OkStatus(); }
-  absl::Status PowerOn(const std::function<absl::Status()>&) override { return absl::OkStatus(); }
+  absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
   void SendHeartbeat() override {}
   timing::ClockEstimate ControllerClock() const override { return {}; }
   double StateRateHz() const override { return 500; }

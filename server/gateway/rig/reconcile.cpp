@@ -73,6 +73,7 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const session::Jour
   record.motion.transit = {Eigen::Isometry3d::Identity()};
   record.motion.end = Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1));
   record.time_scale = options_.time_scale;
+  record.recovered = true;
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.contacts = *contacts;
   record.contacts.contact_ticks.resize(options_.fingers);

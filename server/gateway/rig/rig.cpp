@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -16,9 +17,15 @@
 namespace touchstone::gateway {
 namespace {
 
-// Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens.
+// Program ids are taken from the journal in blocks, so that no id is ever used twice, whatever happens. A new journal
+// begins anywhere in their range: the controller's registers keep what a program of another journal left there.
 constexpr uint32_t kProgramIdBlock = 1000;
 constexpr uint32_t kMaxProgramId = (1u << 28) - kProgramIdBlock;
+
+uint32_t RandomProgramId() {
+  std::random_device random;
+  return std::uniform_int_distribution<uint32_t>(1, kMaxProgramId - kProgramIdBlock)(random);
+}
 
 }  // namespace
 
@@ -26,6 +33,7 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
   std::unique_ptr<Rig> rig(new Rig(std::move(options), std::move(parts)));
   session::Journal& journal = rig->journal();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string next, journal.Metadata("next_program_id"));
+  if (next.empty()) rig->next_program_id_ = RandomProgramId();
   if (!next.empty() && !absl::SimpleAtoi(next, &rig->next_program_id_))
     return absl::DataLossError(
         absl::StrCat("the journal's next_program_id is '", next, "': a number was expected"));
@@ -39,11 +47,20 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Metadata(kStopKey));
   rig->stopped_ = !rig->stop_reason_.empty();
   if (rig->stopped_) spdlog::warn("still stopped {}; touchstone rig reset releases it", rig->stop_reason_);
+  rig->heartbeats_ = std::make_unique<Heartbeats>([arm = rig->parts_.arm.get()] { arm->SendHeartbeat(); });
+  TOUCHSTONE_RETURN_IF_ERROR(rig->LatchInterruption());
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
+  rig->safety_thread_ = std::thread([&rig = *rig] { rig.WatchSafety(); });
   return rig;
 }
 
 Rig::~Rig() {
+  {
+    std::lock_guard<std::mutex> lock(watch_mutex_);
+    ending_ = true;
+  }
+  watch_ends_.notify_all();
+  if (safety_thread_.joinable()) safety_thread_.join();
   if (motions_ > 0) parts_.arm->Stop().IgnoreError();
 }
 
@@ -54,7 +71,10 @@ uint32_t Rig::NextProgramId() {
     const absl::Status kept = journal().SetMetadata("next_program_id", absl::StrCat(reserved_program_id_));
     if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
   }
-  return next_program_id_++;
+  const uint32_t id = next_program_id_++;
+  // What an earlier program left in the controller's registers must never pass for this one's.
+  const absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
+  return arm.ok() && arm->program_id == id ? NextProgramId() : id;
 }
 
 std::optional<calibration::UpFace> Rig::MountedUpFace() const {
@@ -200,6 +220,21 @@ absl::StatusOr<arm::PlannedTouch> Rig::Check(const std::string& object, const ge
     TOUCHSTONE_ASSIGN_OR_RETURN(here, parts_.arm->State());
   }
   return parts_.planner->Plan(here, object, bounds, calibration::UpFaceFor(touch.approach), touch, where);
+}
+
+absl::StatusOr<arm::PlannedTouch> Rig::CheckView(const source::ViewCommand& command,
+                                                 const arm::ArmState* from, const std::string& where) const {
+  arm::ArmState here;
+  if (from != nullptr) {
+    here = *from;
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(here, parts_.arm->State());
+  }
+  const calibration::UpFace up_face = calibration::UpFaceFor(command.object_from_camera.rotation().col(2));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
+                              parts_.planner->ObjectPose(command.object, command.bounds, up_face));
+  return parts_.planner->PlanView(here, base_from_object * command.object_from_camera, command.object,
+                                  command.bounds, up_face, where);
 }
 
 }  // namespace touchstone::gateway

@@ -7,12 +7,14 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -23,6 +25,8 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
+#include "server/gateway/rig/camera_pose.h"
+#include "server/gateway/rig/heartbeats.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
 #include "server/source/rig_device.h"
@@ -40,6 +44,7 @@ struct RigOptions {
   double mount_timeout_s = 120;
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
+  CameraPoseTolerance camera_tolerance;  // of photographs
   // The box of an object by its name, object frame; none: not known. Null: none is.
   std::function<std::optional<geometry::Bounds>(const std::string&)> bounds_of;
 };
@@ -69,9 +74,10 @@ class Rig : public source::RigDevice {
   // The journalled touch of that id, if it is done.
   absl::StatusOr<std::optional<session::JournalTouch>> FindDone(const source::TouchCommand& command) const;
 
-  // Moves the camera there and takes a picture, which is journalled as it came.
-  absl::StatusOr<image::Frame> Photograph(const source::ViewCommand& command,
-                                          const source::MotionGuard& guard) override;
+  // Moves the camera there and takes a picture, which is journalled as it came, with the pose that the arm's states
+  // show meanwhile.
+  absl::StatusOr<source::Photograph> Photograph(const source::ViewCommand& command,
+                                                const source::MotionGuard& guard) override;
   bool has_camera() const override { return parts_.camera != nullptr; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
@@ -99,13 +105,21 @@ class Rig : public source::RigDevice {
                                           const touch::CommandedTouch& touch, const arm::ArmState* from,
                                           const std::string& where) const;
 
+  // The same of a photograph.
+  absl::StatusOr<arm::PlannedTouch> CheckView(const source::ViewCommand& command, const arm::ArmState* from,
+                                              const std::string& where) const;
+
   // Stops everything, now; never waits for anything. Returns how many motions were under way. Every motion is
   // refused (ABORTED) from now on, also by the next process on this journal, until Reset.
+  //
+  // The same latch closes by itself: after a protective or emergency stop, a violation, a fault or recovery of the
+  // controller, after a safeguard stop that interrupted or refused a motion, and when a program ended that this
+  // gateway had neither stopped nor seen done (a watchdog, somebody at the teach pendant), also before its start.
   uint32_t Stop(const std::string& reason, const std::string& who);
   // Releases a stop, moving nothing; without a stop it does nothing. FAILED_PRECONDITION while the controller's
   // own safety mode forbids motion, UNAVAILABLE while it cannot be asked: the stop holds then.
   absl::Status Reset(const std::string& reason, const std::string& who);
-  // Who stopped it and why, for people; empty: it is not stopped.
+  // Who or what stopped it and why, for people: "by ana@lab rig-stop 4711 (cable caught)"; empty: it is not stopped.
   std::string StopReason() const;
 
   source::SourceState State() const override;
@@ -139,7 +153,10 @@ class Rig : public source::RigDevice {
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
                            const source::MotionGuard& guard);
+  // Another one than the controller's registers show.
   uint32_t NextProgramId();
+  // The states that have arrived since.
+  std::vector<arm::ArmState> StatesSince(double host_s) const;
   absl::Status EnsureSession(const std::string& name);
   // Rig seconds since the session's first touch began.
   absl::StatusOr<double> SessionTimeS(const std::string& session, double unix_s);
@@ -148,16 +165,31 @@ class Rig : public source::RigDevice {
   absl::StatusOr<session::JournalResult> MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                    const source::TouchCommand& command,
                                                    const source::MotionGuard& guard);
-  // Sends heartbeats and watches until `done` says so; stops the arm and returns why on anything else.
-  // `limit_s`: host time. `max_force_n`: none: that of the limits.
+  // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
+  // motion may not go on (the controller's safety mode, its guard).
+  absl::Status MayGoOn(const source::MotionGuard& guard);
+  // Watches until `done` says so; stops the arm and returns why on anything else. `limit_s`: host time.
+  // `max_force_n`: none: that of the limits.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,
                          const source::MotionGuard& guard,
                          const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
                          std::optional<double> max_force_n = std::nullopt);
   void Remember(const absl::Status& status);
 
+  // rig_safety.cpp
+  // Closes the latch of Stop; `what` is "by WHOM (WHY)", and is added to what closed it before.
+  void Latch(const std::string& what);
+  // Latches what the controller's states since the last look tell; `refused`: a motion is being asked for now.
+  void LookAtSafety(bool refused = false);
+  void WatchSafety();  // the thread
+  // Before anything else at the start: latches if a motion was under way when the process before this one ended.
+  absl::Status LatchInterruption();
+  absl::Status LatchUnlessItEnded(uint32_t program_id, const std::string& what);
+
   // The journal's record of who stopped the rig and why; "" once it was reset.
   static constexpr char kStopKey[] = "stop";
+  // Of the last motion that is no touch: its program's id and what it was; "" once it has failed.
+  static constexpr char kMotionKey[] = "motion_under_way";
 
   const RigOptions options_;
   RigParts parts_;
@@ -167,13 +199,22 @@ class Rig : public source::RigDevice {
   mutable std::mutex stop_mutex_;     // of the reason, and of what the journal keeps of it
   std::string stop_reason_;
   std::atomic<uint32_t> motions_{0};  // under way
-  std::atomic<double> last_heartbeat_s_{0};
   mutable std::mutex status_mutex_;
   source::SourceStatus status_;
   std::optional<calibration::UpFace> up_face_;  // of the object on the fixture
   std::mutex sessions_mutex_;
   std::set<std::string> sessions_;  // known to be in the journal
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
+
+  std::mutex safety_mutex_;    // of what LookAtSafety knows
+  double safety_seen_s_ = -1;  // controller time of the last state that it has seen; below 0: none yet
+  std::optional<arm::SafetyMode> latched_safety_;  // that it latched last, while it lasts
+  std::mutex watch_mutex_;
+  std::condition_variable watch_ends_;
+  bool ending_ = false;
+  // Last: their threads use what stands above.
+  std::unique_ptr<Heartbeats> heartbeats_;
+  std::thread safety_thread_;
 };
 
 }  // namespace touchstone::gateway

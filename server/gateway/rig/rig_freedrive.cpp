@@ -1,4 +1,6 @@
 // The arm in a person's hands.
+#include <absl/strings/str_cat.h>
+
 #include <limits>
 
 #include "server/base/status.h"
@@ -18,9 +20,12 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")));
   audit().Write("freedrive", {{"program", std::to_string(program_id)}}).IgnoreError();
   ++motions_;
-  absl::Status status = parts_.arm->StartFreedrive(program_id);
+  const HeartbeatScope beating(heartbeats_.get());
+  absl::Status status = parts_.arm->StartFreedrive(program_id, guard);
   double reported_s = 0;
   // Whatever ends the watch stops the program, and with it freedrive. The hand may press as hard as it likes.
   if (status.ok())
@@ -36,6 +41,7 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
         },
         std::numeric_limits<double>::infinity());
   --motions_;
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
   audit().Write("freedrive_ended", {{"why", std::string(status.message())}}).IgnoreError();
   return status;
 }

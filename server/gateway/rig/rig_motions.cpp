@@ -2,6 +2,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
+#include <algorithm>
+
 #include "server/base/status.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
@@ -12,6 +14,8 @@
 namespace touchstone::gateway {
 absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   constexpr double kPatienceS = 10;
+  LookAtSafety(/*refused=*/true);
+  TOUCHSTONE_RETURN_IF_ERROR(guard());
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
   if (state.robot_mode == arm::RobotMode::kRunning || !arm::SafetyPermitsMotion(state.safety_mode).ok())
     return parts_.arm->Ready();
@@ -34,8 +38,8 @@ absl::Status Rig::PowerOn(const source::MotionGuard& caller) {
   return status;
 }
 
-absl::StatusOr<image::Frame> Rig::Photograph(const source::ViewCommand& command,
-                                             const source::MotionGuard& caller) {
+absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& command,
+                                                   const source::MotionGuard& caller) {
   const source::MotionGuard guard = UntilStopped(caller);
   if (parts_.camera == nullptr)
     return absl::FailedPreconditionError(
@@ -55,39 +59,78 @@ absl::StatusOr<image::Frame> Rig::Photograph(const source::ViewCommand& command,
       const arm::PlannedTouch plan,
       parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, up_face, "view"));
   TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
-  const absl::StatusOr<image::Frame> frame = parts_.camera->Take(timing::HostNowS());
+  const double asked_s = timing::HostNowS();
+  const absl::StatusOr<image::Frame> frame = parts_.camera->Take(asked_s);
   if (!frame.ok()) {
     Remember(frame.status());
-    return frame;
+    return frame.status();
+  }
+  // Every state from the asking to now: the exposure lies somewhere within.
+  const Eigen::Isometry3d tip_from_camera = plan.motion.transit.back().inverse() * base_from_camera;
+  const absl::StatusOr<MeasuredCameraPose> measured =
+      MeasureCameraPose(StatesSince(asked_s), tip_from_camera, base_from_camera, options_.camera_tolerance);
+  if (!measured.ok()) {
+    Remember(measured.status());
+    return measured.status();
   }
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   session::JournalImage image;
   image.id = source::ViewId(command);
   image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
   image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
-  image.unix_s = timing::UnixNowS();
+  image.unix_s = timing::UnixNowS() - (timing::HostNowS() - frame->host_time_s);
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().AddImage(command.session, image));
+  // A view that was taken before is a repeat, under a name of its own.
+  absl::Status added = journal().AddImage(command.session, image);
+  for (int repeat = 2; absl::IsAlreadyExists(added); ++repeat) {
+    image.id = absl::StrCat(source::ViewId(command), " #", repeat);
+    added = journal().AddImage(command.session, image);
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(added);
   std::lock_guard<std::mutex> status_lock(status_mutex_);
   ++status_.images;
   status_.image_width = frame->width, status_.image_height = frame->height;
-  return frame;
+  source::Photograph photograph;
+  photograph.frame = *frame;
+  photograph.object_from_camera = base_from_object.inverse() * measured->base_from_camera;
+  photograph.unix_s = image.unix_s;
+  photograph.deviation_m = measured->deviation_m, photograph.deviation_rad = measured->deviation_rad;
+  return photograph;
+}
+
+std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
+  const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  if (!now.ok()) return {};
+  const double since_rig_s = (timing::HostNowS() - host_s + 1) * options_.time_scale;
+  std::vector<arm::ArmState> states =
+      parts_.arm->History(now->controller_time_s - since_rig_s, now->controller_time_s);
+  const auto first = std::find_if(states.begin(), states.end(),
+                                  [&](const arm::ArmState& state) { return state.host_time_s >= host_s; });
+  states.erase(states.begin(), first);
+  return states;
 }
 
 absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
                               const source::MotionGuard& guard) {
   const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_RETURN_IF_ERROR(
+      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
   ++motions_;
-  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints);
+  const HeartbeatScope beating(heartbeats_.get());
+  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints, guard);
   if (status.ok())
     status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
                        [](const arm::ArmState& state) -> absl::StatusOr<bool> {
                          return state.phase == arm::MotionPhase::kDone;
                        });
   --motions_;
-  if (!status.ok()) Remember(status);
+  if (!status.ok()) {
+    Remember(status);
+    // This process knows how it ended: no riddle for the next one.
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
+  }
   return status;
 }
 

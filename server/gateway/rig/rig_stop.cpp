@@ -14,6 +14,12 @@ source::MotionGuard Rig::UntilStopped(const source::MotionGuard& caller) const {
   return [this, caller, stops = stops_.load()]() -> absl::Status {
     if (stops_ == stops && !stopped_) return caller();
     const std::string reason = StopReason();
+    // What has to be done first at the teach pendant comes first.
+    if (const absl::StatusOr<arm::ArmState> arm = parts_.arm->State(); arm.ok())
+      if (const absl::Status safety = arm::SafetyPermitsMotion(arm->safety_mode); !safety.ok())
+        return absl::FailedPreconditionError(absl::StrCat(safety.message(), "; then release the stop",
+                                                          reason.empty() ? "" : " ", reason,
+                                                          " with 'touchstone rig reset'"));
     return absl::AbortedError(absl::StrCat("the rig was stopped", reason.empty() ? "" : " ", reason,
                                            ": make sure that it may move, then release the stop with "
                                            "'touchstone rig reset'"));
@@ -35,14 +41,7 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
   const absl::Status status = parts_.arm->Stop();
   parts_.changes->Notify();
   if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
-  {
-    std::lock_guard<std::mutex> lock(stop_mutex_);
-    // A reset that was under way may have released it since.
-    stopped_ = true;
-    stop_reason_ = absl::StrCat("by ", who, " (", reason, ")");
-    const absl::Status kept = journal().SetMetadata(kStopKey, stop_reason_);
-    if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
-  }
+  Latch(absl::StrCat("by ", who, " (", reason, ")"));
   audit()
       .Write("stop", {{"who", who},
                       {"reason", reason},
@@ -53,6 +52,7 @@ uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
 }
 
 absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
+  LookAtSafety();  // what happened until now is what the person has seen
   const uint64_t stops = stops_;
   if (!stopped_) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState arm, parts_.arm->State());

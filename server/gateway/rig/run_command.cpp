@@ -21,18 +21,22 @@ namespace touchstone::gateway {
 
 absl::Status RunCommand(const std::vector<std::string>& arguments, double timeout_s,
                         const std::function<absl::Status()>& guard) {
+  if (guard)
+    if (absl::Status allowed = guard(); !allowed.ok()) return allowed;
   const std::string command = absl::StrJoin(arguments, " ");
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
 
-  // Its signals are its own: this process may have blocked some.
+  // Its signals are its own: this process may have blocked some. So is its process group: what it has started ends
+  // with it.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
@@ -60,7 +64,7 @@ absl::Status RunCommand(const std::vector<std::string>& arguments, double timeou
       stop = absl::DeadlineExceededError(
           absl::StrCat("'", command, "' did not end within ", ShortestNumber(timeout_s), " s"));
     if (!stop.ok()) {
-      kill(pid, SIGKILL);
+      kill(-pid, SIGKILL);
       waitpid(pid, &status, 0);
       return stop;
     }

@@ -15,8 +15,8 @@
 namespace touchstone::gateway {
 namespace {
 
-constexpr double kHeartbeatPeriodS = 0.01;  // host time; also how soon a lost lease is noticed
-constexpr double kProgramStartsS = 2;       // host time that a program may take until its phase is reported
+constexpr double kLookPeriodS = 0.01;  // host time; how soon a lost lease is noticed
+constexpr double kProgramStartsS = 2;  // host time that a program may take until its phase is reported
 
 }  // namespace
 
@@ -38,15 +38,9 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   for (;;) {
     const uint64_t changes = parts_.changes->count();
     const double now_s = timing::HostNowS();
-    if (now_s - last_heartbeat_s_ >= kHeartbeatPeriodS) {
-      parts_.arm->SendHeartbeat();
-      last_heartbeat_s_ = now_s;
-    }
-    if (const absl::Status allowed = guard(); !allowed.ok()) return give_up(allowed);
+    if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
-    if (const absl::Status safety = arm::SafetyPermitsMotion(state->safety_mode); !safety.ok())
-      return give_up(safety);
     if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     seen = seen || state->program_id == program_id;
     if (seen) {
@@ -58,9 +52,13 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     // A program that ended by itself, or never began.
     const bool rests = state->runtime_state == arm::RuntimeState::kStopped && now_s - began_s > 0.5;
     at_rest_since_s = !rests ? 0 : at_rest_since_s == 0 ? now_s : at_rest_since_s;
-    if (seen && rests && now_s - at_rest_since_s > 0.5)
-      return give_up(absl::UnavailableError(absl::StrCat("the arm's program ended during ", what,
-                                                         " at phase '", arm::PhaseName(state->phase), "'")));
+    if (seen && rests && now_s - at_rest_since_s > 0.5) {
+      const std::string ended = absl::StrCat("the arm's program ", program_id, " ended during ", what,
+                                             " at phase '", arm::PhaseName(state->phase), "'");
+      Latch(absl::StrCat("by the arm's controller (", ended,
+                         ": its watchdog, the teach pendant or another program ended it)"));
+      return give_up(absl::UnavailableError(ended));
+    }
     if (!seen && now_s - began_s > kProgramStartsS + 1)
       return give_up(
           absl::UnavailableError(absl::StrCat("the arm never began program ", program_id, " (", what,
@@ -68,8 +66,20 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (now_s - began_s > limit_s)
       return give_up(absl::UnavailableError(absl::StrCat(
           what, " took longer than ", ShortestNumber(std::round(limit_s)), " s and was stopped")));
-    parts_.changes->WaitForChange(changes, kHeartbeatPeriodS);
+    parts_.changes->WaitForChange(changes, kLookPeriodS);
   }
+}
+
+absl::Status Rig::MayGoOn(const source::MotionGuard& guard) {
+  heartbeats_->Permit();
+  // The controller's own stop first: it says more than that the latch has closed because of it.
+  if (const absl::StatusOr<arm::ArmState> state = parts_.arm->State(); state.ok()) {
+    if (const absl::Status safety = arm::SafetyPermitsMotion(state->safety_mode); !safety.ok()) {
+      LookAtSafety();
+      return safety;
+    }
+  }
+  return guard();
 }
 
 absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
@@ -87,16 +97,21 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   };
 
   // To the start. The capture begins there, at rest and with every finger free.
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion));
+  const HeartbeatScope beating(heartbeats_.get());
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->StartTouch(record.motion, guard));
   TOUCHSTONE_RETURN_IF_ERROR(
       Supervise(program_id, limit_s, "the transit to the start", guard, phase_is(arm::MotionPhase::kReady)));
-  if (const absl::Status started = parts_.effector->StartCapture(program_id); !started.ok()) {
+  if (const absl::Status started = parts_.effector->StartCapture(program_id, [&] { return MayGoOn(guard); });
+      !started.ok()) {
     parts_.arm->Stop().IgnoreError();
     return started;
   }
 
   // The approach: until every finger has reported, the first one is pushed far enough, or the stroke ends.
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->BeginApproach(program_id));
+  if (const absl::Status began = parts_.arm->BeginApproach(program_id, guard); !began.ok()) {
+    parts_.arm->Stop().IgnoreError();
+    return began;
+  }
   const Eigen::Vector3d approach =
       (plan.motion.end.translation() - plan.motion.transit.back().translation()).normalized();
   bool ended = false;

@@ -9,29 +9,12 @@
 #include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/gateway/rig/approach_fit.h"
+#include "server/gateway/rig/touch_series.h"
 #include "server/geometry/pose.h"
 
 namespace touchstone::gateway {
 namespace {
-
-// A straight line through (time, distance), by least squares.
-struct Line {
-  double time_s = 0, distance_m = 0, speed_m_s = 0;
-  int points = 0;
-};
-
-Line FitLine(const std::vector<std::pair<double, double>>& points) {
-  Line line;
-  line.points = static_cast<int>(points.size());
-  for (const auto& [t, d] : points) line.time_s += t / points.size(), line.distance_m += d / points.size();
-  double tt = 0, td = 0;
-  for (const auto& [t, d] : points) {
-    tt += (t - line.time_s) * (t - line.time_s);
-    td += (t - line.time_s) * (d - line.distance_m);
-  }
-  line.speed_m_s = tt > 0 ? td / tt : 0;
-  return line;
-}
 
 std::array<double, 6> NoPose() {
   std::array<double, 6> none;
@@ -62,55 +45,114 @@ std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states
 
 namespace {
 
-// The straight part of an approach, as the controller's states show it.
+// States before the first contact alone, if there are so many: from then on the object holds against the arm.
+constexpr int kEnoughFreeStates = 400;
+constexpr double kFullSpeed = 0.995;  // share
+
+// The approach, as the controller's states show it.
 struct Approach {
-  bool seen = false;              // any state of it was recorded
-  double began_controller_s = 0;  // controller time
-  double speed_m_s = 0;           // measured; 0: too few states
+  bool seen = false;                          // any state of it was recorded
+  double began_controller_s = 0;              // controller time
+  double began_controller_uncertainty_s = 0;  // standard
+  double speed_m_s = 0;                       // measured
 };
 
-absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
-  const arm::ArmTouch& motion = record.motion;
-  const Eigen::Vector3d start = motion.transit.back().translation();
-  const Eigen::Vector3d direction = (motion.end.translation() - start).normalized();
-  const double ramp_m = motion.speed_m_s * motion.speed_m_s / (2 * record.acceleration_m_s2);
+// The controller's limiter and the pendant's slider act together: the arm's speed is their product.
+absl::Status CheckSpeedScaling(const std::vector<arm::ArmState>& states) {
+  const arm::ArmState* slowest = nullptr;
+  for (const arm::ArmState& state : states)
+    if (slowest == nullptr || state.speed_scaling * state.target_speed_fraction <
+                                  slowest->speed_scaling * slowest->target_speed_fraction)
+      slowest = &state;
+  if (slowest == nullptr || slowest->speed_scaling * slowest->target_speed_fraction >= kFullSpeed)
+    return absl::OkStatus();
+  const auto percent = [](double share) { return ShortestNumber(std::round(1000 * share) / 10); };
+  return absl::FailedPreconditionError(
+      absl::StrCat("the arm did not go at the commanded speed during the approach, so its contact times "
+                   "cannot be compared with "
+                   "others: the speed slider stood at ",
+                   percent(slowest->target_speed_fraction), " % and the controller's limiter left ",
+                   percent(slowest->speed_scaling),
+                   " %; set the slider at the teach pendant to 100 %, see whether a safety limit (reduced "
+                   "mode, a plane) slows the "
+                   "arm, and touch again"));
+}
 
-  Approach approach;
-  std::vector<std::pair<double, double>> full_speed;  // time since the first state, distance from the start
-  double min_scaling = 1, origin_s = 0;
-  for (const arm::ArmState& state : record.states) {
-    if (state.program_id != motion.program_id || state.phase != arm::MotionPhase::kApproach) continue;
-    if (!approach.seen) origin_s = state.controller_time_s;
-    approach.seen = true;
-    min_scaling = std::min(min_scaling, state.speed_scaling);
-    const double distance_m = direction.dot(state.base_from_tip.translation() - start);
-    const double speed_m_s = direction.dot(state.tip_velocity_m_s);
-    if (distance_m > 2 * ramp_m && std::abs(speed_m_s - motion.speed_m_s) < 0.1 * motion.speed_m_s)
-      full_speed.emplace_back(state.controller_time_s - origin_s, distance_m);
+// Controller times of the first and the last contact; none if there is no contact or no common time.
+std::optional<std::pair<double, double>> ContactSpan(const TouchRecording& record) {
+  if (!record.controller_clock.valid || !record.effector_clock.valid) return std::nullopt;
+  std::optional<std::pair<double, double>> span;
+  for (const auto& ticks : record.contacts.contact_ticks) {
+    if (!ticks.has_value()) continue;
+    const double device_s = static_cast<double>(*ticks) / record.tick_hz;
+    const double controller_s = record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
+    if (!span.has_value()) span = {controller_s, controller_s};
+    span->first = std::min(span->first, controller_s);
+    span->second = std::max(span->second, controller_s);
   }
-  if (min_scaling < 0.995)
-    return absl::FailedPreconditionError(absl::StrCat(
-        "the controller scaled the speed to ", ShortestNumber(std::round(1000 * min_scaling) / 10),
-        " % during the approach, so its contact times cannot be compared with others: set the speed "
-        "slider to 100 % and touch again"));
+  return span;
+}
 
-  // When it began: from the line of constant speed and the ramp before it; else when its phase was first
-  // reported.
-  approach.began_controller_s = origin_s;
-  const Line line = FitLine(full_speed);
-  if (line.points == 0) return approach;
-  // Few states, as on an accelerated clock, do not determine the speed: then it is the commanded one.
-  const bool measured = line.points >= 3 && line.speed_m_s > 0;
-  if (measured) approach.speed_m_s = line.speed_m_s;
-  approach.began_controller_s = origin_s + line.time_s -
-                                line.distance_m / (measured ? line.speed_m_s : motion.speed_m_s) -
-                                motion.speed_m_s / (2 * record.acceleration_m_s2);
+// The states of the approach at its commanded course: until it brakes, whether at the last contact or at the end of
+// the stroke.
+std::vector<ApproachState> CourseOf(const TouchRecording& record, const std::vector<arm::ArmState>& states) {
+  const arm::ArmTouch& motion = record.motion;
+  const Eigen::Vector3d start = motion.transit.back().translation(), way = motion.end.translation() - start;
+  const ApproachProfile profile{motion.speed_m_s, record.acceleration_m_s2};
+  const double brakes_m = way.norm() - profile.RampM();
+  const std::optional<std::pair<double, double>> contacts = ContactSpan(record);
+  std::vector<ApproachState> course, all;
+  int free_states = 0;
+  for (const arm::ArmState& state : states) {
+    ApproachState each{state.controller_time_s,
+                       way.normalized().dot(state.base_from_tip.translation() - start)};
+    if (each.distance_m > brakes_m) break;
+    if (!all.empty() && each.time_s <= all.back().time_s) continue;  // sent twice
+    all.push_back(each);
+    if (!contacts.has_value() || each.time_s > contacts->second) continue;
+    course.push_back(each);
+    if (each.time_s < contacts->first) free_states = static_cast<int>(course.size());
+  }
+  // Without a common time, or one that is wrong by more than the approach took, the short braking is an outlier.
+  if (static_cast<int>(course.size()) < kMinApproachStates) return all;
+  if (free_states >= kEnoughFreeStates) course.resize(free_states);
+  return course;
+}
+
+std::vector<arm::ArmState> ApproachStates(const TouchRecording& record) {
+  std::vector<arm::ArmState> states;
+  for (const arm::ArmState& state : record.states)
+    if (state.program_id == record.motion.program_id && state.phase == arm::MotionPhase::kApproach)
+      states.push_back(state);
+  return states;
+}
+
+absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
+  Approach approach;
+  const std::vector<arm::ArmState> states = ApproachStates(record);
+  // Recovered after an interruption: nobody recorded the arm.
+  if (states.empty() && record.recovered) return approach;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSpeedScaling(states));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const ApproachFit fit,
+      FitApproach(CourseOf(record, states), {record.motion.speed_m_s, record.acceleration_m_s2}));
+  approach.seen = true;
+  approach.began_controller_s = fit.began_s;
+  approach.began_controller_uncertainty_s = fit.began_uncertainty_s;
+  approach.speed_m_s = fit.speed_m_s;
   return approach;
 }
 
-// Contact times since the device's `began_device_s`, and poses at contact where `synchronised`.
+// Standard uncertainty of a clock's reading at a remote time, in host seconds.
+double HostUncertaintyS(const timing::ClockEstimate& clock, double remote_s) {
+  const double age_s = std::abs(clock.HostOf(remote_s) - clock.host_at_s);
+  return std::hypot(clock.offset_uncertainty_s, clock.rate_uncertainty * age_s) / clock.rate;
+}
+
+// Contact times since the device's `began_device_s`, and poses at contact where `synchronised`. *moved_s: by how much
+// all of them were moved, since no contact comes before its approach.
 std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, double began_device_s,
-                                              double device_rate, bool synchronised) {
+                                              double device_rate, bool synchronised, double* moved_s) {
   std::vector<session::JournalFinger> fingers;
   for (const auto& ticks : record.contacts.contact_ticks) {
     session::JournalFinger finger;
@@ -135,6 +177,7 @@ std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, doub
   for (const session::JournalFinger& finger : fingers)
     if (finger.contact_time_s < early_s) early_s = finger.contact_time_s;
   for (session::JournalFinger& finger : fingers) finger.contact_time_s -= early_s;
+  *moved_s = -early_s;
   return fingers;
 }
 
@@ -166,18 +209,37 @@ absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record) {
       synchronised
           ? record.effector_clock.RemoteOf(record.controller_clock.HostOf(approach.began_controller_s))
           : first_s;
-  result.fingers = FingersOf(record, began_device_s, device_rate, synchronised);
+  double moved_s = 0;
+  result.fingers = FingersOf(record, began_device_s, device_rate, synchronised, &moved_s);
   const double tick_s = 1.0 / record.tick_hz / device_rate * scale;
   const double rate_share =
       record.effector_clock.valid ? record.effector_clock.rate_uncertainty / device_rate : 2e-4;
   result.time_uncertainty_s = std::hypot(tick_s / std::sqrt(12.0), rate_share * span_s);
-  result.synchronisation_uncertainty_s =
-      synchronised ? std::hypot(record.effector_clock.offset_uncertainty_s / device_rate,
-                                record.controller_clock.offset_uncertainty_s / record.controller_clock.rate) *
-                         scale
-                   : kNaN;
+  // Of the approach's start on the device's clock: how well the states show it, and both clocks then.
+  result.synchronisation_uncertainty_s = kNaN;
+  if (synchronised) {
+    const double host_s = std::hypot(HostUncertaintyS(record.effector_clock, began_device_s),
+                                     HostUncertaintyS(record.controller_clock, approach.began_controller_s),
+                                     approach.began_controller_uncertainty_s / record.controller_clock.rate);
+    result.synchronisation_uncertainty_s = std::hypot(host_s * scale, moved_s);
+  }
   result.effector_drift = device_rate / scale - 1;
   return result;
+}
+
+absl::StatusOr<v1::TouchSeries> SeriesOf(const TouchRecording& record) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Approach approach, ApproachOf(record));
+  const double controller_rate =
+      record.controller_clock.valid ? record.controller_clock.rate : record.time_scale;
+  v1::TouchSeries series;
+  for (const arm::ArmState& state : ApproachStates(record)) {
+    series.add_time_s((state.controller_time_s - approach.began_controller_s) / controller_rate *
+                      record.time_scale);
+    for (const double q : state.joints_rad) series.add_joints_rad(q);
+    for (const double part : geometry::PoseVectorOf(state.base_from_tip)) series.add_base_from_tip(part);
+    for (int axis = 0; axis < 3; ++axis) series.add_tip_force_n(state.tip_force_n[axis]);
+  }
+  return series;
 }
 
 }  // namespace touchstone::gateway

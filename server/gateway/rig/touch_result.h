@@ -22,11 +22,12 @@ struct TouchRecording {
   timing::ClockEstimate effector_clock;    // device seconds on host seconds
   timing::ClockEstimate controller_clock;  // controller seconds on host seconds
   std::vector<arm::ArmState> states;       // of the whole touch, oldest first
+  bool recovered = false;  // after an interruption, without states: times then count from the first contact
 };
 
 // Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds). Session and
-// Unix times stay 0. FAILED_PRECONDITION if the controller scaled the speed during the approach: times would
-// not be comparable.
+// Unix times stay 0. FAILED_PRECONDITION if the approach was not made at the commanded speed, by what the controller
+// says or by its poses: times would not be comparable. UNAVAILABLE if too few states of it arrived.
 absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record);
 
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/gateway/rig/touch_result.h"
+#include "server/gateway/rig/touch_series.h"
 
 namespace touchstone::gateway {
 namespace {
@@ -18,6 +19,10 @@ double Distance(double t) {
   return t < ramp_s ? 0.5 * kAcceleration * t * t : kSpeed * (t - 0.5 * ramp_s);
 }
 
+struct Scaling {
+  double slider = 1, limiter = 1;
+};
+
 // An approach along -z that began at controller time 100.0013 s, told 500 times a second by a controller
 // whose clock is 37 s ahead of the host's and 50 ppm fast, and contacts told by a device whose clock is
 // 120 ppm slow.
@@ -25,7 +30,7 @@ struct Made {
   TouchRecording record;
   double began_controller_s = 100.0013;
 
-  explicit Made(std::vector<std::optional<double>> contacts_s, double scale = 1) {
+  explicit Made(std::vector<std::optional<double>> contacts_s, Scaling scaling = Scaling()) {
     record.motion.program_id = 7;
     record.motion.speed_m_s = kSpeed;
     record.motion.transit = {Eigen::Isometry3d(Eigen::Translation3d(0.3, 0, 0.3))};
@@ -42,7 +47,8 @@ struct Made {
       state.phase = t < 0 ? arm::MotionPhase::kReady : arm::MotionPhase::kApproach;
       state.base_from_tip.translation() = Eigen::Vector3d(0.3, 0, 0.3 - Distance(t));
       state.tip_velocity_m_s = Eigen::Vector3d(0, 0, -(Distance(t + 5e-4) - Distance(t - 5e-4)) / 1e-3);
-      state.speed_scaling = scale;
+      state.speed_scaling = scaling.limiter;
+      state.target_speed_fraction = scaling.slider;
       record.states.push_back(state);
     }
     for (const auto& t : contacts_s) {
@@ -73,7 +79,7 @@ TEST(TouchResult, DifferencesAreInHostTimeWhateverTheEffectorsClockDoes) {
   EXPECT_NEAR(result->effector_drift, -120e-6, 1e-9);
 }
 
-TEST(TouchResult, OneStateAtFullSpeedTellsWhenTheApproachBegan) {
+TEST(TouchResult, TooFewStatesOfTheApproachAreRefused) {
   Made made({{1.2}, {1.0}, {2.5}});
   std::vector<arm::ArmState> few;
   for (const arm::ArmState& state : made.record.states)
@@ -81,9 +87,8 @@ TEST(TouchResult, OneStateAtFullSpeedTellsWhenTheApproachBegan) {
       few.push_back(state);
   made.record.states = few;
   const auto result = ResultOf(made.record);
-  ASSERT_TRUE(result.ok()) << result.status();
-  EXPECT_NEAR(result->fingers[0].contact_time_s, 1.2, 1e-4);
-  EXPECT_EQ(result->speed_m_s, 0) << "one state tells no speed";
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kUnavailable) << result.status();
+  EXPECT_THAT(std::string(result.status().message()), testing::HasSubstr("only 1 states"));
 }
 
 TEST(TouchResult, ContactsFartherApartThanTheTouchTookAreNotBelieved) {
@@ -100,6 +105,7 @@ TEST(TouchResult, AnErrorOfTheClocksNeverPutsAContactBeforeItsApproach) {
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->fingers[0].contact_time_s, 0);
   EXPECT_NEAR(result->fingers[1].contact_time_s, 2.0, 2e-6);
+  EXPECT_GT(result->synchronisation_uncertainty_s, 2.4) << "the times were moved by 2.5 s";
 }
 
 TEST(TouchResult, ThePoseAtContactIsInterpolatedAtItsMoment) {
@@ -117,20 +123,38 @@ TEST(TouchResult, AFingerThatReportedNothingHasNeitherTimeNorPose) {
   EXPECT_NEAR(result->fingers[2].contact_time_s, 1.3, 2e-6);
 }
 
-TEST(TouchResult, AScaledSpeedIsRefusedSinceItsTimesWouldMislead) {
-  const auto result = ResultOf(Made({{1.2}, {1.0}, {1.3}}, 0.5).record);
-  ASSERT_EQ(result.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(result.status().message()), testing::HasSubstr("50 %"));
+TEST(TouchResult, ASpeedSliderOrALimiterBelowFullIsRefusedWithBothNumbers) {
+  for (const auto& [slider, limiter] : {std::pair(0.5, 1.0), std::pair(1.0, 0.5), std::pair(0.9, 0.8)}) {
+    const auto result = ResultOf(Made({{1.2}, {1.0}, {1.3}}, Scaling{slider, limiter}).record);
+    ASSERT_EQ(result.status().code(), absl::StatusCode::kFailedPrecondition) << slider << " " << limiter;
+    EXPECT_THAT(
+        std::string(result.status().message()),
+        testing::AllOf(testing::HasSubstr("slider stood at " + std::to_string(int(100 * slider)) + " %"),
+                       testing::HasSubstr("limiter left " + std::to_string(int(100 * limiter)) + " %")));
+  }
 }
 
-TEST(TouchResult, WithoutTheArmsRecordTimesCountFromTheFirstContact) {
+TEST(TouchResult, ASlowArmIsRefusedByItsPosesWhateverTheControllerSays) {
+  Made made({{1.2}, {1.0}, {2.5}});
+  for (arm::ArmState& state : made.record.states)
+    state.base_from_tip.translation().z() = 0.3 - (0.3 - state.base_from_tip.translation().z()) * 0.5;
+  const auto result = ResultOf(made.record);
+  ASSERT_EQ(result.status().code(), absl::StatusCode::kFailedPrecondition) << result.status();
+  EXPECT_THAT(std::string(result.status().message()),
+              testing::AllOf(testing::HasSubstr("10 mm/s"), testing::HasSubstr("20 mm/s")));
+}
+
+TEST(TouchResult, ARecoveredTouchCountsFromItsFirstContact) {
   Made made({{1.2}, {1.0}, {2.5}});
   made.record.states.clear();
+  EXPECT_EQ(ResultOf(made.record).status().code(), absl::StatusCode::kUnavailable);
+  made.record.recovered = true;
   const auto result = ResultOf(made.record);
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->fingers[1].contact_time_s, 0);
   EXPECT_NEAR(result->fingers[2].contact_time_s, 1.5, 2e-6);
   EXPECT_TRUE(std::isnan(result->fingers[0].base_from_tip[0]));
+  EXPECT_TRUE(std::isnan(result->synchronisation_uncertainty_s));
 }
 
 TEST(TouchResult, UncertaintiesGrowWithTheClocksTheyComeFrom) {
@@ -142,6 +166,26 @@ TEST(TouchResult, UncertaintiesGrowWithTheClocksTheyComeFrom) {
   ASSERT_TRUE(good.ok() && bad.ok());
   EXPECT_GT(bad->synchronisation_uncertainty_s, 3 * good->synchronisation_uncertainty_s);
   EXPECT_GT(bad->time_uncertainty_s, 10 * good->time_uncertainty_s);
+}
+
+TEST(TouchSeries, HasEveryStateOfTheApproachOnTheContactsTime) {
+  Made made({{1.2}, {1.0}, {2.5}});
+  for (arm::ArmState& state : made.record.states) {
+    state.joints_rad = {0, 1, 2, 3, 4, state.controller_time_s};
+    state.tip_force_n = Eigen::Vector3d(1, 2, state.controller_time_s);
+  }
+  const auto series = SeriesOf(made.record);
+  ASSERT_TRUE(series.ok()) << series.status();
+  ASSERT_EQ(series->time_s_size(), 1999);
+  ASSERT_EQ(series->joints_rad_size(), 6 * 1999);
+  ASSERT_EQ(series->base_from_tip_size(), 6 * 1999);
+  ASSERT_EQ(series->tip_force_n_size(), 3 * 1999);
+  for (const int k : {0, 1000, 1998}) {
+    const double t = series->time_s(k), controller_s = series->tip_force_n(3 * k + 2);
+    EXPECT_NEAR(t, (controller_s - made.began_controller_s) / (1 + 50e-6), 3e-6) << k;
+    EXPECT_EQ(series->joints_rad(6 * k + 5), controller_s) << k;
+    EXPECT_NEAR(series->base_from_tip(6 * k + 2), 0.3 - Distance(t), 1e-7) << k;
+  }
 }
 
 TEST(PoseAt, NothingIsMadeUpAcrossAGap) {

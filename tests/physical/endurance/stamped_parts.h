@@ -29,14 +29,15 @@ class StampedArm : public gateway::arm::Arm {
     return arm_->History(from_s, to_s);
   }
   absl::Status Ready() const override { return arm_->Ready(); }
-  absl::Status StartTouch(const gateway::arm::ArmTouch& touch) override {
-    const absl::Status status = arm_->StartTouch(touch);
+  absl::Status StartTouch(const gateway::arm::ArmTouch& touch,
+                          const gateway::arm::StartGuard& guard) override {
+    const absl::Status status = arm_->StartTouch(touch, guard);
     stamps_->program_sent_s = gateway::timing::HostNowS();
     stamps_->disk_before_s = stamps_->disk_s;
     return status;
   }
-  absl::Status BeginApproach(uint32_t program_id) override {
-    const absl::Status status = arm_->BeginApproach(program_id);
+  absl::Status BeginApproach(uint32_t program_id, const gateway::arm::StartGuard& guard) override {
+    const absl::Status status = arm_->BeginApproach(program_id, guard);
     stamps_->go_sent_s = gateway::timing::HostNowS();
     return status;
   }
@@ -46,8 +47,9 @@ class StampedArm : public gateway::arm::Arm {
     return status;
   }
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
-                           const std::vector<std::array<double, 6>>& joints) override {
-    return arm_->MoveThrough(program_id, poses, joints);
+                           const std::vector<std::array<double, 6>>& joints,
+                           const gateway::arm::StartGuard& guard) override {
+    return arm_->MoveThrough(program_id, poses, joints, guard);
   }
   absl::Status Stop() override { return arm_->Stop(); }
   absl::Status PowerOn(const std::function<absl::Status()>& guard) override { return arm_->PowerOn(guard); }
@@ -67,9 +69,9 @@ class StampedEffector : public gateway::effector::Effector {
  public:
   StampedEffector(std::unique_ptr<gateway::effector::Effector> effector, int fingers, Stamps* stamps)
       : effector_(std::move(effector)), fingers_(fingers), stamps_(stamps) {}
-  absl::Status StartCapture(uint32_t touch) override {
+  absl::Status StartCapture(uint32_t touch, const std::function<absl::Status()>& guard) override {
     const double began_s = gateway::timing::HostNowS();
-    const absl::Status status = effector_->StartCapture(touch);
+    const absl::Status status = effector_->StartCapture(touch, guard);
     stamps_->effector_arm_s = gateway::timing::HostNowS() - began_s;
     return status;
   }

@@ -2,6 +2,7 @@
 
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 #include <algorithm>
@@ -27,7 +28,7 @@ namespace {
 constexpr double kStateEveryS = 0.1;  // primary and secondary, host time
 constexpr double kMinCycleS = 0.001;  // of the control loop, host time
 constexpr double kMaxIdleS = 0.005;   // between two looks at the faults, host time
-constexpr size_t kMaxConnections = 64, kMaxLine = 65536;
+constexpr size_t kMaxConnections = 64, kMaxLine = 65536, kMaxCommands = 10'000;
 constexpr double kRoundingS = 1e-9;  // of the times of cycles
 constexpr int kMaxLateData = 50;     // packages that a late host makes up for
 
@@ -109,8 +110,24 @@ class EmulatedController : public Controller {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.Count(what);
   }
+  std::vector<std::string> Commands() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return commands_;
+  }
 
  private:
+  void Take(const std::string& command) {
+    if (commands_.size() < kMaxCommands) commands_.push_back(command);
+  }
+
+  // "move" of "def move():..."
+  static std::string NameOf(const std::string& program) {
+    const size_t space = program.find(' '), parenthesis = program.find('(');
+    return space < parenthesis && parenthesis != std::string::npos
+               ? program.substr(space + 1, parenthesis - space - 1)
+               : "?";
+  }
+
   void CloseListeners() {
     for (int& fd : listeners_)
       if (fd >= 0) close(fd);
@@ -118,6 +135,8 @@ class EmulatedController : public Controller {
   }
 
   void Loop() {
+    // Linux lets sleepers wake 50 us late to save power; controllers run a real-time kernel, which does not.
+    prctl(PR_SET_TIMERSLACK, 1000, 0, 0, 0);
     while (!stop_) {
       std::vector<pollfd> polled = Polled();
       const double wait_s = std::clamp(NextWakeHostS() - HostNowS(), 0.0, kMaxIdleS);
@@ -224,7 +243,7 @@ class EmulatedController : public Controller {
       case kPrimary:
       case kSecondary:
         for (const std::string& program : client->programs.Feed(std::exchange(client->received, {})))
-          machine_.StartProgram(program);
+          Take("program " + NameOf(program)), machine_.StartProgram(program);
         return;
       default: {
         const bool was_started = client->rtde->started();
@@ -243,6 +262,8 @@ class EmulatedController : public Controller {
       const std::string line = client->received.substr(0, end);
       client->received.erase(0, end + 1);
       bool quit = false;
+      for (const char* command : {"power on", "power off", "brake release", "unlock protective stop"})
+        if (line.rfind(command, 0) == 0) Take(command);
       client->connection.Send(AnswerDashboard(line, options_.model, &machine_, &quit) + "\n");
       if (quit) {
         client->connection.CloseWhenSent();
@@ -315,6 +336,7 @@ class EmulatedController : public Controller {
   Faults* const faults_;
   mutable std::recursive_mutex mutex_;  // a listener may ask for the pose while it is told of a motion
   Machine machine_;
+  std::vector<std::string> commands_;
   std::mt19937_64 random_;
   RtdeSession::Taken taken_;
   std::list<Client> clients_;

@@ -1,0 +1,347 @@
+// What closes the latch of Stop, and what goes out while it is closed, with an arm and an end effector that a test
+// moves by hand.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+
+#include "server/base/test_folder.h"
+#include "server/gateway/arm/kinematics.h"
+#include "server/gateway/rig/rig.h"
+
+namespace touchstone::gateway {
+namespace {
+
+using arm::ArmState;
+using arm::MotionPhase;
+using arm::RuntimeState;
+using arm::SafetyMode;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class FakeArm final : public arm::Arm {
+ public:
+  explicit FakeArm(timing::ChangeNotifier* changes) : changes_(changes) {
+    const arm::MotionLimits limits;
+    state_.joints_rad = limits.home_rad;
+    state_.base_from_tip = arm::UrKinematics::ForModel("ur3e").value().Forward(limits.home_rad);
+    state_.robot_mode = arm::RobotMode::kRunning;
+    state_.safety_mode = SafetyMode::kNormal;
+    state_.runtime_state = RuntimeState::kStopped;
+    state_.speed_scaling = state_.target_speed_fraction = 1;
+    Change([](ArmState*) {});
+  }
+  // The next state that the controller sends.
+  void Change(const std::function<void(ArmState*)>& change) {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      change(&state_);
+      state_.controller_time_s += 0.002;
+      state_.host_time_s = timing::HostNowS();
+      history_.push_back(state_);
+    }
+    changes_->Notify();
+  }
+  void SetSafety(SafetyMode mode) {
+    Change([mode](ArmState* state) { state->safety_mode = mode; });
+  }
+  void SetProgram(uint32_t id, MotionPhase phase, RuntimeState runtime) {
+    Change([=](ArmState* state) {
+      state->program_id = id, state->phase = phase, state->runtime_state = runtime;
+    });
+  }
+
+  absl::StatusOr<ArmState> State() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return state_;
+  }
+  std::vector<ArmState> History(double from_s, double to_s) const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<ArmState> states;
+    for (const ArmState& state : history_)
+      if (state.controller_time_s >= from_s && state.controller_time_s <= to_s) states.push_back(state);
+    return states;
+  }
+  absl::Status Ready() const override { return absl::OkStatus(); }
+  absl::Status StartTouch(const arm::ArmTouch&, const arm::StartGuard&) override {
+    return absl::UnimplementedError("no touches here");
+  }
+  absl::Status BeginApproach(uint32_t, const arm::StartGuard&) override { return absl::OkStatus(); }
+  absl::Status EndApproach(uint32_t) override { return absl::OkStatus(); }
+  absl::Status MoveThrough(uint32_t id, const std::vector<Eigen::Isometry3d>&,
+                           const std::vector<std::array<double, 6>>&, const arm::StartGuard& guard) override {
+    if (before_send) before_send();
+    if (const absl::Status allowed = guard(); !allowed.ok()) return allowed;
+    ++programs;
+    SetProgram(id, MotionPhase::kTransit, RuntimeState::kPlaying);
+    return absl::OkStatus();
+  }
+  absl::Status Stop() override {
+    ++stops;
+    Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
+    return absl::OkStatus();
+  }
+  absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
+  void SendHeartbeat() override { heartbeat_s = timing::HostNowS(); }
+  timing::ClockEstimate ControllerClock() const override { return {}; }
+  double StateRateHz() const override { return 500; }
+  std::string Model() const override { return "ur3e"; }
+  std::string Address() const override { return "a test"; }
+  std::string Version() const override { return "0"; }
+
+  std::function<void()> before_send;
+  std::atomic<int> programs{0}, stops{0};
+  std::atomic<double> heartbeat_s{0};
+
+ private:
+  timing::ChangeNotifier* const changes_;
+  mutable std::mutex mutex_;
+  ArmState state_;
+  std::vector<ArmState> history_;
+};
+
+class FakeEffector final : public effector::Effector {
+ public:
+  absl::Status StartCapture(uint32_t, const std::function<absl::Status()>&) override {
+    return absl::OkStatus();
+  }
+  absl::Status EndCapture() override { return absl::OkStatus(); }
+  absl::StatusOr<effector::EffectorTouch> Touch() const override { return absl::NotFoundError("none"); }
+  absl::StatusOr<effector::EffectorTouch> Recall(uint32_t) override { return absl::NotFoundError("none"); }
+  effector::EffectorState State() const override {
+    effector::EffectorState state;
+    state.connected = true;
+    return state;
+  }
+  timing::ClockEstimate Clock() const override { return {}; }
+};
+
+class RigLatch : public testing::Test {
+ protected:
+  ~RigLatch() override { End(); }
+
+  void MakeParts() {
+    parts_.changes = std::make_unique<timing::ChangeNotifier>();
+    auto arm = std::make_unique<FakeArm>(parts_.changes.get());
+    arm_ = arm.get();
+    parts_.arm = std::move(arm);
+    parts_.effector = std::make_unique<FakeEffector>();
+    parts_.planner =
+        arm::MotionPlanner::Create("ur3e", arm::MotionLimits(), calibration::Calibration()).value();
+    parts_.journal =
+        session::Journal::Open(folder_.Path("rig.db"), session::Journal::Mode::kCreateOrReadWrite).value();
+    parts_.audit = audit::AuditLog::Open(folder_.Path("audit.jsonl")).value();
+  }
+  void Start() {
+    if (arm_ == nullptr) MakeParts();
+    absl::StatusOr<std::unique_ptr<Rig>> rig = Rig::Create(RigOptions(), std::move(parts_));
+    ASSERT_TRUE(rig.ok()) << rig.status();
+    rig_ = *std::move(rig);
+  }
+  void End() {
+    rig_ = nullptr;
+    arm_ = nullptr;
+    parts_ = RigParts();
+  }
+  // A touch that a process before this one had under way.
+  void JournalExecuting(uint32_t program_id) {
+    session::JournalSession session;
+    session.name = "monday";
+    ASSERT_TRUE(parts_.journal->EnsureSession(session).ok());
+    ASSERT_TRUE(parts_.journal->Begin("monday", "touch 7", "lat00", "+z", "command").ok());
+    ASSERT_TRUE(parts_.journal->Executing("monday", "touch 7", program_id, 1).ok());
+  }
+
+  static bool WaitFor(const std::function<bool()>& done) {
+    for (const double until_s = timing::HostNowS() + 30; timing::HostNowS() < until_s;) {
+      if (done()) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
+  }
+  bool WaitForLatch() {
+    return WaitFor([&] { return !rig_->StopReason().empty(); });
+  }
+  // Two looks of the safety watch at the least.
+  void LetTheWatchLook() {
+    const double until_s = timing::HostNowS() + 0.2;
+    while (timing::HostNowS() < until_s) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  absl::Status Home() {
+    return rig_->Home([] { return absl::OkStatus(); });
+  }
+  std::future<absl::Status> HomeLater() {
+    return std::async(std::launch::async, [this] { return Home(); });
+  }
+
+  const TestFolder folder_;
+  RigParts parts_;
+  FakeArm* arm_ = nullptr;
+  std::unique_ptr<Rig> rig_;
+};
+
+TEST_F(RigLatch, AProtectiveStopLatchesHoweverShortItWas) {
+  Start();
+  LetTheWatchLook();
+  arm_->SetSafety(SafetyMode::kProtectiveStop);
+  arm_->SetSafety(SafetyMode::kNormal);
+  ASSERT_TRUE(WaitForLatch());
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("PROTECTIVE_STOP between motions"));
+  const absl::Status refused = Home();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kAborted);
+  EXPECT_THAT(std::string(refused.message()), AllOf(HasSubstr("PROTECTIVE_STOP"), HasSubstr("rig reset")));
+  EXPECT_EQ(arm_->programs, 0);
+  ASSERT_TRUE(rig_->Reset("looked", "ana").ok());
+  EXPECT_EQ(rig_->StopReason(), "");
+  // Once more is another stop.
+  arm_->SetSafety(SafetyMode::kProtectiveStop);
+  EXPECT_TRUE(WaitForLatch());
+}
+
+TEST_F(RigLatch, WhatIsFoundAtTheStartLatchesAndOutlivesTheProcess) {
+  for (const SafetyMode mode :
+       {SafetyMode::kProtectiveStop, SafetyMode::kRobotEmergencyStop, SafetyMode::kSystemEmergencyStop,
+        SafetyMode::kViolation, SafetyMode::kFault, SafetyMode::kRecovery}) {
+    MakeParts();
+    arm_->SetSafety(mode);
+    Start();
+    ASSERT_TRUE(WaitForLatch());
+    EXPECT_EQ(rig_->Reset("too early", "ana").code(), absl::StatusCode::kFailedPrecondition);
+    End();
+    Start();
+    EXPECT_NE(rig_->StopReason(), "");
+    EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
+    EXPECT_TRUE(rig_->Reset("looked", "ana").ok());
+    End();
+  }
+}
+
+TEST_F(RigLatch, ASafeguardLatchesOnlyIfItInterruptedOrRefusedAMotion) {
+  Start();
+  arm_->SetSafety(SafetyMode::kSafeguardStop);
+  LetTheWatchLook();
+  arm_->SetSafety(SafetyMode::kNormal);
+  LetTheWatchLook();
+  EXPECT_EQ(rig_->StopReason(), "") << "somebody changed the object";
+
+  arm_->SetSafety(SafetyMode::kSafeguardStop);
+  const absl::Status refused = Home();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("SAFEGUARD_STOP when a motion was asked for"));
+  arm_->SetSafety(SafetyMode::kNormal);
+  EXPECT_EQ(Home().code(), absl::StatusCode::kAborted) << "a retry moved the arm when the door closed";
+  EXPECT_EQ(arm_->programs, 0);
+  ASSERT_TRUE(rig_->Reset("nobody is inside", "ana").ok());
+
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  arm_->SetSafety(SafetyMode::kSafeguardStop);
+  EXPECT_EQ(homing.get().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("SAFEGUARD_STOP during program"));
+}
+
+TEST_F(RigLatch, AProgramThatSomethingElseEndedLatches) {
+  Start();
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  // As after a trip of the watchdog, or "stop" at the teach pendant.
+  arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
+  EXPECT_EQ(homing.get().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(rig_->StopReason(), AllOf(HasSubstr("ended during a motion"), HasSubstr("phase 'transit'")));
+  EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(arm_->programs, 1);
+}
+
+TEST_F(RigLatch, NothingGoesOutForAMotionFromBeforeAStopEvenIfItWasReset) {
+  Start();
+  for (const bool reset : {false, true}) {
+    arm_->before_send = [&] {
+      rig_->Stop("while the program was built", "ana");
+      if (reset) {
+        ASSERT_TRUE(rig_->Reset("a mistake", "ana").ok());
+      }
+    };
+    EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
+    EXPECT_EQ(arm_->programs, 0);
+    EXPECT_TRUE(rig_->Reset("looked", "ana").ok());
+  }
+}
+
+TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
+  Start();
+  std::atomic<bool> hang{false};
+  std::atomic<double> hangs_since_s{0};
+  auto homing = std::async(std::launch::async, [&] {
+    return rig_->Home([&] {
+      if (hang && hangs_since_s == 0) {
+        hangs_since_s = timing::HostNowS();
+        while (hang) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      return absl::OkStatus();
+    });
+  });
+  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  // They come while it moves, for longer than one permit.
+  const double began_s = timing::HostNowS();
+  EXPECT_TRUE(WaitFor([&] { return arm_->heartbeat_s > began_s + 2 * Heartbeats::kPermitS; }));
+  hang = true;
+  ASSERT_TRUE(WaitFor([&] { return hangs_since_s > 0; }));
+  ASSERT_TRUE(WaitFor([&] { return timing::HostNowS() > hangs_since_s + 3 * Heartbeats::kPermitS; }));
+  EXPECT_LT(arm_->heartbeat_s, hangs_since_s + 2 * Heartbeats::kPermitS);
+  hang = false;
+  rig_->Stop("enough", "ana");
+  EXPECT_FALSE(homing.get().ok());
+}
+
+// --- What a process before this one left
+
+TEST_F(RigLatch, ATouchThatWasUnderWayLatchesWithWhereTheArmStands) {
+  MakeParts();
+  JournalExecuting(7);
+  arm_->SetProgram(7, MotionPhase::kApproach, RuntimeState::kStopped);
+  Start();
+  EXPECT_THAT(rig_->StopReason(),
+              AllOf(HasSubstr("touch 'touch 7' of session 'monday', program 7"), HasSubstr("had been ended"),
+                    HasSubstr("phase 'approach'"), HasSubstr("NORMAL"), HasSubstr("the tip stands at")));
+  EXPECT_EQ(arm_->stops, 0) << "nothing ran";
+  EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
+}
+
+TEST_F(RigLatch, AProgramThatStillRunsIsStoppedAndLatches) {
+  MakeParts();
+  JournalExecuting(7);
+  arm_->SetProgram(7, MotionPhase::kApproach, RuntimeState::kPlaying);
+  Start();
+  EXPECT_GE(arm_->stops, 1);
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("ran on and was stopped"));
+}
+
+TEST_F(RigLatch, AProgramThatCameToItsEndOrNeverBeganNeedsNobody) {
+  for (const auto& [id, phase] : {std::pair(7, MotionPhase::kDone), std::pair(6, MotionPhase::kDone)}) {
+    MakeParts();
+    JournalExecuting(7);
+    arm_->SetProgram(id, phase, RuntimeState::kStopped);
+    Start();
+    EXPECT_EQ(rig_->StopReason(), "");
+    EXPECT_EQ(arm_->stops, 0);
+    End();
+  }
+}
+
+TEST_F(RigLatch, AMotionWithoutATouchIsFoundTooAndOnlyOnce) {
+  MakeParts();
+  ASSERT_TRUE(parts_.journal->SetMetadata("motion_under_way", "9 a motion without a touch").ok());
+  arm_->SetProgram(9, MotionPhase::kTransit, RuntimeState::kStopped);
+  Start();
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("a motion without a touch, program 9"));
+  ASSERT_TRUE(rig_->Reset("looked", "ana").ok());
+  End();
+  MakeParts();
+  arm_->SetProgram(9, MotionPhase::kTransit, RuntimeState::kStopped);
+  Start();
+  EXPECT_EQ(rig_->StopReason(), "");
+}
+
+}  // namespace
+}  // namespace touchstone::gateway

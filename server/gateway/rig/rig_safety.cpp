@@ -1,0 +1,198 @@
+// What closes the latch of Stop without anybody's call: the controller's safety modes, and motions that were under way
+// when a gateway ended.
+//
+// Protective and emergency stops, violations, faults and recovery latch whenever they are seen. A safeguard stop (a
+// door, a light curtain) latches only if it interrupted a motion or one was asked for while it stood: UR's user manuals
+// list it as used up to every cycle and with an automatic or manual reset, unlike the emergency stop, so a person may
+// change the object between motions without a reset, but no program that retries moves the arm when the door closes.
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_split.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <limits>
+
+#include "server/base/status.h"
+#include "server/base/units.h"
+#include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/rig.h"
+
+namespace touchstone::gateway {
+namespace {
+
+constexpr double kSafetyLookS = 0.02;  // host time between two looks; no state in between is missed
+constexpr double kArmAnswersS = 10;    // host time that the arm gets at the start
+constexpr double kProgramEndsS = 5;    // host time that a program gets to end after a stop
+constexpr size_t kMaxReasonBytes = 1000;
+
+std::string UtcNow() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  char text[32] = "";
+  if (::gmtime_r(&now, &parts) != nullptr) std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+// `interrupts`: it stopped a motion, or one was refused because of it.
+bool Latches(arm::SafetyMode mode, bool interrupts) {
+  switch (mode) {
+    case arm::SafetyMode::kProtectiveStop:
+    case arm::SafetyMode::kRecovery:
+    case arm::SafetyMode::kSystemEmergencyStop:
+    case arm::SafetyMode::kRobotEmergencyStop:
+    case arm::SafetyMode::kViolation:
+    case arm::SafetyMode::kFault:
+      return true;
+    case arm::SafetyMode::kSafeguardStop:
+      return interrupts;
+    default:
+      return false;
+  }
+}
+
+std::string PlaceOf(const arm::ArmState& state) {
+  const Eigen::Vector3d mm = state.base_from_tip.translation() * kMillimetresPerMetre;
+  return absl::StrFormat("the tip stands at %.1f, %.1f, %.1f mm of the base", mm.x(), mm.y(), mm.z());
+}
+
+}  // namespace
+
+void Rig::Latch(const std::string& what) {
+  stopped_ = true;
+  ++stops_;
+  parts_.changes->Notify();
+  std::string all;
+  {
+    std::lock_guard<std::mutex> lock(stop_mutex_);
+    // A reset that was under way may have released it since.
+    stopped_ = true;
+    const std::string dated = absl::StrCat(what, " at ", UtcNow());
+    if (stop_reason_.empty())
+      stop_reason_ = dated;
+    else if (stop_reason_.find(what) == std::string::npos &&
+             stop_reason_.size() + dated.size() < kMaxReasonBytes)
+      absl::StrAppend(&stop_reason_, "; then ", dated);
+    all = stop_reason_;
+    const absl::Status kept = journal().SetMetadata(kStopKey, stop_reason_);
+    if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
+  }
+  spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);
+}
+
+void Rig::LookAtSafety(bool refused) {
+  std::lock_guard<std::mutex> lock(safety_mutex_);
+  if (const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+      now.ok() && now->controller_time_s < safety_seen_s_)
+    safety_seen_s_ = 0;  // the controller was started anew
+  const bool first = safety_seen_s_ < 0;
+  for (const arm::ArmState& state :
+       parts_.arm->History(std::nextafter(safety_seen_s_, std::numeric_limits<double>::infinity()),
+                           std::numeric_limits<double>::infinity())) {
+    const bool at_start = first && safety_seen_s_ < 0;
+    safety_seen_s_ = state.controller_time_s;
+    if (arm::SafetyPermitsMotion(state.safety_mode).ok()) {
+      latched_safety_.reset();
+      continue;
+    }
+    const bool moving = motions_ > 0;
+    if (latched_safety_ == state.safety_mode || !Latches(state.safety_mode, moving)) continue;
+    latched_safety_ = state.safety_mode;
+    const std::string when = at_start ? "found when the arm was reached"
+                             : moving ? absl::StrCat("during program ", state.program_id, ", phase '",
+                                                     arm::PhaseName(state.phase), "'")
+                                      : "between motions";
+    const std::string what = absl::StrCat(arm::SafetyModeName(state.safety_mode), " ", when);
+    Latch(absl::StrCat("by the arm's controller (", what, ")"));
+    audit().Write("latched", {{"what", what}}).IgnoreError();
+  }
+  // A safeguard that stood open unnoticed, until somebody wanted to move.
+  const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  if (!refused || !now.ok() || latched_safety_ == now->safety_mode || !Latches(now->safety_mode, true))
+    return;
+  latched_safety_ = now->safety_mode;
+  const std::string what =
+      absl::StrCat(arm::SafetyModeName(now->safety_mode), " when a motion was asked for");
+  Latch(absl::StrCat("by the arm's controller (", what, ")"));
+  audit().Write("latched", {{"what", what}}).IgnoreError();
+}
+
+void Rig::WatchSafety() {
+  std::unique_lock<std::mutex> lock(watch_mutex_);
+  while (!ending_) {
+    lock.unlock();
+    LookAtSafety();
+    lock.lock();
+    watch_ends_.wait_for(lock, std::chrono::duration<double>(kSafetyLookS), [this] { return ending_; });
+  }
+}
+
+absl::Status Rig::LatchInterruption() {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto unfinished, journal().Unfinished());
+  for (const auto& [session, touch] : unfinished)
+    if (touch.stage == session::TouchStage::kExecuting)
+      TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(
+          touch.program_id, absl::StrCat("touch '", touch.id, "' of session '", session, "'")));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string motion, journal().Metadata(kMotionKey));
+  if (motion.empty()) return absl::OkStatus();
+  const std::pair<std::string, std::string> parts = absl::StrSplit(motion, absl::MaxSplits(' ', 1));
+  uint32_t program_id = 0;
+  if (!absl::SimpleAtoi(parts.first, &program_id))
+    return absl::DataLossError(absl::StrCat("the journal's ", kMotionKey, " is '", motion,
+                                            "': a program's id and what it did were expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(program_id, parts.second));
+  // The latch is on the disk: it need not be found again.
+  return journal().SetMetadata(kMotionKey, "");
+}
+
+// Nothing hinges on what the controller's watchdog did when the heartbeats ceased: whether the program still runs, has
+// ended in mid-way or at its end, and where the arm stands, is what the controller says now.
+absl::Status Rig::LatchUnlessItEnded(uint32_t program_id, const std::string& what) {
+  const auto state_once = [&](double patience_s, const std::function<bool(const arm::ArmState&)>& good) {
+    absl::StatusOr<arm::ArmState> state = parts_.arm->State();
+    for (const double until_s = timing::HostNowS() + patience_s;
+         (!state.ok() || !good(*state)) && timing::HostNowS() < until_s; state = parts_.arm->State())
+      parts_.changes->WaitForChange(parts_.changes->count(), 0.02);
+    return state;
+  };
+  const auto rests = [](const arm::ArmState& state) {
+    return state.runtime_state == arm::RuntimeState::kStopped;
+  };
+  absl::StatusOr<arm::ArmState> state = state_once(kArmAnswersS, [](const arm::ArmState&) { return true; });
+  std::string found;
+  if (!state.ok()) {
+    found = absl::StrCat("the arm cannot be asked: ", state.status().message());
+  } else {
+    const bool ran = !rests(*state);
+    if (ran) {
+      parts_.arm->Stop().IgnoreError();
+      state = state_once(kProgramEndsS, rests);
+    }
+    if (!state.ok()) {
+      found = absl::StrCat("its program ran on and was stopped; then: ", state.status().message());
+    } else {
+      // Another program's id: this one never began. No id: the controller was started anew since, if it began.
+      if (!ran && state->program_id != 0 &&
+          (state->program_id != program_id || state->phase == arm::MotionPhase::kDone))
+        return absl::OkStatus();
+      found =
+          absl::StrCat(!rests(*state)                    ? "its program runs on although it was stopped"
+                       : ran                             ? "its program ran on and was stopped"
+                       : state->program_id != program_id ? "the controller knows nothing of its program"
+                                                         : "its program had been ended (by the watchdog "
+                                                           "for want of heartbeats, or at the teach pendant)",
+                       ", phase '", arm::PhaseName(state->phase), "', safety mode ",
+                       arm::SafetyModeName(state->safety_mode), ", ", PlaceOf(*state));
+    }
+  }
+  const std::string text =
+      absl::StrCat(what, ", program ", program_id, ", was under way when the gateway ended: ", found);
+  Latch(absl::StrCat("by the start of the gateway (", text, ")"));
+  audit().Write("latched", {{"what", text}}).IgnoreError();
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone::gateway

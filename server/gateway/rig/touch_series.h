@@ -1,0 +1,18 @@
+// The states of one approach as a series over time: kept on request.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "server/gateway/rig/touch_result.h"
+#include "touchstone/v1/types.pb.h"
+
+namespace touchstone::gateway {
+
+// How the journal names the encoding of a series: the serialised message.
+inline constexpr char kSeriesEncoding[] = "touchstone.v1.TouchSeries";
+
+// Every state of the approach; its times count from where the contact times of ResultOf(record) count from. The same
+// errors as ResultOf.
+absl::StatusOr<v1::TouchSeries> SeriesOf(const TouchRecording& record);
+
+}  // namespace touchstone::gateway
