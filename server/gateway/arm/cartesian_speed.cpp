@@ -13,7 +13,24 @@ namespace {
 constexpr double kStepM = 0.01, kStepRad = 0.07;
 constexpr double kShare = 0.8;  // of a joint's speed
 
+// By what factor the arm must slow down for a step that would take so long.
+double SlowingFor(const UrKinematics& kinematics, const Joints& from, const Joints& to, double step_s) {
+  const std::array<double, 6>& max_rad_s = kinematics.model().max_joint_speed_rad_s;
+  double slower = 0;
+  for (size_t i = 0; i < 6 && step_s > 0; ++i)
+    slower = std::max(slower, std::abs(to[i] - from[i]) / (kShare * max_rad_s[i] * step_s));
+  return slower;
+}
+
 }  // namespace
+
+Eigen::Isometry3d PoseBetween(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double part) {
+  const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
+  Eigen::Isometry3d pose = from;
+  pose.translation() += part * (to.translation() - from.translation());
+  pose.linear() = from.linear() * Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix();
+  return pose;
+}
 
 double LimitedCartesianSpeed(const UrKinematics& kinematics, const ArmBody& body,
                              const Eigen::Isometry3d& tip_from_flange, const Eigen::Isometry3d& from,
@@ -27,15 +44,20 @@ double LimitedCartesianSpeed(const UrKinematics& kinematics, const ArmBody& body
   double slower = 1;
   BodyPoints points = body.At(kinematics, *joints);
   for (int step = 1; step <= steps; ++step) {
-    const double part = static_cast<double>(step) / steps;
-    Eigen::Isometry3d pose = from;
-    pose.translation() += part * line_m;
-    pose.linear() = from.linear() * Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix();
-    const std::optional<Joints> found = kinematics.Nearest(pose * tip_from_flange, *joints);
+    const std::optional<Joints> found = kinematics.Nearest(
+        PoseBetween(from, to, static_cast<double>(step) / steps) * tip_from_flange, *joints);
     if (!found.has_value()) break;
-    const std::array<double, 6>& max_rad_s = kinematics.model().max_joint_speed_rad_s;
-    for (size_t i = 0; i < 6 && step_s > 0; ++i)
-      slower = std::max(slower, std::abs((*found)[i] - (*joints)[i]) / (kShare * max_rad_s[i] * step_s));
+    const double slowing = SlowingFor(kinematics, *joints, *found, step_s);
+    slower = std::max(slower, slowing);
+    Joints before = *joints;
+    for (int k = 1; k <= kFinerSteps && slowing > kFinerFromShare; ++k) {
+      const double part = (step - 1 + static_cast<double>(k) / kFinerSteps) / steps;
+      const std::optional<Joints> fine =
+          kinematics.Nearest(PoseBetween(from, to, part) * tip_from_flange, before);
+      if (!fine.has_value()) break;
+      slower = std::max(slower, SlowingFor(kinematics, before, *fine, step_s / kFinerSteps));
+      before = *fine;
+    }
     const BodyPoints next = body.At(kinematics, *found);
     if (step_s > 0)
       slower = std::max(slower, ArmBody::Farthest(points, next, nullptr) / (body.max_speed_m_s() * step_s));

@@ -105,6 +105,14 @@ absl::Status LineCheck::CheckStep(const Joints& from, const Joints& to, double s
   return absl::OkStatus();
 }
 
+double LineCheck::FastShare(const Joints& from, const Joints& to, double step_s) const {
+  double share = 0;
+  for (size_t i = 0; i < 6 && step_s > 0; ++i)
+    share =
+        std::max(share, std::abs(to[i] - from[i]) / (kinematics_.model().max_joint_speed_rad_s[i] * step_s));
+  return share;
+}
+
 absl::Status LineCheck::CheckBodyStep(const BodyPoints& from, const BodyPoints& to, double step_s,
                                       double max_slowing, double speed_m_s, const std::string& what) const {
   const char* which = "";
@@ -132,11 +140,7 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   const double max_slowing = may_slow ? kMaxSlowing : 1;
   BodyPoints points = body_.At(kinematics_, *joints);
   for (int step = 0; step <= steps; ++step) {
-    const double fraction = static_cast<double>(step) / steps;
-    Eigen::Isometry3d pose = from;
-    pose.translation() += fraction * line_m;
-    pose.linear() =
-        from.linear() * Eigen::AngleAxisd(fraction * turn.angle(), turn.axis()).toRotationMatrix();
+    const Eigen::Isometry3d pose = PoseBetween(from, to, static_cast<double>(step) / steps);
     TOUCHSTONE_RETURN_IF_ERROR(CheckTips(pose, what));
 
     Joints next;
@@ -145,6 +149,17 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
     if (Farthest(next, *joints) > kPostureRad) return OutOfReach(pose, what);
     TOUCHSTONE_RETURN_IF_ERROR(
         CheckStep(*joints, next, step > 0 ? step_s : 0, max_slowing, speed_m_s, pose.translation(), what));
+    if (step > 0 && FastShare(*joints, next, step_s) > kFinerFromShare) {
+      Joints before = *joints, fine = next;
+      for (int k = 1; k <= kFinerSteps; ++k) {
+        const Eigen::Isometry3d at =
+            PoseBetween(from, to, (step - 1 + static_cast<double>(k) / kFinerSteps) / steps);
+        if (!JointsAt(at, before, &fine)) return OutOfReach(at, what);
+        TOUCHSTONE_RETURN_IF_ERROR(
+            CheckStep(before, fine, step_s / kFinerSteps, max_slowing, speed_m_s, at.translation(), what));
+        before = fine;
+      }
+    }
     TOUCHSTONE_RETURN_IF_ERROR(CheckJointLimits(next, what, wrist_3_beyond));
     const BodyPoints next_points = body_.At(kinematics_, next);
     TOUCHSTONE_RETURN_IF_ERROR(body_.CheckInside(next_points, what));

@@ -50,6 +50,8 @@ class LineCheck {
   absl::Status CheckTips(const Eigen::Isometry3d& base_from_tip, const std::string& what) const;
   absl::Status CheckStep(const Joints& from, const Joints& to, double step_s, double max_slowing,
                          double speed_m_s, const Eigen::Vector3d& tip_m, const std::string& what) const;
+  // The largest share of its speed that a joint needs for a step that takes so long.
+  double FastShare(const Joints& from, const Joints& to, double step_s) const;
   absl::Status CheckBodyStep(const BodyPoints& from, const BodyPoints& to, double step_s, double max_slowing,
                              double speed_m_s, const std::string& what) const;
   // OUT_OF_RANGE names the joint beyond its limits; *wrist_3_beyond as in Follow.
