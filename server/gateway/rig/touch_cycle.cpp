@@ -8,6 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/force_guard.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
 #include "server/gateway/rig/touch_series.h"
@@ -25,7 +26,8 @@ constexpr double kProgramStartsS = 2;  // host time that a program may take unti
 
 absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what,
                             const source::MotionGuard& guard,
-                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done) {
+                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                            std::optional<double> max_force_n) {
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
@@ -34,6 +36,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (now_s - looked_s > kHungS) hung_s = now_s - looked_s, hung_at_s = now_s;
     looked_s = now_s;
   };
+  ForceGuard force(*parts_.arm, max_force_n.value_or(parts_.planner->limits().max_force_n), what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
     look_for_hang(timing::HostNowS());
@@ -53,6 +56,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
     if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
+    if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     seen = seen || state->program_id == program_id;
     if (seen) {
       const absl::StatusOr<bool> over = done(*state);
