@@ -54,6 +54,21 @@ install_python_package() {
   printf '%s' "$sources" > "$stamp"
 }
 
+# Clients of other makers, for tests/end_to_end/test_other_clients.py, beside the environment and not in it. Where PyPI
+# cannot be reached those tests are skipped, and say so; that is no failure.
+install_other_clients() {
+  local wanted='ur_rtde==1.6.5 urpy==1.2.0 urx==0.11.0 math3d==4.0.0' into=$root/build/other_clients
+  if [[ -f $into/installed && $(< "$into/installed") == "$wanted" ]]; then return; fi
+  rm -rf "$into"
+  # shellcheck disable=SC2086
+  if "$python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 --no-deps --target "$into" $wanted
+  then
+    printf '%s' "$wanted" > "$into/installed"
+  else
+    echo "PyPI cannot be reached: tests with clients of other makers are skipped"
+  fi
+}
+
 # What the Python tests need from PyPI, in build/venv. Nothing is done when the list is the one that was installed last.
 install_python_test_packages() {
   local stamp=$root/build/venv/python-packages.txt

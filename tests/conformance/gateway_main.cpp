@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -49,6 +50,7 @@ int main(int argc, char** argv) {
     options.dir = folder.string();
     options.speedup = 40;
     options.supershape_triangles = 2000;
+    if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller
     emulator = touchstone::rig::Emulator::Start(options);
     gateway = StartGateway({"--config", emulator->config_path().c_str(), "--arm-watchdog-hz", "0.5",
                             "--arm-silence-s", "5", "--effector-silence-s", "5"});

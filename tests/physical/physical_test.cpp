@@ -78,6 +78,7 @@ void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& ch
   options.speedup = 20;
   options.supershape_triangles = 2000;
   options.powered = true;
+  if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller
   if (change) change(&options);
   emulator_ = rig::Emulator::Start(options);
 }

@@ -10,6 +10,7 @@
 #include "server/gateway/arm/motion_planner.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "tests/rig/controller.h"
+#include "tests/rig/controller/test_client.h"
 
 namespace touchstone {
 namespace {
@@ -54,6 +55,8 @@ class EmulatedArm : public testing::Test {
     arm.secondary_port = controller_->ports().secondary;
     arm.rtde_port = controller_->ports().rtde;
     arm.script.flange_from_tip.translation().z() = 0.12;
+    arm.script.payload_kg = 0.7;
+    arm.script.payload_cog_m = Eigen::Vector3d(0, 0.01, 0.045);
     arm.script.time_scale = speedup;
     // A busy machine's pauses are no dead gateway and no frozen controller.
     arm.script.watchdog_hz = 0.2;
@@ -217,6 +220,20 @@ TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
   // Whatever is up again first carries it.
   EXPECT_TRUE(Wait([&] { return arm_->Stop().ok(); }));
   ExpectAtRestSoon();
+}
+
+// Not the tool centre point, which a UR takes where a program does not name it.
+TEST_F(EmulatedArm, ControllerGetsTheCentreOfGravityOfThePayload) {
+  Heart heart(arm_.get());
+  ASSERT_TRUE(arm_->StartTouch(SomeTouch(19)).ok());
+  ASSERT_TRUE(WaitForProgram(19));
+  rig::TouchClient state(controller_->ports().rtde, "payload,payload_cog");
+  state.Next();
+  rig::WireReader rest(state.rest);
+  EXPECT_EQ(rest.Get<double>(), 0.7);
+  EXPECT_EQ(rest.Get<double>(), 0);
+  EXPECT_EQ(rest.Get<double>(), 0.01);
+  EXPECT_EQ(rest.Get<double>(), 0.045);
 }
 
 TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {

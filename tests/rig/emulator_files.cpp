@@ -101,7 +101,8 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
       Quoted("http://" + options.address + ":" + std::to_string(addresses.camera_port) + "/video.mjpg"),
       kVerticalFovDeg);
   // The plate lies below the arm's base, and an approach may be told to end just above it.
-  text += absl::StrFormat("\n[limits]\nbox_min_mm = [-500, -500, %.9g]\n", kPlateZM * 1e3);
+  text += absl::StrFormat("\n[limits]\nbox_min_mm = [-500, -500, %.9g]\npayload_cog_mm = [0, 0, 45]\n",
+                          kPlateZM * 1e3);
   Write(dir + "/gateway.toml", text);
 }
 
@@ -115,6 +116,7 @@ void WriteAddresses(const EmulatorOptions& options, const EmulatorAddresses& add
         {"dashboard_port", addresses.arm.dashboard},
         {"primary_port", addresses.arm.primary},
         {"secondary_port", addresses.arm.secondary},
+        {"realtime_port", addresses.arm.realtime},
         {"rtde_port", addresses.arm.rtde}}},
       {"effector",
        {{"port", options.dir + "/effector"}, {"sensor", options.sensor}, {"fingers", options.fingers}}},

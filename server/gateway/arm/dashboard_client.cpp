@@ -56,6 +56,9 @@ absl::StatusOr<std::string> DashboardClient::Ask(const std::string& command, dou
       TOUCHSTONE_RETURN_IF_ERROR(sent);
       return ReadLine(until_s);
     }();
+    // In local control an e-Series controller refuses, and goes on refusing on this connection after it was switched to
+    // remote control ("... and reconnect to port 29999").
+    if (reply.ok() && absl::StrContains(*reply, "reconnect to port")) socket_.reset();
     if (reply.ok()) return reply;
     if (!refused.ok()) return refused;
     socket_.reset();  // a late reply must not be taken for that of the next command

@@ -169,6 +169,21 @@ TEST(DashboardClient, SomethingElseOnThePortIsNoDashboard) {
   EXPECT_THAT(std::string(dashboard.Ask("robotmode", kPatienceS).status().message()), HasSubstr("SSH-2.0"));
 }
 
+TEST(DashboardClient, ConnectsAnewAfterARefusalInLocalControl) {
+  FakeServer server([](FakeServer::Connection& connection, int number) {
+    connection.Send("Connected: Universal Robots Dashboard Server\n");
+    for (std::string line = connection.Receive(); !line.empty(); line = connection.Receive())
+      connection.Send(
+          number > 0 ? "Powering on\n"
+                     : "Command is not allowed due to safety reasons, please switch robot to Remote Control "
+                       "mode and reconnect to port 29999\n");
+  });
+  DashboardClient dashboard("127.0.0.1", server.port());
+  const absl::Status refused = dashboard.Demand("power on", "Powering on", kPatienceS);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("Remote Control"));
+  EXPECT_TRUE(dashboard.Demand("power on", "Powering on", kPatienceS).ok());
+}
+
 // Ports on which nobody listens.
 UrArmOptions Nowhere() {
   UrArmOptions options;

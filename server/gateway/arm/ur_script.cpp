@@ -27,13 +27,23 @@ std::string Phase(MotionPhase phase) {
                       ")\n");
 }
 
+// UR's script manual (SW 5.x, set_payload): without a centre of gravity the tool centre point is taken for it, which
+// for fingers is much too far out; an arm that believes that stops protectively. set_payload_mass leaves the centre of
+// gravity as it is, which at the start of a program is the installation's.
+std::string Payload(const ScriptOptions& options) {
+  const std::string kg = Number(options.payload_kg);
+  if (!options.payload_cog_m.has_value()) return absl::StrCat("  set_payload_mass(", kg, ")\n");
+  const Eigen::Vector3d& cog = *options.payload_cog_m;
+  return absl::StrCat("  set_payload(", kg, ", [", Number(cog.x()), ",", Number(cog.y()), ",",
+                      Number(cog.z()), "])\n");
+}
+
 // What every program begins with. The phase is written before the id, so that nobody sees this id with
 // an old phase.
 std::string Head(uint32_t program_id, const ScriptOptions& options) {
   std::string text = absl::StrCat("  rtde_set_watchdog(\"input_int_register_", kHeartbeatRegister, "\", ",
                                   Number(options.watchdog_hz / options.time_scale), ", \"stop\")\n");
-  absl::StrAppend(&text, "  set_tcp(", PoseText(options.flange_from_tip), ")\n  set_payload(",
-                  Number(options.payload_kg), ")\n");
+  absl::StrAppend(&text, "  set_tcp(", PoseText(options.flange_from_tip), ")\n", Payload(options));
   if (!options.gravity_m_s2.isApprox(ScriptOptions().gravity_m_s2))
     absl::StrAppend(&text, "  set_gravity([", Number(options.gravity_m_s2.x()), ",",
                     Number(options.gravity_m_s2.y()), ",", Number(options.gravity_m_s2.z()), "])\n");
@@ -110,16 +120,25 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
 
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                         const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
-                        const ScriptOptions& options) {
+                        const std::vector<double>& speeds_rad_s, const ScriptOptions& options) {
   std::string text = absl::StrCat("def move_", program_id, "():\n", Head(program_id, options),
                                   Lines(poses, speeds_m_s, options));
-  for (const Joints& q : joints) {
+  for (size_t k = 0; k < joints.size(); ++k) {
     absl::StrAppend(&text, "  movej([");
-    for (size_t i = 0; i < q.size(); ++i) absl::StrAppend(&text, i == 0 ? "" : ",", Number(q[i]));
+    for (size_t i = 0; i < joints[k].size(); ++i)
+      absl::StrAppend(&text, i == 0 ? "" : ",", Number(joints[k][i]));
     absl::StrAppend(&text, "], a=", Number(options.joint_acceleration_rad_s2),
-                    ", v=", Number(options.joint_speed_rad_s), ")\n");
+                    ", v=", Number(speeds_rad_s[k]), ")\n");
   }
   return absl::StrCat(text, Phase(MotionPhase::kDone), "end\n");
+}
+
+std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options) {
+  const std::string mode = e_series ? "freedrive_mode()\n" : "teach_mode()\n";
+  return absl::StrCat("def guide_", program_id, "():\n", Head(program_id, options), "  ", mode,
+                      Phase(MotionPhase::kReady), "  while read_input_integer_register(", kCommandRegister,
+                      ") != ", CommandWord(program_id, kCommandRetract), ":\n    sync()\n  end\n  end_", mode,
+                      Phase(MotionPhase::kDone), "end\n");
 }
 
 std::string StopProgram() {

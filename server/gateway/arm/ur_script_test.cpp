@@ -9,6 +9,7 @@ namespace touchstone::gateway::arm {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 Eigen::Isometry3d Down(double x_m, double z_m) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -26,15 +27,24 @@ ArmTouch SomeTouch() {
   return touch;
 }
 
+// UR takes the tool centre point for a centre of gravity that set_payload does not name.
+TEST(TouchProgram, NeverLeavesTheCentreOfGravityToTheTool) {
+  ScriptOptions options;
+  const std::string text = TouchProgram(SomeTouch(), {0.25, 0.2, 0.15}, options);
+  EXPECT_THAT(text, HasSubstr("  set_payload_mass(0.5)\n"));
+  EXPECT_THAT(text, Not(HasSubstr("set_payload(")));
+}
+
 // Byte for byte: what the controller gets is part of the interface.
 TEST(TouchProgram, ReadsAsItDoes) {
   ScriptOptions options;
   options.flange_from_tip.translation().z() = 0.12;
+  options.payload_cog_m = Eigen::Vector3d(0, 0.01, 0.045);
   const std::string expected =
       "def touch_17():\n"
       "  rtde_set_watchdog(\"input_int_register_24\", 4, \"stop\")\n"
       "  set_tcp(p[0,0,0.12,0,0,0])\n"
-      "  set_payload(0.5)\n"
+      "  set_payload(0.5, [0,0.01,0.045])\n"
       "  write_output_integer_register(25, 1)\n"
       "  write_output_integer_register(24, 17)\n"
       "  movel(p[0.3,0,0.3,3.14159265,0,0], a=1.2, v=0.25)\n"
@@ -79,12 +89,24 @@ TEST(TouchProgram, WatchdogIsSlowerOnAnAcceleratedClock) {
 
 TEST(MoveProgram, EndsWithTheJoints) {
   const std::string text =
-      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, ScriptOptions());
+      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, {0.8}, ScriptOptions());
   EXPECT_THAT(text, HasSubstr("def move_5():\n"));
   EXPECT_THAT(
       text,
-      HasSubstr(
-          "  movej([0,-1.5,0.25,0,1,0], a=1.4, v=1.05)\n  write_output_integer_register(25, 5)\nend\n"));
+      HasSubstr("  movej([0,-1.5,0.25,0,1,0], a=1.4, v=0.8)\n  write_output_integer_register(25, 5)\nend\n"));
+}
+
+TEST(FreedriveProgram, UsesTheWordsOfItsSeriesAndEndsThemByCommand) {
+  const std::string e_series = FreedriveProgram(7, true, ScriptOptions());
+  EXPECT_THAT(e_series, HasSubstr("  freedrive_mode()\n"));
+  EXPECT_THAT(e_series, HasSubstr("  end_freedrive_mode()\n"));
+  EXPECT_THAT(e_series, HasSubstr("rtde_set_watchdog"));
+  EXPECT_LT(e_series.find("freedrive_mode()"), e_series.find("!= 30"))
+      << "waits for the command while it is free";
+  const std::string cb3 = FreedriveProgram(7, false, ScriptOptions());
+  EXPECT_THAT(cb3, HasSubstr("  teach_mode()\n"));
+  EXPECT_THAT(cb3, HasSubstr("  end_teach_mode()\n"));
+  EXPECT_EQ(cb3.find("freedrive"), std::string::npos);
 }
 
 TEST(LineSpeed, IsSlowerWhereTheToolTurnsMuchOnAShortWay) {

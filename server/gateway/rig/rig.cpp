@@ -74,7 +74,8 @@ absl::StatusOr<uint32_t> Rig::NextProgramId() {
   const uint32_t id = next_program_id_++;
   // What an earlier program left in the controller's registers must never pass for this one's.
   const absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
-  return arm.ok() && arm->program_id == id ? NextProgramId() : id;
+  if (arm.ok() && arm->program_id == id) return NextProgramId();
+  return id;
 }
 
 std::optional<calibration::UpFace> Rig::MountedUpFace() const {

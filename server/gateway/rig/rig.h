@@ -46,6 +46,8 @@ struct RigOptions {
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
   CameraPoseTolerance camera_tolerance;  // of photographs
+  // The box of an object by its name, object frame; none: not known. Null: none is.
+  std::function<std::optional<geometry::Bounds>(const std::string&)> bounds_of;
 };
 
 struct RigParts {
@@ -94,6 +96,10 @@ class Rig : public source::RigDevice {
   absl::Status Mount(const std::string& object, calibration::UpFace up_face,
                      const source::MotionGuard& caller);
   absl::Status Home(const source::MotionGuard& caller);
+  // Frees the arm for a hand to guide it, and reports where it is some twenty times a second, until the guard's error,
+  // which is returned.
+  absl::Status Guide(const std::function<void(const arm::ArmState&)>& report,
+                     const source::MotionGuard& caller);
   // Powers the arm on and releases its brakes; OK once it is ready to move. FAILED_PRECONDITION says what a
   // person has to do first.
   absl::Status PowerOn(const source::MotionGuard& caller);
@@ -173,9 +179,11 @@ class Rig : public source::RigDevice {
   // motion may not go on (the controller's safety mode, its guard).
   absl::Status MayGoOn(const source::MotionGuard& guard);
   // Watches until `done` says so; stops the arm and returns why on anything else. `limit_s`: host time.
+  // `max_force_n`: none: that of the limits.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,
                          const source::MotionGuard& guard,
-                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done);
+                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                         std::optional<double> max_force_n = std::nullopt);
   void Remember(const absl::Status& status);
 
   // rig_safety.cpp

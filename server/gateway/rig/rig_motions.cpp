@@ -153,8 +153,17 @@ absl::Status Rig::Home(const source::MotionGuard& caller) {
 absl::Status Rig::MoveHome(const source::MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
-  return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, guard);
+  // How high the tool must be lifted depends on what lies there.
+  std::optional<double> top_m;
+  const std::string object = Status().object;
+  const std::optional<calibration::UpFace> up_face = MountedUpFace();
+  const auto bounds = options_.bounds_of && up_face.has_value() ? options_.bounds_of(object) : std::nullopt;
+  if (bounds.has_value()) {
+    const absl::StatusOr<double> top = parts_.planner->ObjectTop(object, *bounds, *up_face);
+    if (top.ok()) top_m = *top;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::HomePath path, parts_.planner->PlanHome(from, top_m));
+  return MoveThrough(path.poses, path.joints, 30, guard);
 }
 
 absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace up_face,

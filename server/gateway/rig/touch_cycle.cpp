@@ -8,6 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/force_guard.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
 #include "server/gateway/rig/touch_series.h"
@@ -17,19 +18,33 @@ namespace touchstone::gateway {
 namespace {
 
 constexpr double kLookPeriodS = 0.01;  // host time; how soon a lost lease is noticed
+constexpr double kHungS = 0.4;         // host time between two looks in which heartbeats may have ceased
+constexpr double kAfterHangS = 1;      // host time after it in which a failure may come of it
 constexpr double kProgramStartsS = 2;  // host time that a program may take until its phase is reported
 
 }  // namespace
 
 absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what,
                             const source::MotionGuard& guard,
-                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done) {
+                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                            std::optional<double> max_force_n) {
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
+  double looked_s = began_s, hung_s = 0, hung_at_s = 0;
+  const auto look_for_hang = [&](double now_s) {
+    if (now_s - looked_s > kHungS) hung_s = now_s - looked_s, hung_at_s = now_s;
+    looked_s = now_s;
+  };
+  ForceGuard force(*parts_.arm, max_force_n.value_or(parts_.planner->limits().max_force_n), what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
+    look_for_hang(timing::HostNowS());
     const absl::Status stop = parts_.arm->Stop();
+    // Whether the watchdog had ended the program before cannot be told any more.
+    if (hung_s > 0 && timing::HostNowS() - hung_at_s < kAfterHangS)
+      Latch(absl::StrCat("by the gateway (it hung for ", ShortestNumber(std::round(10 * hung_s) / 10),
+                         " s during ", what, ", program ", program_id, ")"));
     if (!stop.ok())
       status = absl::Status(status.code(), absl::StrCat(status.message(), " (and: ", stop.message(), ")"));
     return status;
@@ -37,9 +52,11 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   for (;;) {
     const uint64_t changes = parts_.changes->count();
     const double now_s = timing::HostNowS();
+    look_for_hang(now_s);
     if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
+    if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     seen = seen || state->program_id == program_id;
     if (seen) {
       const absl::StatusOr<bool> over = done(*state);

@@ -15,12 +15,12 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/rig/controller/client.h"
 #include "tests/rig/controller/dashboard.h"
 #include "tests/rig/controller/machine.h"
 #include "tests/rig/controller/net.h"
 #include "tests/rig/controller/primary_packets.h"
-#include "tests/rig/controller/program_reader.h"
-#include "tests/rig/controller/rtde_session.h"
+#include "tests/rig/controller/realtime_packet.h"
 
 namespace touchstone::rig {
 namespace {
@@ -32,19 +32,6 @@ constexpr size_t kMaxConnections = 64, kMaxLine = 65536, kMaxCommands = 10'000;
 constexpr double kRoundingS = 1e-9;  // of the times of cycles
 constexpr int kMaxLateData = 50;     // packages that a late host makes up for
 
-enum Port { kDashboard, kPrimary, kSecondary, kRtde, kPorts };
-
-struct Client {
-  Client(Port the_port, int fd) : port(the_port), connection(fd) {}
-  Port port;
-  QueuedConnection connection;
-  std::string received;
-  ProgramReader programs;
-  std::unique_ptr<RtdeSession> rtde;
-  double next_data_s = 0;    // simulated time at which the next package is due
-  double data_cycle_s = -1;  // that of the last one
-};
-
 // One thread serves the sockets and moves the arm.
 class EmulatedController : public Controller {
  public:
@@ -55,9 +42,16 @@ class EmulatedController : public Controller {
         faults_(faults),
         machine_(options, faults, tip),
         random_(options.seed + 1) {
-    const int wanted[kPorts] = {options.dashboard_port, options.primary_port, options.secondary_port,
-                                options.rtde_port};
+    const int wanted[kPorts] = {options.dashboard_port,
+                                options.primary_port,
+                                options.secondary_port,
+                                options.realtime_port,
+                                options.rtde_port,
+                                options.primary_read_only_port,
+                                options.secondary_read_only_port,
+                                options.realtime_read_only_port};
     int bound[kPorts] = {};
+    std::fill(std::begin(listeners_), std::end(listeners_), -1);
     try {
       for (int port = 0; port < kPorts; ++port)
         listeners_[port] = Listen(options.address, wanted[port], &bound[port]);
@@ -67,7 +61,9 @@ class EmulatedController : public Controller {
       CloseListeners();
       throw;
     }
-    ports_ = {bound[kDashboard], bound[kPrimary], bound[kSecondary], bound[kRtde]};
+    ports_ = {
+        bound[kDashboard], bound[kPrimary],         bound[kSecondary],         bound[kRealtime],
+        bound[kRtde],      bound[kPrimaryReadOnly], bound[kSecondaryReadOnly], bound[kRealtimeReadOnly]};
     thread_ = std::thread([this] { Loop(); });
   }
 
@@ -91,6 +87,16 @@ class EmulatedController : public Controller {
   Eigen::Isometry3d BaseFromFlange() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.ActualFlangeAt(clock_->NowS());
+  }
+  std::string MoveByHand(const std::array<double, 6>& joints_rad) override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.MoveByHand(Joints(joints_rad.data()))
+               ? ""
+               : "the arm is not free: its brakes hold against the hand";
+  }
+  bool Free() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.free();
   }
   bool Moving() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
@@ -163,7 +169,7 @@ class EmulatedController : public Controller {
         next = std::min(next, host_s + (machine_.NextCycleS() - sim_s) / clock_->speedup());
     }
     for (const Client& client : clients_) {
-      if (client.rtde && client.rtde->started())
+      if (client.WantsData())
         next = std::min(next, host_s + (client.next_data_s - sim_s) / clock_->speedup());
       next = std::min(next, client.connection.NextReleaseS());
     }
@@ -197,7 +203,7 @@ class EmulatedController : public Controller {
     for (const Announcement& announcement : machine_.TakeAnnouncements()) {
       const std::string packet = AnnouncementPacket(announcement, machine_.now_s());
       for (Client& client : clients_)
-        if (client.port == kPrimary || client.port == kSecondary) client.connection.Send(packet);
+        if (client.GetsMessages()) client.connection.Send(packet);
     }
     SendStates();
     const double host_s = HostNowS();
@@ -212,10 +218,11 @@ class EmulatedController : public Controller {
       while (clients_.size() < kMaxConnections) {
         const int fd = accept4(listeners_[port], nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd < 0) break;
-        Client& client = clients_.emplace_back(static_cast<Port>(port), fd);
+        Client& client = clients_.emplace_back(static_cast<Port>(port), fd, machine_.LocalControl());
+        client.next_data_s = machine_.now_s() + CycleBoundaryIn(machine_.now_s());
         if (port == kDashboard) client.connection.Send(std::string(kDashboardBanner) + "\n");
         if (port == kRtde) client.rtde = std::make_unique<RtdeSession>(&machine_, options_.model, &taken_);
-        if (port == kPrimary || port == kSecondary) {
+        if (client.GetsStates()) {
           client.connection.Send(VersionPacket(options_.model));
           client.connection.Send(StatePacket(machine_.State(), machine_.geometry(), options_.model));
         }
@@ -232,17 +239,21 @@ class EmulatedController : public Controller {
         return ReceiveDashboard(client);
       case kPrimary:
       case kSecondary:
+      case kRealtime:
         for (const std::string& program : client->programs.Feed(std::exchange(client->received, {})))
           Take("program " + NameOf(program)), machine_.StartProgram(program);
         return;
-      default: {
+      case kRtde: {
         const bool was_started = client->rtde->started();
         client->connection.Send(client->rtde->Receive(&client->received));
         input_came_ = true;
         if (!was_started && client->rtde->started())
           client->next_data_s = machine_.now_s() + CycleBoundaryIn(machine_.now_s());
         if (client->rtde->broken()) client->connection.CloseWhenSent();
+        return;
       }
+      default:  // a read-only port
+        client->received.clear();
     }
   }
 
@@ -254,7 +265,7 @@ class EmulatedController : public Controller {
       bool quit = false;
       for (const char* command : {"power on", "power off", "brake release", "unlock protective stop"})
         if (line.rfind(command, 0) == 0) Take(command);
-      client->connection.Send(AnswerDashboard(line, options_.model, &machine_, &quit) + "\n");
+      client->connection.Send(AnswerDashboard(line, options_.model, client->local, &machine_, &quit) + "\n");
       if (quit) {
         client->connection.CloseWhenSent();
         return;
@@ -270,7 +281,7 @@ class EmulatedController : public Controller {
     for (int count = 0;; ++count) {
       double due_s = std::numeric_limits<double>::infinity();
       for (const Client& client : clients_)
-        if (client.rtde && client.rtde->started()) due_s = std::min(due_s, client.next_data_s);
+        if (client.WantsData()) due_s = std::min(due_s, client.next_data_s);
       if (due_s > now_s) return;
       const bool late = count >= kMaxLateData;
       machine_.Advance(late ? now_s : due_s + kRoundingS, changed);
@@ -286,11 +297,11 @@ class EmulatedController : public Controller {
     const double cycle_s = std::floor(now_s / machine_.cycle_s() + 1e-6) * machine_.cycle_s();
     std::optional<RobotState> state;
     for (Client& client : clients_) {
-      if (!client.rtde || !client.rtde->started()) continue;
+      if (!client.WantsData()) continue;
       if (!all) {
         if (client.next_data_s > now_s) continue;
         // The rate is one of host time: an accelerated rig sends no more packages than another.
-        const double period_s = clock_->speedup() / client.rtde->rate_hz();
+        const double period_s = clock_->speedup() * client.DataPeriodS(machine_.cycle_s());
         client.next_data_s = machine_.CycleAtOrAfter(client.next_data_s + period_s);
         if (client.next_data_s <= now_s) client.next_data_s = machine_.CycleAtOrAfter(now_s + period_s);
       }
@@ -305,7 +316,7 @@ class EmulatedController : public Controller {
           release_s = host_s + uniform(random_) * late_ms * 1e-3;
       }
       if (!state) state = machine_.State();
-      client.connection.Send(client.rtde->Data(*state), release_s);
+      client.connection.Send(client.rtde ? client.rtde->Data(*state) : RealtimePacket(*state), release_s);
     }
   }
 
@@ -315,7 +326,7 @@ class EmulatedController : public Controller {
     next_state_s_ = std::max(next_state_s_ + kStateEveryS, host_s + kStateEveryS / 2);
     std::string packet;
     for (Client& client : clients_) {
-      if ((client.port != kPrimary && client.port != kSecondary) || client.connection.Busy()) continue;
+      if (!client.GetsStates() || client.connection.Busy()) continue;
       if (packet.empty()) packet = StatePacket(machine_.State(), machine_.geometry(), options_.model);
       client.connection.Send(packet);
     }
@@ -330,7 +341,7 @@ class EmulatedController : public Controller {
   std::mt19937_64 random_;
   RtdeSession::Taken taken_;
   std::list<Client> clients_;
-  int listeners_[kPorts] = {-1, -1, -1, -1};
+  int listeners_[kPorts];
   int wake_ = -1;
   Ports ports_;
   bool frozen_ = false, input_came_ = false;

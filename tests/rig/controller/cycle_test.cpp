@@ -5,6 +5,7 @@
 
 #include "tests/rig/controller/dashboard.h"
 #include "tests/rig/controller/machine.h"
+#include "tests/rig/controller/realtime_packet.h"
 #include "tests/rig/controller/test_client.h"
 
 namespace touchstone::rig {
@@ -116,7 +117,7 @@ std::string Watched(const std::string& action) {
 
 std::string AskDashboard(Machine* machine, const std::string& line) {
   bool quit = false;
-  return AnswerDashboard(line, "ur3e", machine, &quit);
+  return AnswerDashboard(line, "ur3e", false, machine, &quit);
 }
 
 TEST(Watchdog, StopEndsTheProgramWithoutAProtectiveStop) {
@@ -180,6 +181,84 @@ TEST(Dashboard, PausesAndStopsWhatRunsAndSaysSoWhereNothingDoes) {
   EXPECT_EQ(AskDashboard(&machine, "play"), "Failed to execute: play");
   machine.Advance(2, nullptr);
   EXPECT_EQ(machine.State().runtime_state, kStopped);
+}
+
+TEST(Payload, TakesTheToolForItsCentreOfGravityWhereNoneIsGiven) {
+  Machine machine(Exact(), nullptr, nullptr);
+  const auto run = [&](const std::string& script) {
+    machine.StartProgram(script);
+    machine.Advance(machine.now_s() + 0.01, nullptr);
+    return machine.State().payload_cog_m;
+  };
+  const Eigen::Vector3d tool(0, 0, 0.12), given(0, 0.01, 0.03);
+  EXPECT_EQ(run("def a():\n set_payload(1)\n set_tcp(p[0,0,0.12,0,0,0])\nend\n"), tool);
+  EXPECT_EQ(run("def b():\n set_payload(1, [0,0.01,0.03])\n set_tcp(p[0,0,0.2,0,0,0])\nend\n"), given);
+  EXPECT_EQ(run("set_payload_mass(2)\n"), given);
+  EXPECT_EQ(machine.State().payload_kg, 2);
+}
+
+TEST(LocalControl, MovesNothingFromOutsideAndTellsEverything) {
+  Faults faults;
+  Machine e_series(Exact("ur3e"), &faults, nullptr), cb3(Exact("ur3"), &faults, nullptr);
+  faults.Set("local_control", 1);
+  for (Machine* machine : {&e_series, &cb3}) {
+    machine->StartProgram(kDown);
+    machine->Advance(0.3, nullptr);
+  }
+  EXPECT_FALSE(e_series.program_running());
+  EXPECT_TRUE(cb3.program_running()) << "CB3 knows no local control";
+  bool quit = false;
+  EXPECT_EQ(AskDashboard(&e_series, "is in remote control"), "false");
+  EXPECT_EQ(AskDashboard(&e_series, "robotmode"), "Robotmode: RUNNING");
+  EXPECT_EQ(AskDashboard(&e_series, "power off").substr(0, 22), "Command is not allowed");
+  faults.Set("local_control", 0);
+  EXPECT_EQ(AnswerDashboard("power off", "ur3e", true, &e_series, &quit).substr(0, 22),
+            "Command is not allowed")
+      << "a connection from before must reconnect";
+  EXPECT_EQ(AskDashboard(&e_series, "power off"), "Powering off");
+}
+
+// The layout is UR's "RealTime 5.10": offsets by its table.
+TEST(Realtime, PacketHasTheTablesSizeAndPlaces) {
+  Machine machine(Exact(), nullptr, nullptr);
+  machine.SetPayload(0.7, Eigen::Vector3d(0.01, 0.02, 0.03));
+  machine.Advance(0.01, nullptr);
+  const RobotState state = machine.State();
+  const std::string packet = RealtimePacket(state);
+  ASSERT_EQ(packet.size(), 1220u);
+  EXPECT_EQ(WireReader(packet).Get<int32_t>(), 1220);
+  const auto at = [&](size_t offset) {
+    return WireReader(std::string_view(packet).substr(offset)).Get<double>();
+  };
+  EXPECT_EQ(at(4), state.timestamp_s);
+  EXPECT_EQ(at(12 + 8), state.target_q[1]);
+  EXPECT_EQ(at(252 + 8), state.actual_q[1]);
+  EXPECT_EQ(at(444), state.actual_tcp_pose[0]);
+  EXPECT_EQ(at(588 + 16), state.target_tcp_pose[2]);
+  EXPECT_EQ(at(756), kRunning);
+  EXPECT_EQ(at(764), 253);
+  EXPECT_EQ(at(812), kNormal);
+  EXPECT_EQ(at(940), 1);
+  EXPECT_EQ(at(1052), kStopped);
+  EXPECT_EQ(at(1060), state.elbow_m[0]);
+  EXPECT_EQ(at(1108), kNormal);
+  EXPECT_EQ(at(1140), 0.7);
+  EXPECT_EQ(at(1148 + 16), 0.03);
+}
+
+TEST(Realtime, PortRunsProgramsAndItsTwinOnlyTells) {
+  SimClock clock(20);
+  const auto controller = Controller::Start(Exact(), &clock, nullptr, nullptr);
+  TestClient realtime(controller->ports().realtime), twin(controller->ports().realtime_read_only);
+  const std::string program = "def go():\n write_output_integer_register(25, 3)\nend\n";
+  twin.Send(program);
+  while (twin.buffer.size() < 1220) ASSERT_TRUE(twin.More());
+  EXPECT_EQ(WireReader(twin.buffer).Get<int32_t>(), 1220);
+  EXPECT_EQ(controller->Count("programs"), 0u);
+  realtime.Send(program);
+  TouchClient state(controller->ports().rtde);
+  state.Until([&] { return state.phase == 3; });
+  EXPECT_EQ(controller->Count("programs"), 1u);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 
 namespace touchstone::rig {
 namespace {
@@ -38,7 +39,8 @@ bool StartsWith(const std::string& text, const std::string& with) {
 
 }  // namespace
 
-std::string AnswerDashboard(const std::string& line, const std::string& model, Machine* machine, bool* quit) {
+std::string AnswerDashboard(const std::string& line, const std::string& model, bool local, Machine* machine,
+                            bool* quit) {
   std::string command = line;
   while (!command.empty() && std::isspace(static_cast<unsigned char>(command.back()))) command.pop_back();
   std::string lower = command;
@@ -48,6 +50,17 @@ std::string AnswerDashboard(const std::string& line, const std::string& model, M
   if (lower == "robotmode") return "Robotmode: " + ModeName(machine->robot_mode());
   if (lower == "safetymode") return "Safetymode: " + SafetyName(machine->LaggingSafetyMode(), false);
   if (lower == "safetystatus") return "Safetystatus: " + SafetyName(machine->LaggingSafetyMode(), true);
+  // In local control an e-Series answers so to what does more than tell (UniversalRobots/Universal_Robots_ROS_Driver,
+  // issues 125 and 262, which also say that a connection from before stays refused). Which commands it refuses UR does
+  // not list; here all that change something.
+  static const std::set<std::string> kRemoteOnly = {
+      "power on", "power off", "brake release", "play",
+      "pause",    "stop",      "shutdown",      "unlock protective stop"};
+  if (e_series && (local || machine->LocalControl()) &&
+      (kRemoteOnly.count(lower) > 0 || StartsWith(lower, "load ")))
+    return "Command is not allowed due to safety reasons, please switch robot to Remote Control mode and "
+           "reconnect to "
+           "port 29999";
   if (lower == "power on") {
     machine->PowerOn();
     return "Powering on";
@@ -84,7 +97,7 @@ std::string AnswerDashboard(const std::string& line, const std::string& model, M
     return e_series ? "URSoftware 5.11.0.108249 (Sep 01 2021)" : "URSoftware 3.15.8.106339 (Jun 20 2022)";
   if (lower == "get robot model") return "UR3";
   if (lower == "get serial number") return e_series ? "20200300000" : "2014300000";
-  if (e_series && lower == "is in remote control") return "true";
+  if (e_series && lower == "is in remote control") return machine->LocalControl() ? "false" : "true";
   if (lower == "quit") {
     *quit = true;
     return "Disconnected";

@@ -16,7 +16,11 @@ int main(int argc, char** argv) {
   options.dashboard_port = 29999;
   options.primary_port = 30001;
   options.secondary_port = 30002;
+  options.realtime_port = 30003;
   options.rtde_port = 30004;
+  options.primary_read_only_port = 30011;
+  options.secondary_read_only_port = 30012;
+  options.realtime_read_only_port = 30013;
   double speedup = 1;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -31,6 +35,8 @@ int main(int argc, char** argv) {
       speedup = std::atof(value.c_str());
     } else if (name == "--any-port") {
       options.dashboard_port = options.primary_port = options.secondary_port = options.rtde_port = 0;
+      options.realtime_port = options.primary_read_only_port = 0;
+      options.secondary_read_only_port = options.realtime_read_only_port = 0;
     } else {
       std::fprintf(stderr, "unknown argument '%s'\n", argument.c_str());
       return 2;
@@ -41,8 +47,10 @@ int main(int argc, char** argv) {
     Faults faults;
     const auto controller = Controller::Start(options, &clock, &faults, nullptr);
     const auto ports = controller->ports();
-    std::printf("Emulated controller (a test tool) on %s: dashboard %d, primary %d, secondary %d, rtde %d\n",
-                options.address.c_str(), ports.dashboard, ports.primary, ports.secondary, ports.rtde);
+    std::printf(
+        "Emulated controller (a test tool) on %s: dashboard %d, primary %d, secondary %d, realtime %d, "
+        "rtde %d\n",
+        options.address.c_str(), ports.dashboard, ports.primary, ports.secondary, ports.realtime, ports.rtde);
     std::fflush(stdout);
     while (std::getchar() != EOF) {
     }

@@ -23,7 +23,8 @@ Machine::Machine(const ControllerOptions& options, Faults* faults, TipListener* 
     : options_(options),
       faults_(faults),
       tip_(tip),
-      geometry_(GeometryOf(options.model)),
+      geometry_(options.calibrated ? CalibratedGeometry(GeometryOf(options.model))
+                                   : GeometryOf(options.model)),
       cycle_s_(options.model == "ur3" ? 0.008 : 0.002),
       random_(options.seed) {
   for (int i = 0; i < 6; ++i) joints_[i] = options.joints_rad[i];
@@ -191,6 +192,10 @@ void Machine::ProtectiveStop(int code, const std::string& why) {
   Halt();
 }
 
+bool Machine::LocalControl() const {
+  return options_.model != "ur3" && faults_ && faults_->Get("local_control") != 0;
+}
+
 bool Machine::Unlock() {
   if (safety_mode_ != kProtectiveStop) return true;
   if (now_s_ < stopped_at_s_ + kUnlockAfterS) return false;
@@ -241,7 +246,7 @@ void Machine::SetTool(const Eigen::Isometry3d& flange_from_tip) {
   flange_from_tip_ = flange_from_tip;
 }
 
-void Machine::SetPayload(double kg, const Eigen::Vector3d& cog_m) {
+void Machine::SetPayload(double kg, const std::optional<Eigen::Vector3d>& cog_m) {
   payload_kg_ = kg;
   payload_cog_m_ = cog_m;
 }

@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -91,6 +92,8 @@ class Machine : public ScriptHost {
   void ReleaseBrakes();
   bool Unlock();  // false: not within 5 s of the stop
   int LaggingSafetyMode() const;
+  // Only e-Series controllers know it: what comes from outside may be read, but moves nothing.
+  bool LocalControl() const;
   int robot_mode() const { return robot_mode_; }
   int safety_mode() const { return safety_mode_; }
 
@@ -124,7 +127,19 @@ class Machine : public ScriptHost {
   Outcome MoveAlong(const Vector6& twist, double acceleration, double duration_s, int thread);
   Outcome StopMotion(double deceleration);
   void SetTool(const Eigen::Isometry3d& flange_from_tip);
-  void SetPayload(double kg, const Eigen::Vector3d& cog_m);
+  void RequestProtectiveStop() { protective_stop_asked_ = true; }  // of a program: at the end of this cycle
+  // Without a centre of gravity the tool centre point is, now and whenever it is set (UR's script manual, SW 5.x,
+  // set_payload). Flange frame.
+  void SetPayload(double kg, const std::optional<Eigen::Vector3d>& cog_m);
+  void SetPayloadMass(double kg) { payload_kg_ = kg; }
+  Eigen::Vector3d PayloadCog() const {
+    return payload_cog_m_.value_or(Eigen::Vector3d(flange_from_tip_.translation()));
+  }
+  double payload_kg() const { return payload_kg_; }
+  void SetFreedrive(bool on);
+  bool free() const { return free_; }
+  bool MoveByHand(const Joints& joints);  // false: it is not free
+  bool e_series() const { return options_.model != "ur3"; }
   void SetWatchdog(const std::string& variable, double min_hz, const std::string& action);
   void WriteOutput(int index, int32_t value);
   void WriteOutput(int index, double value);
@@ -173,7 +188,7 @@ class Machine : public ScriptHost {
   Joints joints_;
   Eigen::Isometry3d flange_from_tip_ = Eigen::Isometry3d::Identity();
   double payload_kg_ = 0;
-  Eigen::Vector3d payload_cog_m_ = Eigen::Vector3d::Zero();
+  std::optional<Eigen::Vector3d> payload_cog_m_ = Eigen::Vector3d::Zero();
   std::unique_ptr<Motion> motion_, past_;  // past_: the one before, which ended at past_end_s_
   double past_end_s_ = 0;
   uint64_t straight_motions_ = 0;
@@ -182,6 +197,7 @@ class Machine : public ScriptHost {
   int robot_mode_ = kPowerOff, safety_mode_ = kNormal;
   double stopped_at_s_ = -1e9;
   bool emergency_ = false, frozen_ = false;
+  bool free_ = false;  // for a hand, while the program runs that asked for it
   double frozen_at_s_ = 0;
   std::vector<std::pair<double, int>> safety_history_;
   std::vector<std::pair<double, std::function<void()>>> later_;
@@ -193,6 +209,7 @@ class Machine : public ScriptHost {
   std::vector<Announcement> announcements_;
 
   std::unique_ptr<ScriptMachine> script_;
+  bool protective_stop_asked_ = false;
   bool script_fresh_ = false, in_secondary_ = false, paused_ = false;
   double script_due_s_ = 0;  // the cycle at which it begins, or goes on after a motion
   struct Watchdog {

@@ -1,5 +1,6 @@
 // How programs begin, run, are paused and end, and the watchdogs over them.
 #include <algorithm>
+#include <utility>
 
 #include "tests/rig/controller/machine_motion.h"
 #include "tests/rig/controller/never.h"
@@ -7,6 +8,8 @@
 namespace touchstone::rig {
 
 void Machine::StartProgram(const std::string& script) {
+  // Without a word (UniversalRobots/Universal_Robots_ROS_Driver, issue 13).
+  if (LocalControl()) return;
   ScriptProgram program;
   try {
     program = Compile(script, Builtins());
@@ -67,6 +70,10 @@ void Machine::RunScript() {
   const bool goes_on = script_->Run(now_s_);
   // A motion whose thread has ended belongs to nobody; unless stopl has taken it over, it ends now.
   if (motion_ && motion_->thread >= 0 && !script_->Lives(motion_->thread)) motion_->thread = -1;
+  if (std::exchange(protective_stop_asked_, false)) {
+    ProtectiveStop(0, "the program asked for it");
+    return;
+  }
   if (!goes_on) {
     if (const auto& failure = script_->failure())
       Announce({Announcement::kException, "", failure->what, failure->line, failure->column});
@@ -79,6 +86,7 @@ void Machine::EndProgram() {
   Announce({Announcement::kKey, "PROGRAM_XXX_STOPPED", script_->program().name});
   script_.reset();
   watchdogs_.clear();
+  free_ = false;
   paused_ = false;
   if (motion_) motion_->thread = -1;
   changed_ = true;

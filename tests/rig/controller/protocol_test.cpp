@@ -78,6 +78,16 @@ TEST(Rtde, TellsTheTypesOfItsFields) {
   EXPECT_EQ(session.Ask(RtdeMessage('S', "")), Bytes({0, 4, 83, 0}));
 }
 
+// UR's table of outputs has these from 5.2 and 5.9 on, CB3 never; the last from 5.15 on.
+TEST(Rtde, HasTheFieldsOfItsSeriesAndVersion) {
+  Session e_series, cb3("ur3");
+  const std::string names =
+      "tool_output_mode,tool_digital_output0_mode,tool_digital_output1_mode,ft_raw_wrench,payload_inertia,"
+      "collision_detection_ratio";
+  EXPECT_EQ(Types(&e_series, names), "UINT8,UINT8,UINT8,VECTOR6D,VECTOR6D,NOT_FOUND");
+  EXPECT_EQ(Types(&cb3, names), "NOT_FOUND,NOT_FOUND,NOT_FOUND,NOT_FOUND,VECTOR6D,NOT_FOUND");
+}
+
 TEST(Rtde, WritesAsManyBytesAsTheTypeSays) {
   const std::map<std::string, size_t> sizes = {
       {"BOOL", 1},   {"UINT8", 1},     {"INT32", 4},     {"UINT32", 4},        {"UINT64", 8},
@@ -170,7 +180,7 @@ TEST(Primary, WritesItsMessagesByteForByte) {
 
 std::string Ask(Machine* machine, const std::string& line, const std::string& model = "ur3e") {
   bool quit = false;
-  return AnswerDashboard(line, model, machine, &quit);
+  return AnswerDashboard(line, model, false, machine, &quit);
 }
 
 TEST(Dashboard, SpeaksTheTextsOfTheController) {
@@ -196,7 +206,7 @@ TEST(Dashboard, SpeaksTheTextsOfTheController) {
   EXPECT_EQ(Ask(&machine, "is in remote control", "ur3"), "could not understand: 'is in remote control'");
   EXPECT_EQ(Ask(&machine, "make coffee"), "could not understand: 'make coffee'");
   bool quit = false;
-  EXPECT_EQ(AnswerDashboard("quit", "ur3e", &machine, &quit), "Disconnected");
+  EXPECT_EQ(AnswerDashboard("quit", "ur3e", false, &machine, &quit), "Disconnected");
   EXPECT_TRUE(quit);
 }
 

@@ -26,6 +26,12 @@ RtdeOutput ConstantWord(uint32_t value) {
   return Scalar("UINT32", [value](const RobotState&) { return value; });
 }
 
+// Not on CB3.
+RtdeOutput ESeries(RtdeOutput output) {
+  output.e_series_only = true;
+  return output;
+}
+
 uint32_t Packed(const std::array<bool, 128>& bits, int from) {
   uint32_t word = 0;
   for (int i = 0; i < 32; ++i) word |= static_cast<uint32_t>(bits[from + i]) << i;
@@ -38,11 +44,10 @@ void AddMotion(Outputs& all) {
   all["target_qdd"] = Vector("VECTOR6D", [](const RobotState& s) { return s.target_qdd; });
   all["actual_q"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_q; });
   all["actual_qd"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_qd; });
-  all["actual_qdd"] = Vector("VECTOR6D", [](const RobotState& s) { return s.target_qdd; });
   all["actual_TCP_pose"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_tcp_pose; });
   all["actual_TCP_speed"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_tcp_speed; });
   all["actual_TCP_force"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_tcp_force; });
-  all["ft_raw_wrench"] = Vector("VECTOR6D", [](const RobotState& s) { return s.actual_tcp_force; });
+  all["ft_raw_wrench"] = ESeries(all["actual_TCP_force"]);  // 5.9
   all["target_TCP_pose"] = Vector("VECTOR6D", [](const RobotState& s) { return s.target_tcp_pose; });
   all["target_TCP_speed"] = Vector("VECTOR6D", [](const RobotState& s) { return s.target_tcp_speed; });
   all["tcp_offset"] = Vector("VECTOR6D", [](const RobotState& s) { return s.tcp_offset; });
@@ -53,12 +58,8 @@ void AddMotion(Outputs& all) {
   all["actual_tool_accelerometer"] =
       Vector("VECTOR3D", [](const RobotState&) { return Eigen::Vector3d(0, 0, -9.82); });
   all["actual_momentum"] = Constant(0);
-  all["joint_position_deviation_ratio"] = Constant(0);
-  all["collision_detection_ratio"] = Constant(0);
-  for (const char* name : {"target_current", "actual_current", "actual_current_as_torque",
-                           "joint_control_output", "target_moment", "actual_moment"})
+  for (const char* name : {"target_current", "actual_current", "joint_control_output", "target_moment"})
     all[name] = Constant6(0);
-  all["actual_current_window"] = Constant6(1);
   all["joint_temperatures"] = Constant6(28);
   all["actual_joint_voltage"] = Constant6(48);
 }
@@ -84,7 +85,6 @@ void AddModes(Outputs& all) {
   all["script_control_line"] =
       Scalar("UINT32", [](const RobotState& s) { return static_cast<uint32_t>(s.script_line); });
   all["payload"] = Scalar("DOUBLE", [](const RobotState& s) { return s.payload_kg; });
-  all["payload_mass"] = all["payload"];
   all["payload_cog"] = Vector("VECTOR3D", [](const RobotState& s) { return s.payload_cog_m; });
   all["payload_inertia"] = Constant6(0);
 }
@@ -102,6 +102,9 @@ void AddElectrics(Outputs& all) {
     all[name] = Constant(0);
   all["tool_temperature"] = Constant(28);
   all["tool_output_voltage"] = Scalar("INT32", [](const RobotState&) { return int32_t{0}; });
+  for (const char* name :
+       {"tool_output_mode", "tool_digital_output0_mode", "tool_digital_output1_mode"})  // 5.2
+    all[name] = ESeries(Scalar("UINT8", [](const RobotState&) { return uint8_t{0}; }));
   for (const char* name : {"analog_io_types", "tool_mode", "tool_analog_input_types", "euromap67_input_bits",
                            "euromap67_output_bits"})
     all[name] = ConstantWord(0);

@@ -114,10 +114,11 @@ std::string RtdeSession::SetUpOutputs(std::string_view payload) {
   std::string types;
   bool all = true;
   for (const std::string& name : Names(from.left)) {
-    const auto found = RtdeOutputs().find(name);
-    if (found != RtdeOutputs().end()) outputs_.push_back(&found->second);
-    all &= found != RtdeOutputs().end();
-    types += (types.empty() ? "" : ",") + (found != RtdeOutputs().end() ? found->second.type : "NOT_FOUND");
+    const auto row = RtdeOutputs().find(name);
+    const bool found = row != RtdeOutputs().end() && (e_series_ || !row->second.e_series_only);
+    if (found) outputs_.push_back(&row->second);
+    all &= found;
+    types += (types.empty() ? "" : ",") + (found ? row->second.type : "NOT_FOUND");
   }
   if (!all) outputs_.clear();
   recipe_ = outputs_.empty() ? 0 : 1;

@@ -27,9 +27,10 @@ class ScriptCodeWriter {
 
   static const std::set<std::string>& Reserved() {
     static const std::set<std::string> words = {
-        "def",      "thread", "sec",  "end",  "if",   "elif",  "else", "while", "break",
-        "continue", "return", "halt", "pass", "run",  "kill",  "join", "local", "global",
-        "and",      "or",     "xor",  "not",  "True", "False", "true", "false"};
+        "def",          "thread", "sec",  "end",  "if",   "elif",  "else", "while", "break",
+        "continue",     "return", "halt", "pass", "run",  "kill",  "join", "local", "global",
+        "and",          "or",     "xor",  "not",  "True", "False", "true", "false", "enter_critical",
+        "exit_critical"};
     return words;
   }
 

@@ -46,6 +46,7 @@ ScriptProgram StatementCompiler::Program() {
   SkipLineEnds();
   if (Peek().kind != Kind::kEnd) Fail("unexpected '" + Peek().text + "' behind the program's end");
   Finish();
+  ResolveLater();
   program_.functions[0].name = program_.name;
   for (const auto& [index, place] : used_globals_)
     if (!assigned_globals_.count(index))
@@ -82,6 +83,7 @@ void StatementCompiler::Statement() {
       return;
     }
     Next();
+    SkipLineEnds();  // ur_rtde writes "global x = # comment" and the value on the next line
     Expression();
     return Store(name, scope, false);
   }
@@ -106,7 +108,8 @@ void StatementCompiler::Statement() {
     Emit(Op::kHalt);
     return;
   }
-  if (IsWord("pass")) {
+  // Threads here only give way where they wait: every section is critical.
+  if (IsWord("pass") || IsWord("enter_critical") || IsWord("exit_critical")) {
     Next();
     return;
   }

@@ -75,6 +75,19 @@ int ExpressionCompiler::Items(const char* close) {
   return count;
 }
 
+// A pose p[0,0,0,0,0,0], not an item p[0] of a variable that somebody called p.
+bool ExpressionCompiler::BracketHasComma(int ahead) const {
+  int depth = 0;
+  for (;; ++ahead) {
+    const Token& token = Peek(ahead);
+    if (token.kind == Kind::kEnd || token.kind == Kind::kLineEnd) return false;
+    if (token.kind != Kind::kSign) continue;
+    if (token.text == "[" || token.text == "(") ++depth;
+    if ((token.text == "]" || token.text == ")") && --depth == 0) return false;
+    if (token.text == "," && depth == 1) return true;
+  }
+}
+
 void ExpressionCompiler::Primary() {
   const Token token = Peek();
   if (token.kind == Kind::kNumber) {
@@ -96,7 +109,8 @@ void ExpressionCompiler::Primary() {
     Expect(")");
   } else if (Take("[")) {
     EmitAt(token, Op::kMakeList, Items("]"));
-  } else if (token.kind == Kind::kName && token.text == "p" && IsSign("[", 1)) {
+  } else if (token.kind == Kind::kName && token.text == "p" && IsSign("[", 1) &&
+             (LocalOf("p") < 0 || BracketHasComma(1))) {
     Next();
     Next();
     if (Items("]") != 6) Fail("a pose has six numbers");
@@ -111,10 +125,8 @@ void ExpressionCompiler::Primary() {
     Expect("(");
     const int count = Items(")");
     const int index = FunctionOf(name.text);
-    if (index < 0 || !program_.functions[index].thread)
-      throw CompileError("compile_error_name_not_found:" + name.text + ":", name.line, name.column);
-    CheckCount(name, program_.functions[index].parameters, program_.functions[index].parameters, count);
-    EmitAt(name, Op::kRun, index, count);
+    if (index >= 0) CheckCall(name, index, Op::kRun, count);
+    EmitAt(name, Op::kRun, index >= 0 ? index : Later(name, count), count);
   } else if (token.kind == Kind::kName && !Reserved().count(token.text)) {
     Next();
     if (IsSign("("))
@@ -134,6 +146,32 @@ void ExpressionCompiler::CheckCount(const Token& name, int least, int most, int 
                        name.line, name.column);
 }
 
+void ExpressionCompiler::CheckCall(const Token& name, int index, Op op, int given) {
+  const ScriptFunction& function = program_.functions[index];
+  if (op == Op::kRun && !function.thread)
+    throw CompileError("compile_error_name_not_found:" + name.text + ":", name.line, name.column);
+  CheckCount(name, function.parameters, function.parameters, given);
+}
+
+int ExpressionCompiler::Later(const Token& name, int given) {
+  later_.push_back({name, given});
+  return -static_cast<int>(later_.size());
+}
+
+void ExpressionCompiler::ResolveLater() {
+  for (ScriptFunction& function : program_.functions) {
+    for (Instruction& code : function.code) {
+      if ((code.op != Op::kCall && code.op != Op::kRun) || code.a >= 0) continue;
+      const auto& [name, given] = later_[-code.a - 1];
+      const int index = FunctionOf(name.text);
+      if (index < 0)
+        throw CompileError("compile_error_name_not_found:" + name.text + ":", name.line, name.column);
+      CheckCall(name, index, code.op, given);
+      code.a = index;
+    }
+  }
+}
+
 void ExpressionCompiler::Call(const Token& name) {
   Expect("(");
   if (const int index = FunctionOf(name.text); index >= 0) {
@@ -145,8 +183,11 @@ void ExpressionCompiler::Call(const Token& name) {
   int builtin = -1;
   for (size_t i = 0; i < builtins_.size(); ++i)
     if (name.text == builtins_[i].name) builtin = static_cast<int>(i);
-  if (builtin < 0)
-    throw CompileError("compile_error_name_not_found:" + name.text + ":", name.line, name.column);
+  if (builtin < 0) {  // may be defined below
+    const int count = Items(")");
+    EmitAt(name, Op::kCall, Later(name, count), count);
+    return;
+  }
   // Arguments by place and by name become one list in the order of the parameters; the missing are None.
   const BuiltinSignature& signature = builtins_[builtin];
   const int most = static_cast<int>(signature.parameters.size());

@@ -1,32 +1,12 @@
 // The functions of the controller that scripts may call. Blends (r=) are driven as stops.
 #include <cmath>
 
-#include "tests/rig/controller/machine.h"
+#include "tests/rig/controller/script_builtin.h"
 
 namespace touchstone::rig {
 namespace {
 
-using Arguments = std::vector<Value>;
-using Function = Outcome (*)(Machine& machine, const Arguments& arguments, int thread);
-
-bool Given(const Arguments& arguments, size_t i) {
-  return i < arguments.size() && arguments[i].kind != Value::Kind::kNone;
-}
-double NumberOr(const Arguments& arguments, size_t i, const char* what, double otherwise) {
-  return Given(arguments, i) ? arguments[i].AsNumber(what) : otherwise;
-}
-Outcome Result(Value value) {
-  return {Outcome::Wait::kNone, std::move(value), 0};
-}
-Outcome Number(double number) {
-  return Result(Value::Number(number));
-}
-Outcome Nothing(Machine&, const Arguments&, int) {
-  return {};
-}
-Outcome Pose(const Eigen::Isometry3d& transform) {
-  return Result(Value::Vector(ToPose(transform), Value::Kind::kPose));
-}
+using namespace builtin;  // its helpers
 
 int Register(const Value& value, int count) {
   const int index = value.AsInteger("a register's number");
@@ -51,17 +31,25 @@ Joints JointTarget(Machine& machine, const Value& target, const Joints& near) {
   return found.front();
 }
 
+double PayloadOf(const Value& value) {
+  const double kg = value.AsNumber("a payload");
+  if (!(kg >= 0 && kg <= 3)) throw ScriptError("a payload must lie between 0 and 3 kg, is " + value.ToText());
+  return kg;
+}
+
+Eigen::Vector3d CogOf(const Value& value) {
+  if (value.items.size() != 3) throw ScriptError("a centre of gravity has three numbers");
+  Eigen::Vector3d cog;
+  for (int i = 0; i < 3; ++i) cog[i] = value.items[i].AsNumber("a centre of gravity");
+  return cog;
+}
+
 double Apply(const Value& value, double (*of)(double)) {
   return of(value.AsNumber("an argument"));
 }
 
-struct Row {
-  BuiltinSignature signature;
-  Function function;
-};
-
-const std::vector<Row>& Rows() {
-  static const std::vector<Row> rows = {
+const std::vector<BuiltinRow>& MainRows() {
+  static const std::vector<BuiltinRow> rows = {
       // Motion.
       {{"movel", {"pose", "a", "v", "t", "r"}, 1},
        [](Machine& m, const Arguments& x, int thread) {
@@ -95,18 +83,50 @@ const std::vector<Row>& Rows() {
        }},
       {{"set_payload", {"m", "cog"}, 1},
        [](Machine& m, const Arguments& x, int) {
-         Eigen::Vector3d cog = Eigen::Vector3d::Zero();
-         if (Given(x, 1)) {
-           if (x[1].items.size() != 3) throw ScriptError("a centre of gravity has three numbers");
-           for (int i = 0; i < 3; ++i) cog[i] = x[1].items[i].AsNumber("a centre of gravity");
-         }
-         const double kg = x[0].AsNumber("a payload");
-         if (!(kg >= 0 && kg <= 3))
-           throw ScriptError("a payload must lie between 0 and 3 kg, is " + x[0].ToText());
-         m.SetPayload(kg, cog);
+         std::optional<Eigen::Vector3d> cog;
+         if (Given(x, 1)) cog = CogOf(x[1]);
+         m.SetPayload(PayloadOf(x[0]), cog);
+         return Outcome{};
+       }},
+      {{"set_payload_mass", {"m"}, 1},
+       [](Machine& m, const Arguments& x, int) {
+         m.SetPayloadMass(PayloadOf(x[0]));
+         return Outcome{};
+       }},
+      {{"set_payload_cog", {"CoG"}, 1},
+       [](Machine& m, const Arguments& x, int) {
+         m.SetPayload(m.payload_kg(), CogOf(x[0]));
+         return Outcome{};
+       }},
+      {{"set_target_payload", {"m", "cog", "inertia", "transition_time"}, 2},
+       [](Machine& m, const Arguments& x, int) {
+         m.SetPayload(PayloadOf(x[0]), CogOf(x[1]));
          return Outcome{};
        }},
       {{"set_gravity", {"d"}, 1}, Nothing},
+      // A hand may move the arm. The first pair is of the e-Series, the second of both series (script manuals).
+      {{"freedrive_mode", {"freeAxes", "feature"}, 0},
+       [](Machine& m, const Arguments&, int) {
+         if (!m.e_series()) throw ScriptError("freedrive_mode is not known to a CB3; teach_mode is");
+         m.SetFreedrive(true);
+         return Outcome{};
+       }},
+      {{"end_freedrive_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         if (!m.e_series()) throw ScriptError("end_freedrive_mode is not known to a CB3; end_teach_mode is");
+         m.SetFreedrive(false);
+         return Outcome{};
+       }},
+      {{"teach_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         m.SetFreedrive(true);
+         return Outcome{};
+       }},
+      {{"end_teach_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         m.SetFreedrive(false);
+         return Outcome{};
+       }},
       // What the arm does.
       {{"get_actual_tcp_pose", {}, 0},
        [](Machine& m, const Arguments&, int) {
@@ -128,17 +148,18 @@ const std::vector<Row>& Rows() {
        }},
       {{"is_steady", {}, 0},
        [](Machine& m, const Arguments&, int) { return Result(Value::Bool(m.Resting())); }},
-      {{"get_inverse_kin", {"x", "qnear"}, 1},
+      {{"get_inverse_kin", {"x", "qnear", "maxPositionError", "maxOrientationError", "tcp"}, 1},
        [](Machine& m, const Arguments& x, int) {
          const Joints near = Given(x, 1) ? Joints(x[1].AsSix("qnear")) : m.JointsAt(m.now_s());
          Value pose = x[0];
          pose.kind = Value::Kind::kPose;
          return Result(Value::Vector(JointTarget(m, pose, near), Value::Kind::kList));
        }},
-      {{"get_forward_kin", {"q"}, 0},
+      {{"get_forward_kin", {"q", "tcp"}, 0},
        [](Machine& m, const Arguments& x, int) {
          const Joints q = Given(x, 0) ? Joints(x[0].AsSix("q")) : m.JointsAt(m.now_s());
-         return Pose(BaseFromFlange(m.geometry(), q) * m.flange_from_tip());
+         const Eigen::Isometry3d tool = Given(x, 1) ? FromPose(x[1].AsSix("tcp")) : m.flange_from_tip();
+         return Pose(BaseFromFlange(m.geometry(), q) * tool);
        }},
       // Time.
       {{"sleep", {"t"}, 1},
@@ -274,12 +295,22 @@ const std::vector<Row>& Rows() {
   return rows;
 }
 
+const std::vector<BuiltinRow>& Rows() {
+  static const std::vector<BuiltinRow> rows = [] {
+    std::vector<BuiltinRow> all = MainRows();
+    const std::vector<BuiltinRow> more = OtherBuiltins();
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }();
+  return rows;
+}
+
 }  // namespace
 
 const std::vector<BuiltinSignature>& Builtins() {
   static const std::vector<BuiltinSignature> signatures = [] {
     std::vector<BuiltinSignature> all;
-    for (const Row& row : Rows()) all.push_back(row.signature);
+    for (const BuiltinRow& row : Rows()) all.push_back(row.signature);
     return all;
   }();
   return signatures;

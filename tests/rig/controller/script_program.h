@@ -4,7 +4,7 @@
 // global; if/elif/else, while, break, continue, return, halt, pass; and, or, xor, not; == != < <= > >= + - *
 // / %; numbers, True, False, strings, lists [..], poses p[..], indexing (reading and writing); calls with
 // named arguments; the functions of script_functions.cpp. Not: switch, structs, interpreter mode, sockets,
-// XML-RPC, string escapes. A name that is first assigned in the outermost def is visible in everything that
+// XML-RPC, string escapes. Functions that are not emulated compile (script_functions_other.cpp). A name that is first assigned in the outermost def is visible in everything that
 // is defined in it; one that is first assigned in a nested def or thread is its own, unless declared global.
 #pragma once
 

@@ -104,6 +104,24 @@ TEST(Script, CallsFunctionsWithScopesOfTheirOwn) {
               ElementsAre("5", "1", "5", "120"));
 }
 
+// As ur_rtde's control program is written.
+TEST(Script, CallsWhatIsDefinedBelowAndKnowsAVariableFromAPose) {
+  EXPECT_THAT(Texts(R"(
+  global offset = # the value is on the next line
+24  def first(p):
+    enter_critical
+    p[0] = p[0] + second(p[1], offset)
+    exit_critical
+    return p
+  end
+  def second(x, y):
+    return x + y
+  end
+  textmsg(first(p[1,2,3,0,0,0]))
+)"),
+              ElementsAre("p[27, 2, 3, 0, 0, 0]"));
+}
+
 TEST(Script, RunsThreadsThatCanBeJoinedAndKilled) {
   EXPECT_THAT(Texts(R"(
   count = 0
