@@ -29,6 +29,8 @@ constexpr char kImagesHeader[] =
     "measured_eye_x_mm,measured_eye_y_mm,measured_eye_z_mm,measured_at_x_mm,measured_at_y_mm,measured_at_z_"
     "mm,"
     "measured_up_x,measured_up_y,measured_up_z,cov_unix_s";
+// Pixel centres lie at half-integers in an image set, at integers where OpenCV's numbers are used.
+constexpr double kHalf = 0.5;
 constexpr size_t kUnixColumn = 22;
 
 std::string TextOf(const std::string& path) {
@@ -49,7 +51,8 @@ std::string CameraText(const ImageSetCamera& camera) {
       image::PinholeIntrinsics(camera.width_px, camera.height_px, camera.vertical_fov_rad);
   return absl::StrFormat(
       "{width_px: %d, height_px: %d, fx_px: %.10g, fy_px: %.10g, cx_px: %.10g, cy_px: %.10g}\n",
-      camera.width_px, camera.height_px, pinhole.fx_px, pinhole.fy_px, pinhole.cx_px, pinhole.cy_px);
+      camera.width_px, camera.height_px, pinhole.fx_px, pinhole.fy_px, pinhole.cx_px + kHalf,
+      pinhole.cy_px + kHalf);
 }
 
 void AppendPose(const v1::CameraPose& pose, std::string* line) {

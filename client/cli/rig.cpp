@@ -64,6 +64,7 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
       PlannedRow& row = (*rows)[wanted[k]];
       row.possible = check.possible();
       row.reason = check.reason();
+      row.notes.assign(check.notes().begin(), check.notes().end());
       row.up_face = client::UpFaceWord(check.up_face());
       row.duration_s = check.duration_s();
       if (checks != nullptr) checks->push_back(std::move(check));
@@ -105,6 +106,7 @@ void AddRig(Cli* cli) {
   AddRigRun(cli, group);
   AddRigPhotos(cli, group);
   AddRigCalibrate(cli, group);
+  AddRigTeach(cli, group);
 }
 
 }  // namespace touchstone::cli

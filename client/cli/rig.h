@@ -41,5 +41,6 @@ void AddRigDryRun(Cli* cli, CLI::App* group);
 void AddRigRun(Cli* cli, CLI::App* group);
 void AddRigPhotos(Cli* cli, CLI::App* group);
 void AddRigCalibrate(Cli* cli, CLI::App* group);
+void AddRigTeach(Cli* cli, CLI::App* group);
 
 }  // namespace touchstone::cli

@@ -10,6 +10,9 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/source/touch_ids.h"
+#include "server/geometry/pose.h"
+#include "server/service/convert.h"
+#include "server/session/base_pose.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::cli {
@@ -66,6 +69,25 @@ std::string RestingFaceRequest(const std::string& object, const std::string& up_
   if (object == mounted_object)
     return absl::StrCat("Turn ", object, " so that its face ", up_face, " points up");
   return absl::StrCat("Put ", object, " on the fixture with its face ", up_face, " up");
+}
+
+absl::StatusOr<client::MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
+                                                  double standoff_m, double speed_m_s) {
+  if (state.object().empty() || !state.has_object_from_tip())
+    return absl::FailedPreconditionError(
+        "what lies on the fixture is unknown, or the calibration has no pose of it: touchstone rig mount "
+        "says it");
+  const Eigen::Isometry3d object_from_tip =
+      geometry::PoseFromVector(session::ParseBasePose(state.object_from_tip()));
+  client::MeasuredTouch touch;
+  touch.touch = number;
+  touch.object = state.object();
+  *touch.commanded.mutable_target_m() = service::ToProto(Eigen::Vector3d(object_from_tip.translation()));
+  *touch.commanded.mutable_approach() = service::ToProto(Eigen::Vector3d(object_from_tip.linear().col(2)));
+  *touch.commanded.mutable_lateral() = service::ToProto(Eigen::Vector3d(object_from_tip.linear().col(0)));
+  touch.commanded.set_standoff_m(standoff_m);
+  touch.commanded.set_speed_m_s(speed_m_s);
+  return touch;
 }
 
 double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {

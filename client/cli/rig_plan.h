@@ -9,6 +9,7 @@
 #include <absl/status/statusor.h>
 
 #include "client/source/measurement_csv.h"
+#include "touchstone/v1/freedrive.pb.h"
 
 namespace touchstone::cli {
 
@@ -20,6 +21,7 @@ struct PlannedRow {
   std::string reason;   // why not
   std::string up_face;  // of the object, that it needs
   double duration_s = 0;
+  std::vector<std::string> notes;  // what does not forbid it: a singularity that it comes near to
 };
 
 // Rows (by index) that need the same object lying the same way.
@@ -42,6 +44,11 @@ absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::Measure
 // face -x points up".
 std::string RestingFaceRequest(const std::string& object, const std::string& up_face,
                                const std::string& mounted_object);
+
+// The touch whose contact a guided arm shows: its tip is the target, its axis the approach. FAILED_PRECONDITION without an
+// object on the fixture.
+absl::StatusOr<client::MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
+                                                  double standoff_m, double speed_m_s);
 
 // The standard deviation of one finger's contact time among repeats of the same touch, seconds: what no pose
 // explains. Only whole touches count. NaN without repeats.

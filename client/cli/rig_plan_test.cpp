@@ -179,5 +179,24 @@ TEST(RigRecord, JournalsStandBesideMeasurementFiles) {
   EXPECT_EQ(JournalPathOf("out/set.txt").status().code(), absl::StatusCode::kInvalidArgument);
 }
 
+// The tip's frame has z along the approach and x along the fingers.
+TEST(TaughtTouch, TouchesWhereTheTipIsAlongItsAxis) {
+  v1::GuideState state;
+  EXPECT_FALSE(TaughtTouch(state, 0, 0.06, 0.02).ok()) << "nothing lies on the fixture";
+  state.set_object("lat20");
+  v1::BasePose& pose = *state.mutable_object_from_tip();
+  pose.mutable_position_m()->set_x(0.01), pose.mutable_position_m()->set_z(0.07);
+  pose.mutable_rotation_rad()->set_x(3.14159265358979);  // looks down
+  const auto touch = TaughtTouch(state, 4, 0.05, 0.03);
+  ASSERT_TRUE(touch.ok()) << touch.status();
+  EXPECT_EQ(touch->touch, 4u);
+  EXPECT_EQ(touch->object, "lat20");
+  EXPECT_NEAR(touch->commanded.target_m().x(), 0.01, 1e-12);
+  EXPECT_NEAR(touch->commanded.approach().z(), -1, 1e-9);
+  EXPECT_NEAR(touch->commanded.lateral().x(), 1, 1e-9);
+  EXPECT_EQ(touch->commanded.standoff_m(), 0.05);
+  EXPECT_EQ(touch->commanded.speed_m_s(), 0.03);
+}
+
 }  // namespace
 }  // namespace touchstone::cli

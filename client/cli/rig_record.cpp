@@ -10,6 +10,7 @@
 #include "server/base/status.h"
 #include "server/session/base_pose.h"
 #include "server/session/command_bytes.h"
+#include "server/session/touch_series.h"
 
 namespace touchstone::cli {
 
@@ -87,7 +88,10 @@ absl::Status RigRecord::Begin(const std::string& id, const client::MeasuredTouch
 }
 
 absl::Status RigRecord::Done(const std::string& id, const v1::TouchResult& result) {
-  return journal_->Done(session_, id, ResultOfMessage(result));
+  if (!result.measured().has_series()) return journal_->Done(session_, id, ResultOfMessage(result));
+  const session::JournalSeries series{session::kSeriesEncoding,
+                                      result.measured().series().SerializeAsString()};
+  return journal_->Done(session_, id, ResultOfMessage(result), &series);
 }
 
 absl::Status RigRecord::Failed(const std::string& id, const absl::Status& why) {

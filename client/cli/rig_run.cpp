@@ -21,7 +21,7 @@ constexpr size_t kMaxRefusalsShown = 20;
 struct RunOptions {
   MotionFlags motion;
   std::string plan, output;
-  bool skip_impossible = false;
+  bool skip_impossible = false, series = false;
 };
 
 class Run {
@@ -118,6 +118,7 @@ class Run {
     request.set_session(session_);
     *request.add_touches() = row.touch.commanded;
     request.add_touch_ids(row.id);
+    request.set_series(options_.series);
     const auto start = std::chrono::steady_clock::now();
     absl::StatusOr<v1::TouchResponse> response = source_->Touch(request);
     // Somebody took the object away or mounted another one: a person can correct that, once.
@@ -143,6 +144,7 @@ class Run {
                                        response.status().message()));
     }
     TOUCHSTONE_RETURN_IF_ERROR(record_->Done(row.id, response->results(0)));
+    without_series_ += options_.series && !response->results(0).measured().has_series();
     took_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     expected_s_ += row.duration_s;
     if (expected_s_ > 0) pace_ = took_s_ / expected_s_;
@@ -180,6 +182,9 @@ class Run {
         std::isfinite(noise_s) ? absl::StrCat("; repeats differ by ",
                                               Rounded(noise_s * kMicrosecondsPerSecond), " us per finger")
                                : ""));
+    if (without_series_ > 0)
+      cli_.Log(absl::StrCat(Counted(without_series_, "touch has", "touches have"),
+                            " no series: the rig had made them before, without --series"));
     cli_.Log(absl::StrCat("next: touchstone diagnose ", options_.output, " --model nominal.yaml",
                           csv ? ""
                               : absl::StrCat("\n      touchstone session export ", options_.output, " ",
@@ -195,7 +200,7 @@ class Run {
   RigConnection rig_;
   std::unique_ptr<client::LeasedSource> source_;
   std::unique_ptr<RigRecord> record_;
-  size_t impossible_ = 0, made_ = 0, left_ = 0;
+  size_t impossible_ = 0, made_ = 0, left_ = 0, without_series_ = 0;
   double left_s_ = 0, took_s_ = 0, expected_s_ = 0, pace_ = 1;
 };
 
@@ -228,6 +233,10 @@ void AddRigRun(Cli* cli, CLI::App* group) {
   command->get_option("--force")->description("Replace a measurement file that exists; never a journal");
   command->add_flag("--skip-impossible", options->skip_impossible,
                     "Leave out touches that the rig cannot make. Default: move nothing if there is one");
+  command->add_flag(
+      "--series", options->series,
+      "Also keep the arm's joints, tip pose and tip force during each approach (about 200 kB a touch); "
+      "session export writes them to HDF5");
   AddMotionOptions(command, &options->motion, true);
   command->get_option("--session")
       ->description(

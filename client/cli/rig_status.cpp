@@ -38,7 +38,7 @@ std::string Pose(const v1::BasePose& pose) {
                       three(pose.rotation_rad(), 1 / kRadiansPerDegree), " deg");
 }
 
-std::string ArmText(const v1::ArmStatus& arm) {
+std::string ArmText(const v1::ArmStatus& arm, const v1::RigLimits& limits) {
   std::string text = absl::StrCat("Arm           ", arm.model(), " at ", arm.address(),
                                   arm.connected() ? "" : ": NOT CONNECTED", "\n");
   if (!arm.connected()) return text;
@@ -52,6 +52,15 @@ std::string ArmText(const v1::ArmStatus& arm) {
   text += Line("States", absl::StrCat(Rounded(arm.rate_hz()), " Hz, the newest is ",
                                       Rounded(kMillisecondsPerSecond * arm.state_age_s()), " ms old"));
   text += Line("Tip", Pose(arm.base_from_tip()));
+  const v1::Vector3& force = arm.tip_force_n();
+  text +=
+      Line("Force", absl::StrCat(Rounded(std::round(10 * std::hypot(force.x(), force.y(), force.z())) / 10),
+                                 " N on the tip; ", Rounded(limits.max_force_n()),
+                                 " N beyond that at rest stop a motion"));
+  text += Line("Kinematics", arm.calibrated_kinematics()
+                                 ? "this arm's own calibration"
+                                 : "as published of the model; the controller has not sent "
+                                   "the arm's own (is port 30001 open?)");
   text +=
       Line("Clock", absl::StrCat("drift ", Rounded(kPartsPerMillion * arm.clock_drift()), " ppm, known to ",
                                  Rounded(kMicrosecondsPerSecond * arm.clock_uncertainty_s()), " us"));
@@ -98,7 +107,7 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
                                             : absl::StrCat(rig.object(), " with its face ",
                                                            client::UpFaceWord(rig.up_face()), " up"),
                        rig.mounts_itself() ? "; the rig changes it by itself" : "", "\n");
-  text += ArmText(rig.arm()) + EffectorText(rig.effector());
+  text += ArmText(rig.arm(), rig.limits()) + EffectorText(rig.effector());
   const v1::CameraStatus& camera = rig.camera();
   text += absl::StrCat(
       "Camera        ",

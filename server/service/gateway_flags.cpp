@@ -23,9 +23,11 @@ struct Raw {
   double debounce_ms = 5;
   int threshold = 512, hysteresis = 16;
   double vertical_fov_deg = 45;
+  double min_speed_mm_s = 0.1, arm_margin_mm = 45, max_arm_speed_mm_s = 250;
   double max_speed_mm_s = 100, transit_speed_mm_s = 150, acceleration_mm_s2 = 1200;
   double max_standoff_mm = 150, stroke_beyond_target_mm = 30, max_tilt_deg = 60, clearance_mm = 50;
-  std::vector<double> payload_cog_mm, box_min_mm, box_max_mm, joint_min_deg, joint_max_deg, home_deg;
+  std::vector<double> payload_cog_mm, box_min_mm, box_max_mm, arm_box_min_mm, arm_box_max_mm, joint_min_deg,
+      joint_max_deg, home_deg;
 };
 
 std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
@@ -48,7 +50,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"mesh_dir", "Every mesh file of a folder; may be repeated", &raw->mesh_dir},
       {"supershape_triangles", "About how many triangles each built-in supershape has",
        &o.common.supershape_triangles},
-      {"arm.model", "ur3 (CB3) or ur3e", &o.arm.model},
+      {"arm.model", "ur3 (CB3), ur3e, ur5e or ur10e", &o.arm.model},
       {"arm.address", "Host name or address of the controller", &o.arm.address},
       {"arm.dashboard_port", "", &o.arm.dashboard_port},
       {"arm.primary_port", "", &o.arm.primary_port},
@@ -85,6 +87,7 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
        &o.pose_tolerance_mm},
       {"camera.pose_tolerance_deg", "The same of its direction", &o.pose_tolerance_deg},
       {"limits.max_speed_mm_s", "Limit of an approach's speed", &raw->max_speed_mm_s},
+      {"limits.min_speed_mm_s", "The least speed of an approach", &raw->min_speed_mm_s},
       {"limits.transit_speed_mm_s", "Speed between touches", &raw->transit_speed_mm_s,
        "limits.transfer_speed_mm_s"},
       {"limits.acceleration_mm_s2", "", &raw->acceleration_mm_s2},
@@ -95,6 +98,17 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.clearance_mm", "Transits cross so far above the object", &raw->clearance_mm},
       {"limits.box_min_mm", "Corner of the box that the tip must stay in, base frame", &raw->box_min_mm},
       {"limits.box_max_mm", "Its other corner", &raw->box_max_mm},
+      {"limits.arm_box_min_mm",
+       "Corner of the box that elbow, wrist, flange and camera must stay in; none: the tips' floor, no walls",
+       &raw->arm_box_min_mm},
+      {"limits.arm_box_max_mm", "Its other corner", &raw->arm_box_max_mm},
+      {"limits.arm_margin_mm", "They stay so far inside it: about the radius of the arm's links",
+       &raw->arm_margin_mm},
+      {"limits.max_arm_speed_mm_s", "Of elbow, wrist, flange and camera in any motion",
+       &raw->max_arm_speed_mm_s},
+      {"limits.max_force_n",
+       "Force on the tip, beyond what is felt at rest before a motion, at which it is stopped",
+       &o.limits.max_force_n},
       {"limits.joint_min_deg", "Six joints", &raw->joint_min_deg},
       {"limits.joint_max_deg", "Six joints", &raw->joint_max_deg},
       {"limits.home_deg", "Six joints", &raw->home_deg},
@@ -163,6 +177,9 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
 
   o.camera.vertical_fov_rad = raw.vertical_fov_deg * kRadiansPerDegree;
   gateway::arm::MotionLimits& limits = o.limits;
+  limits.min_speed_m_s = raw.min_speed_mm_s / 1000;
+  limits.arm_margin_m = raw.arm_margin_mm / 1000;
+  limits.max_arm_speed_m_s = raw.max_arm_speed_mm_s / 1000;
   limits.max_speed_m_s = raw.max_speed_mm_s / 1000;
   limits.transit_speed_m_s = raw.transit_speed_mm_s / 1000;
   limits.acceleration_m_s2 = raw.acceleration_mm_s2 / 1000;
@@ -175,6 +192,10 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
                                         &limits.payload_cog_m.emplace(Eigen::Vector3d::Zero())));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_min_mm, 1e-3, "limits.box_min_mm", &limits.box_min_m));
   TOUCHSTONE_RETURN_IF_ERROR(TakeList(raw.box_max_mm, 1e-3, "limits.box_max_mm", &limits.box_max_m));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      TakeList(raw.arm_box_min_mm, 1e-3, "limits.arm_box_min_mm", &limits.arm_box_min_m));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      TakeList(raw.arm_box_max_mm, 1e-3, "limits.arm_box_max_mm", &limits.arm_box_max_m));
   TOUCHSTONE_RETURN_IF_ERROR(
       TakeList(raw.joint_min_deg, kRadiansPerDegree, "limits.joint_min_deg", &limits.joint_min_rad));
   TOUCHSTONE_RETURN_IF_ERROR(

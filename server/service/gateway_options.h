@@ -15,7 +15,7 @@
 namespace touchstone::service {
 
 struct ArmOptions {
-  std::string model = "ur3e";  // or "ur3"
+  std::string model = "ur3e";  // a name of arm_model.h
   std::string address;         // "192.168.0.10"
   int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
   double silence_s = 0.5;  // host time without a state: the controller counts as frozen

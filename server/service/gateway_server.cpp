@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/rig/rig.h"
+#include "server/service/freedrive_service.h"
 #include "server/service/journal_sessions_service.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
@@ -18,15 +19,17 @@
 namespace touchstone::service {
 namespace {
 
-absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& options) {
+absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& options,
+                                                      const source::ObjectStore& objects) {
   gateway::RigParts parts;
   parts.changes = std::make_unique<gateway::timing::ChangeNotifier>();
   TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::calibration::Calibration calibration,
                               gateway::calibration::ReadCalibration(options.calibration));
   gateway::arm::MotionLimits limits = options.limits;
   limits.outermost_finger_m = 0.5 * (options.effector.fingers.size() - 1) * options.spacing_mm / 1000;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.planner,
-                              gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration));
+  // Before anything is connected: that the limits make sense.
+  TOUCHSTONE_RETURN_IF_ERROR(
+      gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration).status());
   TOUCHSTONE_ASSIGN_OR_RETURN(
       parts.journal, session::Journal::Open(options.journal, session::Journal::Mode::kCreateOrReadWrite));
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.audit, gateway::audit::AuditLog::Open(options.audit_log));
@@ -53,7 +56,16 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   arm.script.acceleration_m_s2 = options.limits.acceleration_m_s2;
   arm.script.time_scale = options.time_scale;
   arm.script.watchdog_hz = options.arm.watchdog_hz;
-  TOUCHSTONE_ASSIGN_OR_RETURN(parts.arm, gateway::arm::ConnectUrArm(arm, parts.changes.get()));
+  arm.body_limits = limits;
+  arm.calibration = calibration;
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::arm::UrArm> connected,
+                              gateway::arm::ConnectUrArm(arm, parts.changes.get()));
+  // The rig lets go of its planner before its arm.
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      parts.planner,
+      gateway::arm::MotionPlanner::Create(options.arm.model, limits, calibration,
+                                          [ur = connected.get()] { return ur->CalibratedKinematics(); }));
+  parts.arm = std::move(connected);
   TOUCHSTONE_ASSIGN_OR_RETURN(parts.effector,
                               gateway::effector::Effector::Open(options.effector, parts.changes.get()));
   if (!options.camera.uri.empty()) {
@@ -74,6 +86,11 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   rig.mount_timeout_s = options.mount_timeout_s;
   rig.provenance_note = options.provenance_note;
   rig.effector_port = options.effector.port;
+  rig.bounds_of = [&objects](const std::string& name) -> std::optional<geometry::Bounds> {
+    const absl::StatusOr<const source::ServedObject*> object = objects.Find(name, "object");
+    if (!object.ok()) return std::nullopt;
+    return (*object)->surface->bounds();
+  };
   rig.camera_tolerance.position_m = options.pose_tolerance_mm / 1000;
   rig.camera_tolerance.angle_rad = options.pose_tolerance_deg * kRadiansPerDegree;
   return gateway::Rig::Create(std::move(rig), std::move(parts));
@@ -89,6 +106,7 @@ struct GatewayServer::Parts {
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<RigService> rig_service;
+  std::unique_ptr<FreedriveService> freedrive;
   std::unique_ptr<JournalSessionsService> sessions;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
@@ -110,7 +128,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   session::Journal* journal = nullptr;
   std::unique_ptr<source::RigDevice> device;
   if (options.replay.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::Rig> rig, OpenRig(options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<gateway::Rig> rig, OpenRig(options, resources.objects));
     parts.rig = rig.get();
     journal = &rig->journal();
     device = std::move(rig);
@@ -133,6 +151,8 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     parts.control = std::make_unique<RigControlService>(&resources, parts.leases.get(), parts.rig);
     parts.rig_service = std::make_unique<RigService>(&resources, parts.leases.get(), parts.rig);
     services.push_back({"touchstone.v1.Rig", parts.rig_service.get()});
+    parts.freedrive = std::make_unique<FreedriveService>(&resources, parts.leases.get(), parts.rig);
+    services.push_back({"touchstone.v1.Freedrive", parts.freedrive.get()});
   } else {
     parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   }

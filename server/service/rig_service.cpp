@@ -21,6 +21,32 @@ v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   return session::BasePoseMessage(geometry::PoseVectorOf(pose));
 }
 
+v1::RigLimits LimitsOf(const gateway::arm::MotionLimits& limits) {
+  v1::RigLimits message;
+  *message.mutable_box_min_m() = ToProto(limits.box_min_m);
+  *message.mutable_box_max_m() = ToProto(limits.box_max_m);
+  *message.mutable_arm_box_min_m() = ToProto(limits.ArmBoxMin());
+  *message.mutable_arm_box_max_m() = ToProto(limits.arm_box_max_m);
+  message.set_arm_margin_m(limits.arm_margin_m);
+  message.set_min_speed_m_s(limits.min_speed_m_s);
+  message.set_max_speed_m_s(limits.max_speed_m_s);
+  message.set_max_arm_speed_m_s(limits.max_arm_speed_m_s);
+  message.set_max_force_n(limits.max_force_n);
+  return message;
+}
+
+// Where the arm and its tips are, for a drawing.
+absl::Status DescribePosture(const gateway::Rig& rig, const Eigen::Isometry3d& base_from_tip,
+                             const std::array<double, 6>& joints_rad, v1::ArmPosture* posture) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const gateway::arm::BodyPoints points, rig.planner().Body(joints_rad));
+  for (const Eigen::Vector3d& point : points.links) *posture->add_links_m() = ToProto(point);
+  if (points.camera.has_value()) *posture->mutable_camera_m() = ToProto(*points.camera);
+  for (int k = 0; k < rig.fingers(); ++k)
+    *posture->add_tips_m() =
+        ToProto(base_from_tip * Eigen::Vector3d((k - 0.5 * (rig.fingers() - 1)) * rig.spacing_m(), 0, 0));
+  return absl::OkStatus();
+}
+
 v1::ArmStatus ArmStatusOf(const gateway::arm::Arm& arm, double time_scale) {
   v1::ArmStatus status;
   status.set_model(arm.Model());
@@ -38,6 +64,7 @@ v1::ArmStatus ArmStatusOf(const gateway::arm::Arm& arm, double time_scale) {
     status.set_program_id(now->program_id);
     status.set_phase(static_cast<v1::MotionPhase>(now->phase));
     status.set_speed_scaling(now->speed_scaling);
+    *status.mutable_tip_force_n() = ToProto(now->tip_force_n);
   }
   if (const gateway::timing::ClockEstimate clock = arm.ControllerClock(); clock.valid) {
     status.set_clock_drift(clock.rate / time_scale - 1);
@@ -146,6 +173,9 @@ grpc::Status RigControlService::GetState(grpc::ServerContext* context, const v1:
 void RigService::Describe(v1::RigState* state) const {
   const source::SourceStatus status = rig_->Status();
   *state->mutable_arm() = ArmStatusOf(rig_->arm(), rig_->options().time_scale);
+  const absl::StatusOr<gateway::arm::UrKinematics> kinematics = rig_->planner().Kinematics();
+  state->mutable_arm()->set_calibrated_kinematics(kinematics.ok() && kinematics->calibrated());
+  *state->mutable_limits() = LimitsOf(rig_->planner().limits());
   *state->mutable_effector() = EffectorStatusOf(*rig_);
   if (rig_->camera() != nullptr) *state->mutable_camera() = CameraStatusOf(*rig_->camera(), status);
   const absl::StatusOr<gateway::arm::ArmState> arm = rig_->arm().State();
@@ -157,6 +187,7 @@ void RigService::Describe(v1::RigState* state) const {
   state->set_recovered_touches(status.recovered_touches);
   state->set_interrupted_touches(status.interrupted_touches);
   state->set_last_error(!arm.ok()             ? std::string(arm.status().message())
+                        : !kinematics.ok()    ? std::string(kinematics.status().message())
                         : !effector.connected ? effector.why
                                               : status.last_error);
   state->set_time_scale(rig_->options().time_scale);
@@ -193,11 +224,20 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     const absl::StatusOr<gateway::arm::PlannedTouch> plan =
         rig_->Check(request.object(), bounds, touch, &from, where);
     check->set_possible(plan.ok());
+    const gateway::arm::MotionPlanner& planner = rig_->planner();
+    if (const auto lies =
+            planner.ObjectPose(request.object(), bounds, gateway::calibration::UpFaceFor(touch.approach));
+        request.path() && lies.ok()) {
+      *check->mutable_base_from_object() = PoseToProto(*lies);
+      *check->mutable_object_min_m() = ToProto(bounds.min_m);
+      *check->mutable_object_max_m() = ToProto(bounds.max_m);
+    }
     if (!plan.ok()) {
       check->set_reason(std::string(plan.status().message()));
       continue;
     }
     check->set_duration_s(plan->motion.duration_s);
+    for (const std::string& note : plan->notes) check->add_notes(note);
     // The next one begins where this one ends: at its start.
     from.base_from_tip = plan->motion.transit.back();
     from.joints_rad = plan->start_joints_rad;
@@ -205,6 +245,10 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     for (const Eigen::Isometry3d& pose : plan->motion.transit) *check->add_path() = PoseToProto(pose);
     *check->add_path() = PoseToProto(plan->motion.end);
     check->set_transit_poses(plan->motion.transit.size());
+    TOUCHSTONE_RETURN_IF_ERROR(
+        DescribePosture(*rig_, from.base_from_tip, plan->start_joints_rad, check->mutable_start_posture()));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        DescribePosture(*rig_, plan->motion.end, plan->end_joints_rad, check->mutable_end_posture()));
   }
   return absl::OkStatus();
 }

@@ -128,6 +128,8 @@ v1::TouchResponse ToProto(const source::TouchResults& results) {
     }
     if (!results.journalled.empty())
       *result->mutable_measured() = MeasuredToProto(results.journalled[touch], results.session);
+    if (touch < results.series.size() && results.series[touch].has_value())
+      result->mutable_measured()->mutable_series()->ParseFromString(results.series[touch]->columns);
   }
   return message;
 }

@@ -164,6 +164,7 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
   request.first_index = message.first_index();
   request.session = message.session();
   request.ids.assign(message.touch_ids().begin(), message.touch_ids().end());
+  request.series = message.series();
   return request;
 }
 

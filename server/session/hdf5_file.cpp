@@ -140,6 +140,13 @@ absl::StatusOr<Hdf5Handle> Hdf5ColumnsReader::Dataset(const std::string& name, u
   return dataset;
 }
 
+bool Hdf5ColumnsReader::Has(const std::string& name) const {
+  // H5Lexists asks for one step of the path only.
+  for (size_t slash = name.find('/'); slash != std::string::npos; slash = name.find('/', slash + 1))
+    if (H5Lexists(file_, name.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+  return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0;
+}
+
 absl::StatusOr<std::vector<double>> Hdf5ColumnsReader::Numbers(const std::string& name,
                                                                uint64_t count) const {
   uint64_t there = 0;

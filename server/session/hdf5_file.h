@@ -71,6 +71,7 @@ class Hdf5ColumnsReader {
   static absl::StatusOr<Hdf5ColumnsReader> Open(const std::string& path);
 
   // `count` values, whatever their shape.
+  bool Has(const std::string& name) const;
   absl::StatusOr<std::vector<double>> Numbers(const std::string& name, uint64_t count) const;
   absl::StatusOr<std::vector<uint64_t>> Whole(const std::string& name, uint64_t count) const;
   absl::StatusOr<std::vector<std::string>> Texts(const std::string& name, uint64_t count) const;

@@ -62,7 +62,9 @@ absl::StatusOr<std::vector<JournalSession>> JournalFile::SessionsWhere(const cha
 absl::StatusOr<JournalSession> JournalFile::CheckedSession(int64_t session_id) const {
   const absl::Status whole = CheckSession(file_.get(), session_id);
   if (!whole.ok() && !Skipped(whole)) return whole;
-  return ReadSession(file_.get(), session_id);
+  absl::StatusOr<JournalSession> session = ReadSession(file_.get(), session_id);
+  if (Skipped(session.status())) return ReadSession(file_.get(), session_id, false);
+  return session;
 }
 
 absl::StatusOr<JournalSession> JournalFile::Session(const std::string& name) const {

@@ -157,7 +157,9 @@ class Journal {
 
   // Touches that were made elsewhere, kDone or kFailed, in the order of their approaches: all in one step, or
   // none. Their numbers are given anew, after those that are there. ALREADY_EXISTS names an id that is.
-  virtual absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) = 0;
+  // `series` has one entry per touch, or none.
+  virtual absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches,
+                                   const std::vector<std::optional<JournalSeries>>& series = {}) = 0;
 
   virtual absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
                                                            const std::string& id) const = 0;

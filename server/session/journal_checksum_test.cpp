@@ -232,6 +232,27 @@ TEST_F(JournalChecksum, DamageIsLeftOutOnRequestOnlyAndThenSaid) {
       absl::IsInvalidArgument(Journal::Open(path_, Mode::kReadWrite, [](const absl::Status&) {}).status()));
 }
 
+TEST_F(JournalChecksum, WhatIsWholeOfAFileWithATornPageIsExportedOnRequest) {
+  Make(300);
+  const auto size = std::filesystem::file_size(path_);
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(size / 2 / 4096 * 4096));
+    file << std::string(4096, '\xA5');
+  }
+  EXPECT_TRUE(absl::IsDataLoss(Everything(path_).status()));
+  int said = 0;
+  auto journal = Journal::Open(path_, Mode::kReadOnly, [&](const absl::Status&) { ++said; });
+  ASSERT_TRUE(journal.ok()) << journal.status();
+  size_t whole = 0;
+  const absl::Status read = (*journal)->ForEachTouch("s", [&](const JournalTouch&) { return ++whole > 0; });
+  EXPECT_TRUE(read.ok()) << read;
+  EXPECT_GT(said, 0);
+  EXPECT_GT(whole, 100u);
+  EXPECT_LT(whole, 300u);
+  EXPECT_TRUE((*journal)->Sessions().ok());
+}
+
 TEST_F(JournalChecksum, RowsThatVanishOrAreExchangedAreMissed) {
   const struct {
     const char* sql;

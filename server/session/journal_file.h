@@ -56,7 +56,8 @@ class JournalFile : public Journal {
   absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result,
                     const JournalSeries* series) override;
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override;
-  absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) override;
+  absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches,
+                           const std::vector<std::optional<JournalSeries>>& series) override;
   absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
                                                    const std::string& id) const override;
   absl::StatusOr<std::optional<JournalSeries>> Series(const std::string& session,

@@ -108,10 +108,9 @@ absl::Status CheckTables(SqliteFile* file) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, expected.Step());
     if (!more) return absl::OkStatus();
     if (found[expected.Text(0)] != expected.Text(1))
-      return absl::DataLossError(
-          absl::StrCat("journal ", file->path(), " is damaged: its table '", expected.Text(0),
-                       "' is not that of version ", kJournalVersion,
-                       "; keep a copy, then rescue what is whole with: sqlite3 FILE .recover | sqlite3 NEW"));
+      return absl::DataLossError(absl::StrCat("journal ", file->path(), " is damaged: its table '",
+                                              expected.Text(0), "' is not that of version ", kJournalVersion,
+                                              "; ", kRescueTheFile));
   }
 }
 
@@ -178,9 +177,7 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool has_row, check.Step());
     if (has_row && check.Text(0) != "ok")
       return absl::DataLossError(
-          absl::StrCat("journal ", path, " is damaged (", check.Text(0),
-                       "); keep a copy, then rescue what is whole with: sqlite3 FILE .recover | "
-                       "sqlite3 NEW; work on with NEW"));
+          absl::StrCat("journal ", path, " is damaged (", check.Text(0), "); ", kRescueTheFile));
   }
   if (version == 1) {
     TOUCHSTONE_RETURN_IF_ERROR(MigrateFromVersion1(&file));

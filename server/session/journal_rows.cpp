@@ -265,7 +265,7 @@ absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
   return image;
 }
 
-absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id) {
+absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id, bool with_counts) {
   const SqliteSnapshot snapshot(file);
   JournalSession session;
   {
@@ -284,7 +284,10 @@ absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id)
     if (!row.IsNull(6)) session.deleted_unix_s = row.Double(6);
     session.deleted_by = row.Text(7);
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(const SessionTally tally, ReadTally(file, session_id));
+  SessionTally tally;
+  if (with_counts) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(tally, ReadTally(file, session_id));
+  }
   session.touches = static_cast<uint64_t>(tally.touches);
   session.done = static_cast<uint64_t>(tally.done);
   session.failed = static_cast<uint64_t>(tally.failed);

@@ -28,7 +28,7 @@ absl::StatusOr<JournalTouch> ReadTouch(SqliteFile* file, int64_t touch_id);
 absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id);
 absl::StatusOr<std::optional<JournalSeries>> ReadSeries(SqliteFile* file, int64_t touch_id);
 
-// A session with its counts and objects; the counts are checked, the session's head is not.
-absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id);
+// A session with its objects and, where `with_counts`, its counts, which are checked; its head is not.
+absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id, bool with_counts = true);
 
 }  // namespace touchstone::session

@@ -69,26 +69,42 @@ absl::Status Damaged(const SqliteFile& file, absl::string_view what, absl::strin
 // What helps against a row that is damaged or missing.
 std::string ExportTheRest(const SqliteFile& file, absl::string_view session) {
   return absl::StrCat("keep a copy, then write what is whole with: touchstone session export ", file.path(),
-                      " ", session, " --skip-damaged -o rest.h5 (sqlite3 ", file.path(),
-                      " .recover finds lost pages, but not a value that has changed)");
+                      " ", session, " --skip-damaged -o rest.h5");
 }
 
-absl::Status ReadIds(SqliteFile* file, const char* query, int64_t session_id, bool images,
-                     std::vector<int64_t>* ids) {
+// What is listed of a session's rows: `ids`, the sum of their checksums, and whether their numbers rise.
+struct Listing {
+  std::vector<int64_t> ids;
   uint64_t digest = 0;
   bool in_order = true;
-  {
-    SqliteStatement rows = file->Prepare(query);
-    rows.Bind(session_id);
-    for (int64_t last = -1;;) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, rows.Step());
-      if (!found) break;
-      ids->push_back(rows.Integer(0));
-      digest += static_cast<uint64_t>(rows.Integer(1));
-      in_order = in_order && rows.Integer(2) > last;
-      last = rows.Integer(2);
-    }
+};
+
+absl::Status List(SqliteFile* file, const char* query, int64_t session_id, Listing* listing) {
+  SqliteStatement rows = file->Prepare(query);
+  rows.Bind(session_id);
+  for (int64_t last = -1;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, rows.Step());
+    if (!found) return absl::OkStatus();
+    listing->ids.push_back(rows.Integer(0));
+    listing->digest += static_cast<uint64_t>(rows.Integer(2));
+    listing->in_order = listing->in_order && rows.Integer(1) > last;
+    last = rows.Integer(1);
   }
+}
+
+// `by_index` reads nothing but the index: it still lists rows whose page is damaged.
+absl::Status ReadIds(SqliteFile* file, const char* query, const char* by_index, int64_t session_id,
+                     bool images, std::vector<int64_t>* ids) {
+  Listing listing;
+  const absl::Status listed = List(file, query, session_id, &listing);
+  if (!listed.ok()) {
+    listing = Listing();
+    List(file, by_index, session_id, &listing).IgnoreError();
+  }
+  const uint64_t digest = listing.digest;
+  const bool in_order = listing.in_order;
+  *ids = std::move(listing.ids);
+  if (!listed.ok()) return listed;
   if (!file->has_checksums()) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const SessionTally tally, ReadTally(file, session_id));
   const int64_t count = images ? tally.images : tally.touches;
@@ -293,13 +309,15 @@ absl::Status SealSession(SqliteFile* file, int64_t session_id) {
 }
 
 absl::Status ReadTouchIds(SqliteFile* file, int64_t session_id, std::vector<int64_t>* ids) {
-  return ReadIds(file, "SELECT touch_id, checksum, number FROM touch WHERE session_id = ? ORDER BY number",
-                 session_id, false, ids);
+  return ReadIds(file, "SELECT touch_id, number, checksum FROM touch WHERE session_id = ? ORDER BY number",
+                 "SELECT touch_id, number, 0 FROM touch WHERE session_id = ? ORDER BY number", session_id,
+                 false, ids);
 }
 
 absl::Status ReadImageIds(SqliteFile* file, int64_t session_id, std::vector<int64_t>* ids) {
-  return ReadIds(file, "SELECT image_id, checksum, number FROM image WHERE session_id = ? ORDER BY number",
-                 session_id, true, ids);
+  return ReadIds(file, "SELECT image_id, number, checksum FROM image WHERE session_id = ? ORDER BY number",
+                 "SELECT image_id, number, 0 FROM image WHERE session_id = ? ORDER BY number", session_id,
+                 true, ids);
 }
 
 absl::Status InsertHead(SqliteFile* file) {

@@ -132,13 +132,15 @@ absl::Status JournalFile::Failed(const std::string& session, const std::string& 
                  });
 }
 
-absl::Status JournalFile::AddFinished(const std::string& session, const std::vector<JournalTouch>& touches) {
+absl::Status JournalFile::AddFinished(const std::string& session, const std::vector<JournalTouch>& touches,
+                                      const std::vector<std::optional<JournalSeries>>& series) {
   const std::lock_guard<std::mutex> lock(mutex_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
     TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
     TOUCHSTONE_ASSIGN_OR_RETURN(uint64_t number, NextNumber(known.session_id));
-    for (JournalTouch touch : touches) {
+    for (size_t k = 0; k < touches.size(); ++k) {
+      JournalTouch touch = touches[k];
       TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", touch.id));
       if (touch.stage != TouchStage::kDone && touch.stage != TouchStage::kFailed)
         return Wrong(absl::StrCat("touch '", touch.id, "' is ", StageInWords(touch.stage),
@@ -151,7 +153,8 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
                                                      touch.id,
                                                      "' already; add to a session of another name"));
       touch.number = number++;
-      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch, nullptr, &tally));
+      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch,
+                                             k < series.size() && series[k] ? &*series[k] : nullptr, &tally));
     }
     return WriteTally(file_.get(), known.session_id, tally);
   });

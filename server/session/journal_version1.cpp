@@ -97,8 +97,7 @@ absl::Status WantNoLaterTable(SqliteFile* file) {
   if (later == 0) return absl::OkStatus();
   return absl::DataLossError(
       absl::StrCat("journal ", file->path(),
-                   " is damaged: it calls itself version 1 and has tables of a later one; keep a "
-                   "copy, then rescue what is whole with: sqlite3 FILE .recover | sqlite3 NEW"));
+                   " is damaged: it calls itself version 1 and has tables of a later one; ", kRescueTheFile));
 }
 
 absl::Status SealAll(SqliteFile* file) {

@@ -1,4 +1,5 @@
 #include "server/session/session_files.h"
+#include "server/session/touch_series.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -230,13 +231,23 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
   result.effector_drift = 1e-4 / 3;
   for (int i = 0; i < 3; ++i)
     result.fingers.push_back({1.0 / 3 + i, {0.1, 0.2, 0.3, 1, 2, i / 7.0}, (uint64_t{1} << 63) + i});
-  ASSERT_TRUE(journal_->AddFinished("s", more).ok());
+  v1::TouchSeries states;
+  for (int k = 0; k < 4; ++k) {
+    states.add_time_s(k / 3.0);
+    for (int i = 0; i < 6; ++i) states.add_joints_rad(k + i / 7.0);
+    for (int i = 0; i < 6; ++i) states.add_base_from_tip(k - i / 7.0);
+    for (int i = 0; i < 3; ++i) states.add_tip_force_n(10 * k + i / 7.0);
+  }
+  const JournalSeries series{kSeriesEncoding, states.SerializeAsString()};
+  ASSERT_TRUE(journal_->AddFinished("s", more, {series}).ok());
   JournalImage image;
   image.id = "front";
   image.object = "cup";
   image.width = 64;
   image.height = 48;
   image.base_from_camera = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  image.measured_base_from_camera = {0.11, 0.2, 0.3, 0.4, 0.5, 0.6};
+  image.measured_unix_s = 1.7e9 - 1.0 / 3;
   image.unix_s = 1.7e9;
   image.png = std::string("\x89PNG\0\0", 6);
   ASSERT_TRUE(journal_->AddImage("s", image).ok());
@@ -259,6 +270,12 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
                     .ok());
     return all;
   };
+  const auto again = journal_->Series("again", "with poses"),
+             none = journal_->Series("again", touches("again")[0].id);
+  ASSERT_TRUE(again.ok() && again->has_value()) << again.status();
+  EXPECT_EQ((*again)->encoding, series.encoding);
+  EXPECT_EQ((*again)->columns, series.columns);
+  EXPECT_TRUE(none.ok() && !none->has_value());
   const auto before = touches("s"), after = touches("again");
   ASSERT_EQ(before.size(), 4u);
   ASSERT_EQ(after.size(), 4u);
@@ -292,6 +309,8 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
                                    EXPECT_EQ(kept.png, image.png);
                                    EXPECT_EQ(kept.width, 64);
                                    EXPECT_EQ(kept.base_from_camera, image.base_from_camera);
+                                   EXPECT_EQ(kept.measured_base_from_camera, image.measured_base_from_camera);
+                                   EXPECT_EQ(kept.measured_unix_s, image.measured_unix_s);
                                    return true;
                                  })
                   .ok());

@@ -4,15 +4,18 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 #include "server/session/hdf5_file.h"
 #include "server/session/session_files.h"
+#include "server/session/touch_series.h"
 
 namespace touchstone::session {
 namespace {
 
 constexpr char kFormat[] = "touchstone: session/1";
+constexpr uint64_t kMaxRows = 1u << 28;
 constexpr uint64_t kNoNumber = std::numeric_limits<uint64_t>::max();  // of a round or face that is unknown
 
 void Append(const v1::Vector3& v, std::vector<double>* values) {
@@ -79,6 +82,67 @@ void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf
   columns->Bytes("command", commands);
 }
 
+// Series end to end, and how many states each touch has; nothing if no touch has one.
+absl::Status WriteSeries(const Journal& journal, const std::string& session,
+                         const std::vector<JournalTouch>& touches, Hdf5Columns* columns) {
+  std::vector<uint64_t> states;
+  std::vector<double> time, joints, position, rotation, force;
+  for (const JournalTouch& touch : touches) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<JournalSeries> kept, journal.Series(session, touch.id));
+    v1::TouchSeries series;
+    if (kept.has_value()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(series, ParseSeries(*kept, absl::StrCat("touch '", touch.id, "'")));
+    }
+    states.push_back(series.time_s_size());
+    time.insert(time.end(), series.time_s().begin(), series.time_s().end());
+    joints.insert(joints.end(), series.joints_rad().begin(), series.joints_rad().end());
+    force.insert(force.end(), series.tip_force_n().begin(), series.tip_force_n().end());
+    for (int k = 0; k < series.base_from_tip_size(); ++k)
+      (k % 6 < 3 ? position : rotation).push_back(series.base_from_tip(k));
+  }
+  if (time.empty()) return absl::OkStatus();
+  const hsize_t rows = time.size();
+  columns->Whole("series/states", states, {states.size()});
+  columns->Numbers("series/time_s", "s", time, {rows});
+  columns->Numbers("series/joints_rad", "rad", joints, {rows, 6});
+  columns->Numbers("series/base_from_tip_position_m", "m", position, {rows, 3});
+  columns->Numbers("series/base_from_tip_rotation_rad", "rad", rotation, {rows, 3});
+  columns->Numbers("series/tip_force_n", "N", force, {rows, 3});
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::optional<JournalSeries>>> ReadSeriesOf(const Hdf5ColumnsReader& file,
+                                                                       uint64_t touches) {
+  std::vector<std::optional<JournalSeries>> all;
+  if (touches == 0 || !file.Has("series/states")) return all;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto states, file.Whole("series/states", touches));
+  uint64_t rows = 0;
+  for (const uint64_t count : states) {
+    if (count > kMaxRows || (rows += count) > kMaxRows)
+      return absl::InvalidArgumentError("series/states: more states than can be read");
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto time, file.Numbers("series/time_s", rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto joints, file.Numbers("series/joints_rad", 6 * rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto position, file.Numbers("series/base_from_tip_position_m", 3 * rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto rotation,
+                              file.Numbers("series/base_from_tip_rotation_rad", 3 * rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto force, file.Numbers("series/tip_force_n", 3 * rows));
+  uint64_t row = 0;
+  for (const uint64_t count : states) {
+    v1::TouchSeries series;
+    for (const uint64_t end = row + count; row < end; ++row) {
+      series.add_time_s(time[row]);
+      for (int k = 0; k < 6; ++k) series.add_joints_rad(joints[6 * row + k]);
+      for (int k = 0; k < 3; ++k) series.add_base_from_tip(position[3 * row + k]);
+      for (int k = 0; k < 3; ++k) series.add_base_from_tip(rotation[3 * row + k]);
+      for (int k = 0; k < 3; ++k) series.add_tip_force_n(force[3 * row + k]);
+    }
+    all.emplace_back();
+    if (count > 0) all.back() = JournalSeries{kSeriesEncoding, series.SerializeAsString()};
+  }
+  return all;
+}
+
 absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t fingers,
                          std::vector<JournalTouch>* touches) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("id", rows));
@@ -137,7 +201,7 @@ void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) 
   const hsize_t rows = images.size();
   std::vector<std::string> ids, objects, up_faces, pngs;
   std::vector<uint64_t> sizes;
-  std::vector<double> poses, unix_s;
+  std::vector<double> poses, measured, measured_unix_s, unix_s;
   for (const JournalImage& image : images) {
     ids.push_back(image.id);
     objects.push_back(image.object);
@@ -145,6 +209,9 @@ void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) 
     pngs.push_back(image.png);
     sizes.insert(sizes.end(), {static_cast<uint64_t>(image.width), static_cast<uint64_t>(image.height)});
     poses.insert(poses.end(), image.base_from_camera.begin(), image.base_from_camera.end());
+    measured.insert(measured.end(), image.measured_base_from_camera.begin(),
+                    image.measured_base_from_camera.end());
+    measured_unix_s.push_back(image.measured_unix_s);
     unix_s.push_back(image.unix_s);
   }
   columns->Texts("images/id", ids);
@@ -152,6 +219,8 @@ void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) 
   columns->Texts("images/placement", up_faces);
   columns->Whole("images/width_height_px", sizes, {rows, 2});
   columns->Numbers("images/base_from_camera_m_rad", "m, rad", poses, {rows, 6});
+  columns->Numbers("images/measured_base_from_camera_m_rad", "m, rad", measured, {rows, 6});
+  columns->Numbers("images/measured_unix_s", "s", measured_unix_s, {rows});
   columns->Numbers("images/unix_s", "s", unix_s, {rows});
   columns->Bytes("images/png", pngs);
 }
@@ -164,6 +233,12 @@ absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vecto
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto poses, file.Numbers("images/base_from_camera_m_rad", 6 * rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto unix_s, file.Numbers("images/unix_s", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto pngs, file.Bytes("images/png", rows));
+  // Files of before these were kept have none.
+  std::vector<double> measured(6 * rows, kNaN), measured_unix_s(rows, kNaN);
+  if (file.Has("images/measured_base_from_camera_m_rad")) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(measured, file.Numbers("images/measured_base_from_camera_m_rad", 6 * rows));
+    TOUCHSTONE_ASSIGN_OR_RETURN(measured_unix_s, file.Numbers("images/measured_unix_s", rows));
+  }
   images->resize(rows);
   for (uint64_t k = 0; k < rows; ++k) {
     JournalImage& image = (*images)[k];
@@ -172,7 +247,11 @@ absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vecto
     image.up_face = up_faces[k];
     image.width = static_cast<int>(sizes[2 * k]);
     image.height = static_cast<int>(sizes[2 * k + 1]);
-    for (int i = 0; i < 6; ++i) image.base_from_camera[i] = poses[6 * k + i];
+    for (int i = 0; i < 6; ++i) {
+      image.base_from_camera[i] = poses[6 * k + i];
+      image.measured_base_from_camera[i] = measured[6 * k + i];
+    }
+    image.measured_unix_s = measured_unix_s[k];
     image.unix_s = unix_s[k];
     image.png = pngs[k];
   }
@@ -207,6 +286,7 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, 
   columns.Numbers("session/spacing_m", "m", {session.spacing_m}, {1});
   columns.Whole("session/fingers_touches_images", {fingers, touches.size(), images.size()}, {3});
   WriteTouches(touches, fingers, &columns);
+  TOUCHSTONE_RETURN_IF_ERROR(WriteSeries(journal, name, touches, &columns));
   WriteImages(images, &columns);
   return columns.Finish();
 }
@@ -230,18 +310,19 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
   session.created_unix_s = created_unix_s[0];
   session.spacing_m = spacing_m[0];
   for (const uint64_t count : counts)
-    if (count > 1u << 28)
+    if (count > kMaxRows)
       return absl::InvalidArgumentError(absl::StrCat(path, ": ", count, " rows cannot be read"));
   session.fingers = static_cast<int>(counts[0]);
   std::vector<JournalTouch> touches;
   std::vector<JournalImage> images;
   TOUCHSTONE_RETURN_IF_ERROR(ReadTouches(file, counts[1], counts[0], &touches));
   TOUCHSTONE_RETURN_IF_ERROR(ReadImages(file, counts[2], &images));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto series, ReadSeriesOf(file, counts[1]));
   if (journal->Session(session.name).ok())
     return absl::AlreadyExistsError(absl::StrCat("there is a session '", session.name, "' already; import ",
                                                  path, " under another name"));
   TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
-  absl::Status added = journal->AddFinished(session.name, touches);
+  absl::Status added = journal->AddFinished(session.name, touches, series);
   for (size_t k = 0; k < images.size() && added.ok(); ++k) added = journal->AddImage(session.name, images[k]);
   if (!added.ok()) (void)journal->EraseSession(session.name);
   return added;

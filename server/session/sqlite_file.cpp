@@ -154,9 +154,7 @@ absl::Status SqliteFile::Error(int result) const {
       return absl::InvalidArgumentError(message(
           "is no journal: it is not an SQLite file, or its beginning is damaged", "name another file"));
     case SQLITE_CORRUPT:
-      return absl::DataLossError(message("is damaged",
-                                         "keep a copy, then rescue what is whole with: sqlite3 FILE .recover "
-                                         "| sqlite3 NEW; work on with NEW"));
+      return absl::DataLossError(message("is damaged", kRescueTheFile));
     case SQLITE_FULL:
       return absl::ResourceExhaustedError(
           message("cannot grow: its disk is full", "make room and try again"));

@@ -15,6 +15,13 @@
 
 namespace touchstone::session {
 
+// What helps when SQLite itself finds a file damaged. Debian's sqlite3 knows .recover, but fails at it (3.40.1 says
+// "SQL logic error": it lacks the table sqlite_dbpage).
+inline constexpr char kRescueTheFile[] =
+    "keep a copy, then write what is whole with: touchstone session export FILE SESSION --skip-damaged -o "
+    "rest.h5; a "
+    "sqlite3 of sqlite.org also has: sqlite3 FILE .recover | sqlite3 NEW";
+
 class SqliteFile;
 
 // A statement in use: bind what its question marks stand for, in their order, then step or run. Given back

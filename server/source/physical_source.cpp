@@ -97,10 +97,14 @@ absl::StatusOr<TouchResults> PhysicalSource::MakeTouches(const TouchRequest& req
     command.bounds = object.surface->bounds();
     command.touch = request.touches[k];
     command.bytes = session::CommandBytes(command.touch);
+    command.series = request.series;
     command.repeat = repeats[command.bytes]++;
     TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalTouch touch, device_->Touch(command, guard));
     for (const session::JournalFinger& finger : touch.result.fingers)
       results.contact_time_s.push_back(finger.contact_time_s);
+    if (request.series) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(results.series.emplace_back(), device_->Series(results.session, touch.id));
+    }
     results.journalled.push_back(std::move(touch));
   }
   return results;

@@ -33,6 +33,10 @@ class FakeDevice final : public RigDevice {
     }
     return touch;
   }
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string&,
+                                                               const std::string& id) const override {
+    return session::JournalSeries{"a test", "states of " + id};
+  }
   absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command, const MotionGuard&) override {
     views.push_back(command);
     source::Photograph photograph;

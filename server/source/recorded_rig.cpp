@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/geometry/pose.h"
 #include "server/image/encode.h"
 #include "server/session/command_bytes.h"
 
@@ -42,6 +43,17 @@ absl::StatusOr<session::JournalTouch> RecordedRig::Touch(const TouchCommand& com
   return *touch;
 }
 
+absl::StatusOr<std::optional<session::JournalSeries>> RecordedRig::Series(const std::string&,
+                                                                          const std::string& id) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions, journal_->Sessions());
+  for (const session::JournalSession& session : sessions) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<session::JournalTouch> touch,
+                                journal_->Find(session.name, id));
+    if (touch.has_value()) return journal_->Series(session.name, id);
+  }
+  return std::optional<session::JournalSeries>();
+}
+
 absl::StatusOr<source::Photograph> RecordedRig::Photograph(const ViewCommand& command,
                                                            const MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(guard());
@@ -55,6 +67,13 @@ absl::StatusOr<source::Photograph> RecordedRig::Photograph(const ViewCommand& co
   frame.width = image.width, frame.height = image.height;
   frame.rgb = std::move(image.pixels);
   photograph.unix_s = found->second.unix_s;
+  const Eigen::Isometry3d base_from_camera = geometry::PoseFromVector(found->second.base_from_camera),
+                          measured = geometry::PoseFromVector(found->second.measured_base_from_camera);
+  if (!measured.matrix().allFinite()) return photograph;
+  const Eigen::Isometry3d off = base_from_camera.inverse() * measured;
+  photograph.object_from_camera = command.object_from_camera * off;
+  photograph.deviation_m = off.translation().norm();
+  photograph.deviation_rad = Eigen::AngleAxisd(off.rotation()).angle();
   return photograph;
 }
 

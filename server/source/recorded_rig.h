@@ -20,6 +20,9 @@ class RecordedRig : public RigDevice {
   // By its id; else by its command, the repeats of it in the order in which they were made and round again.
   // NOT_FOUND: nothing like it was recorded.
   absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command, const MotionGuard& guard) override;
+  // Of whatever session has that touch.
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                               const std::string& id) const override;
   absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command,
                                                 const MotionGuard& guard) override;
   bool has_camera() const override { return !images_.empty(); }

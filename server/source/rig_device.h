@@ -24,6 +24,7 @@ struct TouchCommand {
   geometry::Bounds bounds;  // of the object, object frame
   touch::CommandedTouch touch;
   std::string bytes;    // the touch as the journal keeps it: command_bytes.h, without the session time
+  bool series = false;  // the arm's states during the approach are journalled too
   uint64_t repeat = 0;  // which repeat of the same touch this is, from 0, as far as the caller knows
 };
 
@@ -64,6 +65,9 @@ class RigDevice {
   // was another touch.
   virtual absl::StatusOr<session::JournalTouch> Touch(const TouchCommand& command,
                                                       const MotionGuard& guard) = 0;
+  // What was recorded during a touch that is done; none: that was not asked for.
+  virtual absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                                       const std::string& id) const = 0;
   // FAILED_PRECONDITION if the camera was not where it was commanded to be, within the device's tolerance.
   virtual absl::StatusOr<source::Photograph> Photograph(const ViewCommand& command,
                                                         const MotionGuard& guard) = 0;

@@ -59,6 +59,7 @@ struct TouchRequest {
   uint64_t first_index = 0;      // touch k draws the random numbers of index first_index + k
   std::string session;           // that a physical source journals in; empty: "default"
   std::vector<std::string> ids;  // one per touch, or none
+  bool series = false;  // a physical source also keeps and gives the arm's states during each approach
 };
 
 // One row per touch, in order. Arrays per finger: entry touch * fingers + finger.
@@ -72,6 +73,8 @@ struct TouchResults {
   // Of a physical source: how each was made. Empty at a virtual one.
   std::string session;
   std::vector<session::JournalTouch> journalled;
+  // One per touch where that was asked for; none: the touch was made without.
+  std::vector<std::optional<session::JournalSeries>> series;
 
   size_t size() const { return fingers == 0 ? 0 : contact_time_s.size() / fingers; }
 };

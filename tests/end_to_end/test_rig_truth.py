@@ -53,9 +53,10 @@ def test_photos_are_an_image_set_with_both_poses(rig, tmp_path):
     # Run again, only what is missing is taken.
     (folder / rows[0]["file"]).unlink()
     again = json.loads(touchstone(*command, "--json", server=rig))
-    assert again["kept"] == len(rows) - 1 and len(again["files"]) == len(rows)
-    assert len(rows_of(folder / "images.csv")) == len(rows)
-    assert "another size" in touchstone(*command[:-1], "32x32", server=rig, code=2)
+    # (From where the arm is now it may reach more of the views than then.)
+    assert again["kept"] == len(rows) - 1 and set(first["files"]) <= set(again["files"])
+    assert len(rows_of(folder / "images.csv")) == len(again["files"])
+    assert "another size" in touchstone(*command[:-1], "32x32", server=rig, code=4)
 
 
 def test_a_run_with_series_becomes_hdf5_and_mcap(rig, tmp_path):
@@ -74,14 +75,14 @@ def test_a_run_with_series_becomes_hdf5_and_mcap(rig, tmp_path):
         contacts = file["contact_time_s"][...]
         ids = [identity.decode() for identity in file["id"][...]]
         heights = file["series/base_from_tip_position_m"][...]
-    assert len(states) == made["touches"] and all(states >= 8)
+    assert len(states) == made["touches"] and all(states >= 5)
     assert len(times) == states.sum() and forces.shape == (len(times), 3) and joints.shape == (len(times), 6)
     begin = 0
     for row, count in enumerate(int(count) for count in states):
         own = slice(begin, begin + count)
         begin += count
         assert all(times[own][1:] > times[own][:-1])
-        assert -0.1 < times[own][0] < 0.5 and times[own][-1] > max(contacts[row]) - 0.1
+        assert -0.1 < times[own][0] < 0.5 and times[own][-1] > max(filter(math.isfinite, contacts[row])) - 0.1
         assert heights[own][0].tolist() != heights[own][-1].tolist()
 
     done = subprocess.run([sys.executable, "-m", "touchstone.mcap", tmp_path / "session.h5", "-o", tmp_path / "session.mcap"],
@@ -95,7 +96,7 @@ def test_a_run_with_series_becomes_hdf5_and_mcap(rig, tmp_path):
     touches = [types_pb2.RecordedTouch.FromString(data) for data in found["/touch"]]
     assert [touch.result.measured.touch_id for touch in touches] == ids
     for touch, row in zip(touches, contacts):
-        assert list(touch.result.contact_time_s) == list(row)
+        assert [*map(repr, touch.result.contact_time_s)] == [*map(repr, map(float, row))]
     assert len(found["/arm_state"]) == len(times)
 
     # Imported again, the series is the same.
@@ -104,3 +105,21 @@ def test_a_run_with_series_becomes_hdf5_and_mcap(rig, tmp_path):
     with h5py.File(tmp_path / "again.h5") as file:
         assert (file["series/states"][...] == states).all() and (file["series/tip_force_n"][...] == forces).all()
         assert (file["series/time_s"][...] == times).all()
+
+
+def test_the_python_client_gets_a_series_where_it_asks_for_one(rig, tmp_path):
+    package = pytest.importorskip("touchstone")
+    plan = tmp_path / "plan.csv"
+    touchstone("plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o", plan)
+    client = package.connect(rig)
+    rows = package.read_plan(plan)
+    with client.session("python") as session:
+        for (thing, face), group in client.rig.groups(rows).items():
+            client.rig.prepare(thing, face)
+            done = session.touch(group[0], series=True)
+            series = done.result.measured[0].series
+            count = len(series.time_s)
+            assert count >= 5 and len(series.joints_rad) == len(series.base_from_tip) == 6 * count
+            assert len(series.tip_force_n) == 3 * count and max(done.time_us) * 1e-6 < series.time_s[-1] + 0.1
+            assert not session.touch(group[0]).result.measured[0].HasField("series")
+            break

@@ -237,20 +237,32 @@ TEST_F(Latch, AKilledGatewaysSuccessorSaysWhatItFoundAndWaitsForAPerson) {
 TEST_F(Latch, AGatewayThatHungFindsItsProgramEndedAndWaitsForAPerson) {
   StartRig();
   StartGatewayProcess();
-  KeptLease lease(control_.get(), "before", true);
-  auto touch = TouchLater(lease.token(), FromAbove(0.0005), "hung");
-  WaitUntilApproaching();
-  ASSERT_EQ(kill(gateway_process(), SIGSTOP), 0);
-  WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > 0; }, "the watchdog notices");
-  WaitForRest();
-  const size_t commands = CommandCount();
-  ASSERT_EQ(kill(gateway_process(), SIGCONT), 0);
-  EXPECT_FALSE(touch.get().status.ok());
-  EXPECT_THAT(CommandsSince(commands), Each("program stop_motion"));
-  // A lease that ran out meanwhile, or the end of the program: whichever it saw first, it does not move again by itself.
-  WaitForRigTime(10);
-  EXPECT_THAT(CommandsSince(commands), Each("program stop_motion"));
-  EXPECT_FALSE(emulator_->controller().Moving());
+  // Shortly, and for longer than a lease lasts.
+  for (const double hung_s : {0.0, 3.0}) {
+    const uint64_t watchdog_stops = emulator_->controller().Count("watchdog_stops");
+    const uint32_t before = RigState().arm().program_id();
+    KeptLease lease(control_.get(), "before", true);
+    auto touch = TouchLater(lease.token(), FromAbove(0.0005), "hung");
+    WaitUntil([&] { return RigState().arm().program_id() != before; }, "the program begins");
+    WaitUntilApproaching();
+    ASSERT_EQ(kill(gateway_process(), SIGSTOP), 0);
+    const auto since = std::chrono::steady_clock::now();
+    WaitUntil([&] { return emulator_->controller().Count("watchdog_stops") > watchdog_stops; },
+              "the watchdog notices");
+    WaitUntil(
+        [&] { return std::chrono::steady_clock::now() > since + std::chrono::duration<double>(hung_s); },
+        "it hangs so long");
+    WaitForRest();
+    const size_t commands = CommandCount();
+    ASSERT_EQ(kill(gateway_process(), SIGCONT), 0);
+    EXPECT_FALSE(touch.get().status.ok());
+    WaitUntil([&] { return !StopReason().empty(); }, "the gateway latches");
+    EXPECT_THAT(CommandsSince(commands), Each("program stop_motion"));
+    if (State() == v1::SOURCE_STATE_PROTECTIVE_STOP) UnlockByHand();
+    ExpectNothingMovesUntilReset("");
+    EXPECT_FALSE(emulator_->controller().Moving());
+    EXPECT_TRUE(Reset().ok());
+  }
   KillGatewayProcess();
 }
 

@@ -19,6 +19,7 @@ struct ControllerOptions {
   int dashboard_port = 0, primary_port = 0, secondary_port = 0, realtime_port = 0, rtde_port = 0;
   int primary_read_only_port = 0, secondary_read_only_port = 0, realtime_read_only_port = 0;
   std::array<double, 6> joints_rad{{0, -1.5708, -1.5708, -1.5708, 1.5708, 0}};
+  bool calibrated = false;       // a delta of its own in every row of its kinematics, as real arms have
   bool powered = false;          // begins with power off, as a controller that was just switched on
   double finger_give_m = 0.050;  // pushed further than this beyond a contact: protective stop (C153)
   double position_noise_m = 5e-6, joint_noise_rad = 2e-5;  // of what it reports
@@ -43,6 +44,9 @@ class Controller {
   virtual Eigen::Isometry3d BaseFromTip() const = 0;
   virtual Eigen::Isometry3d BaseFromFlange() const = 0;
   virtual bool Moving() const = 0;
+  // A hand turns the joints so, at once. An error text if the arm is not free (freedrive, teach mode); else empty.
+  virtual std::string MoveByHand(const std::array<double, 6>& joints_rad) = 0;
+  virtual bool Free() const = 0;
   // How often something happened: "programs" and "motions" that began, "protective_stops", "watchdog_stops"
   // (programs that a watchdog ended or paused).
   virtual uint64_t Count(const std::string& what) const = 0;

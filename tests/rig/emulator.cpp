@@ -167,6 +167,7 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   controller.model = options.arm, controller.address = options.address;
   controller.dashboard_port = options.dashboard_port, controller.primary_port = options.primary_port;
   controller.secondary_port = options.secondary_port, controller.rtde_port = options.rtde_port;
+  controller.calibrated = options.calibrated;
   controller.powered = options.powered, controller.seed = options.seed;
   controller.finger_give_m = options.finger_give_mm * 1e-3;
   controller_ = Controller::Start(controller, clock_.get(), &faults_, fingers_.get());

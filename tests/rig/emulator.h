@@ -38,6 +38,7 @@ struct EmulatorOptions {
   bool pace_baud = false;                              // bytes take their time at 115200 baud, simulated
   bool unplug_resets = false;                          // the device takes its power from the line
   std::vector<std::pair<std::string, double>> faults;  // from the beginning
+  bool calibrated = false;                             // the arm's kinematics have deltas of their own
   bool powered = false;                                // the arm; else it is off as after switching on
   double finger_give_mm = 60;                          // farther beyond a contact: protective stop
   // The program that gateway.toml's mount_command calls; empty: touchstone-rig-emulator beside the running

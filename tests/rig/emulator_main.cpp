@@ -95,6 +95,8 @@ int main(int argc, char** argv) {
   app.add_option("--spacing-mm", options.spacing_mm, "Between neighbouring fingers");
   app.add_option("--sensor", options.sensor, "Of the fingers")
       ->check(CLI::IsMember({"optical", "microswitch", "resistor"}));
+  app.add_flag("--calibrated", options.calibrated,
+               "The arm's kinematics have deltas of their own, as real arms have");
   app.add_option("--finger-give-mm", options.finger_give_mm,
                  "Pushed farther beyond a contact: protective stop");
   app.add_option("--drift-ppm", options.drift_ppm, "Of the device's oscillator");

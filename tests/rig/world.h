@@ -55,6 +55,8 @@ class TipListener {
                             const std::function<double(double)>& distance_at) = 0;
   // It ended or was stopped; the arm rests.
   virtual void OnMotionEnded(uint64_t number, double now_s) = 0;
+  // How far all fingers together are indented, m, as of the last progress.
+  virtual double IndentationM() const { return 0; }
 };
 
 // Faults that can be switched on while it runs, by name, each with a number. Thread-safe.
@@ -77,6 +79,8 @@ class TipListener {
 //               speed_scaling     0 to 1: what the trajectory limiter leaves of the commanded speed
 //               speed_slider      0 to 1: the pendant's slider; moved when this number changes
 //               local_control     1: the e-Series robot is in local control
+//               finger_stiffness  N per mm of every finger's indentation, on the tip
+//               force_offset_n    N downwards that a payload which is set wrong pretends
 //   camera      stale_frame       1: repeats the last picture
 //               camera_unplug     seconds of host time
 class Faults {

@@ -169,7 +169,8 @@ class Client:
         return Touches.from_messages(self._connection.call(_SOURCE, "ExpandPlan", request).touches)
 
     def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
-              lease_token: str = "", session: str = "", ids: Sequence[str] | None = None) -> Batch:
+              lease_token: str = "", session: str = "", ids: Sequence[str] | None = None,
+              series: bool = False) -> Batch:
         """Touches in the order given, as one session. NaN where a finger reported nothing.
 
         Args:
@@ -179,6 +180,8 @@ class Client:
           session: that a physical source journals them in.
           ids: one per touch. A physical source answers an id that the session has from its journal, without motion, so
             that the call is repeated when the source was lost; without ids it is not.
+          series: a physical source also keeps and gives the arm's states during each approach (`measured[k].series`,
+            touchstone.v1.TouchSeries), about 200 kB a touch.
 
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
@@ -192,6 +195,7 @@ class Client:
         request = source_pb2.TouchRequest(
             object=object, touches=touches.to_messages(), model=model_ref(model), seed=checks.uint64("seed", seed),
             first_index=checks.uint64("start", start), lease_token=lease_token, session=session, touch_ids=ids or (),
+            series=series,
         )
         with contextlib.nullcontext() if lease_token else self._leased() as lease:
             reply = self._touch(request, lease)

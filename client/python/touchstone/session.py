@@ -52,15 +52,16 @@ class Session:
         self._lease.__exit__(None, None, None)
         self._lease = None
 
-    def touch(self, row: Row) -> Row:
+    def touch(self, row: Row, series: bool = False) -> Row:
         """Makes the touch, or gets it from the journal if it was made before; the row with its times.
 
         A source that is lost in between is asked again, for the same touch, as long as the client's retry_for_s. Where
         a person must put down or turn the object, Refused says how; Client.rig.mount() reports that it is done.
+        With `series` the arm's states come along (Client.touch).
         """
         if self._lease is None:
             raise Refused(f'Session {self.name} is not open; use it as "with client.session({self.name!r}) as session".')
         result = self._client.touch(row.object, row.command, session=self.name,
-                                    ids=[touch_id(self.name, row.object, row.touch)])
+                                    ids=[touch_id(self.name, row.object, row.touch)], series=series)
         return Row(row.touch, row.object, row.command, tuple(float(t) for t in result["contact_time_us"][0]),
                    result.measured[0].session_time_s if result.measured else row.session_time_s, result)

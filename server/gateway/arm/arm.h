@@ -10,6 +10,7 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/strings/str_cat.h>
 #include <Eigen/Geometry>
 
 #include "server/gateway/timing/change_notifier.h"
@@ -120,6 +121,12 @@ class Arm {
   virtual absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                                    const std::vector<std::array<double, 6>>& joints,
                                    const StartGuard& guard = nullptr) = 0;
+  // Sends a program that frees the arm for a hand to guide it (kReady while it is free), until EndApproach, or until the
+  // program ends in any other way.
+  virtual absl::Status StartFreedrive(uint32_t program_id, const StartGuard& = nullptr) {
+    return absl::UnimplementedError(
+        absl::StrCat("program ", program_id, ": this arm cannot be guided by hand"));
+  }
   // Stops whatever moves, now, from any thread: on the wire before it returns, never queued behind anything.
   virtual absl::Status Stop() = 0;
   // Powers on and releases the brakes if they are not; never unlocks a protective stop. `guard` is asked before

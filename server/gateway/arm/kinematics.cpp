@@ -1,10 +1,13 @@
 #include "server/gateway/arm/kinematics.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
 
@@ -13,16 +16,6 @@ namespace {
 
 constexpr double kSingular = 1e-9;
 constexpr double kOtherArmM = 0.05;
-
-DhTable Table(double d1, double a2, double a3, double d4, double d5, double d6) {
-  const double quarter = kPi / 2;
-  return {{{0, d1, quarter, 0},
-           {a2, 0, 0, 0},
-           {a3, 0, 0, 0},
-           {0, d4, quarter, 0},
-           {0, d5, -quarter, 0},
-           {0, d6, 0, 0}}};
-}
 
 Eigen::Isometry3d Link(const DhRow& row, double joint_rad) {
   const double c = std::cos(joint_rad + row.theta_rad), s = std::sin(joint_rad + row.theta_rad);
@@ -49,6 +42,16 @@ double Acos(double cosine) {
   return std::abs(cosine) > 1 && std::abs(cosine) < 1 + 1e-9 ? (cosine > 0 ? 0 : kPi) : std::acos(cosine);
 }
 
+// The farthest that two tables put the flange apart at some joints far from each other.
+double FlangesApart(const DhTable& a, const DhTable& b) {
+  double apart_m = 0;
+  for (const Joints& joints : {Joints{{0, -1.5, -1.5, -1.5, 1.5, 0}}, Joints{{2, -0.7, 0.9, 0.3, -1, 2}}}) {
+    const double m = (Chain(a, joints).translation() - Chain(b, joints).translation()).norm();
+    apart_m = std::isfinite(m) ? std::max(apart_m, m) : std::numeric_limits<double>::infinity();
+  }
+  return apart_m;
+}
+
 }  // namespace
 
 double Farthest(const Joints& a, const Joints& b) {
@@ -58,25 +61,24 @@ double Farthest(const Joints& a, const Joints& b) {
 }
 
 absl::StatusOr<UrKinematics> UrKinematics::ForModel(const std::string& model) {
-  UrKinematics made;
-  if (model == "ur3")
-    made.nominal_ = Table(0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819);
-  else if (model == "ur3e")
-    made.nominal_ = Table(0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921);
-  else
-    return absl::InvalidArgumentError(
-        absl::StrCat("arm model '", model, "' is not known", DidYouMean(model, {"ur3", "ur3e"})));
-  made.table_ = made.nominal_;
-  return made;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ArmModel* found, FindArmModel(model));
+  return UrKinematics(found);
 }
 
 absl::StatusOr<UrKinematics> UrKinematics::Calibrated(const DhTable& table) const {
-  for (const Joints& joints : {Joints{{0, -1.5, -1.5, -1.5, 1.5, 0}}, Joints{{2, -0.7, 0.9, 0.3, -1, 2}}}) {
-    const Eigen::Vector3d apart = Chain(table, joints).translation() - Chain(nominal_, joints).translation();
-    if (!(apart.norm() < kOtherArmM))
-      return absl::FailedPreconditionError(absl::StrCat(
-          "the controller's calibrated kinematics lead the flange ", ShortestNumber(apart.norm()),
-          " m from where the model's do, at most ", kOtherArmM, " m: is the arm's model set right?"));
+  const double apart_m = FlangesApart(table, nominal_);
+  if (!(apart_m < kOtherArmM))
+    return absl::FailedPreconditionError(
+        absl::StrCat("the controller's calibrated kinematics lead the flange ", ShortestNumber(apart_m),
+                     " m from where a ", model_->name, "'s do, at most ", kOtherArmM,
+                     " m: is the arm's model set right?"));
+  for (const ArmModel& other : ArmModels()) {
+    if (const double m = FlangesApart(table, other.dh); m < apart_m)
+      return absl::FailedPreconditionError(absl::StrFormat(
+          "the controller's calibrated kinematics belong to a %s, from which they lead the flange %.1f mm "
+          "away, not to a "
+          "%s, from which it is %.1f mm: set arm.model right",
+          other.name, m / kMetresPerMillimetre, model_->name, apart_m / kMetresPerMillimetre));
   }
   UrKinematics made = *this;
   made.table_ = table;
@@ -90,6 +92,40 @@ Eigen::Isometry3d UrKinematics::Forward(const Joints& joints) const {
 
 std::vector<Joints> UrKinematics::Inverse(const Eigen::Isometry3d& base_from_flange,
                                           const Joints& near) const {
+  std::vector<Joints> solutions;
+  for (Joints solution : NominalInverse(base_from_flange, near)) {
+    if (calibrated_ && !Refine(base_from_flange, &solution)) continue;
+    for (size_t i = 0; i < 6; ++i) solution[i] = Near(solution[i], near[i]);
+    solutions.push_back(solution);
+  }
+  std::stable_sort(solutions.begin(), solutions.end(),
+                   [&](const Joints& a, const Joints& b) { return Farthest(a, near) < Farthest(b, near); });
+  return solutions;
+}
+
+std::optional<Joints> UrKinematics::Nearest(const Eigen::Isometry3d& base_from_flange,
+                                            const Joints& near) const {
+  for (Joints solution : NominalInverse(base_from_flange, near)) {
+    if (calibrated_ && !Refine(base_from_flange, &solution)) continue;
+    for (size_t i = 0; i < 6; ++i) solution[i] = Near(solution[i], near[i]);
+    return solution;
+  }
+  return std::nullopt;
+}
+
+std::array<Eigen::Vector3d, 7> UrKinematics::LinkPoints(const Joints& joints) const {
+  std::array<Eigen::Vector3d, 7> points;
+  points[0].setZero();
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  for (size_t i = 0; i < 6; ++i) {
+    pose = pose * Link(nominal_[i], joints[i]);
+    points[i + 1] = pose.translation();
+  }
+  return points;
+}
+
+std::vector<Joints> UrKinematics::NominalInverse(const Eigen::Isometry3d& base_from_flange,
+                                                 const Joints& near) const {
   const double a2 = nominal_[1].a_m, a3 = nominal_[2].a_m, d4 = nominal_[3].d_m, d6 = nominal_[5].d_m;
   const Eigen::Matrix3d rotation = base_from_flange.linear();
   const Eigen::Vector3d flange = base_from_flange.translation();
@@ -126,7 +162,6 @@ std::vector<Joints> UrKinematics::Inverse(const Eigen::Isometry3d& base_from_fla
         q[1] = std::atan2(y, x) - std::atan2(a3 * std::sin(q[2]), a2 + a3 * std::cos(q[2]));
         q[3] = std::atan2(shoulder_from_wrist1(1, 0), shoulder_from_wrist1(0, 0)) - q[1] - q[2];
         Joints solution = q;
-        if (calibrated_ && !Refine(base_from_flange, &solution)) continue;
         for (size_t i = 0; i < 6; ++i) solution[i] = Near(solution[i], near[i]);
         solutions.push_back(solution);
       }

@@ -37,9 +37,29 @@ TEST(UrKinematics, StretchedArmReachesWhatItsLinksAddUpTo) {
   EXPECT_LT((ur3e.linear().col(2) - Eigen::Vector3d(0, -1, 0)).norm(), 1e-12) << "the flange looks along -y";
 }
 
+// Stretched to the side at zero, as published: UR5e 0.425 + 0.3922, UR10e 0.6127 + 0.57155 m.
+TEST(UrKinematics, LargerArmsAreInTheTable) {
+  EXPECT_NEAR(Arm("ur5e").Forward({{0, 0, 0, 0, 0, 0}}).translation().x(), -0.8172, 1e-12);
+  EXPECT_NEAR(Arm("ur10e").Forward({{0, 0, 0, 0, 0, 0}}).translation().x(), -1.18425, 1e-12);
+}
+
+// A wrong row would pass every test of the others.
+TEST(ArmModels, EveryRowIsWhole) {
+  for (const ArmModel& model : ArmModels()) {
+    EXPECT_EQ(model.rtde_hz, model.e_series ? 500 : 125) << model.name;
+    const double reach_m = -model.dh[1].a_m - model.dh[2].a_m;
+    EXPECT_NEAR(reach_m, model.reach_m, 0.15 * model.reach_m) << model.name;
+    for (const double speed : model.max_joint_speed_rad_s) EXPECT_GE(speed, 2 * kPi / 3) << model.name;
+    for (const ArmModel& other : ArmModels())
+      EXPECT_EQ(&other == &model, Arm(other.name).Calibrated(model.dh).ok())
+          << model.name << " as " << other.name;
+  }
+  EXPECT_EQ(ArmModelNames(), "ur3, ur3e, ur5e or ur10e");
+}
+
 TEST(UrKinematics, InverseFindsTheJointsThatLedToAPose) {
   std::mt19937_64 random(4);
-  for (const std::string model : {"ur3", "ur3e"}) {
+  for (const std::string model : {"ur3", "ur3e", "ur5e", "ur10e"}) {
     const UrKinematics arm = Arm(model);
     for (int i = 0; i < 3000; ++i) {
       const Joints joints = RandomJoints(&random);
@@ -94,6 +114,7 @@ TEST(UrKinematics, CalibratedArmIsInvertedExactly) {
     const std::vector<Joints> found = arm.Inverse(arm.Forward(joints), joints);
     if (found.empty()) continue;  // at the edge of what the nominal arm reaches
     EXPECT_LT(Farthest(found.front(), joints), 1e-6);
+    EXPECT_LT(Farthest(arm.Nearest(arm.Forward(joints), joints).value(), joints), 1e-6);
     ++solved;
   }
   EXPECT_GT(solved, 150);

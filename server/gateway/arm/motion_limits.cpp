@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <string>
-#include <utility>
 
+#include "server/base/status.h"
 #include "server/base/text.h"
 
 namespace touchstone::gateway::arm {
@@ -19,23 +19,57 @@ absl::Status Invalid(const std::string& what, double value, const std::string& r
       absl::StrCat("limits: ", what, " = ", ShortestNumber(value), ": must be ", right));
 }
 
+// A number between bounds, both in its own unit.
+absl::Status CheckBetween(const char* what, double value, double min, double max) {
+  if (value >= min && value <= max) return absl::OkStatus();
+  return Invalid(what, value, absl::StrCat("from ", ShortestNumber(min), " to ", ShortestNumber(max)));
+}
+
+absl::Status CheckJoints(const MotionLimits& limits, const ArmModel& model) {
+  constexpr double kToleranceRad = 1e-3;  // of what people round
+  for (size_t i = 0; i < 6; ++i) {
+    const double most = model.max_joint_rad[i];
+    if (!(limits.joint_min_rad[i] < limits.joint_max_rad[i]))
+      return Invalid(absl::StrCat("joint_min_rad[", i, "]"), limits.joint_min_rad[i], "below joint_max_rad");
+    if (!(limits.joint_min_rad[i] >= -most - kToleranceRad) ||
+        !(limits.joint_max_rad[i] <= most + kToleranceRad))
+      return Invalid(absl::StrCat("joint_min_rad[", i, "] or joint_max_rad[", i, "]"),
+                     limits.joint_min_rad[i] < -most ? limits.joint_min_rad[i] : limits.joint_max_rad[i],
+                     absl::StrCat("within ", ShortestNumber(most), ", what a ", model.name, " can turn"));
+    if (!(limits.home_rad[i] >= limits.joint_min_rad[i]) || !(limits.home_rad[i] <= limits.joint_max_rad[i]))
+      return Invalid(absl::StrCat("home_rad[", i, "]"), limits.home_rad[i], "within the joint's limits");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::Status CheckMotionLimits(const MotionLimits& limits) {
-  for (const auto& [what, value] : {std::pair<const char*, double>{"max_speed_m_s", limits.max_speed_m_s},
-                                    {"transit_speed_m_s", limits.transit_speed_m_s},
-                                    {"acceleration_m_s2", limits.acceleration_m_s2},
-                                    {"max_standoff_m", limits.max_standoff_m},
-                                    {"stroke_beyond_target_m", limits.stroke_beyond_target_m},
-                                    {"clearance_m", limits.clearance_m}})
-    if (!(value > 0) || !(value <= 10)) return Invalid(what, value, "above 0 and at most 10");
+absl::Status CheckMotionLimits(const MotionLimits& limits, const ArmModel& model) {
+  constexpr double kMinSpeedMS = 1e-6, kMinTransitMS = 1e-3, kMinLengthM = 1e-3, kMost = 10;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("min_speed_m_s", limits.min_speed_m_s, kMinSpeedMS, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween("max_speed_m_s", limits.max_speed_m_s, limits.min_speed_m_s, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween("transit_speed_m_s", limits.transit_speed_m_s, kMinTransitMS, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween("max_arm_speed_m_s", limits.max_arm_speed_m_s, kMinTransitMS, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("acceleration_m_s2", limits.acceleration_m_s2, 1e-2, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("max_standoff_m", limits.max_standoff_m, kMinLengthM, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween("stroke_beyond_target_m", limits.stroke_beyond_target_m, 1e-4, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("clearance_m", limits.clearance_m, kMinLengthM, kMost));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("arm_margin_m", limits.arm_margin_m, 0, 0.5));
+  // Twice its error would trip it; beyond its range nothing is measured.
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween("max_force_n", limits.max_force_n, 2 * model.force_accuracy_n, model.force_range_n));
   if (!(limits.max_tilt_rad >= 0) || !(limits.max_tilt_rad <= kMaxTiltRad))
     return Invalid("max_tilt_rad", limits.max_tilt_rad, "from 0 to 1.4");
   if (!(limits.outermost_finger_m >= 0) || !(limits.outermost_finger_m <= 0.5))
     return Invalid("outermost_finger_m", limits.outermost_finger_m, "from 0 to 0.5");
-  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= limits.max_payload_kg))
+  if (!(limits.payload_kg >= 0) || !(limits.payload_kg <= model.max_payload_kg))
     return Invalid("payload_kg", limits.payload_kg,
-                   absl::StrCat("from 0 to max_payload_kg = ", ShortestNumber(limits.max_payload_kg)));
+                   absl::StrCat("from 0 to ", ShortestNumber(model.max_payload_kg), ", what a ", model.name,
+                                " carries"));
   if (limits.payload_cog_m.has_value())
     for (int axis = 0; axis < 3; ++axis)
       if (!(std::abs((*limits.payload_cog_m)[axis]) <= kMaxCogM))
@@ -44,13 +78,11 @@ absl::Status CheckMotionLimits(const MotionLimits& limits) {
   for (int axis = 0; axis < 3; ++axis)
     if (!(limits.box_min_m[axis] < limits.box_max_m[axis]))
       return Invalid(absl::StrCat("box_min_m[", axis, "]"), limits.box_min_m[axis], "below box_max_m");
-  for (size_t i = 0; i < 6; ++i) {
-    if (!(limits.joint_min_rad[i] < limits.joint_max_rad[i]))
-      return Invalid(absl::StrCat("joint_min_rad[", i, "]"), limits.joint_min_rad[i], "below joint_max_rad");
-    if (!(limits.home_rad[i] >= limits.joint_min_rad[i]) || !(limits.home_rad[i] <= limits.joint_max_rad[i]))
-      return Invalid(absl::StrCat("home_rad[", i, "]"), limits.home_rad[i], "within the joint's limits");
-  }
-  return absl::OkStatus();
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(limits.ArmBoxMin()[axis] + 2 * limits.arm_margin_m < limits.arm_box_max_m[axis]))
+      return Invalid(absl::StrCat("arm_box_min_m[", axis, "]"), limits.ArmBoxMin()[axis],
+                     "below arm_box_max_m by more than twice arm_margin_m");
+  return CheckJoints(limits, model);
 }
 
 }  // namespace touchstone::gateway::arm

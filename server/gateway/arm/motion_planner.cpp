@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -23,11 +25,9 @@ constexpr double kMinStandoffM = 1e-3;
 
 class UrMotionPlanner final : public MotionPlanner {
  public:
-  UrMotionPlanner(const std::string& arm_model, const UrKinematics& kinematics, const MotionLimits& limits,
-                  const calibration::Calibration& calibration)
-      : limits_(limits),
-        calibration_(calibration),
-        check_(arm_model, kinematics, limits, calibration.flange_from_tip) {}
+  UrMotionPlanner(const UrKinematics& published, const MotionLimits& limits,
+                  const calibration::Calibration& calibration, OwnKinematics own)
+      : published_(published), limits_(limits), calibration_(calibration), own_(std::move(own)) {}
 
   absl::StatusOr<PlannedTouch> Plan(const ArmState& from, const std::string& object,
                                     const geometry::Bounds& bounds, calibration::UpFace up_face,
@@ -36,7 +36,22 @@ class UrMotionPlanner final : public MotionPlanner {
   absl::StatusOr<PlannedTouch> PlanView(const ArmState& from, const Eigen::Isometry3d& base_from_camera,
                                         const std::string& object, const geometry::Bounds& bounds,
                                         calibration::UpFace up_face, const std::string& where) const override;
-  absl::StatusOr<std::vector<Eigen::Isometry3d>> PlanHome(const ArmState& from) const override;
+  absl::StatusOr<HomePath> PlanHome(const ArmState& from, std::optional<double> object_top_m) const override;
+  absl::StatusOr<double> ObjectTop(const std::string& object, const geometry::Bounds& bounds,
+                                   calibration::UpFace up_face) const override {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
+                                ObjectPose(object, bounds, up_face));
+    return ClearanceHeight(base_from_object, bounds) - limits_.clearance_m;
+  }
+  absl::StatusOr<UrKinematics> Kinematics() const override {
+    const std::optional<DhTable> own = own_ ? own_() : std::nullopt;
+    if (!own.has_value()) return published_;
+    return published_.Calibrated(*own);
+  }
+  absl::StatusOr<BodyPoints> Body(const Joints& joints) const override {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const LineCheck check, Check());
+    return check.body().At(check.kinematics(), joints);
+  }
   absl::StatusOr<Eigen::Isometry3d> ObjectPose(const std::string& object, const geometry::Bounds& bounds,
                                                calibration::UpFace up_face) const override;
   const MotionLimits& limits() const override { return limits_; }
@@ -47,19 +62,27 @@ class UrMotionPlanner final : public MotionPlanner {
                           const touch::CommandedTouch& touch) const;
   // The height of the clearance plane over an object, base frame.
   double ClearanceHeight(const Eigen::Isometry3d& base_from_object, const geometry::Bounds& bounds) const;
+  absl::StatusOr<LineCheck> Check() const {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics kinematics, Kinematics());
+    return LineCheck(kinematics, limits_, calibration_);
+  }
   // Joints where the arm is, as the planner's own kinematics has them.
-  absl::StatusOr<Joints> JointsOf(const ArmState& from) const;
+  static absl::StatusOr<Joints> JointsOf(const LineCheck& check, const ArmState& from);
   // Follows all lines; the joints at the end.
-  absl::StatusOr<Joints> FollowAll(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses,
-                                   Joints joints, int* wrist_3_beyond) const;
+  absl::StatusOr<Joints> FollowAll(const LineCheck& check, Eigen::Isometry3d from,
+                                   const std::vector<Eigen::Isometry3d>& poses, Joints joints,
+                                   int* wrist_3_beyond, SingularityWatch* watch) const;
   // A checked path from where the arm is to a pose, over the clearance plane; *joints become those of its end.
-  absl::StatusOr<std::vector<Eigen::Isometry3d>> Transit(const ArmState& from, const Eigen::Isometry3d& start,
-                                                         double clearance_height_m, Joints* joints) const;
+  absl::StatusOr<std::vector<Eigen::Isometry3d>> Transit(const LineCheck& check, const ArmState& from,
+                                                         const Eigen::Isometry3d& start,
+                                                         double clearance_height_m, Joints* joints,
+                                                         SingularityWatch* watch) const;
   double TransitDuration(Eigen::Isometry3d from, const std::vector<Eigen::Isometry3d>& poses) const;
 
+  const UrKinematics published_;
   const MotionLimits limits_;
   const calibration::Calibration calibration_;
-  const LineCheck check_;
+  const OwnKinematics own_;
 };
 
 absl::Status UrMotionPlanner::CheckTouch(const std::string& object, calibration::UpFace up_face,
@@ -67,10 +90,10 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, calibration:
   if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
       !std::isfinite(touch.stroke_m))
     return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
-  if (!(touch.speed_m_s > 0) || touch.speed_m_s > limits_.max_speed_m_s)
-    return absl::OutOfRangeError(absl::StrFormat("speed %.4g mm/s: must be above 0 and at most %.4g mm/s",
-                                                 touch.speed_m_s / kMetresPerMillimetre,
-                                                 limits_.max_speed_m_s / kMetresPerMillimetre));
+  if (!(touch.speed_m_s >= limits_.min_speed_m_s) || touch.speed_m_s > limits_.max_speed_m_s)
+    return absl::OutOfRangeError(absl::StrFormat(
+        "speed %.4g mm/s: must be from %.4g to %.4g mm/s", touch.speed_m_s / kMetresPerMillimetre,
+        limits_.min_speed_m_s / kMetresPerMillimetre, limits_.max_speed_m_s / kMetresPerMillimetre));
   if (!(touch.standoff_m >= kMinStandoffM) || touch.standoff_m > limits_.max_standoff_m)
     return absl::OutOfRangeError(absl::StrFormat(
         "standoff %.4g mm: must be from %.4g to %.4g mm", touch.standoff_m / kMetresPerMillimetre,
@@ -113,13 +136,13 @@ double UrMotionPlanner::ClearanceHeight(const Eigen::Isometry3d& base_from_objec
   return top_m + limits_.clearance_m;
 }
 
-absl::StatusOr<Joints> UrMotionPlanner::JointsOf(const ArmState& from) const {
+absl::StatusOr<Joints> UrMotionPlanner::JointsOf(const LineCheck& check, const ArmState& from) {
   // Calibrated kinematics differ from the published ones by millimetres: joints a few degrees apart
   // are another arm.
   constexpr double kOtherArmRad = 0.15;
   Joints joints;
   if (!from.base_from_tip.matrix().allFinite() ||
-      !check_.JointsAt(from.base_from_tip, from.joints_rad, &joints) ||
+      !check.JointsAt(from.base_from_tip, from.joints_rad, &joints) ||
       Farthest(joints, from.joints_rad) > kOtherArmRad)
     return absl::FailedPreconditionError(
         absl::StrCat("the arm's present pose at ", PointText(from.base_from_tip.translation()),
@@ -129,38 +152,40 @@ absl::StatusOr<Joints> UrMotionPlanner::JointsOf(const ArmState& from) const {
   return joints;
 }
 
-absl::StatusOr<Joints> UrMotionPlanner::FollowAll(Eigen::Isometry3d from,
+absl::StatusOr<Joints> UrMotionPlanner::FollowAll(const LineCheck& check, Eigen::Isometry3d from,
                                                   const std::vector<Eigen::Isometry3d>& poses, Joints joints,
-                                                  int* wrist_3_beyond) const {
+                                                  int* wrist_3_beyond, SingularityWatch* watch) const {
   *wrist_3_beyond = 0;
   for (size_t i = 0; i < poses.size(); ++i) {
     const std::string what = i + 1 == poses.size() ? "the descent to the start" : "the transit";
     TOUCHSTONE_RETURN_IF_ERROR(
-        check_.Follow(from, poses[i], limits_.transit_speed_m_s, true, what, &joints, wrist_3_beyond));
+        check.Follow(from, poses[i], limits_.transit_speed_m_s, true, what, &joints, wrist_3_beyond, watch));
     from = poses[i];
   }
   return joints;
 }
 
-absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transit(const ArmState& from,
-                                                                        const Eigen::Isometry3d& start,
-                                                                        double clearance_height_m,
-                                                                        Joints* joints) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
+absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transit(
+    const LineCheck& check, const ArmState& from, const Eigen::Isometry3d& start, double clearance_height_m,
+    Joints* joints, SingularityWatch* watch) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(check, from));
   const TransitPath path{from.base_from_tip, start, clearance_height_m, limits_.outermost_finger_m};
   std::vector<Eigen::Isometry3d> poses = path.Poses(0);
   int beyond = 0;
-  absl::StatusOr<Joints> end = FollowAll(from.base_from_tip, poses, here, &beyond);
+  SingularityWatch seen;
+  absl::StatusOr<Joints> end = FollowAll(check, from.base_from_tip, poses, here, &beyond, &seen);
   // Near its limit it would be stuck: the approach and the next retract turn it a little, too.
   if (end.ok() && (*end)[5] > limits_.joint_max_rad[5] - kWristReserveRad) beyond = 1;
   if (end.ok() && (*end)[5] < limits_.joint_min_rad[5] + kWristReserveRad) beyond = -1;
   if (beyond != 0) {
     // Wrist 3 would wind the cable up: the tool turns in the other direction.
     const std::vector<Eigen::Isometry3d> unwinding = path.Poses(-beyond);
-    if (absl::StatusOr<Joints> other = FollowAll(from.base_from_tip, unwinding, here, &beyond); other.ok())
-      poses = unwinding, end = other;
+    SingularityWatch seen_then;
+    absl::StatusOr<Joints> other = FollowAll(check, from.base_from_tip, unwinding, here, &beyond, &seen_then);
+    if (other.ok()) poses = unwinding, end = other, seen = seen_then;
   }
   TOUCHSTONE_RETURN_IF_ERROR(end.status());
+  *watch = seen;
   *joints = *end;
   return poses;
 }
@@ -182,6 +207,7 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
                                                    const std::string& where) const {
   const auto plan = [&]() -> absl::StatusOr<PlannedTouch> {
     TOUCHSTONE_RETURN_IF_ERROR(CheckTouch(object, up_face, touch));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const LineCheck check, Check());
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
                                 ObjectPose(object, bounds, up_face));
 
@@ -208,12 +234,16 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::Plan(const ArmState& from, const s
     planned.motion.speed_m_s = touch.speed_m_s;
     planned.motion.end = start * Eigen::Translation3d(0, 0, stroke_m);
     Joints joints;
-    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transit,
-                                Transit(from, start, ClearanceHeight(base_from_object, bounds), &joints));
+    SingularityWatch watch;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        planned.motion.transit,
+        Transit(check, from, start, ClearanceHeight(base_from_object, bounds), &joints, &watch));
     planned.start_joints_rad = joints;
     int beyond = 0;
-    TOUCHSTONE_RETURN_IF_ERROR(
-        check_.Follow(start, planned.motion.end, touch.speed_m_s, false, "the approach", &joints, &beyond));
+    TOUCHSTONE_RETURN_IF_ERROR(check.Follow(start, planned.motion.end, touch.speed_m_s, false, "the approach",
+                                            &joints, &beyond, &watch));
+    planned.end_joints_rad = joints;
+    planned.notes = watch.Notes();
 
     // Contacts are expected at the target.
     const Eigen::Isometry3d target = start * Eigen::Translation3d(0, 0, std::min(stroke_m, touch.standoff_m));
@@ -243,9 +273,13 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(
     planned.motion.speed_m_s = limits_.transit_speed_m_s;
     planned.motion.end = tip;
     Joints joints;
-    TOUCHSTONE_ASSIGN_OR_RETURN(planned.motion.transit,
-                                Transit(from, tip, ClearanceHeight(base_from_object, bounds), &joints));
-    planned.start_joints_rad = joints;
+    SingularityWatch watch;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const LineCheck check, Check());
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        planned.motion.transit,
+        Transit(check, from, tip, ClearanceHeight(base_from_object, bounds), &joints, &watch));
+    planned.start_joints_rad = planned.end_joints_rad = joints;
+    planned.notes = watch.Notes();
     planned.motion.duration_s = TransitDuration(from.base_from_tip, planned.motion.transit);
     return planned;
   }();
@@ -253,39 +287,22 @@ absl::StatusOr<PlannedTouch> UrMotionPlanner::PlanView(
   return absl::Status(plan.status().code(), absl::StrCat(where, ": ", plan.status().message()));
 }
 
-absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::PlanHome(const ArmState& from) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(from));
-  const Eigen::Isometry3d home = check_.TipAt(limits_.home_rad);
-  // Back out along the tool's axis as far as the arm can, then straight up to home's height, then across.
-  absl::Status why;
-  for (const double back_m :
-       {limits_.max_standoff_m, limits_.max_standoff_m / 2, limits_.max_standoff_m / 4, 0.0}) {
-    const std::vector<Eigen::Isometry3d> out =
-        RetractPath(from.base_from_tip, back_m, home.translation().z());
-    int beyond = 0;
-    const absl::StatusOr<Joints> above = FollowAll(from.base_from_tip, out, here, &beyond);
-    if (!above.ok()) {
-      why = above.status();
-      continue;
-    }
-    // Across in a straight line where that works; else the joints alone lead home.
-    std::vector<Eigen::Isometry3d> across = out;
-    across.push_back(home);
-    const Eigen::Isometry3d& last = out.empty() ? from.base_from_tip : out.back();
-    if (FollowAll(last, {home}, *above, &beyond).ok()) return across;
-    return out;
-  }
-  return absl::Status(why.code(), absl::StrCat("home: ", why.message(), "; move the arm free by hand"));
+absl::StatusOr<HomePath> UrMotionPlanner::PlanHome(const ArmState& from,
+                                                   std::optional<double> object_top_m) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const LineCheck check, Check());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Joints here, JointsOf(check, from));
+  return FindHomePath(check, limits_, object_top_m, from.base_from_tip, here);
 }
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<MotionPlanner>> MotionPlanner::Create(
-    const std::string& arm_model, const MotionLimits& limits, const calibration::Calibration& calibration) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics kinematics, UrKinematics::ForModel(arm_model));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckMotionLimits(limits));
+    const std::string& arm_model, const MotionLimits& limits, const calibration::Calibration& calibration,
+    OwnKinematics own) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const UrKinematics published, UrKinematics::ForModel(arm_model));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMotionLimits(limits, published.model()));
   return std::unique_ptr<MotionPlanner>(
-      std::make_unique<UrMotionPlanner>(arm_model, kinematics, limits, calibration));
+      std::make_unique<UrMotionPlanner>(published, limits, calibration, std::move(own)));
 }
 
 }  // namespace touchstone::gateway::arm

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/base/units.h"
+#include "server/gateway/arm/cartesian_speed.h"
 #include "server/gateway/arm/line_check.h"
 #include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
@@ -30,7 +31,7 @@ struct Rig {
       : limits(with),
         kinematics(UrKinematics::ForModel(model).value()),
         planner(MotionPlanner::Create(model, with, Fixture()).value()),
-        check(model, kinematics, with, Fixture().flange_from_tip) {
+        check(kinematics, with, Fixture()) {
     at.joints_rad = with.home_rad;
     at.base_from_tip = check.TipAt(with.home_rad);
   }
@@ -161,6 +162,9 @@ TEST(MotionPlanner, RefusesWithValueAndLimit) {
   touch.speed_m_s = 0.2;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"200 mm/s", "100 mm/s"});
   touch = FromAbove();
+  touch.speed_m_s = 1e-9;
+  ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"1e-06 mm/s", "from 0.1 to 100 mm/s"});
+  touch = FromAbove();
   touch.standoff_m = 0.2;
   ExpectRefused(rig.Plan(touch), absl::StatusCode::kOutOfRange, {"standoff 200 mm", "150 mm"});
   touch = FromAbove();
@@ -222,6 +226,17 @@ TEST(MotionPlanner, LimitsThatMakeNoSenseAreRefused) {
   limits.box_min_m.z() = 1;
   EXPECT_FALSE(MotionPlanner::Create("ur3", limits, Fixture()).ok());
   EXPECT_FALSE(MotionPlanner::Create("ur10", MotionLimits(), Fixture()).ok());
+  limits = MotionLimits();
+  limits.max_force_n = 10;
+  EXPECT_THAT(std::string(MotionPlanner::Create("ur3", limits, Fixture()).status().message()),
+              HasSubstr("max_force_n = 10: must be from 20 to 150"));
+  EXPECT_TRUE(MotionPlanner::Create("ur3e", limits, Fixture()).ok());
+  limits.max_force_n = 40;
+  EXPECT_FALSE(MotionPlanner::Create("ur3e", limits, Fixture()).ok()) << "its sensor measures 30 N";
+  limits = MotionLimits();
+  limits.transit_speed_m_s = 1e-9;
+  EXPECT_THAT(std::string(MotionPlanner::Create("ur3", limits, Fixture()).status().message()),
+              HasSubstr("transit_speed_m_s"));
 }
 
 // Always turned the same way, the wrist would wind its cable up without end.
@@ -244,16 +259,18 @@ TEST(MotionPlanner, UnwindsTheWristBeforeItsLimit) {
 TEST(MotionPlanner, HomeLeavesTheObjectAlongTheToolsAxisFirst) {
   Rig rig("ur3e");
   std::mt19937_64 random(8);
-  const touch::CommandedTouch touch = RandomTouch(&random, 0.3);
+  touch::CommandedTouch touch = RandomTouch(&random, 0.3);
+  touch.standoff_m = 0.01;
   const auto plan = rig.Plan(touch);
   ASSERT_TRUE(plan.ok()) << plan.status();
   rig.Make(*plan);
-  const auto home = rig.planner->PlanHome(rig.at);
+  const auto home = rig.planner->PlanHome(rig.at, 0.175);
   ASSERT_TRUE(home.ok()) << home.status();
-  ASSERT_FALSE(home->empty());
-  const Eigen::Vector3d out = (home->front().translation() - rig.at.base_from_tip.translation()).normalized();
+  ASSERT_FALSE(home->poses.empty());
+  const Eigen::Vector3d out =
+      (home->poses.front().translation() - rig.at.base_from_tip.translation()).normalized();
   EXPECT_LT((out + touch.approach).norm(), 1e-6);
-  EXPECT_TRUE(home->back().isApprox(rig.check.TipAt(rig.limits.home_rad), 1e-6));
+  EXPECT_TRUE(home->poses.back().isApprox(rig.check.TipAt(rig.limits.home_rad), 1e-6));
 }
 
 TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
@@ -278,6 +295,112 @@ TEST(MotionPlanner, CameraLooksFromWhereItWasAsked) {
           .code(),
       absl::StatusCode::kFailedPrecondition)
       << "without flange_from_camera";
+}
+
+TEST(MotionPlanner, PlansWithTheArmsOwnKinematicsOnceTheyAreKnown) {
+  std::optional<DhTable> sent;
+  const auto planner = MotionPlanner::Create("ur3e", MotionLimits(), Fixture(), [&] { return sent; }).value();
+  EXPECT_FALSE(planner->Kinematics()->calibrated());
+  const Rig published("ur3e");
+  const auto nominal = published.Plan(FromAbove());
+  ASSERT_TRUE(nominal.ok());
+
+  DhTable table = published.kinematics.table();
+  table[2].a_m += 3e-3, table[3].alpha_rad += 2e-3;
+  table[1].d_m += 0.8, table[2].d_m -= 0.8;  // calibrations put the frames of parallel joints anywhere
+  sent = table;
+  ASSERT_TRUE(planner->Kinematics()->calibrated());
+  const UrKinematics own = published.kinematics.Calibrated(table).value();
+  ArmState at;
+  at.joints_rad = MotionLimits().home_rad;
+  at.base_from_tip = own.Forward(at.joints_rad) * Fixture().flange_from_tip;
+  const auto plan = planner->Plan(at, "cube", kCube, calibration::UpFace::kPlusZ, FromAbove(), "touches[3]");
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  const Eigen::Isometry3d reached = own.Forward(plan->start_joints_rad) * Fixture().flange_from_tip;
+  EXPECT_LT((reached.translation() - plan->motion.transit.back().translation()).norm(), 1e-6);
+  EXPECT_GT(Farthest(plan->start_joints_rad, nominal->start_joints_rad), 1e-3)
+      << "as the published arm has them";
+
+  sent = UrKinematics::ForModel("ur3")->table();
+  ExpectRefused(planner->Plan(at, "cube", kCube, calibration::UpFace::kPlusZ, FromAbove(), "touches[3]"),
+                absl::StatusCode::kFailedPrecondition, {"belong to a ur3", "not to a ur3e", "arm.model"});
+}
+
+TEST(MotionPlanner, ElbowWristAndCameraStayInTheArmsBox) {
+  MotionLimits limits;
+  limits.arm_box_max_m = Eigen::Vector3d(1, 1, 0.4);
+  ExpectRefused(Rig("ur3e", limits).Plan(FromAbove()), absl::StatusCode::kOutOfRange,
+                {"the arm's elbow to z = ", "ends at 400.0 mm less arm_margin_mm = 45.0 mm"});
+  // A camera beside the tool meets the floor before the tip does.
+  calibration::Calibration calibration = Fixture();
+  calibration.has_camera = true;
+  calibration.flange_from_camera.translation() = Eigen::Vector3d(0, 0, 0.115);
+  limits = MotionLimits();
+  limits.arm_box_min_m.z() = 0.15;
+  const Rig rig("ur3e");
+  const auto planner = MotionPlanner::Create("ur3e", limits, calibration).value();
+  ExpectRefused(planner->Plan(rig.at, "cube", kCube, calibration::UpFace::kPlusZ, FromAbove(), "touches[3]"),
+                absl::StatusCode::kOutOfRange, {"the approach", "camera", "begins at 150.0 mm"});
+}
+
+TEST(MotionPlanner, NoPartOfTheArmIsFasterThanItMay) {
+  MotionLimits limits;
+  limits.max_arm_speed_m_s = 0.05;
+  touch::CommandedTouch touch = FromAbove();
+  touch.speed_m_s = 0.08;
+  ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
+                {"the approach at 80.0 mm/s", "at most 50 mm/s (max_arm_speed_mm_s)"});
+}
+
+// Between two samples the elbow of a nearly stretched arm turns much faster than from one to the other; the controller
+// stops protectively for it.
+TEST(MotionPlanner, SpeedsHoldBetweenTheSamplesNearAStretchedElbow) {
+  const Rig rig("ur3e");
+  const ArmBody body(rig.limits, Fixture());
+  const Eigen::Isometry3d tip_from_flange = Fixture().flange_from_tip.inverse();
+  Joints bent = rig.limits.home_rad;
+  int looked = 0;
+  for (double elbow = 0.12; elbow > 0.01; elbow *= 0.7) {
+    bent[2] = -elbow, bent[3] = -kPi / 2 - bent[1] - bent[2];
+    const Eigen::Isometry3d to = rig.check.TipAt(bent);
+    Eigen::Isometry3d from = to;
+    from.translation() -=
+        0.06 * Eigen::Vector3d(to.translation().x(), to.translation().y(), 0.2).normalized();
+    Joints begin;
+    if (!rig.check.JointsAt(from, bent, &begin) || Farthest(begin, bent) > 1) continue;
+    ++looked;
+    Joints joints = begin;
+    const double speed_m_s =
+        LimitedCartesianSpeed(rig.kinematics, body, tip_from_flange, from, to, 0.15, &joints);
+    Joints before = begin;
+    for (int k = 1; k <= 2000; ++k) {
+      Joints now;
+      ASSERT_TRUE(rig.check.JointsAt(PoseBetween(from, to, k / 2000.0), before, &now));
+      for (size_t i = 0; i < 6; ++i)
+        ASSERT_LT(std::abs(now[i] - before[i]) / (0.06 / speed_m_s / 2000),
+                  rig.kinematics.model().max_joint_speed_rad_s[i])
+            << "joint " << i << ", elbow ends at " << elbow << ", at " << k / 2000.0;
+      before = now;
+    }
+  }
+  EXPECT_GE(looked, 5);
+}
+
+TEST(MotionPlanner, TellsOfTheSingularityThatAPlanComesNearTo) {
+  const Rig rig("ur3e");
+  const auto plain = rig.Plan(FromAbove());
+  ASSERT_TRUE(plain.ok()) << plain.status();
+  EXPECT_THAT(plain->notes, ::testing::IsEmpty());
+  // Far out the elbow is nearly stretched.
+  touch::CommandedTouch touch = FromAbove();
+  bool told = false;
+  for (touch.target_m.x() = 0; touch.target_m.x() < 0.2; touch.target_m.x() += 0.002) {
+    const auto plan = rig.Plan(touch);
+    if (!plan.ok()) break;
+    for (const std::string& note : plan->notes)
+      told = told || note.find("near the elbow singularity: the elbow is ") != std::string::npos;
+  }
+  EXPECT_TRUE(told);
 }
 
 }  // namespace

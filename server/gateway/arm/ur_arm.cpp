@@ -34,10 +34,6 @@ absl::Status StopOverDashboard(const std::string& address, int port) {
                                                     running.substr(0, 200), "'"));
 }
 
-double RateOf(const std::string& model) {
-  return model == "ur3" ? 125 : 500;
-}
-
 }  // namespace
 
 UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
@@ -45,8 +41,9 @@ UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
     : options_(options),
       changes_(changes),
       nominal_(nominal),
+      body_(options.body_limits, options.calibration),
       tip_from_flange_(options.script.flange_from_tip.inverse()),
-      history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * RateOf(options.model))),
+      history_(kHistoryS, static_cast<size_t>(1.5 * kHistoryS * nominal.model().rtde_hz)),
       clock_(options.script.time_scale),
       dashboard_(options.address, options.dashboard_port),
       primary_(options.address, options.primary_port,
@@ -54,7 +51,7 @@ UrArmOnTcp::UrArmOnTcp(const UrArmOptions& options, const UrKinematics& nominal,
       programs_(options.address, options.secondary_port, nullptr),
       stops_(options.address, options.secondary_port, nullptr),
       rtde_(
-          {options.address, options.rtde_port, RateOf(options.model), 4 * options.frozen_after_s + 1},
+          {options.address, options.rtde_port, nominal.model().rtde_hz, 4 * options.frozen_after_s + 1},
           [this](const RtdeSample& sample, double host_s) { OnSample(sample, host_s); },
           [this] { changes_->Notify(); }) {}
 
@@ -99,14 +96,23 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
   return sent;
 }
 
-std::vector<double> UrArmOnTcp::Speeds(const ArmState& from,
-                                       const std::vector<Eigen::Isometry3d>& path) const {
+UrKinematics UrArmOnTcp::Kinematics() const {
+  const std::optional<DhTable> own = CalibratedKinematics();
+  if (!own.has_value()) return nominal_;
+  absl::StatusOr<UrKinematics> calibrated = nominal_.Calibrated(*own);
+  return calibrated.ok() ? *calibrated
+                         : nominal_;  // nothing is planned, and so sent, with those of another arm
+}
+
+std::vector<double> UrArmOnTcp::Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path,
+                                       Joints* joints) const {
+  const UrKinematics kinematics = Kinematics();
   std::vector<double> speeds_m_s;
-  Joints joints = from.joints_rad;
+  *joints = from.joints_rad;
   Eigen::Isometry3d at = from.base_from_tip;
   for (const Eigen::Isometry3d& pose : path) {
-    speeds_m_s.push_back(LimitedCartesianSpeed(nominal_, tip_from_flange_, at, pose,
-                                               options_.script.transit_speed_m_s, &joints));
+    speeds_m_s.push_back(LimitedCartesianSpeed(kinematics, body_, tip_from_flange_, at, pose,
+                                               options_.script.transit_speed_m_s, joints));
     at = pose;
   }
   return speeds_m_s;
@@ -119,7 +125,8 @@ absl::Status UrArmOnTcp::StartTouch(const ArmTouch& touch, const StartGuard& gua
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
   std::vector<Eigen::Isometry3d> path = touch.transit;
   path.push_back(touch.end);  // the speed of the retract
-  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path), options_.script), guard);
+  Joints joints;
+  return Begin(touch.program_id, TouchProgram(touch, Speeds(now, path, &joints), options_.script), guard);
 }
 
 absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
@@ -127,8 +134,21 @@ absl::Status UrArmOnTcp::MoveThrough(uint32_t program_id, const std::vector<Eige
                                      const StartGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(Ready());
   TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState now, State());
-  return Begin(program_id, MoveProgram(program_id, poses, Speeds(now, poses), joints, options_.script),
+  Joints at;
+  const std::vector<double> speeds_m_s = Speeds(now, poses, &at);
+  std::vector<double> speeds_rad_s;
+  for (const Joints& next : joints) {
+    speeds_rad_s.push_back(
+        LimitedJointSpeed(Kinematics(), body_, at, next, options_.script.joint_speed_rad_s));
+    at = next;
+  }
+  return Begin(program_id, MoveProgram(program_id, poses, speeds_m_s, joints, speeds_rad_s, options_.script),
                guard);
+}
+
+absl::Status UrArmOnTcp::StartFreedrive(uint32_t program_id, const StartGuard& guard) {
+  TOUCHSTONE_RETURN_IF_ERROR(Ready());
+  return Begin(program_id, FreedriveProgram(program_id, nominal_.model().e_series, options_.script), guard);
 }
 
 absl::Status UrArmOnTcp::BeginApproach(uint32_t program_id, const StartGuard& guard) {
@@ -188,12 +208,22 @@ absl::Status UrArmOnTcp::Stop() {
 
 absl::Status UrArmOnTcp::DemandPower(const std::string& command, const std::string& expected,
                                      const StartGuard& guard, bool* sent) {
-  return dashboard_.Demand(command, expected, kDashboardS, [&](const std::function<absl::Status()>& send) {
-    return SendStart(guard, [&] {
-      *sent = true;  // a demand without an answer may have been heard
-      return send();
-    });
-  });
+  bool reached = false;
+  absl::Status status =
+      dashboard_.Demand(command, expected, kDashboardS, [&](const std::function<absl::Status()>& send) {
+        reached = true;
+        return SendStart(guard, [&] {
+          *sent = true;  // a demand without an answer may have been heard
+          return send();
+        });
+      });
+  if (!status.ok() && !reached)
+    status = absl::Status(status.code(),
+                          absl::StrCat(status.message(),
+                                       "; enable the dashboard server (PolyScope 5.10 and later: Settings, "
+                                       "Security, Services), or power the arm on at the teach pendant "
+                                       "(PolyScope X has no dashboard server)"));
+  return status;
 }
 
 absl::Status UrArmOnTcp::PowerOffAgain(const absl::Status& why) {

@@ -1,4 +1,4 @@
-// A UR3 or UR3e as an Arm: state over RTDE, programs over the secondary interface, power over the dashboard.
+// An arm of Universal Robots (arm_model.h) as an Arm: state over RTDE, programs over the secondary interface, power over the dashboard.
 #pragma once
 
 #include <memory>
@@ -8,15 +8,19 @@
 #include <absl/status/statusor.h>
 
 #include "server/gateway/arm/arm.h"
+#include "server/gateway/arm/motion_limits.h"
 #include "server/gateway/arm/ur_script.h"
+#include "server/gateway/calibration/calibration.h"
 
 namespace touchstone::gateway::arm {
 
 struct UrArmOptions {
-  std::string model = "ur3e";  // or "ur3"
+  std::string model = "ur3e";  // a name of arm_model.h
   std::string address;
   int dashboard_port = 29999, primary_port = 30001, secondary_port = 30002, rtde_port = 30004;
-  ScriptOptions script;             // tool, payload, speeds, time scale
+  ScriptOptions script;                  // tool, payload, speeds, time scale
+  MotionLimits body_limits;              // of these only max_arm_speed_m_s is looked at
+  calibration::Calibration calibration;  // and of this only where the camera is
   double frozen_after_s = 0.5;      // host time without a state after which the controller counts as frozen
   double program_start_s = 1.5;     // host time that a program may take to begin
   double connect_wait_s = 2;        // host time that ConnectUrArm waits for the first state

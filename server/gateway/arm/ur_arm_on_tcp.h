@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/gateway/arm/arm_body.h"
 #include "server/gateway/arm/dashboard_client.h"
 #include "server/gateway/arm/registers.h"
 #include "server/gateway/arm/rtde_client.h"
@@ -62,6 +63,7 @@ class UrArmOnTcp final : public UrArm {
                            const std::vector<std::array<double, 6>>& joints,
                            const StartGuard& guard) override;
   absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard) override;
+  absl::Status StartFreedrive(uint32_t program_id, const StartGuard& guard) override;
   absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetract); }
   absl::Status Stop() override;
   absl::Status PowerOn(const StartGuard& guard) override;
@@ -105,13 +107,18 @@ class UrArmOnTcp final : public UrArm {
   absl::Status Command(uint32_t program_id, int command);
   absl::Status SendStop();
   // The tip's speed on each line of a path, m/s.
-  std::vector<double> Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path) const;
+  // *joints become those of its end.
+  std::vector<double> Speeds(const ArmState& from, const std::vector<Eigen::Isometry3d>& path,
+                             Joints* joints) const;
+  // Its own, once the controller has sent them.
+  UrKinematics Kinematics() const;
   // Why the program that was sent last has not begun, if it should have by now. With mutex_ held.
   absl::Status StartFailure() const;
 
   const UrArmOptions options_;
   timing::ChangeNotifier* const changes_;
   const UrKinematics nominal_;
+  const ArmBody body_;
   const Eigen::Isometry3d tip_from_flange_;
 
   mutable std::mutex mutex_;  // of what follows

@@ -102,7 +102,7 @@ absl::Status UrArmOnTcp::Ready() const {
                                                options_.address, ":", options_.secondary_port,
                                                "; trying again"));
   // Only e-Series controllers know local control, and only a program that did not begin makes one suspect it.
-  if (suspect_ && options_.model == "ur3e") {
+  if (suspect_ && nominal_.model().e_series) {
     const absl::StatusOr<std::string> remote = dashboard_.Ask("is in remote control", kRemoteControlAnswerS);
     if (remote.ok() && absl::AsciiStrToLower(*remote) == "false")
       return absl::FailedPreconditionError(

@@ -120,16 +120,25 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
 
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                         const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
-                        const ScriptOptions& options) {
+                        const std::vector<double>& speeds_rad_s, const ScriptOptions& options) {
   std::string text = absl::StrCat("def move_", program_id, "():\n", Head(program_id, options),
                                   Lines(poses, speeds_m_s, options));
-  for (const Joints& q : joints) {
+  for (size_t k = 0; k < joints.size(); ++k) {
     absl::StrAppend(&text, "  movej([");
-    for (size_t i = 0; i < q.size(); ++i) absl::StrAppend(&text, i == 0 ? "" : ",", Number(q[i]));
+    for (size_t i = 0; i < joints[k].size(); ++i)
+      absl::StrAppend(&text, i == 0 ? "" : ",", Number(joints[k][i]));
     absl::StrAppend(&text, "], a=", Number(options.joint_acceleration_rad_s2),
-                    ", v=", Number(options.joint_speed_rad_s), ")\n");
+                    ", v=", Number(speeds_rad_s[k]), ")\n");
   }
   return absl::StrCat(text, Phase(MotionPhase::kDone), "end\n");
+}
+
+std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options) {
+  const std::string mode = e_series ? "freedrive_mode()\n" : "teach_mode()\n";
+  return absl::StrCat("def guide_", program_id, "():\n", Head(program_id, options), "  ", mode,
+                      Phase(MotionPhase::kReady), "  while read_input_integer_register(", kCommandRegister,
+                      ") != ", CommandWord(program_id, kCommandRetract), ":\n    sync()\n  end\n  end_", mode,
+                      Phase(MotionPhase::kDone), "end\n");
 }
 
 std::string StopProgram() {

@@ -31,10 +31,13 @@ std::string PoseText(const Eigen::Isometry3d& pose);
 // `speeds_m_s` has one speed for every line of the transit, and one for the retract.
 std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speeds_m_s,
                          const ScriptOptions& options);
-// One speed for every pose.
+// One speed for every pose, and one of the joint that turns farthest for every set of joints.
 std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                         const std::vector<double>& speeds_m_s, const std::vector<Joints>& joints,
-                        const ScriptOptions& options);
+                        const std::vector<double>& speeds_rad_s, const ScriptOptions& options);
+// Frees the arm until kCommandRetract. An e-Series calls it freedrive_mode, a CB3 teach_mode (UR's script manuals, SW 5
+// and SW 3). What ends the program ends it too: a stop, another program, the watchdog.
+std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options);
 std::string StopProgram();
 
 // What stands in the command register to command a program.

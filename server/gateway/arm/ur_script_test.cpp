@@ -89,12 +89,24 @@ TEST(TouchProgram, WatchdogIsSlowerOnAnAcceleratedClock) {
 
 TEST(MoveProgram, EndsWithTheJoints) {
   const std::string text =
-      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, ScriptOptions());
+      MoveProgram(5, {Down(0.3, 0.3)}, {0.25}, {{{0, -1.5, 0.25, 0, 1, 0}}}, {0.8}, ScriptOptions());
   EXPECT_THAT(text, HasSubstr("def move_5():\n"));
   EXPECT_THAT(
       text,
-      HasSubstr(
-          "  movej([0,-1.5,0.25,0,1,0], a=1.4, v=1.05)\n  write_output_integer_register(25, 5)\nend\n"));
+      HasSubstr("  movej([0,-1.5,0.25,0,1,0], a=1.4, v=0.8)\n  write_output_integer_register(25, 5)\nend\n"));
+}
+
+TEST(FreedriveProgram, UsesTheWordsOfItsSeriesAndEndsThemByCommand) {
+  const std::string e_series = FreedriveProgram(7, true, ScriptOptions());
+  EXPECT_THAT(e_series, HasSubstr("  freedrive_mode()\n"));
+  EXPECT_THAT(e_series, HasSubstr("  end_freedrive_mode()\n"));
+  EXPECT_THAT(e_series, HasSubstr("rtde_set_watchdog"));
+  EXPECT_LT(e_series.find("freedrive_mode()"), e_series.find("!= 30"))
+      << "waits for the command while it is free";
+  const std::string cb3 = FreedriveProgram(7, false, ScriptOptions());
+  EXPECT_THAT(cb3, HasSubstr("  teach_mode()\n"));
+  EXPECT_THAT(cb3, HasSubstr("  end_teach_mode()\n"));
+  EXPECT_EQ(cb3.find("freedrive"), std::string::npos);
 }
 
 TEST(LineSpeed, IsSlowerWhereTheToolTurnsMuchOnAShortWay) {

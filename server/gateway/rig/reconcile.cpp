@@ -80,7 +80,7 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const session::Jour
   record.effector_clock = parts_.effector->Clock();
   TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalResult result, ResultOf(record));
   result.recovered = true;
-  TOUCHSTONE_ASSIGN_OR_RETURN(result.session_time_s, SessionTimeS(session, timing::UnixNowS()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(result.session_time_s, session_clock_.NowS(session));
   return journal().Done(session, touch.id, result);
 }
 

@@ -64,17 +64,18 @@ Rig::~Rig() {
   if (motions_ > 0) parts_.arm->Stop().IgnoreError();
 }
 
-uint32_t Rig::NextProgramId() {
+absl::StatusOr<uint32_t> Rig::NextProgramId() {
   if (next_program_id_ >= kMaxProgramId) next_program_id_ = reserved_program_id_ = 1;
   if (next_program_id_ >= reserved_program_id_) {
-    reserved_program_id_ = next_program_id_ + kProgramIdBlock;
-    const absl::Status kept = journal().SetMetadata("next_program_id", absl::StrCat(reserved_program_id_));
-    if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
+    const uint32_t reserved = next_program_id_ + kProgramIdBlock;
+    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata("next_program_id", absl::StrCat(reserved)));
+    reserved_program_id_ = reserved;
   }
   const uint32_t id = next_program_id_++;
   // What an earlier program left in the controller's registers must never pass for this one's.
   const absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
-  return arm.ok() && arm->program_id == id ? NextProgramId() : id;
+  if (arm.ok() && arm->program_id == id) return NextProgramId();
+  return id;
 }
 
 std::optional<calibration::UpFace> Rig::MountedUpFace() const {
@@ -100,7 +101,9 @@ source::SourceStatus Rig::Status() const {
 
 absl::Status Rig::EnsureSession(const std::string& name) {
   std::lock_guard<std::mutex> lock(sessions_mutex_);
-  if (sessions_.count(name) > 0) return absl::OkStatus();
+  // It may have been deleted since.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool there, journal().HasSession(name));
+  if (there && name == last_session_) return absl::OkStatus();
   session::JournalSession session;
   session.name = name;
   session.created_unix_s = timing::UnixNowS();
@@ -109,7 +112,7 @@ absl::Status Rig::EnsureSession(const std::string& name) {
   session.fingers = options_.fingers;
   session.spacing_m = options_.spacing_m;
   TOUCHSTONE_RETURN_IF_ERROR(journal().EnsureSession(session));
-  sessions_.insert(name);
+  last_session_ = name;
   return absl::OkStatus();
 }
 
@@ -128,6 +131,8 @@ absl::StatusOr<std::optional<session::JournalTouch>> Rig::FindDone(
   if (touch->object != command.object || !session::SameCommand(touch->command, command.bytes))
     return absl::AlreadyExistsError(absl::StrCat("touch id '", command.id, "' of session '", command.session,
                                                  "' stands for another touch already: take a new id"));
+  if (touch->stage == session::TouchStage::kExecuting)
+    TOUCHSTONE_RETURN_IF_ERROR(unwritten_.Kept(command.session, command.id));
   if (touch->stage != session::TouchStage::kDone) return std::optional<session::JournalTouch>();
   return touch;
 }
@@ -136,6 +141,7 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
                                                  const source::MotionGuard& caller) {
   const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
+  unwritten_.Flush();
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<session::JournalTouch> known, FindDone(command));
   if (known.has_value()) return *std::move(known);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
@@ -154,22 +160,24 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
                                                    command.touch, "touch '" + command.id + "'"));
 
   const double began_s = timing::HostNowS(), began_unix_s = timing::UnixNowS();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalTouch intent,
-                              journal().Begin(command.session, command.id, command.object,
-                                              calibration::UpFaceName(up_face), command.bytes));
+  // Whatever else is written for it goes before: once it is executing, only its end is left to write.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double session_time_s, session_clock_.NowS(command.session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::JournalTouch intent,
+      journal().BeginExecuting(command.session, command.id, command.object, calibration::UpFaceName(up_face),
+                               command.bytes, program_id, parts_.effector->State().boot_id));
   if (intent.stage == session::TouchStage::kDone) return intent;
-  const uint32_t program_id = NextProgramId();
-  TOUCHSTONE_RETURN_IF_ERROR(
-      journal().Executing(command.session, command.id, program_id, parts_.effector->State().boot_id));
   ++motions_;
-  absl::StatusOr<session::JournalResult> result = MakeTouch(plan, program_id, command, guard);
+  std::optional<session::JournalSeries> series;
+  absl::StatusOr<session::JournalResult> result = MakeTouch(plan, program_id, command, guard, &series);
   --motions_;
   if (!result.ok()) {
     Remember(result.status());
     spdlog::warn("touch '{}' of session '{}': {}", command.id, command.session,
                  std::string(result.status().message()));
     TOUCHSTONE_RETURN_IF_ERROR(
-        journal().Failed(command.session, command.id, std::string(result.status().message())));
+        unwritten_.Failed(command.session, command.id, std::string(result.status().message())));
     audit()
         .Write("touch_failed", {{"session", command.session},
                                 {"id", command.id},
@@ -178,9 +186,10 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
     return result.status();
   }
 
-  result->start_unix_s = began_unix_s;
-  TOUCHSTONE_ASSIGN_OR_RETURN(result->session_time_s, SessionTimeS(command.session, began_unix_s));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().Done(command.session, command.id, *result));
+  if (result->start_unix_s == 0) result->start_unix_s = began_unix_s;
+  result->session_time_s = session_time_s;
+  TOUCHSTONE_RETURN_IF_ERROR(
+      unwritten_.Done(command.session, command.id, *result, series.has_value() ? &*series : nullptr));
   {
     std::lock_guard<std::mutex> status_lock(status_mutex_);
     const double took_s = timing::HostNowS() - began_s;
@@ -190,19 +199,6 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
   TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(command));
   if (!known.has_value()) return absl::InternalError("the journal lost a result that it had acknowledged");
   return *std::move(known);
-}
-
-absl::StatusOr<double> Rig::SessionTimeS(const std::string& session, double unix_s) {
-  const std::string key = "first_touch_unix_s " + session;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, journal().Metadata(key));
-  double first_s = unix_s;
-  if (text.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(key, absl::StrFormat("%.6f", unix_s)));
-  } else if (!absl::SimpleAtod(text, &first_s)) {
-    return absl::DataLossError(
-        absl::StrCat("the journal's '", key, "' is '", text, "': a number was expected"));
-  }
-  return (unix_s - first_s) * options_.time_scale;
 }
 
 image::Intrinsics Rig::IntrinsicsOf(const image::Frame& frame) const {

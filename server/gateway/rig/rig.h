@@ -12,7 +12,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -27,6 +26,8 @@
 #include "server/gateway/effector/effector.h"
 #include "server/gateway/rig/camera_pose.h"
 #include "server/gateway/rig/heartbeats.h"
+#include "server/gateway/rig/session_clock.h"
+#include "server/gateway/rig/unwritten_outcomes.h"
 #include "server/geometry/mesh.h"
 #include "server/session/journal.h"
 #include "server/source/rig_device.h"
@@ -45,6 +46,8 @@ struct RigOptions {
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
   CameraPoseTolerance camera_tolerance;  // of photographs
+  // The box of an object by its name, object frame; none: not known. Null: none is.
+  std::function<std::optional<geometry::Bounds>(const std::string&)> bounds_of;
 };
 
 struct RigParts {
@@ -76,6 +79,10 @@ class Rig : public source::RigDevice {
   // show meanwhile.
   absl::StatusOr<source::Photograph> Photograph(const source::ViewCommand& command,
                                                 const source::MotionGuard& guard) override;
+  absl::StatusOr<std::optional<session::JournalSeries>> Series(const std::string& session,
+                                                               const std::string& id) const override {
+    return parts_.journal->Series(session, id);
+  }
   bool has_camera() const override { return parts_.camera != nullptr; }
   image::Intrinsics IntrinsicsOf(const image::Frame& frame) const override;
   int fingers() const override { return options_.fingers; }
@@ -89,6 +96,10 @@ class Rig : public source::RigDevice {
   absl::Status Mount(const std::string& object, calibration::UpFace up_face,
                      const source::MotionGuard& caller);
   absl::Status Home(const source::MotionGuard& caller);
+  // Frees the arm for a hand to guide it, and reports where it is some twenty times a second, until the guard's error,
+  // which is returned.
+  absl::Status Guide(const std::function<void(const arm::ArmState&)>& report,
+                     const source::MotionGuard& caller);
   // Powers the arm on and releases its brakes; OK once it is ready to move. FAILED_PRECONDITION says what a
   // person has to do first.
   absl::Status PowerOn(const source::MotionGuard& caller);
@@ -128,7 +139,11 @@ class Rig : public source::RigDevice {
   std::string Provenance() const;  // where a session's data come from: note, arm, end effector
 
  private:
-  Rig(RigOptions options, RigParts parts) : options_(std::move(options)), parts_(std::move(parts)) {}
+  Rig(RigOptions options, RigParts parts)
+      : options_(std::move(options)),
+        parts_(std::move(parts)),
+        unwritten_(parts_.journal.get()),
+        session_clock_(parts_.journal.get(), options_.time_scale) {}
   absl::Status Reconcile();
   absl::Status ReconcileTouch(const std::string& session, const session::JournalTouch& touch);
 
@@ -143,29 +158,32 @@ class Rig : public source::RigDevice {
                              const source::MotionGuard& guard);
   // What lies on the fixture now, in the journal and the audit log.
   absl::Status NoteMounted(const std::string& object, calibration::UpFace up_face);
+  absl::Status NoteNothingMounted();
   absl::Status MoveHome(const source::MotionGuard& guard);
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
                            const source::MotionGuard& guard);
-  // Another one than the controller's registers show.
-  uint32_t NextProgramId();
-  // The states that have arrived since.
+  // Another one than the controller's registers show. Refused where it could be used again after a restart: the journal
+  // must know of it.
+  absl::StatusOr<uint32_t> NextProgramId();
+  // The states that have arrived since, and the next one.
   std::vector<arm::ArmState> StatesSince(double host_s) const;
   absl::Status EnsureSession(const std::string& name);
-  // Rig seconds since the session's first touch began.
-  absl::StatusOr<double> SessionTimeS(const std::string& session, double unix_s);
 
   // touch_cycle.cpp
   absl::StatusOr<session::JournalResult> MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                    const source::TouchCommand& command,
-                                                   const source::MotionGuard& guard);
+                                                   const source::MotionGuard& guard,
+                                                   std::optional<session::JournalSeries>* series);
   // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
   // motion may not go on (the controller's safety mode, its guard).
   absl::Status MayGoOn(const source::MotionGuard& guard);
   // Watches until `done` says so; stops the arm and returns why on anything else. `limit_s`: host time.
+  // `max_force_n`: none: that of the limits.
   absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,
                          const source::MotionGuard& guard,
-                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done);
+                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                         std::optional<double> max_force_n = std::nullopt);
   void Remember(const absl::Status& status);
 
   // rig_safety.cpp
@@ -185,6 +203,8 @@ class Rig : public source::RigDevice {
 
   const RigOptions options_;
   RigParts parts_;
+  UnwrittenOutcomes unwritten_;
+  SessionClock session_clock_;
   std::timed_mutex moving_;           // held by the one that moves
   std::atomic<bool> stopped_{false};  // until Reset
   std::atomic<uint64_t> stops_{0};    // how often it was stopped: a motion of before a stop never resumes
@@ -195,7 +215,7 @@ class Rig : public source::RigDevice {
   source::SourceStatus status_;
   std::optional<calibration::UpFace> up_face_;  // of the object on the fixture
   std::mutex sessions_mutex_;
-  std::set<std::string> sessions_;  // known to be in the journal
+  std::string last_session_;  // whose fingers and spacing are this rig's
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
 
   std::mutex safety_mutex_;    // of what LookAtSafety knows

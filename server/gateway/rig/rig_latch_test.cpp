@@ -294,6 +294,23 @@ TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
   EXPECT_FALSE(homing.get().ok());
 }
 
+TEST_F(RigLatch, AMotionThatFailedAfterAHangLatchesAndOneThatFailedInTimeDoesNot) {
+  Start();
+  for (const int hang_ms : {0, 600}) {
+    const int programs = arm_->programs;
+    const absl::Status lost = rig_->Home([&]() -> absl::Status {
+      if (arm_->programs == programs) return absl::OkStatus();
+      std::this_thread::sleep_for(std::chrono::milliseconds(hang_ms));
+      return absl::AbortedError("the lease was lost");
+    });
+    EXPECT_EQ(lost.code(), absl::StatusCode::kAborted);
+    if (hang_ms == 0)
+      EXPECT_EQ(rig_->StopReason(), "");
+    else
+      EXPECT_THAT(rig_->StopReason(), testing::ContainsRegex("it hung for [0-9.]+ s during a motion"));
+  }
+}
+
 // --- What a process before this one left
 
 TEST_F(RigLatch, ATouchThatWasUnderWayLatchesWithWhereTheArmStands) {

@@ -79,6 +79,8 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
   image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
   image.unix_s = timing::UnixNowS() - (timing::HostNowS() - frame->host_time_s);
+  image.measured_base_from_camera = geometry::PoseVectorOf(measured->base_from_camera);
+  image.measured_unix_s = image.unix_s;
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
   // A view that was taken before is a repeat, under a name of its own.
@@ -100,7 +102,15 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
 }
 
 std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
-  const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  constexpr double kNextStateS = 0.5;  // host time
+  const double called_s = timing::HostNowS();
+  uint64_t changes = parts_.changes->count();
+  absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+  while (now.ok() && now->host_time_s < called_s && timing::HostNowS() < called_s + kNextStateS) {
+    parts_.changes->WaitForChange(changes, 0.01);
+    changes = parts_.changes->count();
+    now = parts_.arm->State();
+  }
   if (!now.ok()) return {};
   const double since_rig_s = (timing::HostNowS() - host_s + 1) * options_.time_scale;
   std::vector<arm::ArmState> states =
@@ -114,7 +124,7 @@ std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
 absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
                               const source::MotionGuard& guard) {
-  const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
   TOUCHSTONE_RETURN_IF_ERROR(
       journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
   ++motions_;
@@ -129,7 +139,7 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
   if (!status.ok()) {
     Remember(status);
     // This process knows how it ended: no riddle for the next one.
-    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
+    unwritten_.SetFacts({{kMotionKey, ""}}, true).IgnoreError();
   }
   return status;
 }
@@ -143,8 +153,17 @@ absl::Status Rig::Home(const source::MotionGuard& caller) {
 absl::Status Rig::MoveHome(const source::MotionGuard& guard) {
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Eigen::Isometry3d> poses, parts_.planner->PlanHome(from));
-  return MoveThrough(poses, {parts_.planner->limits().home_rad}, 30, guard);
+  // How high the tool must be lifted depends on what lies there.
+  std::optional<double> top_m;
+  const std::string object = Status().object;
+  const std::optional<calibration::UpFace> up_face = MountedUpFace();
+  const auto bounds = options_.bounds_of && up_face.has_value() ? options_.bounds_of(object) : std::nullopt;
+  if (bounds.has_value()) {
+    const absl::StatusOr<double> top = parts_.planner->ObjectTop(object, *bounds, *up_face);
+    if (top.ok()) top_m = *top;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::HomePath path, parts_.planner->PlanHome(from, top_m));
+  return MoveThrough(path.poses, path.joints, 30, guard);
 }
 
 absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace up_face,
@@ -168,13 +187,27 @@ absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace u
   std::vector<std::string> command = options_.mount_command;
   for (std::string& word : command)
     word = absl::StrReplaceAll(word, {{"{object}", object}, {"{up_face}", face}, {"{placement}", face}});
+  TOUCHSTONE_RETURN_IF_ERROR(NoteNothingMounted());
   TOUCHSTONE_RETURN_IF_ERROR(RunCommand(command, options_.mount_timeout_s, guard));
   return NoteMounted(object, up_face);
 }
 
+absl::Status Rig::NoteNothingMounted() {
+  {
+    std::lock_guard<std::mutex> lock(status_mutex_);
+    status_.object.clear(), up_face_.reset();
+  }
+  return unwritten_.SetFacts({{"mounted_object", ""}, {"mounted_placement", ""}}, true);
+}
+
 absl::Status Rig::NoteMounted(const std::string& object, calibration::UpFace up_face) {
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata("mounted_object", object));
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata("mounted_placement", calibration::UpFaceName(up_face)));
+  // What lay there before does not any more, whether or not this can be written down.
+  const absl::Status noted = unwritten_.SetFacts(
+      {{"mounted_object", object}, {"mounted_placement", calibration::UpFaceName(up_face)}}, false);
+  if (!noted.ok()) {
+    NoteNothingMounted().IgnoreError();
+    return noted;
+  }
   audit().Write("mounted", {{"object", object}, {"up_face", calibration::UpFaceName(up_face)}}).IgnoreError();
   std::lock_guard<std::mutex> lock(status_mutex_);
   status_.object = object, up_face_ = up_face;

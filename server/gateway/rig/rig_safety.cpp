@@ -77,7 +77,7 @@ void Rig::Latch(const std::string& what) {
              stop_reason_.size() + dated.size() < kMaxReasonBytes)
       absl::StrAppend(&stop_reason_, "; then ", dated);
     all = stop_reason_;
-    const absl::Status kept = journal().SetMetadata(kStopKey, stop_reason_);
+    const absl::Status kept = unwritten_.SetFacts({{kStopKey, stop_reason_}}, true);
     if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
   }
   spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);

@@ -63,7 +63,7 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
     std::lock_guard<std::mutex> lock(stop_mutex_);
     if (stops_ != stops) return absl::AbortedError("the rig was stopped again meanwhile: the stop holds");
     // On the disk before anything may move.
-    TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kStopKey, ""));
+    TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kStopKey, ""}}, false));
     stop_reason_.clear();
     stopped_ = false;
   }

@@ -8,26 +8,43 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/force_guard.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/touch_result.h"
+#include "server/gateway/rig/touch_series.h"
+#include "server/session/touch_series.h"
 
 namespace touchstone::gateway {
 namespace {
 
 constexpr double kLookPeriodS = 0.01;  // host time; how soon a lost lease is noticed
+constexpr double kHungS = 0.4;         // host time between two looks in which heartbeats may have ceased
+constexpr double kAfterHangS = 1;      // host time after it in which a failure may come of it
 constexpr double kProgramStartsS = 2;  // host time that a program may take until its phase is reported
 
 }  // namespace
 
 absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* what,
                             const source::MotionGuard& guard,
-                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done) {
+                            const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
+                            std::optional<double> max_force_n) {
   const double began_s = timing::HostNowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
+  double looked_s = began_s, hung_s = 0, hung_at_s = 0;
+  const auto look_for_hang = [&](double now_s) {
+    if (now_s - looked_s > kHungS) hung_s = now_s - looked_s, hung_at_s = now_s;
+    looked_s = now_s;
+  };
+  ForceGuard force(*parts_.arm, max_force_n.value_or(parts_.planner->limits().max_force_n), what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
+    look_for_hang(timing::HostNowS());
     const absl::Status stop = parts_.arm->Stop();
+    // Whether the watchdog had ended the program before cannot be told any more.
+    if (hung_s > 0 && timing::HostNowS() - hung_at_s < kAfterHangS)
+      Latch(absl::StrCat("by the gateway (it hung for ", ShortestNumber(std::round(10 * hung_s) / 10),
+                         " s during ", what, ", program ", program_id, ")"));
     if (!stop.ok())
       status = absl::Status(status.code(), absl::StrCat(status.message(), " (and: ", stop.message(), ")"));
     return status;
@@ -35,9 +52,11 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   for (;;) {
     const uint64_t changes = parts_.changes->count();
     const double now_s = timing::HostNowS();
+    look_for_hang(now_s);
     if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
+    if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     seen = seen || state->program_id == program_id;
     if (seen) {
       const absl::StatusOr<bool> over = done(*state);
@@ -80,7 +99,8 @@ absl::Status Rig::MayGoOn(const source::MotionGuard& guard) {
 
 absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,
                                                       const source::TouchCommand& command,
-                                                      const source::MotionGuard& guard) {
+                                                      const source::MotionGuard& guard,
+                                                      std::optional<session::JournalSeries>* series) {
   TouchRecording record;
   record.motion = plan.motion;
   record.motion.program_id = program_id;
@@ -128,6 +148,11 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
         return false;
       }));
 
+  // The arm's states are kept for half a minute only, and a line that loses frames may take its time below.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
+  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
+  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+
   // A finger without contact is certain only after the capture has ended and the device's record was read.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
@@ -135,9 +160,11 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState now, parts_.arm->State());
-  const double span_s = plan.motion.duration_s + 5 * options_.time_scale;
-  record.states = parts_.arm->History(now.controller_time_s - span_s, now.controller_time_s);
+  record.unix_minus_host_s = timing::UnixNowS() - timing::HostNowS();
+  if (command.series) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchSeries states, SeriesOf(record));
+    *series = session::JournalSeries{session::kSeriesEncoding, states.SerializeAsString()};
+  }
   return ResultOf(record);
 }
 

@@ -218,6 +218,8 @@ absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record) {
   // Of the approach's start on the device's clock: how well the states show it, and both clocks then.
   result.synchronisation_uncertainty_s = kNaN;
   if (synchronised) {
+    result.start_unix_s =
+        record.controller_clock.HostOf(approach.began_controller_s) + record.unix_minus_host_s;
     const double host_s = std::hypot(HostUncertaintyS(record.effector_clock, began_device_s),
                                      HostUncertaintyS(record.controller_clock, approach.began_controller_s),
                                      approach.began_controller_uncertainty_s / record.controller_clock.rate);

@@ -22,11 +22,12 @@ struct TouchRecording {
   timing::ClockEstimate effector_clock;    // device seconds on host seconds
   timing::ClockEstimate controller_clock;  // controller seconds on host seconds
   std::vector<arm::ArmState> states;       // of the whole touch, oldest first
+  double unix_minus_host_s = 0;            // wall clock less the host's time
   bool recovered = false;  // after an interruption, without states: times then count from the first contact
 };
 
-// Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds). Session and
-// Unix times stay 0. FAILED_PRECONDITION if the approach was not made at the commanded speed, by what the controller
+// Contact times since the approach began, poses at contact, speed, uncertainties (rig seconds), when it began (Unix
+// time; 0: unknown). The session time stays 0. FAILED_PRECONDITION if the approach was not made at the commanded speed, by what the controller
 // says or by its poses: times would not be comparable. UNAVAILABLE if too few states of it arrived.
 absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record);
 

@@ -37,6 +37,7 @@ struct Made {
     record.motion.end = Eigen::Isometry3d(Eigen::Translation3d(0.3, 0, 0.2));
     record.acceleration_m_s2 = kAcceleration;
     record.tick_hz = kTickHz;
+    record.unix_minus_host_s = 1e9;
     record.controller_clock = {true, 50, 87, 1 + 50e-6, 2e-5, 1e-7, 100, 1e-3};
     record.effector_clock = {true, 50, 1234, 1 - 120e-6, 1e-5, 1e-7, 100, 1e-3};
     for (int k = -50; k < 2000; ++k) {
@@ -69,6 +70,8 @@ TEST(TouchResult, ContactTimesCountFromWhenTheApproachBegan) {
   EXPECT_NEAR(result->fingers[0].contact_time_s, 1.2, 2e-6);
   EXPECT_NEAR(result->fingers[1].contact_time_s, 1.0, 2e-6);
   EXPECT_NEAR(result->fingers[2].contact_time_s, 2.5, 2e-6);
+  // Host time 50 is controller time 87.
+  EXPECT_NEAR(result->start_unix_s, 1e9 + 50 + 13.0013, 1e-3);
 }
 
 TEST(TouchResult, DifferencesAreInHostTimeWhateverTheEffectorsClockDoes) {

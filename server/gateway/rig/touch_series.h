@@ -8,9 +8,6 @@
 
 namespace touchstone::gateway {
 
-// How the journal names the encoding of a series: the serialised message.
-inline constexpr char kSeriesEncoding[] = "touchstone.v1.TouchSeries";
-
 // Every state of the approach; its times count from where the contact times of ResultOf(record) count from. The same
 // errors as ResultOf.
 absl::StatusOr<v1::TouchSeries> SeriesOf(const TouchRecording& record);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -13,6 +15,7 @@ namespace touchstone {
 namespace {
 
 constexpr int kMaxAttempts = 40;
+const std::string kIdPrefix = "touch ";
 constexpr uint64_t kCompareEvery = 500;  // the emulator keeps 10,000 touches
 constexpr double kLikenessS = 2e-3;  // as far as a result's differences may lie from those of its own touch
 
@@ -67,6 +70,7 @@ std::vector<double> TimesOf(const v1::TouchResult& result) {
 
 std::string EnduranceReport::Text() const {
   std::ostringstream text;
+  if (before > 0) text << before << " touches of earlier runs; then ";
   text << done << " touches done in " << host_s << " s (" << done / std::max(host_s, 1e-9) << "/s), "
        << attempts << " attempts, " << failed << " of them failed; " << made << " emulated touches\n"
        << "never done " << never << ", wrong " << wrong << ", changed when asked again " << changed << " of "
@@ -170,7 +174,7 @@ PhysicalTest::Answer Endurance::Broken(const v1::CommandedTouch& command, const 
 
 void Endurance::MakeTouch(uint64_t k) {
   const v1::CommandedTouch command = Command(k);
-  const std::string id = "touch " + std::to_string(k);
+  const std::string id = kIdPrefix + std::to_string(k);
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     ++report_.attempts;
     Answer answer;
@@ -271,12 +275,43 @@ void Endurance::CompareWithJournal() {
   report_.lost += answered_s_.size() - std::min(answered_s_.size(), seen.size());
 }
 
+void Endurance::TakeUpJournal() {
+  if (options_.journal.empty() || !std::filesystem::exists(options_.journal)) return;
+  const std::string path = folder_.Path("rig/rig.db");
+  std::filesystem::create_directories(folder_.Path("rig"));
+  std::filesystem::copy_file(options_.journal, path);
+  const auto journal = session::Journal::Open(path, session::Journal::Mode::kReadWrite);
+  if (!journal.ok()) return Remark(std::string(journal.status().message()));
+  const absl::Status read = (*journal)->ForEachTouch("test", [&](const session::JournalTouch& touch) {
+    first_ = std::max<uint64_t>(first_, std::strtoull(touch.id.c_str() + kIdPrefix.size(), nullptr, 10) + 1);
+    if (touch.stage != session::TouchStage::kDone) return true;
+    std::vector<double>& times_s = answered_s_[touch.id];
+    for (const session::JournalFinger& finger : touch.result.fingers)
+      times_s.push_back(finger.contact_time_s);
+    return true;
+  });
+  // On the new emulator's fixture lies nothing.
+  const absl::Status empty = (*journal)->SetMetadata({{"mounted_object", ""}, {"mounted_placement", ""}});
+  if (!read.ok() || !empty.ok()) Remark(std::string((read.ok() ? empty : read).message()));
+  report_.before = answered_s_.size();
+}
+
+void Endurance::LeaveJournal() {
+  if (options_.journal.empty()) return;
+  const std::string path = folder_.Path("rig/rig.db");
+  // Opened and closed, what stands in its log is in the file itself.
+  const absl::Status whole = session::Journal::Open(path, session::Journal::Mode::kReadWrite).status();
+  if (!whole.ok()) return Remark(std::string(whole.message()));
+  std::filesystem::copy_file(path, options_.journal, std::filesystem::copy_options::overwrite_existing);
+}
+
 void Endurance::NoteMemory(double* gateway_mb, double* own_mb) const {
   *own_mb = ResidentMb(getpid());
   *gateway_mb = options_.own_process ? ResidentMb(gateway_process()) : *own_mb;
 }
 
 EnduranceReport Endurance::Run(const std::function<void(const EnduranceReport&)>& progress) {
+  TakeUpJournal();
   StartRig([this](rig::EmulatorOptions* options) {
     options->speedup = options_.speedup;
     options->seed = options_.seed;
@@ -286,7 +321,7 @@ EnduranceReport Endurance::Run(const std::function<void(const EnduranceReport&)>
   NewLease();
   const double began_s = NowS();
   for (uint64_t k = 0; k < options_.touches; ++k) {
-    MakeTouch(k);
+    MakeTouch(first_ + k);
     const bool last = k + 1 == options_.touches;
     if ((k + 1) % kCompareEvery == 0 || last) {
       CompareWithTruth();
@@ -301,6 +336,7 @@ EnduranceReport Endurance::Run(const std::function<void(const EnduranceReport&)>
   lease_ = nullptr;
   options_.own_process ? KillGatewayProcess() : StopGateway();
   CompareWithJournal();
+  LeaveJournal();
   return report_;
 }
 

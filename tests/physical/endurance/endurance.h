@@ -22,9 +22,12 @@ struct EnduranceOptions {
   double fault_share = 0.1;      // of the attempts that something breaks in
   bool own_process = true;       // the gateway is a process, that may be killed; else it is in this one
   double repeated_share = 0.05;  // of the touches that are asked for once more when they are done
+  // A journal that an earlier run has left, which this one goes on with, and where it leaves its own. Empty: none.
+  std::string journal;
 };
 
 struct EnduranceReport {
+  uint64_t before = 0;    // ids with a result that an earlier run had left
   uint64_t done = 0;      // ids with a result
   uint64_t attempts = 0;  // calls that were meant to move
   uint64_t failed = 0;    // of them, without a result
@@ -78,6 +81,9 @@ class Endurance : public PhysicalTest {
   void Recover();
   void CompareWithTruth();
   void CompareWithJournal();
+  // The earlier run's journal into the rig's folder, and back at the end.
+  void TakeUpJournal();
+  void LeaveJournal();
   void Remark(const std::string& text);
   void NoteMemory(double* gateway_mb, double* own_mb) const;
 
@@ -87,6 +93,7 @@ class Endurance : public PhysicalTest {
   EnduranceReport report_;
   std::vector<Expected> pending_;  // since the last comparison
   std::map<std::string, std::vector<double>> answered_s_;
+  uint64_t first_ = 0;     // number of the first id that no earlier run has used
   uint64_t compared_ = 0;  // the number of the last emulated touch that was
   double usual_s_ = 0.1;   // host time of a touch
 };

@@ -10,7 +10,8 @@
 namespace {
 
 constexpr char kUsage[] =
-    "touchstone-rig-endurance endurance [TOUCHES [SPEEDUP [FAULT_SHARE [SEED]]]]\n"
+    "touchstone-rig-endurance endurance [TOUCHES [SPEEDUP [FAULT_SHARE [SEED [JOURNAL]]]]]\n"
+    "    JOURNAL: goes on with what an earlier run left there, and leaves its own\n"
     "touchstone-rig-endurance overhead [TOUCHES [SPEEDUP]]\n"
     "touchstone-rig-endurance cpu [SECONDS]\n"
     "touchstone-rig-endurance stop [REPEATS]\n"
@@ -28,6 +29,7 @@ int RunEndurance(int argc, char** argv) {
   options.speedup = Number(argc, argv, 3, options.speedup);
   options.fault_share = Number(argc, argv, 4, 0.02);
   options.seed = static_cast<uint64_t>(Number(argc, argv, 5, 1));
+  if (argc > 6) options.journal = argv[6];
   touchstone::Endurance endurance(options);
   const touchstone::EnduranceReport report = endurance.Run([](const touchstone::EnduranceReport& so_far) {
     std::printf("-- so far\n%s", so_far.Text().c_str());

@@ -1,4 +1,7 @@
 // The gateway's own time in a touch: what passes between what it hears and what it says, while the rig waits.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -97,6 +100,22 @@ absl::StatusOr<double> Overhead::FirstHeardS(const gateway::arm::ArmState& last,
   return absl::NotFoundError(std::string("no state has the phase ") + gateway::arm::PhaseName(phase));
 }
 
+// How long the disk itself takes for one: a page appended to a file in that folder, then fdatasync.
+std::vector<double> SyncTimesS(const std::string& folder) {
+  const std::string path = folder + "/sync";
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  const std::string page(4096, 'x');
+  std::vector<double> times_s;
+  for (int k = 0; k < 50 && file >= 0; ++k) {
+    const double began_s = gateway::timing::HostNowS();
+    if (write(file, page.data(), page.size()) < 0 || fdatasync(file) != 0) break;
+    times_s.push_back(gateway::timing::HostNowS() - began_s);
+  }
+  if (file >= 0) close(file);
+  unlink(path.c_str());
+  return times_s;
+}
+
 void PrintRow(const char* name, std::vector<double> times_s) {
   std::sort(times_s.begin(), times_s.end());
   const auto at = [&](double share) {
@@ -151,7 +170,9 @@ int Overhead::Measure(int touches, double speedup) {
   PrintRow("last contact known until retreat is on the wire", retreat_s);
   PrintRow("back at the start until answered (result)", after_s);
   PrintRow("**the gateway's own time, together**", all_s);
-  PrintRow("besides: the journal's disk (3 commits)", disk_s);
+  PrintRow("besides: the journal's disk (2 commits)", disk_s);
+  if (const std::vector<double> sync_s = SyncTimesS(folder_.Path("rig")); !sync_s.empty())
+    PrintRow("for comparison: one page and fdatasync, 50 times", sync_s);
   PrintRow("besides: the end effector's answers to arm and disarm", answers_s);
   PrintRow("a touch in all, host time", wall_s);
   made_rig_ = nullptr;

@@ -159,9 +159,9 @@ class StampedJournal : public session::Journal {
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override {
     return journal_->Failed(session, id, error);
   }
-  absl::Status AddFinished(const std::string& session,
-                           const std::vector<session::JournalTouch>& touches) override {
-    return journal_->AddFinished(session, touches);
+  absl::Status AddFinished(const std::string& session, const std::vector<session::JournalTouch>& touches,
+                           const std::vector<std::optional<session::JournalSeries>>& series) override {
+    return journal_->AddFinished(session, touches, series);
   }
   absl::StatusOr<std::optional<session::JournalTouch>> Find(const std::string& session,
                                                             const std::string& id) const override {

@@ -88,6 +88,16 @@ class EmulatedController : public Controller {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.ActualFlangeAt(clock_->NowS());
   }
+  std::string MoveByHand(const std::array<double, 6>& joints_rad) override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.MoveByHand(Joints(joints_rad.data()))
+               ? ""
+               : "the arm is not free: its brakes hold against the hand";
+  }
+  bool Free() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.free();
+  }
   bool Moving() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.Moving();

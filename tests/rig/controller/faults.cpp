@@ -14,16 +14,28 @@ struct Row {
   bool timed;  // the value is a length in host seconds that runs from when it was set
 };
 constexpr Row kRows[] = {
-    {"drop_bytes", Range::kProbability, 0, false},      {"corrupt_bytes", Range::kProbability, 0, false},
-    {"duplicate_bytes", Range::kProbability, 0, false}, {"unplug", Range::kPositive, 0, true},
-    {"line_delay_ms", Range::kPositive, 0, false},      {"stuck_finger", Range::kFinger, -1, false},
-    {"missing_finger", Range::kFinger, -1, false},      {"bounce", Range::kSwitch, 0, false},
-    {"clock_drift_ppm", Range::kSigned, 0, false},      {"late_packets_ms", Range::kPositive, 0, false},
-    {"skip_packets", Range::kProbability, 0, false},    {"freeze", Range::kPositive, 0, true},
-    {"disconnect", Range::kSwitch, 0, false},           {"protective_stop", Range::kSwitch, 0, false},
-    {"emergency_stop", Range::kSwitch, 0, false},       {"speed_scaling", Range::kProbability, 1, false},
-    {"speed_slider", Range::kProbability, 1, false},    {"local_control", Range::kSwitch, 0, false},
-    {"stale_frame", Range::kSwitch, 0, false},          {"camera_unplug", Range::kPositive, 0, true},
+    {"drop_bytes", Range::kProbability, 0, false},
+    {"corrupt_bytes", Range::kProbability, 0, false},
+    {"duplicate_bytes", Range::kProbability, 0, false},
+    {"unplug", Range::kPositive, 0, true},
+    {"line_delay_ms", Range::kPositive, 0, false},
+    {"stuck_finger", Range::kFinger, -1, false},
+    {"missing_finger", Range::kFinger, -1, false},
+    {"bounce", Range::kSwitch, 0, false},
+    {"clock_drift_ppm", Range::kSigned, 0, false},
+    {"late_packets_ms", Range::kPositive, 0, false},
+    {"skip_packets", Range::kProbability, 0, false},
+    {"freeze", Range::kPositive, 0, true},
+    {"disconnect", Range::kSwitch, 0, false},
+    {"protective_stop", Range::kSwitch, 0, false},
+    {"emergency_stop", Range::kSwitch, 0, false},
+    {"speed_scaling", Range::kProbability, 1, false},
+    {"speed_slider", Range::kProbability, 1, false},
+    {"local_control", Range::kSwitch, 0, false},
+    {"stale_frame", Range::kSwitch, 0, false},
+    {"camera_unplug", Range::kPositive, 0, true},
+    {"finger_stiffness", Range::kPositive, 0.05, false},
+    {"force_offset_n", Range::kSigned, 0, false},
 };
 
 const Row* Find(const std::string& name) {

@@ -50,6 +50,18 @@ ArmGeometry GeometryOf(const std::string& model) {
   return arm;
 }
 
+ArmGeometry CalibratedGeometry(ArmGeometry arm) {
+  const std::array<double, 6> a{2e-4, 8e-4, -6e-4, 1e-4, -1e-4, 0}, d{3e-4, 0.7, -0.7, 2e-4, 4e-4, -2e-4},
+      alpha{1e-3, 0, 0, -8e-4, 6e-4, 0}, theta{0, 1.5e-3, -2e-3, 7e-4, 1e-3, -5e-4};
+  for (int i = 0; i < 6; ++i) {
+    arm.a_m[i] += a[i];
+    arm.d_m[i] += d[i];
+    arm.alpha_rad[i] += alpha[i];
+    arm.theta_rad[i] += theta[i];
+  }
+  return arm;
+}
+
 Eigen::Isometry3d BaseFromFlange(const ArmGeometry& arm, const Joints& joints) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (int i = 0; i < 6; ++i) pose = pose * Link(arm, i, joints[i]);

@@ -24,6 +24,10 @@ struct ArmGeometry {
 // "ur3" or "ur3e" without a calibration delta. Throws std::runtime_error for another name.
 ArmGeometry GeometryOf(const std::string& model);
 
+// The same arm with deltas as a factory's calibration leaves them: up to 1 mm and 2 mrad; those of d along the parallel
+// axes 2 and 3 are large and cancel each other.
+ArmGeometry CalibratedGeometry(ArmGeometry arm);
+
 Eigen::Isometry3d BaseFromFlange(const ArmGeometry& arm, const Joints& joints);
 // Columns: linear (3), angular (3) velocity of the flange's origin per joint speed, base frame.
 Eigen::Matrix<double, 6, 6> Jacobian(const ArmGeometry& arm, const Joints& joints);

@@ -23,7 +23,8 @@ Machine::Machine(const ControllerOptions& options, Faults* faults, TipListener* 
     : options_(options),
       faults_(faults),
       tip_(tip),
-      geometry_(GeometryOf(options.model)),
+      geometry_(options.calibrated ? CalibratedGeometry(GeometryOf(options.model))
+                                   : GeometryOf(options.model)),
       cycle_s_(options.model == "ur3" ? 0.008 : 0.002),
       random_(options.seed) {
   for (int i = 0; i < 6; ++i) joints_[i] = options.joints_rad[i];

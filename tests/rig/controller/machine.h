@@ -136,6 +136,10 @@ class Machine : public ScriptHost {
     return payload_cog_m_.value_or(Eigen::Vector3d(flange_from_tip_.translation()));
   }
   double payload_kg() const { return payload_kg_; }
+  void SetFreedrive(bool on);
+  bool free() const { return free_; }
+  bool MoveByHand(const Joints& joints);  // false: it is not free
+  bool e_series() const { return options_.model != "ur3"; }
   void SetWatchdog(const std::string& variable, double min_hz, const std::string& action);
   void WriteOutput(int index, int32_t value);
   void WriteOutput(int index, double value);
@@ -193,6 +197,7 @@ class Machine : public ScriptHost {
   int robot_mode_ = kPowerOff, safety_mode_ = kNormal;
   double stopped_at_s_ = -1e9;
   bool emergency_ = false, frozen_ = false;
+  bool free_ = false;  // for a hand, while the program runs that asked for it
   double frozen_at_s_ = 0;
   std::vector<std::pair<double, int>> safety_history_;
   std::vector<std::pair<double, std::function<void()>>> later_;

@@ -205,4 +205,16 @@ Outcome Machine::StopMotion(double deceleration) {
   return {Outcome::Wait::kRest, {}, 0};
 }
 
+void Machine::SetFreedrive(bool on) {
+  if (on) RequireReady();
+  if (on && motion_) throw ScriptError("the robot moves: it cannot be freed");
+  free_ = on;
+}
+
+bool Machine::MoveByHand(const Joints& joints) {
+  if (!free_ || motion_) return false;
+  joints_ = joints;
+  return true;
+}
+
 }  // namespace touchstone::rig

@@ -86,6 +86,7 @@ void Machine::EndProgram() {
   Announce({Announcement::kKey, "PROGRAM_XXX_STOPPED", script_->program().name});
   script_.reset();
   watchdogs_.clear();
+  free_ = false;
   paused_ = false;
   if (motion_) motion_->thread = -1;
   changed_ = true;

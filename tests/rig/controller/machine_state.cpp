@@ -79,6 +79,14 @@ RobotState Machine::State() {
     state.actual_tcp_force[i] = noise(options_.position_noise_m > 0 ? (i < 3 ? 0.3 : 0.01) : 0);
   }
 
+  // The fingers are springs; what they press back with acts on the tip against its axis.
+  const Eigen::Isometry3d pressing = BaseFromFlange(geometry_, actual.q) * flange_from_tip_;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  if (tip_ && faults_)
+    force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * pressing.linear().col(2);
+  if (faults_) force.z() -= faults_->Get("force_offset_n");
+  state.actual_tcp_force.head<3>() += force;
+
   state.robot_mode = robot_mode_;
   state.safety_mode = safety_mode_;
   state.runtime_state =

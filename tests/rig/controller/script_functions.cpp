@@ -104,6 +104,29 @@ const std::vector<BuiltinRow>& MainRows() {
          return Outcome{};
        }},
       {{"set_gravity", {"d"}, 1}, Nothing},
+      // A hand may move the arm. The first pair is of the e-Series, the second of both series (script manuals).
+      {{"freedrive_mode", {"freeAxes", "feature"}, 0},
+       [](Machine& m, const Arguments&, int) {
+         if (!m.e_series()) throw ScriptError("freedrive_mode is not known to a CB3; teach_mode is");
+         m.SetFreedrive(true);
+         return Outcome{};
+       }},
+      {{"end_freedrive_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         if (!m.e_series()) throw ScriptError("end_freedrive_mode is not known to a CB3; end_teach_mode is");
+         m.SetFreedrive(false);
+         return Outcome{};
+       }},
+      {{"teach_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         m.SetFreedrive(true);
+         return Outcome{};
+       }},
+      {{"end_teach_mode", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         m.SetFreedrive(false);
+         return Outcome{};
+       }},
       // What the arm does.
       {{"get_actual_tcp_pose", {}, 0},
        [](Machine& m, const Arguments&, int) {

@@ -263,6 +263,7 @@ double Fingers::OnProgress(uint64_t number, double now_s, double distance_m,
   if (number != motion_ || !approach_) return 0;
   const double position_m = offset_m_ + along_ * distance_m;
   double push_m = 0;
+  indentation_m_ = 0;
   for (size_t i = 0; i < approach_->fingers.size(); ++i) {
     Plan& finger = approach_->fingers[i];
     if (!finger.hit) continue;
@@ -271,7 +272,9 @@ double Fingers::OnProgress(uint64_t number, double now_s, double distance_m,
       Contact(i, TimeOf((finger.contact_m - offset_m_) / along_, last_progress_s_, now_s, distance_at));
     else if (along_ < 0 && finger.pressed && position_m <= free_m)
       Release(i, TimeOf((free_m - offset_m_) / along_, last_progress_s_, now_s, distance_at), now_s);
-    if (finger.pressed) push_m = std::max(push_m, position_m - finger.contact_m);
+    if (!finger.pressed) continue;
+    push_m = std::max(push_m, position_m - finger.contact_m);
+    indentation_m_ += std::max(0.0, position_m - finger.contact_m);
   }
   last_progress_s_ = now_s, last_distance_m_ = distance_m;
   return push_m;

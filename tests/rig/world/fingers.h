@@ -77,6 +77,10 @@ class Fingers : public TipListener {
   double OnProgress(uint64_t number, double now_s, double distance_m,
                     const std::function<double(double)>& distance_at) override;
   void OnMotionEnded(uint64_t number, double now_s) override;
+  double IndentationM() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return indentation_m_;
+  }
 
  private:
   // Chance, a stream for each purpose; copied with the rig, so that an approach in the air changes nothing.
@@ -133,6 +137,7 @@ class Fingers : public TipListener {
   // what a metre of it adds.
   uint64_t motion_ = 0;
   double offset_m_ = 0, along_ = 0, last_progress_s_ = 0, last_distance_m_ = 0;
+  double indentation_m_ = 0;
 };
 
 }  // namespace touchstone::rig

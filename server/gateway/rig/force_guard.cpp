@@ -1,0 +1,57 @@
+#include "server/gateway/rig/force_guard.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace touchstone::gateway {
+namespace {
+
+constexpr double kRestMS = 2e-3;                // slower than any motion but the slowest approaches
+constexpr double kRestS = 0.2, kLongRestS = 2;  // rig time that states at rest are looked for in
+constexpr double kMaxRestShare = 0.5;           // of the limit
+
+}  // namespace
+
+ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what)
+    : arm_(arm), max_force_n_(max_force_n), what_(std::move(what)) {
+  const absl::StatusOr<arm::ArmState> now = arm.State();
+  if (!now.ok()) return;  // whoever watches the motion finds that too
+  seen_s_ = now->controller_time_s;
+  for (const double span_s : {kRestS, kLongRestS}) {
+    Eigen::Vector3d sum_n = Eigen::Vector3d::Zero();
+    int count = 0;
+    for (const arm::ArmState& state : arm.History(seen_s_ - span_s, seen_s_)) {
+      if (state.tip_velocity_m_s.norm() > kRestMS) continue;
+      sum_n += state.tip_force_n;
+      ++count;
+    }
+    if (count == 0) continue;
+    at_rest_n_ = sum_n / count;
+    break;
+  }
+  const double most_n = kMaxRestShare * max_force_n_;
+  if (at_rest_n_.norm() > most_n) at_rest_n_ *= most_n / at_rest_n_.norm();
+}
+
+absl::Status ForceGuard::Check(const arm::ArmState& newest) {
+  for (const arm::ArmState& state : arm_.History(seen_s_, newest.controller_time_s))
+    if (absl::Status light = CheckState(state); !light.ok()) return light;
+  seen_s_ = std::max(seen_s_, newest.controller_time_s);
+  return CheckState(newest);
+}
+
+absl::Status ForceGuard::CheckState(const arm::ArmState& state) const {
+  const double force_n = (state.tip_force_n - at_rest_n_).norm();
+  if (force_n <= max_force_n_) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "%s pressed with %.1f N on the tip, beyond the %.1f N that were felt at rest before it; at most %.1f N "
+      "(limits.max_force_n): it was stopped. Find out what it ran into; with nothing there, set "
+      "limits.payload_kg and "
+      "its centre of gravity right",
+      what_, force_n, at_rest_n_.norm(), max_force_n_));
+}
+
+}  // namespace touchstone::gateway
