@@ -19,7 +19,7 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
   const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
-  const uint32_t program_id = NextProgramId();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
   TOUCHSTONE_RETURN_IF_ERROR(
       journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")));
   audit().Write("freedrive", {{"program", std::to_string(program_id)}}).IgnoreError();
