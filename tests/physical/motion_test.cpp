@@ -85,7 +85,11 @@ TEST_F(Motion, APayloadThatIsSetALittleWrongTripsNoForceGuard) {
 
 TEST_F(Motion, ThereIsAWayHomeFromEveryTouchOnBothArms) {
   for (const std::string arm : {"ur3", "ur3e"}) {
-    StartRig([&](rig::EmulatorOptions* options) { options->arm = arm; });
+    // A journal of its own: the other rig's motions are not under way here.
+    StartRig([&](rig::EmulatorOptions* options) {
+      options->arm = arm;
+      options->dir = folder_.Path("rig " + arm);
+    });
     StartGateway();
     KeptLease lease(control_.get(), "client", true);
     for (int which = 0; which < 12; ++which) {

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "server/base/units.h"
-#include "server/gateway/arm/cartesian_speed.h"
 #include "server/gateway/arm/line_check.h"
 #include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
@@ -350,40 +349,6 @@ TEST(MotionPlanner, NoPartOfTheArmIsFasterThanItMay) {
   touch.speed_m_s = 0.08;
   ExpectRefused(Rig("ur3e", limits).Plan(touch), absl::StatusCode::kOutOfRange,
                 {"the approach at 80.0 mm/s", "at most 50 mm/s (max_arm_speed_mm_s)"});
-}
-
-// Between two samples the elbow of a nearly stretched arm turns much faster than from one to the other; the controller
-// stops protectively for it.
-TEST(MotionPlanner, SpeedsHoldBetweenTheSamplesNearAStretchedElbow) {
-  const Rig rig("ur3e");
-  const ArmBody body(rig.limits, Fixture());
-  const Eigen::Isometry3d tip_from_flange = Fixture().flange_from_tip.inverse();
-  Joints bent = rig.limits.home_rad;
-  int looked = 0;
-  for (double elbow = 0.12; elbow > 0.01; elbow *= 0.7) {
-    bent[2] = -elbow, bent[3] = -kPi / 2 - bent[1] - bent[2];
-    const Eigen::Isometry3d to = rig.check.TipAt(bent);
-    Eigen::Isometry3d from = to;
-    from.translation() -=
-        0.06 * Eigen::Vector3d(to.translation().x(), to.translation().y(), 0.2).normalized();
-    Joints begin;
-    if (!rig.check.JointsAt(from, bent, &begin) || Farthest(begin, bent) > 1) continue;
-    ++looked;
-    Joints joints = begin;
-    const double speed_m_s =
-        LimitedCartesianSpeed(rig.kinematics, body, tip_from_flange, from, to, 0.15, &joints);
-    Joints before = begin;
-    for (int k = 1; k <= 2000; ++k) {
-      Joints now;
-      ASSERT_TRUE(rig.check.JointsAt(PoseBetween(from, to, k / 2000.0), before, &now));
-      for (size_t i = 0; i < 6; ++i)
-        ASSERT_LT(std::abs(now[i] - before[i]) / (0.06 / speed_m_s / 2000),
-                  rig.kinematics.model().max_joint_speed_rad_s[i])
-            << "joint " << i << ", elbow ends at " << elbow << ", at " << k / 2000.0;
-      before = now;
-    }
-  }
-  EXPECT_GE(looked, 5);
 }
 
 TEST(MotionPlanner, TellsOfTheSingularityThatAPlanComesNearTo) {
