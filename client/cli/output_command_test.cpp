@@ -109,6 +109,7 @@ std::vector<OutputCase> Cases() {
        ".csv",
        {"plan.csv"},
        false},
+      {"RigTeach", {"rig", "teach", "-o", "OUT", "--server", kNowhere, "--wait-s", "0"}, ".csv", {}, false},
       {"RigCalibrateFlat",
        {"rig", "calibrate", "flat", "--from", "session.db", "-o", "OUT"},
        ".yaml",

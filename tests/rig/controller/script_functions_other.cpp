@@ -25,8 +25,7 @@ bool Reaches(const Machine& machine, const Value& target) {
   return !AllInverse(machine.geometry(), FromPose(six) * machine.flange_from_tip().inverse(), near).empty();
 }
 
-constexpr char kForceMode[] = "force_mode", kFreedriveMode[] = "freedrive_mode", kTeachMode[] = "teach_mode",
-               kServoj[] = "servoj", kServoc[] = "servoc", kSpeedj[] = "speedj",
+constexpr char kForceMode[] = "force_mode", kServoj[] = "servoj", kServoc[] = "servoc", kSpeedj[] = "speedj",
                kToolContact[] = "tool_contact", kHistory[] = "get_actual_joint_positions_history",
                kWaypoint[] = "get_target_waypoint", kExternalSensor[] = "enable_external_ft_sensor",
                kRtdeSensor[] = "ft_rtde_input_enable";
@@ -55,7 +54,8 @@ std::vector<BuiltinRow> OtherBuiltins() {
        [](Machine&, const Arguments&, int) {
          return Result(Value::Vector(Vector6(Vector6::Zero()), Value::Kind::kList));
        }},
-      {{"get_freedrive_status", {}, 0}, [](Machine&, const Arguments&, int) { return Number(0); }},
+      {{"get_freedrive_status", {}, 0},
+       [](Machine& m, const Arguments&, int) { return Number(m.free() ? 1 : 0); }},
       {{"protective_stop", {}, 0},
        [](Machine& m, const Arguments&, int) {
          m.RequestProtectiveStop();
@@ -63,14 +63,10 @@ std::vector<BuiltinRow> OtherBuiltins() {
        }},
       {{"zero_ftsensor", {}, 0}, Nothing},
       {{"end_force_mode", {}, 0}, Nothing},
-      {{"end_freedrive_mode", {}, 0}, Nothing},
-      {{"end_teach_mode", {}, 0}, Nothing},
       {{"force_mode_set_damping", {"damping"}, 1}, Nothing},
       {{"force_mode_set_gain_scaling", {"scaling"}, 1}, Nothing},
       {{kForceMode, {"task_frame", "selection_vector", "wrench", "type", "limits"}, 5},
        NotEmulated<kForceMode>},
-      {{kFreedriveMode, {"freeAxes", "feature"}, 0}, NotEmulated<kFreedriveMode>},
-      {{kTeachMode, {}, 0}, NotEmulated<kTeachMode>},
       {{kServoj, {"q", "a", "v", "t", "lookahead_time", "gain"}, 1}, NotEmulated<kServoj>},
       {{kServoc, {"pose", "a", "v", "r"}, 1}, NotEmulated<kServoc>},
       {{kSpeedj, {"qd", "a", "t"}, 1}, NotEmulated<kSpeedj>},
