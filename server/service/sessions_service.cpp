@@ -79,4 +79,13 @@ grpc::Status SessionsService::DeleteSession(grpc::ServerContext*, const v1::Dele
   return ToGrpc(status);
 }
 
+grpc::Status SessionsService::RestoreSession(grpc::ServerContext*, const v1::RestoreSessionRequest* request,
+                                             v1::Session*) {
+  if (request->name().empty())
+    return {grpc::StatusCode::INVALID_ARGUMENT, "name: say which session is to come back"};
+  return {grpc::StatusCode::UNIMPLEMENTED,
+          "a touchstone-server has no trash, so a session that was deleted here is gone; a "
+          "touchstone-gateway has one"};
+}
+
 }  // namespace touchstone::service

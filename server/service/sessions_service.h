@@ -19,6 +19,8 @@ class SessionsService final : public v1::Sessions::Service {
                              grpc::ServerWriter<v1::ExportSessionResponse>*) override;
   grpc::Status DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest*,
                              v1::DeleteSessionResponse*) override;
+  // UNIMPLEMENTED: there is no trash here.
+  grpc::Status RestoreSession(grpc::ServerContext*, const v1::RestoreSessionRequest*, v1::Session*) override;
 
  private:
   absl::Status DoCreate(grpc::ServerContext* context, grpc::ServerReader<v1::CreateSessionRequest>* reader,

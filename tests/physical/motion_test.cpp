@@ -76,8 +76,8 @@ TEST_F(Motion, ForceBeyondTheLimitStopsTheTouchAndIsToldWithTheLimit) {
 
 TEST_F(Motion, APayloadThatIsSetALittleWrongTripsNoForceGuard) {
   StartRig();
-  ASSERT_EQ(emulator_->faults().Set("force_offset_n", 10), "");
-  StartGateway({"--limits-max-force-n", "8"});
+  ASSERT_EQ(emulator_->faults().Set("force_offset_n", 25), "");
+  StartGateway({"--limits-max-force-n", "20"});
   KeptLease lease(control_.get(), "client", true);
   const Answer answer = Touch(lease.token(), FromAbove(), "offset");
   EXPECT_TRUE(answer.status.ok()) << answer.status.error_message();

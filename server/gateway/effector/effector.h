@@ -32,7 +32,7 @@ struct EffectorOptions {
   std::string port;  // "/dev/ttyACM0"
   int baud = 115200;
   std::vector<EffectorFinger> fingers = std::vector<EffectorFinger>(3);
-  double reply_timeout_s = 0.05;  // of one try, well within the period of the arm's watchdog; tried 20 times
+  double reply_timeout_s = 0.05;  // of one try, well within the period of the arm's watchdog; tried 60 times
   double silence_s = 1.0;         // without a heartbeat: the line is lost
   // Between two queries of its clock: among more of them there are shorter delays. At 0.02 the queries and their answers
   // take a fifth of a line of 115200 baud.

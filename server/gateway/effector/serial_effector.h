@@ -96,7 +96,7 @@ class SerialEffector : public Effector {
   absl::Status Request(std::function<absl::Status()> work,
                        const std::function<absl::Status()>& guard = nullptr);
 
-  static constexpr int kTries = 20;          // of a request
+  static constexpr int kTries = 60;          // of a request
   static constexpr double kClockSlackS = 1;  // by which a device time may seem wrong, in host seconds
 
   const EffectorOptions options_;

@@ -142,6 +142,10 @@ const std::vector<BuiltinRow>& MainRows() {
        [](Machine& m, const Arguments&, int) {
          return Result(Value::Vector(m.JointsAt(m.now_s()), Value::Kind::kList));
        }},
+      {{"get_target_tcp_speed", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         return Result(Value::Vector(m.State().target_tcp_speed, Value::Kind::kList));
+       }},
       {{"get_actual_tcp_speed", {}, 0},
        [](Machine& m, const Arguments&, int) {
          return Result(Value::Vector(m.State().actual_tcp_speed, Value::Kind::kList));

@@ -54,6 +54,22 @@ std::vector<BuiltinRow> OtherBuiltins() {
        [](Machine&, const Arguments&, int) {
          return Result(Value::Vector(Vector6(Vector6::Zero()), Value::Kind::kList));
        }},
+      {{"get_target_payload", {}, 0},
+       [](Machine& m, const Arguments&, int) { return Number(m.payload_kg()); }},
+      {{"get_target_payload_cog", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         const Eigen::Vector3d cog_m = m.PayloadCog();
+         return Result(
+             Value::List({Value::Number(cog_m.x()), Value::Number(cog_m.y()), Value::Number(cog_m.z())}));
+       }},
+      {{"get_target_payload_inertia", {}, 0},
+       [](Machine&, const Arguments&, int) {
+         return Result(Value::Vector(Vector6(Vector6::Zero()), Value::Kind::kList));
+       }},
+      {{"get_target_joint_accelerations", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         return Result(Value::Vector(m.State().target_qdd, Value::Kind::kList));
+       }},
       {{"get_freedrive_status", {}, 0},
        [](Machine& m, const Arguments&, int) { return Number(m.free() ? 1 : 0); }},
       {{"protective_stop", {}, 0},
