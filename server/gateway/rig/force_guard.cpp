@@ -12,11 +12,12 @@ namespace {
 constexpr double kRestMS = 2e-3;                // slower than any motion but the slowest approaches
 constexpr double kRestS = 0.2, kLongRestS = 2;  // rig time that states at rest are looked for in
 constexpr double kMaxRestShare = 0.5;           // of the limit
+constexpr double kReleaseShare = 0.25;          // of the limit, by which the force may grow while it lets go
 
 }  // namespace
 
 ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what)
-    : arm_(arm), max_force_n_(max_force_n), what_(std::move(what)) {
+    : arm_(arm), max_force_n_(max_force_n), allowed_n_(max_force_n), what_(std::move(what)) {
   const absl::StatusOr<arm::ArmState> now = arm.State();
   if (!now.ok()) return;  // whoever watches the motion finds that too
   seen_s_ = now->controller_time_s;
@@ -32,8 +33,10 @@ ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what
     at_rest_n_ = sum_n / count;
     break;
   }
+  const Eigen::Vector3d felt_n = at_rest_n_;
   const double most_n = kMaxRestShare * max_force_n_;
   if (at_rest_n_.norm() > most_n) at_rest_n_ *= most_n / at_rest_n_.norm();
+  allowed_n_ = std::max(max_force_n_, (felt_n - at_rest_n_).norm() + kReleaseShare * max_force_n_);
 }
 
 absl::Status ForceGuard::Check(const arm::ArmState& newest) {
@@ -43,9 +46,12 @@ absl::Status ForceGuard::Check(const arm::ArmState& newest) {
   return CheckState(newest);
 }
 
-absl::Status ForceGuard::CheckState(const arm::ArmState& state) const {
+absl::Status ForceGuard::CheckState(const arm::ArmState& state) {
   const double force_n = (state.tip_force_n - at_rest_n_).norm();
-  if (force_n <= max_force_n_) return absl::OkStatus();
+  if (force_n <= allowed_n_) {
+    allowed_n_ = std::max(max_force_n_, std::min(allowed_n_, force_n + kReleaseShare * max_force_n_));
+    return absl::OkStatus();
+  }
   return absl::FailedPreconditionError(absl::StrFormat(
       "%s pressed with %.1f N on the tip, beyond the %.1f N that were felt at rest before it; at most %.1f N "
       "(limits.max_force_n): it was stopped. Find out what it ran into; with nothing there, set "

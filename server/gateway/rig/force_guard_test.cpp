@@ -78,7 +78,28 @@ TEST(ForceGuard, TakesNoMoreThanHalfTheLimitForAnOffset) {
   arm.Add(1, 0, {0, 0, 40});
   ForceGuard guard(arm, 25, "a motion");
   EXPECT_NEAR(guard.at_rest_n().norm(), 12.5, 1e-9);
+  arm.Add(1.002, 0.02, {0, 0, 48});
   EXPECT_FALSE(guard.Check(*arm.State()).ok());
+}
+
+// After a stop by the guard the fingers are pressed: the way out must not be one that it forbids.
+TEST(ForceGuard, LetsGoOfWhatAMotionBeganAgainstButNeverPressesHarder) {
+  StatesOnly arm;
+  arm.Add(1, 0, {0, 0, 44});
+  ForceGuard guard(arm, 25, "a motion");
+  double time_s = 1;
+  for (const double force_n : {44.0, 46.0, 40.0, 20.0, 2.0}) {
+    arm.Add(time_s += 0.002, 0.02, {0, 0, force_n});
+    EXPECT_TRUE(guard.Check(*arm.State()).ok()) << force_n;
+  }
+  arm.Add(time_s += 0.002, 0.02, {0, 0, 39});
+  EXPECT_FALSE(guard.Check(*arm.State()).ok()) << "once it had let go, the limit holds: 26.5 N beyond 12.5 N";
+
+  StatesOnly pressed;
+  pressed.Add(1, 0, {0, 0, 44});
+  ForceGuard harder(pressed, 25, "a motion");
+  pressed.Add(1.002, 0.02, {0, 0, 51});
+  EXPECT_FALSE(harder.Check(*pressed.State()).ok());
 }
 
 }  // namespace
