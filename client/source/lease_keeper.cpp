@@ -1,6 +1,7 @@
 #include "client/source/lease_keeper.h"
 
 #include <absl/strings/str_cat.h>
+#include <pwd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -31,6 +32,18 @@ Clock::duration Seconds(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+// The login name; "uid1000" where a user has none, as in a container.
+std::string UserName() {
+  for (const char* variable : {"LOGNAME", "USER"})
+    if (const char* name = std::getenv(variable); name != nullptr && *name != '\0') return name;
+  passwd entry{};
+  passwd* found = nullptr;
+  char text[4096];
+  if (::getpwuid_r(::getuid(), &entry, text, sizeof text, &found) == 0 && found != nullptr)
+    return found->pw_name;
+  return absl::StrCat("uid", ::getuid());
+}
+
 // One unary call that ends within `seconds`.
 template <typename Request, typename Response>
 absl::StatusOr<Response> CallWithin(double seconds,
@@ -56,9 +69,6 @@ void SetHolderProgram(const std::string& program) {
 std::string LeaseHolder() {
   char host[256] = "";
   ::gethostname(host, sizeof host - 1);
-  const char* user = std::getenv("USER");
-  if (user == nullptr || *user == '\0') user = std::getenv("LOGNAME");
-  const std::string who = user != nullptr && *user != '\0' ? user : absl::StrCat("uid", ::getuid());
   const std::string process = absl::StrCat(" ", ::getpid());
   std::string program;
   {
@@ -66,7 +76,7 @@ std::string LeaseHolder() {
     program = holder_program.empty() ? ::program_invocation_short_name : holder_program;
   }
   // The process tells two programs apart, so it is never cut.
-  return absl::StrCat(who, "@", host[0] != '\0' ? host : "localhost", " ", program)
+  return absl::StrCat(UserName(), "@", host[0] != '\0' ? host : "localhost", " ", program)
              .substr(0, kMaxHolderBytes - process.size()) +
          process;
 }
