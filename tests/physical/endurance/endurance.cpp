@@ -190,6 +190,8 @@ void Endurance::MakeTouch(uint64_t k) {
       ++report_.failed;
       ++report_.failures[std::to_string(answer.status.error_code()) + " " +
                          answer.status.error_message().substr(0, 60)];
+      // What a fault has taken away needs its time to come back, on a busy machine more.
+      SleepS(0.01 * (1 << std::min(attempt, 7)));
       continue;
     }
     ++report_.done;
