@@ -98,11 +98,11 @@ void TryAlong(const Bench& bench, const ArmState& from, const PlannedTouch& plan
   }
 }
 
-// The whole grid takes minutes under a sanitizer: there a part of it has to do.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kSpots = 1, kSides = 2;
-#else
+// Without optimisation or under a sanitizer the whole grid takes minutes: there a part of it has to do.
+#ifdef NDEBUG
 constexpr int kSpots = 4, kSides = 8;
+#else
+constexpr int kSpots = 1, kSides = 2;
 #endif
 
 TEST(HomePath, LeadsHomeFromEveryTouchEveryStopAndEveryFace) {
