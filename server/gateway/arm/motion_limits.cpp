@@ -45,19 +45,19 @@ absl::Status CheckJoints(const MotionLimits& limits, const ArmModel& model) {
 }  // namespace
 
 absl::Status CheckMotionLimits(const MotionLimits& limits, const ArmModel& model) {
-  constexpr double kMinSpeedMS = 1e-6, kMinTransitMS = 1e-3, kMinLengthM = 1e-3, kMost = 10;
-  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("min_speed_m_s", limits.min_speed_m_s, kMinSpeedMS, kMost));
+  constexpr double kMinSpeedMS = 1e-6, kMinTransitMS = 1e-3, kMinLengthM = 1e-3, kMaxLimit = 10;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("min_speed_m_s", limits.min_speed_m_s, kMinSpeedMS, kMaxLimit));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckBetween("max_speed_m_s", limits.max_speed_m_s, limits.min_speed_m_s, kMost));
+      CheckBetween("max_speed_m_s", limits.max_speed_m_s, limits.min_speed_m_s, kMaxLimit));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckBetween("transit_speed_m_s", limits.transit_speed_m_s, kMinTransitMS, kMost));
+      CheckBetween("transit_speed_m_s", limits.transit_speed_m_s, kMinTransitMS, kMaxLimit));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckBetween("max_arm_speed_m_s", limits.max_arm_speed_m_s, kMinTransitMS, kMost));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("acceleration_m_s2", limits.acceleration_m_s2, 1e-2, kMost));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("max_standoff_m", limits.max_standoff_m, kMinLengthM, kMost));
+      CheckBetween("max_arm_speed_m_s", limits.max_arm_speed_m_s, kMinTransitMS, kMaxLimit));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("acceleration_m_s2", limits.acceleration_m_s2, 1e-2, kMaxLimit));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("max_standoff_m", limits.max_standoff_m, kMinLengthM, kMaxLimit));
   TOUCHSTONE_RETURN_IF_ERROR(
-      CheckBetween("stroke_beyond_target_m", limits.stroke_beyond_target_m, 1e-4, kMost));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("clearance_m", limits.clearance_m, kMinLengthM, kMost));
+      CheckBetween("stroke_beyond_target_m", limits.stroke_beyond_target_m, 1e-4, kMaxLimit));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("clearance_m", limits.clearance_m, kMinLengthM, kMaxLimit));
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween("arm_margin_m", limits.arm_margin_m, 0, 0.5));
   // Twice its error would trip it; beyond its range nothing is measured.
   TOUCHSTONE_RETURN_IF_ERROR(

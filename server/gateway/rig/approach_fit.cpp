@@ -136,10 +136,10 @@ void Fitter::MeasureSpeed(double began_s) {
     residuals.clear();
     for (const ApproachState& state : level)
       residuals.push_back(state.distance_m - distance_m - slope * (state.time_s - time_s));
-    const double most_m = kOutlier * RobustDeviation(residuals);
+    const double limit_m = kOutlier * RobustDeviation(residuals);
     std::vector<ApproachState> kept;
     for (size_t i = 0; i < level.size(); ++i)
-      if (std::abs(residuals[i]) <= most_m) kept.push_back(level[i]);
+      if (std::abs(residuals[i]) <= limit_m) kept.push_back(level[i]);
     if (kept.size() == level.size() || kept.size() < kMinApproachStates) break;
     level = std::move(kept);
   }

@@ -34,8 +34,8 @@ ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what
     break;
   }
   const Eigen::Vector3d felt_n = at_rest_n_;
-  const double most_n = kMaxRestShare * max_force_n_;
-  if (at_rest_n_.norm() > most_n) at_rest_n_ *= most_n / at_rest_n_.norm();
+  const double limit_n = kMaxRestShare * max_force_n_;
+  if (at_rest_n_.norm() > limit_n) at_rest_n_ *= limit_n / at_rest_n_.norm();
   allowed_n_ = std::max(max_force_n_, (felt_n - at_rest_n_).norm() + kReleaseShare * max_force_n_);
 }
 
