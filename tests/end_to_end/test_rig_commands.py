@@ -1,4 +1,5 @@
 """touchstone rig, session and the Python client against a gateway in front of the emulated rig, as people use them."""
+import contextlib
 import csv
 import json
 import os
@@ -33,14 +34,11 @@ def start_gateway(*arguments):
     return process, wait_for_line(process)
 
 
-@pytest.fixture(scope="module")
-def rig(tmp_path_factory):
-    """The address of a gateway in front of the emulated rig."""
-    folder = tmp_path_factory.mktemp("rig")
-    emulator = subprocess.Popen(
-        [BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(SPEEDUP), "--seed", "7", "--sigma-us",
-         str(HIDDEN_SIGMA_US), "--hide", "finger_length.offset_mm=" + ",".join(map(str, HIDDEN_OFFSETS_MM))],
-        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+@contextlib.contextmanager
+def emulated_rig(folder, speedup, *flags):
+    """The address of a gateway in front of an emulated rig that puts its objects down by itself."""
+    emulator = subprocess.Popen([BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(speedup), *flags],
+                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     gateway = None
     try:
         gateway, address = start_gateway("--config", wait_for_line(emulator))
@@ -49,6 +47,13 @@ def rig(tmp_path_factory):
         for process in filter(None, (gateway, emulator)):
             process.terminate()
             process.wait(timeout=PATIENCE_S)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "7", "--sigma-us", str(HIDDEN_SIGMA_US), "--hide",
+                      "finger_length.offset_mm=" + ",".join(map(str, HIDDEN_OFFSETS_MM))) as address:
+        yield address
 
 
 def touchstone(*words, server=None, code=0):

@@ -8,25 +8,15 @@ import sys
 
 import pytest
 
-from test_rig_commands import BIN, PATIENCE_S, PYTHON_CLIENT, start_gateway, touchstone, wait_for_line
+from test_rig_commands import PATIENCE_S, PYTHON_CLIENT, emulated_rig, touchstone
 
 SPEEDUP = 10
 
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    """The address of a gateway in front of an emulated rig that puts its objects down by itself."""
-    folder = tmp_path_factory.mktemp("rig")
-    emulator = subprocess.Popen([BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(SPEEDUP), "--seed", "3"],
-                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    gateway = None
-    try:
-        gateway, address = start_gateway("--config", wait_for_line(emulator))
+    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "3") as address:
         yield address
-    finally:
-        for process in filter(None, (gateway, emulator)):
-            process.terminate()
-            process.wait(timeout=PATIENCE_S)
 
 
 def rows_of(path):
