@@ -1,5 +1,7 @@
 // Noise, silence, resets and lies: a touch loses no contact and gets none that was not made.
+#include <chrono>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -133,6 +135,23 @@ TEST_F(EffectorLineTest, NoticesSilence) {
   const uint64_t truth = device_->Press(0);
   ASSERT_TRUE(WaitForContacts(1));
   EXPECT_EQ(effector_->Touch()->contact_ticks[0], truth);
+}
+
+// A touch that is final, but whose capture was not ended: the device that begins anew is not taken for one that
+// should be armed, again and again.
+TEST_F(EffectorLineTest, StaysConnectedAfterAResetBetweenTheLastContactAndTheEndOfTheCapture) {
+  Start();
+  Open(Options());
+  ASSERT_TRUE(effector_->StartCapture(7).ok());
+  for (int i = 0; i < 3; ++i) device_->Press(i);
+  ASSERT_TRUE(WaitForContacts(3));
+  ASSERT_TRUE(effector_->Recall(7).ok());  // comes after the record was read twice
+  device_->Reset(2002);
+  ASSERT_TRUE(WaitFor([&] { return effector_->State().connected && effector_->State().boot_id == 2002; }));
+  const int hellos = device_->hellos();
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // many statuses
+  EXPECT_EQ(device_->hellos(), hellos);
+  EXPECT_EQ(effector_->Touch()->Contacts(), 3);
 }
 
 TEST_F(EffectorLineTest, BelievesNoImpossibleEvent) {

@@ -107,6 +107,13 @@ absl::Status SerialEffector::ExchangeHello() {
                                     " while the line was lost"));
   }
 
+  {
+    // Hello disarms the device. A touch that was final already stays so, but is not captured any longer: statuses
+    // of an unarmed device are what is expected from now on.
+    std::lock_guard<std::mutex> lock(mutex_);
+    record_.EndCapture();
+  }
+
   firmware::Configure configure;
   configure.fingers = static_cast<uint8_t>(options_.fingers.size());
   for (size_t i = 0; i < options_.fingers.size(); ++i) configure.finger[i] = ConfigOf(options_.fingers[i]);
