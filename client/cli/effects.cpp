@@ -15,7 +15,8 @@ std::string WithUnit(double value, const std::string& unit) {
 }
 
 std::string ArityInWords(const v1::Parameter& parameter) {
-  if (parameter.arity() == v1::PARAMETER_ARITY_VECTOR3) return "x,y,z in the object frame";
+  if (parameter.arity() == v1::PARAMETER_ARITY_VECTOR3) return "x,y,z";
+  if (parameter.arity() == v1::PARAMETER_ARITY_VECTOR2) return "x,y in the image";
   if (parameter.arity() == v1::PARAMETER_ARITY_PER_FINGER)
     return parameter.sum_zero() ? "one per finger, sum 0" : "one per finger";
   return "one number";
@@ -44,6 +45,14 @@ std::string StageWord(v1::EffectStage stage) {
       return "motion";
     case v1::EFFECT_STAGE_SENSOR:
       return "sensor";
+    case v1::EFFECT_STAGE_CAMERA_POSE:
+      return "camera pose";
+    case v1::EFFECT_STAGE_PROJECTION:
+      return "projection";
+    case v1::EFFECT_STAGE_SHADING:
+      return "shading";
+    case v1::EFFECT_STAGE_IMAGE_SENSOR:
+      return "image sensor";
     default:
       return "unknown";
   }

@@ -22,6 +22,8 @@ constexpr UnitRow kUnits[] = {
     {Unit::kMillimetrePerSecondSquared, kMetresPerMillimetre, "mm/s^2", "_mm_s2"},
     {Unit::kMillimetrePerHour, kMetresPerMillimetre / 3600.0, "mm/h", "_mm_per_h"},
     {Unit::kPerMetre, 1.0, "1/m", "_per_m"},
+    {Unit::kPixel, 1.0, "px", "_px"},
+    {Unit::kGreyLevel, 1.0, "grey", "_grey"},
 };
 
 const UnitRow& Row(Unit unit) {

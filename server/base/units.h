@@ -19,6 +19,8 @@ enum class Unit {
   kMillimetrePerSecondSquared,  // _mm_s2,      SI m/s^2
   kMillimetrePerHour,           // _mm_per_h,   SI m/s
   kPerMetre,                    // _per_m,      SI 1/m
+  kPixel,                       // _px,         the same inside: images have no other
+  kGreyLevel,                   // _grey,       the same inside: 0 to 255
 };
 
 // The factor that turns a number of files into SI: si = file * SiFactor(unit).

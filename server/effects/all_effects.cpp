@@ -4,7 +4,7 @@
 #include "server/effects/lookup.h"
 #include "server/effects/surface_map.h"
 
-// The built-in touch effects by stage, in the order in which a stage applies and the catalogue lists them:
+// The built-in effects by stage, touches before photographs, in the order in which a stage applies and the catalogue lists them:
 // one line each, the name of the function that its file exports. Registration by static objects is not used:
 // the linker drops them from a static library.
 #define TOUCHSTONE_TOUCH_EFFECTS(EFFECT) \
@@ -38,15 +38,21 @@
   EFFECT(MissedContact)                  \
   EFFECT(CorrelatedNoise)                \
   EFFECT(PositionNoise)                  \
-  EFFECT(FingerNoise)                    \
-  /* any stage */                        \
-  EFFECT(Formula)                        \
+  EFFECT(FingerNoise)
+
+#define TOUCHSTONE_PHOTO_EFFECTS(EFFECT)
+
+// Of any stage.
+#define TOUCHSTONE_USER_EFFECTS(EFFECT) \
+  EFFECT(Formula)                       \
   EFFECT(Lookup)
 
 namespace touchstone::effects {
 
 #define TOUCHSTONE_DECLARE(function) model::Effect function();
 TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_DECLARE)
+TOUCHSTONE_PHOTO_EFFECTS(TOUCHSTONE_DECLARE)
+TOUCHSTONE_USER_EFFECTS(TOUCHSTONE_DECLARE)
 #undef TOUCHSTONE_DECLARE
 
 namespace {
@@ -56,6 +62,8 @@ class BuiltInCatalogue : public model::EffectCatalogue {
   BuiltInCatalogue() {
 #define TOUCHSTONE_ADD(function) effects_.push_back(std::make_shared<const model::Effect>(function()));
     TOUCHSTONE_TOUCH_EFFECTS(TOUCHSTONE_ADD)
+    TOUCHSTONE_PHOTO_EFFECTS(TOUCHSTONE_ADD)
+    TOUCHSTONE_USER_EFFECTS(TOUCHSTONE_ADD)
 #undef TOUCHSTONE_ADD
   }
 
@@ -88,11 +96,28 @@ class BuiltInCatalogue : public model::EffectCatalogue {
   std::vector<std::shared_ptr<const model::Effect>> effects_;
 };
 
+std::vector<std::shared_ptr<const model::Effect>> EffectsOf(bool photos) {
+  std::vector<std::shared_ptr<const model::Effect>> effects;
+  for (const auto& effect : Catalogue().All())
+    if (effect->of_photos() == photos) effects.push_back(effect);
+  return effects;
+}
+
 }  // namespace
 
 const model::EffectCatalogue& Catalogue() {
   static const BuiltInCatalogue& catalogue = *new BuiltInCatalogue;
   return catalogue;
+}
+
+const std::vector<std::shared_ptr<const model::Effect>>& TouchEffects() {
+  static const auto& effects = *new std::vector<std::shared_ptr<const model::Effect>>(EffectsOf(false));
+  return effects;
+}
+
+const std::vector<std::shared_ptr<const model::Effect>>& PhotoEffects() {
+  static const auto& effects = *new std::vector<std::shared_ptr<const model::Effect>>(EffectsOf(true));
+  return effects;
 }
 
 std::shared_ptr<const model::Effect> FindByRole(model::EffectRole role) {

@@ -1,5 +1,5 @@
 // The shape of an effect's file: a struct of SI parameters, a row for each (what files call it, its unit,
-// bounds and meaning), the texts for people, and a function that changes the batch in the effect's stage.
+// bounds and meaning), the texts for people, and a function that changes the batch (or the photograph's settings) in the effect's stage.
 // DefineEffect turns them into the table that the catalogue, files, forms and fits read. See README.md.
 #pragma once
 
@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "server/base/check.h"
+#include "server/effects/photo_settings.h"
 #include "server/effects/touch_batch.h"
 #include "server/model/effect.h"
 #include "server/model/model.h"
@@ -25,7 +26,7 @@ using PerFinger = std::array<double, model::kMaxFingers>;
 // the field gets SI. The kind of field (one number, a vector, one number per finger) follows from its type.
 template <typename P>
 struct ParameterRow {
-  std::variant<double P::*, Eigen::Vector3d P::*, PerFinger P::*> field;
+  std::variant<double P::*, Eigen::Vector3d P::*, Eigen::Vector2d P::*, PerFinger P::*> field;
   const char* name;  // with the unit's suffix
   Unit unit;
   double lower;
@@ -46,6 +47,7 @@ struct EffectDefinition {
   bool always_per_object = false;
   bool often_per_object = false;
   bool before_cast = false;
+  bool moves_surface = false;
   const char* meaning;
   const char* signature;
   const char* check_on_rig;
@@ -53,7 +55,9 @@ struct EffectDefinition {
   std::vector<model::ConfoundedEffect> confounded_with = {};
   absl::Span<const ParameterRow<P>> rows;
   model::EffectNeeds needs = {};
-  void (*apply)(const P& parameters, TouchBatch& touches);
+  // One of the two, as the stage asks for.
+  void (*apply)(const P& parameters, TouchBatch& touches) = nullptr;
+  void (*apply_to_photo)(const P& parameters, PhotoSettings& photo) = nullptr;
 };
 
 namespace define_effect_internal {
@@ -69,6 +73,8 @@ template <typename P>
       parameters->*(*scalar) = values.at(next++);
     } else if (const auto* vector = std::get_if<Eigen::Vector3d P::*>(&row.field)) {
       for (int axis = 0; axis < 3; ++axis) (parameters->*(*vector))[axis] = values.at(next++);
+    } else if (const auto* pair = std::get_if<Eigen::Vector2d P::*>(&row.field)) {
+      for (int axis = 0; axis < 2; ++axis) (parameters->*(*pair))[axis] = values.at(next++);
     } else {
       PerFinger& entries = parameters->*(std::get<PerFinger P::*>(row.field));
       for (int finger = 0; finger < model::kMaxFingers; ++finger)
@@ -89,6 +95,7 @@ model::Effect DefineEffect(const EffectDefinition<P>& definition) {
   effect.always_per_object = definition.always_per_object;
   effect.often_per_object = definition.often_per_object;
   effect.before_cast = definition.before_cast;
+  effect.moves_surface = definition.moves_surface;
   effect.meaning = definition.meaning;
   effect.signature = definition.signature;
   effect.check_on_rig = definition.check_on_rig;
@@ -101,6 +108,7 @@ model::Effect DefineEffect(const EffectDefinition<P>& definition) {
     info.unit = row.unit;
     info.arity = std::holds_alternative<double P::*>(row.field)            ? model::Arity::kScalar
                  : std::holds_alternative<Eigen::Vector3d P::*>(row.field) ? model::Arity::kVector3
+                 : std::holds_alternative<Eigen::Vector2d P::*>(row.field) ? model::Arity::kVector2
                                                                            : model::Arity::kPerFinger;
     info.lower = row.lower;
     info.upper = row.upper;
@@ -113,6 +121,17 @@ model::Effect DefineEffect(const EffectDefinition<P>& definition) {
     effect.parameters.push_back(std::move(info));
   }
   // The span points to the static rows of the effect's file.
+  TOUCHSTONE_CHECK((definition.apply_to_photo != nullptr) == effect.of_photos());
+  TOUCHSTONE_CHECK((definition.apply != nullptr) != effect.of_photos());
+  if (effect.of_photos()) {
+    effect.apply_to_photo = [rows = definition.rows, apply = definition.apply_to_photo](
+                                absl::Span<const double> values, PhotoSettings& photo) {
+      P parameters{};
+      define_effect_internal::Unpack<P>(rows, values, 0, &parameters);
+      apply(parameters, photo);
+    };
+    return effect;
+  }
   effect.apply = [rows = definition.rows, apply = definition.apply](absl::Span<const double> values,
                                                                     TouchBatch& touches) {
     P parameters{};

@@ -33,6 +33,7 @@ model::Effect ObjectPose() {
       .name = "object_pose",
       .stage = model::Stage::kPose,
       .often_per_object = true,
+      .moves_surface = true,
       .meaning = "The object lies moved or turned against the frame that the touches are commanded in.",
       .signature =
           "A turn tilts every flat face: outer fingers err with opposite signs, and the sign follows the "

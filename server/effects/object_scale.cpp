@@ -25,6 +25,7 @@ model::Effect ObjectScale() {
       .name = "object_scale",
       .stage = model::Stage::kPose,
       .often_per_object = true,
+      .moves_surface = true,
       .meaning = "The object is larger or smaller than its mesh by the same share in every "
                  "direction (a print that shrank).",
       .signature =

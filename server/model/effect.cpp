@@ -14,6 +14,14 @@ const char* StageName(Stage stage) {
       return "motion";
     case Stage::kSensor:
       return "sensor";
+    case Stage::kCameraPose:
+      return "camera pose";
+    case Stage::kProjection:
+      return "projection";
+    case Stage::kShading:
+      return "shading";
+    case Stage::kImageSensor:
+      return "image sensor";
   }
   TOUCHSTONE_CHECK(false && "every stage has a name");
   return "";

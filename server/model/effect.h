@@ -1,4 +1,4 @@
-// An effect: one named physical cause with parameters that changes a touch in exactly one stage.
+// An effect: one named physical cause with parameters that changes a touch or a photograph in exactly one stage.
 // The catalogue, the command line, the forms of the workbench, the fit's bounds and the documentation all
 // read the same rows. This header is the interface; the physics stands in effects/, one file per effect.
 #pragma once
@@ -18,16 +18,31 @@
 
 namespace touchstone::effects {
 class TouchBatch;
-}
+struct PhotoSettings;
+}  // namespace touchstone::effects
 
 namespace touchstone::model {
 
-enum class Stage { kPose, kContact, kMotion, kSensor };
-const char* StageName(Stage stage);  // "pose", ...
+// Of a touch the first four, of a photograph the others, each in the order in which they run.
+enum class Stage {
+  kPose,
+  kContact,
+  kMotion,
+  kSensor,
+  kCameraPose,
+  kProjection,
+  kShading,
+  kImageSensor,
+};
+const char* StageName(Stage stage);  // "pose", ..., "camera pose", ...
+inline bool IsPhotoStage(Stage stage) {
+  return stage >= Stage::kCameraPose;
+}
 
 enum class Arity {
   kScalar,     // one number
-  kVector3,    // x, y, z in the object frame
+  kVector3,    // x, y, z; in the object frame unless the parameter's meaning names another
+  kVector2,    // x, y in the image: right and down
   kPerFinger,  // one number per finger, first to last
 };
 
@@ -49,7 +64,17 @@ struct ParameterInfo {
   std::string meaning;
 
   int Count(int fingers) const {
-    return arity == Arity::kScalar ? 1 : arity == Arity::kVector3 ? 3 : fingers;
+    switch (arity) {
+      case Arity::kScalar:
+        return 1;
+      case Arity::kVector3:
+        return 3;
+      case Arity::kVector2:
+        return 2;
+      case Arity::kPerFinger:
+        break;
+    }
+    return fingers;
   }
 };
 
@@ -66,6 +91,7 @@ enum class EffectRole {
   kNoiseOfLength,  // standard deviation of where a finger triggers: in time it grows as the speed falls
   kNoiseByFinger,  // what a finger's noise has beyond the others'
   kSmoothError,    // a smooth error of the surface, drawn anew for every object
+  kPixelNoise,     // of a photograph's pixels
 };
 
 // Another effect that may explain the same data, and what tells the two apart.
@@ -87,6 +113,7 @@ struct UserTerm {
   std::string name;
   bool adds_time = false;  // adds: time_us instead of travel_mm
   Stage stage = Stage::kMotion;
+  bool adds_grey = false;  // adds: grey, to every pixel of a photograph; the stage is kImageSensor
 };
 
 // What a formula effect is made of.
@@ -129,11 +156,12 @@ struct Effect {
   bool always_per_object = false;  // scope is always object (surface_error)
   bool often_per_object = false;   // a diagnosis also tries values that differ from object to object
   bool before_cast =
-      false;              // contact stage only: sets up the cast instead of changing its result (tip_radius)
-  std::string meaning;    // what it is
-  std::string signature;  // how it shows in the data, and what is told apart from it
-  std::string check_on_rig;  // how to check it
-  std::string remedy;        // how to remove it
+      false;  // contact stage only: sets up the cast instead of changing its result (tip_radius)
+  bool moves_surface = false;  // pose stage only: photographs of the object show it too
+  std::string meaning;         // what it is
+  std::string signature;       // how it shows in the data, and what is told apart from it
+  std::string check_on_rig;    // how to check it
+  std::string remedy;          // how to remove it
   std::vector<ParameterInfo> parameters;
   std::vector<ConfoundedEffect> confounded_with;  // each pair is declared by one of the two
   EffectNeeds needs;
@@ -143,6 +171,10 @@ struct Effect {
 
   // Changes the batch in this effect's stage. `values` are SI, flat, in the order of `parameters`.
   std::function<void(absl::Span<const double> values, effects::TouchBatch& batch)> apply;
+  // The same of an effect of a photograph's stages; each effect has one of the two.
+  std::function<void(absl::Span<const double> values, effects::PhotoSettings& photo)> apply_to_photo;
+
+  bool of_photos() const { return IsPhotoStage(stage); }
 
   // Its draws differ from touch to touch or from object to object: it changes no expectation.
   bool random() const { return role != EffectRole::kSystematic; }

@@ -86,6 +86,7 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
   if (file_values.size() != count) {
     const std::string wanted = parameter.arity == Arity::kPerFinger ? absl::StrCat("one per finger, ", count)
                                : parameter.arity == Arity::kVector3 ? "3, for x, y and z"
+                               : parameter.arity == Arity::kVector2 ? "2, for x and y"
                                                                     : "1";
     return absl::InvalidArgumentError(absl::StrCat(what, " has ", file_values.size(),
                                                    file_values.size() == 1 ? " value" : " values",

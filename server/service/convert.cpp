@@ -76,6 +76,14 @@ v1::EffectStage StageToProto(model::Stage stage) {
       return v1::EFFECT_STAGE_MOTION;
     case model::Stage::kSensor:
       return v1::EFFECT_STAGE_SENSOR;
+    case model::Stage::kCameraPose:
+      return v1::EFFECT_STAGE_CAMERA_POSE;
+    case model::Stage::kProjection:
+      return v1::EFFECT_STAGE_PROJECTION;
+    case model::Stage::kShading:
+      return v1::EFFECT_STAGE_SHADING;
+    case model::Stage::kImageSensor:
+      return v1::EFFECT_STAGE_IMAGE_SENSOR;
   }
   return v1::EFFECT_STAGE_UNSPECIFIED;
 }
@@ -86,6 +94,8 @@ v1::ParameterArity ArityToProto(model::Arity arity) {
       return v1::PARAMETER_ARITY_SCALAR;
     case model::Arity::kVector3:
       return v1::PARAMETER_ARITY_VECTOR3;
+    case model::Arity::kVector2:
+      return v1::PARAMETER_ARITY_VECTOR2;
     case model::Arity::kPerFinger:
       return v1::PARAMETER_ARITY_PER_FINGER;
   }

@@ -69,14 +69,14 @@ model::Model With(const model::Effect& effect, bool typical) {
 
 TEST(EveryEffect, ChangesNothingAtItsNeutralValues) {
   const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(model::NominalModel());
-  for (const auto& effect : effects::Catalogue().All())
+  for (const auto& effect : effects::TouchEffects())
     EXPECT_TRUE(Same(ReportedTimes(With(*effect, false)), effect->name == "gaussian_noise" ? ideal : noisy))
         << effect->name;
 }
 
 TEST(EveryEffect, ChangesReportedTimesAtTypicalValuesAndTheSameWayEveryTime) {
   const std::vector<double> noisy = ReportedTimes(WithNoise()), ideal = ReportedTimes(model::NominalModel());
-  for (const auto& effect : effects::Catalogue().All()) {
+  for (const auto& effect : effects::TouchEffects()) {
     if (effect->parameters.empty()) continue;  // the entry that describes formulas
     const std::vector<double> once = ReportedTimes(With(*effect, true));
     EXPECT_FALSE(Same(once, effect->name == "gaussian_noise" ? ideal : noisy)) << effect->name;

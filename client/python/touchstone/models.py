@@ -84,6 +84,10 @@ _STAGES = {
     types_pb2.EFFECT_STAGE_CONTACT: "contact",
     types_pb2.EFFECT_STAGE_MOTION: "motion",
     types_pb2.EFFECT_STAGE_SENSOR: "sensor",
+    types_pb2.EFFECT_STAGE_CAMERA_POSE: "camera pose",
+    types_pb2.EFFECT_STAGE_PROJECTION: "projection",
+    types_pb2.EFFECT_STAGE_SHADING: "shading",
+    types_pb2.EFFECT_STAGE_IMAGE_SENSOR: "image sensor",
 }
 
 

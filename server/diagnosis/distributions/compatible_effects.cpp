@@ -238,7 +238,7 @@ absl::StatusOr<std::vector<CompatibleEffect>> FindCompatibleEffects(
     const std::vector<std::shared_ptr<const model::Effect>>& also, const std::vector<AssumedPoses>& poses,
     MisfitOfModel misfit, const RenewMisfit& renew, ThreadPool* pool,
     const std::function<bool(double done)>& progress) {
-  std::vector<std::shared_ptr<const model::Effect>> effects = effects::Catalogue().All();
+  std::vector<std::shared_ptr<const model::Effect>> effects = effects::TouchEffects();
   effects.insert(effects.end(), also.begin(), also.end());
   std::vector<EffectDirection> directions;
   for (const auto& effect : effects) {

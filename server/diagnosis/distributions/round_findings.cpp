@@ -240,7 +240,7 @@ bool HasRole(const model::Model& model, std::initializer_list<model::EffectRole>
 template <typename Predicate>
 std::vector<std::string> EffectsThat(const Predicate& does) {
   std::vector<std::string> names;
-  for (const auto& effect : effects::Catalogue().All())
+  for (const auto& effect : effects::TouchEffects())
     if (!effect->parameters.empty() && does(*effect)) names.push_back(effect->name);
   return names;
 }

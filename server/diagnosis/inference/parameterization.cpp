@@ -39,7 +39,8 @@ std::string NameOf(const model::Effect& effect) {
 }
 
 std::string EntryName(const model::ParameterInfo& parameter, int entry, int fingers) {
-  if (parameter.arity == model::Arity::kVector3) return std::string(1, "xyz"[entry]);
+  if (parameter.arity == model::Arity::kVector3 || parameter.arity == model::Arity::kVector2)
+    return std::string(1, "xyz"[entry]);
   if (parameter.arity == model::Arity::kPerFinger) return model::FingerName(entry, fingers);
   return "";
 }

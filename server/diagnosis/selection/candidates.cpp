@@ -53,7 +53,7 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
         input.model->effects.begin(), input.model->effects.end(),
         [&](const model::EffectInstance& instance) { return inference::NameOf(*instance.effect) == name; });
   };
-  for (const auto& effect : effects::Catalogue().All()) {
+  for (const auto& effect : effects::TouchEffects()) {
     const bool describes_only = effect->parameters.empty();  // the entry for formulas
     if (describes_only || effect->random() || has(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;

@@ -160,7 +160,7 @@ absl::StatusOr<Baselines> RunBaselines(const diagnosis::DiagnosisInput& input) {
   std::vector<int> rows = RowsOf(residuals);
 
   std::vector<Columns> candidates;
-  for (const auto& effect : effects::Catalogue().All()) {
+  for (const auto& effect : effects::TouchEffects()) {
     Columns columns{effect->name, Eigen::MatrixXd(residuals.size(), 0), 0};
     if (effect->parameters.empty() || effect->name == "surface_error") continue;
     bool in_model = false;

@@ -95,7 +95,7 @@ TEST(Strengths, UnlistedEffectsHaveTheRmsThatWasAskedFor) {
 }
 
 TEST(Arms, KnowEveryEffectOfTheCatalogueWithItsNumberOfValues) {
-  for (const auto& effect : effects::Catalogue().All()) {
+  for (const auto& effect : effects::TouchEffects()) {
     // Formulas, curves and surfaces that were found by a diagnosis are no causes.
     if (effect->parameters.empty() || effect->name == "lookup" || effect->name == "surface_map") continue;
     // Kinds of noise that no arm hides.
