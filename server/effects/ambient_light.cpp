@@ -25,14 +25,14 @@ model::Effect AmbientLight() {
       .name = "ambient_light",
       .stage = model::Stage::kShading,
       .meaning = "Light of the room reaches every point of the object, from no particular side.",
-      .signature = "The whole object is brighter by the same amount, deep in its dark sides too; the background "
+      .signature =
+          "The whole object is brighter by the same amount, deep in its dark sides too; the background "
           "stays black.",
       .check_on_rig = "Switch the lamps off and take a picture: what is left is ambient light.",
       .remedy = "Darken the room, or keep the effect.",
       .confounded_with =
           {
-              {"background_level",
-               "Look at the background: ambient light leaves it as it is."},
+              {"background_level", "Look at the background: ambient light leaves it as it is."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

@@ -28,8 +28,9 @@ model::Effect CameraRotation() {
       .stage = model::Stage::kCameraPose,
       .meaning = "The camera is turned about its centre against its commanded pose, alike in every picture.",
       .signature = "The whole picture is shifted (about right and down) or turned about its middle (about "
-          "forward), by the same pixels at every distance.",
-      .check_on_rig = "Photograph one point from near and far along the viewing axis: with a turned camera it "
+                   "forward), by the same pixels at every distance.",
+      .check_on_rig =
+          "Photograph one point from near and far along the viewing axis: with a turned camera it "
           "leaves the middle of the picture by the same angle.",
       .remedy = "Repeat the hand-eye calibration, or keep the effect.",
       .rows = kRows,

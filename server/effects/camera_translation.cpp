@@ -26,22 +26,24 @@ model::Effect CameraTranslation() {
       .name = "camera_translation",
       .stage = model::Stage::kCameraPose,
       .meaning = "The camera stands displaced against its commanded pose, by the same vector of its own axes "
-          "in every picture.",
-      .signature = "The object is shifted in every picture by the same number of pixels at one distance, less "
+                 "in every picture.",
+      .signature =
+          "The object is shifted in every picture by the same number of pixels at one distance, less "
           "where it is farther away; nearer or farther shows as another size. A turn of the camera "
           "shifts near and far alike.",
-      .check_on_rig = "Put a calibration board before the camera and compare the pose that it gives with the one "
+      .check_on_rig =
+          "Put a calibration board before the camera and compare the pose that it gives with the one "
           "that the arm reports (hand-eye calibration).",
       .remedy = "Repeat the hand-eye calibration with poses that are turned about all axes, and enter its "
-          "result.",
+                "result.",
       .confounded_with =
           {
               {"camera_rotation",
                "Photograph the object from two distances: a displaced camera shifts the near picture by more "
-          "pixels, a turned one shifts both alike."},
+               "pixels, a turned one shifts both alike."},
               {"object_pose",
                "Turn the camera about its viewing axis by 90 deg: the error of the camera turns along, a "
-          "misplaced object stays where it is."},
+               "misplaced object stays where it is."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

@@ -26,16 +26,18 @@ model::Effect CastShadow() {
       .name = "cast_shadow",
       .stage = model::Stage::kShading,
       .meaning = "The object casts shadows on itself, which the nominal shading leaves out.",
-      .signature = "Dark places with sharp borders beside parts that stand out, on the side away from the key "
+      .signature =
+          "Dark places with sharp borders beside parts that stand out, on the side away from the key "
           "light.",
-      .check_on_rig = "Hold a stick before the object in the light: if its shadow is sharp and dark, the object "
+      .check_on_rig =
+          "Hold a stick before the object in the light: if its shadow is sharp and dark, the object "
           "throws its own as well.",
       .remedy = "Light the object from all sides (a ring or a tent), or keep the effect.",
       .confounded_with =
           {
               {"ambient_light",
                "Look at convex objects and at faces that see the light: shadows lie only behind parts that "
-          "stand out."},
+               "stand out."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

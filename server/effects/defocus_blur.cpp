@@ -13,8 +13,7 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::sigma_px, "sigma_px", Unit::kPixel, 0, 30, 0, 0.8,
-     "Standard deviation of the blur."},
+    {&Parameters::sigma_px, "sigma_px", Unit::kPixel, 0, 30, 0, 0.8, "Standard deviation of the blur."},
 };
 
 void Apply(const Parameters& p, PhotoSettings& photo) {
@@ -28,7 +27,8 @@ model::Effect DefocusBlur() {
       .name = "defocus_blur",
       .stage = model::Stage::kImageSensor,
       .meaning = "The picture is out of focus, alike in all directions.",
-      .signature = "Bright rims outside silhouettes and dark ones inside, of the same width in every direction.",
+      .signature =
+          "Bright rims outside silhouettes and dark ones inside, of the same width in every direction.",
       .check_on_rig = "Photograph a sharp edge and look over how many pixels it rises.",
       .remedy = "Focus on the object, close the aperture, or keep the effect.",
       .confounded_with =

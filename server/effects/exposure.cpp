@@ -12,8 +12,7 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::stops, "stops", Unit::kNone, -8, 8, 0, 0.3,
-     "Doublings of the light; -1 is half of it."},
+    {&Parameters::stops, "stops", Unit::kNone, -8, 8, 0, 0.3, "Doublings of the light; -1 is half of it."},
 };
 
 void Apply(const Parameters& p, PhotoSettings& photo) {
@@ -34,13 +33,13 @@ model::Effect Exposure() {
           {
               {"",
                "Put a card of known reflectance into the picture: a surface of another albedo changes the "
-          "object and not the card."},
+               "object and not the card."},
               {"gamma",
                "Photograph a wedge of grey steps: exposure multiplies all of them, a gamma bends the curve "
-          "and leaves black and white where they are."},
+               "and leaves black and white where they are."},
               {"ambient_light",
                "Look at the dark sides: ambient light adds the same amount to all faces, exposure multiplies "
-          "and leaves black black."},
+               "and leaves black black."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

@@ -33,7 +33,8 @@ model::Effect ImageNoise() {
       .stage = model::Stage::kImageSensor,
       .role = model::EffectRole::kPixelNoise,
       .meaning = "The pixels of repeated photographs scatter independently.",
-      .signature = "Repeats of one picture differ in every pixel, more in bright ones if there is a gain; their "
+      .signature =
+          "Repeats of one picture differ in every pixel, more in bright ones if there is a gain; their "
           "mean settles. It sets the noise floor: no model can go below it.",
       .check_on_rig = "Take thirty pictures of one scene without moving anything.",
       .remedy = "More light, longer exposure, lower gain of the camera, mean of several pictures.",

@@ -27,14 +27,14 @@ model::Effect LightPosition() {
       .stage = model::Stage::kShading,
       .meaning = "The key light stands displaced against its place in the lighting model.",
       .signature = "Faces that look to one side are too bright, those that look to the other too dark; "
-          "silhouettes stay.",
+                   "silhouettes stay.",
       .check_on_rig = "Hold a glossy ball into the picture and see where the highlight lies.",
       .remedy = "Fix the lamp to the camera, measure its place, or keep the effect.",
       .confounded_with =
           {
               {"camera_rotation",
                "Look at the silhouettes: a turned camera moves them, a displaced light changes only grey "
-          "levels within them."},
+               "levels within them."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

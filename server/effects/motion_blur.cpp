@@ -27,8 +27,8 @@ void Apply(const Parameters& p, PhotoSettings& photo) {
     photo.motion_angle_rad = p.angle_rad;
     return;
   }
-  const std::complex<double> motion = std::polar(photo.motion_length_px, photo.motion_angle_rad) +
-                                      std::polar(p.length_px, p.angle_rad);
+  const std::complex<double> motion =
+      std::polar(photo.motion_length_px, photo.motion_angle_rad) + std::polar(p.length_px, p.angle_rad);
   photo.motion_length_px = std::abs(motion);
   photo.motion_angle_rad = std::arg(motion);
 }

@@ -25,7 +25,8 @@ model::Effect PrincipalPoint() {
       .name = "principal_point",
       .stage = model::Stage::kProjection,
       .meaning = "The optical axis meets the image sensor beside the assumed principal point.",
-      .signature = "Every picture is shifted by the same number of pixels at every distance, without the slight "
+      .signature =
+          "Every picture is shifted by the same number of pixels at every distance, without the slight "
           "stretching towards one side that a turned camera brings.",
       .check_on_rig = "Calibrate the lens with a chessboard that also fills the corners of the picture.",
       .remedy = "Enter the calibrated principal point in camera.yaml.",
@@ -33,11 +34,11 @@ model::Effect PrincipalPoint() {
           {
               {"camera_rotation",
                "Turn the camera about its viewing axis by 180 deg and photograph the same point: the mean of "
-          "the two places is the principal point. Wide-angle pictures with the object in the corners "
-          "tell the two apart as well."},
+               "the two places is the principal point. Wide-angle pictures with the object in the corners "
+               "tell the two apart as well."},
               {"camera_translation",
                "Photograph from two distances: a shifted principal point moves both pictures by the same "
-          "number of pixels."},
+               "number of pixels."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

@@ -14,8 +14,7 @@ struct Parameters {
 constexpr ParameterRow<Parameters> kRows[] = {
     {&Parameters::k1, "k1", Unit::kNone, -2, 2, 0, 0.05,
      "Coefficient of r^2; negative: barrel, the corners are drawn inwards."},
-    {&Parameters::k2, "k2", Unit::kNone, -5, 5, 0, 0.05,
-     "Coefficient of r^4."},
+    {&Parameters::k2, "k2", Unit::kNone, -5, 5, 0, 0.05, "Coefficient of r^4."},
 };
 
 void Apply(const Parameters& p, PhotoSettings& photo) {
@@ -30,8 +29,9 @@ model::Effect RadialDistortion() {
       .name = "radial_distortion",
       .stage = model::Stage::kProjection,
       .meaning = "The lens bends straight lines: the magnification changes with the distance from the "
-          "principal point.",
-      .signature = "Edges are displaced along the radius, by an amount that grows with the third power of the "
+                 "principal point.",
+      .signature =
+          "Edges are displaced along the radius, by an amount that grows with the third power of the "
           "distance from the principal point; nothing shows in the middle.",
       .check_on_rig = "Photograph a straight edge along the border of the picture and lay a ruler on it.",
       .remedy = "Calibrate with a chessboard and enter the coefficients in camera.yaml.",

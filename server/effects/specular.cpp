@@ -34,17 +34,19 @@ model::Effect Specular() {
       .name = "specular",
       .stage = model::Stage::kShading,
       .meaning = "The surface is glossy: it mirrors the key light.",
-      .signature = "Bright spots on curved places where the surface looks halfway between the light and the eye; "
+      .signature =
+          "Bright spots on curved places where the surface looks halfway between the light and the eye; "
           "they wander over the object as the camera moves.",
-      .check_on_rig = "Hold a polarising filter before the lens and turn it: highlights fade, matte shading stays.",
-      .remedy = "Dull the surface with scanning spray, polarise light and lens crosswise, or keep the effect.",
+      .check_on_rig =
+          "Hold a polarising filter before the lens and turn it: highlights fade, matte shading stays.",
+      .remedy =
+          "Dull the surface with scanning spray, polarise light and lens crosswise, or keep the effect.",
       .confounded_with =
           {
-              {"exposure",
-               "Look at faces that turn away from the light: gloss leaves them as they are."},
+              {"exposure", "Look at faces that turn away from the light: gloss leaves them as they are."},
               {"light_position",
                "Look at flat faces and dark sides: a highlight is narrow, a displaced light changes whole "
-          "sides."},
+               "sides."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

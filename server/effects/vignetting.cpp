@@ -27,7 +27,7 @@ model::Effect Vignetting() {
       .stage = model::Stage::kImageSensor,
       .meaning = "The lens passes less light towards the corners of the picture.",
       .signature = "Everything far from the middle is darker by a share that grows with the square of the "
-          "distance; an object that moves through the picture changes its grey levels.",
+                   "distance; an object that moves through the picture changes its grey levels.",
       .check_on_rig = "Photograph an evenly lit white sheet.",
       .remedy = "Close the aperture by two stops, or divide by the picture of a white sheet.",
       .rows = kRows,

@@ -19,7 +19,7 @@ constexpr double kUndistortTolerance = 1e-12;  // of normalised coordinates: far
 struct UndistortBlock {
   alignas(64) double xd[kLensBlock], yd[kLensBlock];  // wanted
   alignas(64) double x[kLensBlock], y[kLensBlock];    // found
-  alignas(64) double miss[kLensBlock];                // squared distance from the wanted, before the last step
+  alignas(64) double miss[kLensBlock];  // squared distance from the wanted, before the last step
 };
 
 void NewtonStep(const PhotoLens& lens, UndistortBlock* block) {
@@ -55,9 +55,8 @@ void Undistort(const PhotoLens& lens, UndistortBlock* block) {
 
 absl::Status CheckNumber(const char* field, double value, bool positive) {
   if (std::isfinite(value) && std::abs(value) <= 1e9 && (!positive || value > 0)) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrFormat("lens.%s is %g; must be a finite number of pixels%s", field, value,
-                      positive ? " greater than 0" : ""));
+  return absl::InvalidArgumentError(absl::StrFormat("lens.%s is %g; must be a finite number of pixels%s",
+                                                    field, value, positive ? " greater than 0" : ""));
 }
 
 }  // namespace

@@ -61,8 +61,7 @@ void FindLamps(const PhotoPoints& points, const LampPlaces& lamps, PhotoLamps* r
     const float nk = (nx[i] * kx + ny[i] * ky + nz[i] * kz) * k;
     const float nf = (nx[i] * fx + ny[i] * fy + nz[i] * fz) * f;
     const float hx = kx * k + vx[i], hy = ky * k + vy[i], hz = kz * k + vz[i];
-    const float nh =
-        (nx[i] * hx + ny[i] * hy + nz[i] * hz) / std::sqrt(hx * hx + hy * hy + hz * hz + 1e-30f);
+    const float nh = (nx[i] * hx + ny[i] * hy + nz[i] * hz) / std::sqrt(hx * hx + hy * hy + hz * hz + 1e-30f);
     key_cosine[i] = nk > 0.0f ? nk : 0.0f;
     fill_cosine[i] = nf > 0.0f ? nf : 0.0f;
     half_cosine[i] = nk > 0.0f && nh > 0.0f ? nh : 0.0f;

@@ -12,8 +12,8 @@ namespace touchstone::image {
 // How the lamps stand to every point of PhotoPoints.
 struct PhotoLamps {
   std::vector<float> key_cosine, fill_cosine;  // 0 where the lamp stands behind the surface
-  std::vector<float> half_cosine;              // of the normal and the vector halfway between key light and eye
-  std::vector<uint8_t> in_shadow;              // of the key light, 1: yes; empty until asked
+  std::vector<float> half_cosine;  // of the normal and the vector halfway between key light and eye
+  std::vector<uint8_t> in_shadow;  // of the key light, 1: yes; empty until asked
 };
 
 // Positions of the lamps in the mesh's frame. They belong to the commanded camera and the nominal object: an error of

@@ -145,9 +145,8 @@ void CastPhotoPixels(const geometry::Surface& surface, const PhotoFrame& frame, 
       for (int i = 0; i < 16; ++i) {
         const size_t place = static_cast<size_t>(i / kPhotoTileSide) * (columns + kPhotoTileSide) +
                              (column - box.first_column) + i % kPhotoTileSide;
-        seen[place] = valid[i] != 0 && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID
-                          ? rays.hit.primID[i]
-                          : geometry::kNoTriangle;
+        seen[place] = valid[i] != 0 && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID ? rays.hit.primID[i]
+                                                                                     : geometry::kNoTriangle;
       }
     }
     for (int y = row; y < std::min(row + kPhotoTileSide, box.last_row); ++y) {
@@ -269,8 +268,7 @@ void FindPoints(const geometry::Surface& surface, const ShadingMesh& mesh, const
   const PhotoFrame frame = MakePhotoFrame(surface, mesh, camera, lens, slopes);
   points->pixel.clear();
   points->triangle.clear();
-  if (frame.box.first_row < frame.box.last_row)
-    CastPhotoPixels(surface, frame, lens, slopes, points);
+  if (frame.box.first_row < frame.box.last_row) CastPhotoPixels(surface, frame, lens, slopes, points);
   points->Resize(static_cast<int>(points->pixel.size()));
 
   const auto block = std::make_unique<CornerBlock>();

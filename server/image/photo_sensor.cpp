@@ -135,10 +135,11 @@ absl::Status AddTerms(const effects::PhotoSettings& settings, const PhotoLens& l
         pixel.grey = (*grey)[i];
         const double added = term(pixel);
         if (!std::isfinite(added))
-          return absl::InvalidArgumentError(absl::StrFormat(
-              "an effect of the model that adds grey gives %g in row %d, column %d of a photograph; must be a "
-              "finite number",
-              added, row, column));
+          return absl::InvalidArgumentError(
+              absl::StrFormat("an effect of the model that adds grey gives %g in row %d, column %d of a "
+                              "photograph; must be a "
+                              "finite number",
+                              added, row, column));
         (*grey)[i] = static_cast<float>(std::clamp(pixel.grey + added, 0.0, kFloatGrey));
       }
     }

@@ -20,8 +20,8 @@ struct PixelSurface {
 
 // `light`, height x width, becomes expected grey levels from 0 to 255. What lies beyond the picture's border is taken to
 // be as bright as the border. Error: an added term that is not finite.
-absl::Status RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens, const PixelSurface& surface,
-                         double session_time_s, std::vector<float>* light);
+absl::Status RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens,
+                         const PixelSurface& surface, double session_time_s, std::vector<float>* light);
 
 // Noise by (seed, index, pixel), rounded to 8 bits.
 void DrawPixels(const effects::PhotoSettings& settings, const std::vector<float>& grey, uint64_t seed,

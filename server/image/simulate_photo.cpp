@@ -18,7 +18,8 @@
 namespace touchstone::image {
 namespace {
 
-std::shared_ptr<const ShadingMesh> SharedShadingMesh(const std::shared_ptr<const geometry::Surface>& surface) {
+std::shared_ptr<const ShadingMesh> SharedShadingMesh(
+    const std::shared_ptr<const geometry::Surface>& surface) {
   static ShadingMeshCache& meshes = *new ShadingMeshCache;
   return meshes.Get(surface);
 }
@@ -59,7 +60,8 @@ SurfacePlace PlaceOf(const model::Model& model, const std::string& object) {
 }
 
 absl::Status CheckRequest(const PhotoRequest& request) {
-  if (request.surface == nullptr) return absl::InvalidArgumentError("a photograph needs a surface to look at");
+  if (request.surface == nullptr)
+    return absl::InvalidArgumentError("a photograph needs a surface to look at");
   TOUCHSTONE_RETURN_IF_ERROR(CheckLens(request.lens));
   Camera camera = request.camera;
   camera.vertical_fov_rad = Camera().vertical_fov_rad;  // the lens counts
@@ -160,8 +162,8 @@ absl::StatusOr<Photo> PhotoSimulator::Run(const PhotoRequest& request, const Pho
   kept.UseLens(lens);
   if (!kept.lens_sees)
     return absl::InvalidArgumentError(absl::StrFormat(
-        "the lens sees nothing: with fx %g px, k1 %g and k2 %g no pixel of %d x %d has a viewing ray", lens.fx,
-        lens.k1, lens.k2, lens.width, lens.height));
+        "the lens sees nothing: with fx %g px, k1 %g and k2 %g no pixel of %d x %d has a viewing ray",
+        lens.fx, lens.k1, lens.k2, lens.width, lens.height));
   kept.UseCamera(RealCamera(request.camera, settings, place, bounds), lens);
   kept.UseLamps(PlaceLamps(request.camera, bounds, settings, place), settings.shadow_strength > 0);
   FillLight(kept.points, kept.lamps, settings, &kept.light);

@@ -58,9 +58,9 @@ TEST(PhotoSimulator, MovesTheCameraInItsOwnFrame) {
   real.at_m = real.eye_m + turned.col(2);
   real.up = -turned.col(1);
   const Photo expected = MustPhotograph(EffectLines{}, RequestOf(surface, real));
-  const Photo photo = MustPhotograph({{"camera_translation", {"offset_mm=5,3,8"}},
-                                      {"camera_rotation", {"rotation_deg=1,2,3"}}},
-                                     RequestOf(surface, commanded));
+  const Photo photo = MustPhotograph(
+      {{"camera_translation", {"offset_mm=5,3,8"}}, {"camera_rotation", {"rotation_deg=1,2,3"}}},
+      RequestOf(surface, commanded));
   int other = 0;
   for (size_t i = 0; i < photo.depth_m.size(); ++i)
     other += std::abs(photo.depth_m[i] - expected.depth_m[i]) > 1e-6;
@@ -82,10 +82,9 @@ TEST(PhotoSimulator, ShowsASurfaceThatEffectsMove) {
   const auto moved = MakeSurface("moved", mesh);
   const PhotoRequest request = RequestOf(surface, CameraAt({0.12, -0.26, 0.09}));
   PhotoRequest of_moved = RequestOf(moved, request.camera);
-  const Photo photo = MustPhotograph(
-      {{"object_scale", {"relative=0.05"}},
-       {"object_pose", {"translation_mm=4,6,-2", "rotation_deg=4,-3,10"}}},
-      request);
+  const Photo photo = MustPhotograph({{"object_scale", {"relative=0.05"}},
+                                      {"object_pose", {"translation_mm=4,6,-2", "rotation_deg=4,-3,10"}}},
+                                     request);
   const Photo expected = MustPhotograph(EffectLines{}, of_moved);
   int other = 0, object = 0;
   for (size_t i = 0; i < photo.depth_m.size(); ++i) {
@@ -149,8 +148,7 @@ TEST(PhotoSimulator, RefusesWhatNoCameraSees) {
   const auto surface = MakeSurface("letter", LetterMesh());
   const PhotoRequest good = RequestOf(surface, CameraAt({0.12, -0.26, 0.09}));
   const auto error = [](const PhotoRequest& request) {
-    return std::string(
-        PhotoSimulator(PhotoModel({})).Run(request, {}, nullptr).status().message());
+    return std::string(PhotoSimulator(PhotoModel({})).Run(request, {}, nullptr).status().message());
   };
   EXPECT_EQ(error(good), "");
   PhotoRequest request = good;
