@@ -1,6 +1,7 @@
 // touchstone diagnose: how wrong a model is, where, why, what to add, and what the error becomes.
 #include <filesystem>
 
+#include "client/cli/board.h"
 #include "client/cli/comparison.h"
 #include "client/cli/model_output.h"
 #include "client/source/lab_units.h"
@@ -17,6 +18,7 @@ struct DiagnoseOptions : ComparisonOptions {
   std::string keep_as;
   bool with_formula = false;
   bool with_surface_map = false;
+  BoardOptions board;
 };
 
 // The formula of what no built-in effect explains, or the curve, as effects of this model. Empty: there is none.
@@ -70,6 +72,9 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
 }
 
 absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
+  if (!options.board.corners.empty()) return RunBoardDiagnosis(cli, options, options.board, options.save_model);
+  if (options.board.square_mm != 0)
+    return absl::InvalidArgumentError("--square-mm: the side of a square of what board? Give --board, for instance 9x6");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(
       cli, {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
   if (!options.keep_as.empty() && cli.source().servers.empty())
@@ -117,6 +122,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
       "--with-surface-map\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
+      "touchstone diagnose photos --board 9x6 --square-mm 25 --save-model lens.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
@@ -128,6 +134,7 @@ void AddDiagnose(Cli* cli) {
       "--with-surface-map", options->with_surface_map,
       "With --save-model: where the surfaces depart from their meshes, write a map of them beside "
       "the model (FILE's name with .surface.csv), which the model then applies");
+  AddBoardOptions(command, &options->board);
   command
       ->add_option("--keep-as", options->keep_as,
                    "With --server: keep the improved model there under this name, served at once")

@@ -1,0 +1,129 @@
+#include "server/diagnosis/boards/board_diagnosis.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/diagnosis/boards/board_test_set.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis::boards {
+namespace {
+
+using selection::Verdict;
+using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
+
+BoardDiagnosis Diagnosed(const BoardSet& set, const model::Model& model = model::NominalModel(), uint64_t seed = 0) {
+  absl::StatusOr<BoardDiagnosis> diagnosis = DiagnoseBoards(set, model, seed);
+  EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
+  return diagnosis.ok() ? *std::move(diagnosis) : BoardDiagnosis();
+}
+
+std::vector<std::string> Named(const BoardDiagnosis& diagnosis) {
+  std::vector<std::string> names;
+  for (const BoardStep& step : diagnosis.steps) names.push_back(step.effect);
+  return names;
+}
+
+const inference::ParameterEstimate* Find(const BoardDiagnosis& diagnosis, const std::string& parameter,
+                                         const std::string& axis = "") {
+  for (const BoardStep& step : diagnosis.steps)
+    for (const inference::ParameterEstimate& estimate : step.parameters)
+      if (estimate.name == parameter && estimate.entry == axis) return &estimate;
+  return nullptr;
+}
+
+TEST(BoardDiagnosis, ClaimsNothingWhereTheLensIsTheNominalOne) {
+  int claims = 0;
+  for (uint64_t seed = 0; seed < 30; ++seed) {
+    const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensVector::Zero(), 12, 0.2, 100 + seed));
+    claims += diagnosis.verdict != Verdict::kAdequate;
+    EXPECT_TRUE(diagnosis.improved_model_yaml.empty() || !diagnosis.steps.empty());
+  }
+  EXPECT_EQ(claims, 0);
+}
+
+TEST(BoardDiagnosis, NamesEachEffectOfTheProjectionAlone) {
+  struct Hidden {
+    LensVector lens;
+    const char* effect;
+  };
+  for (const Hidden& hidden : {Hidden{LensWith({{kFocal, 0.04}}), "focal_error"},
+                               Hidden{LensWith({{kOffsetX, 3}, {kOffsetY, -4}}), "principal_point"},
+                               Hidden{LensWith({{kK1, -0.05}, {kK2, 0.02}}), "radial_distortion"}}) {
+    const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(hidden.lens, 14, 0.2, 7));
+    EXPECT_THAT(Named(diagnosis), UnorderedElementsAre(hidden.effect));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kMissingEffects) << diagnosis.summary;
+    ASSERT_TRUE(diagnosis.final.has_value());
+    // Two readings a corner.
+    EXPECT_NEAR(diagnosis.final->heldout_rmse_px, 0.2 * std::sqrt(2.0), 0.03);
+  }
+}
+
+TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
+  const LensVector lens = LensWith({{kFocal, -0.1}, {kOffsetX, 12}, {kOffsetY, -7}, {kK1, -0.28}, {kK2, 0.08}});
+  const BoardSet set = MakeBoardSet(lens, 14, 0.2, 8);
+  const BoardDiagnosis diagnosis = Diagnosed(set);
+  EXPECT_THAT(Named(diagnosis), UnorderedElementsAre("focal_error", "principal_point", "radial_distortion"));
+  const std::pair<const inference::ParameterEstimate*, double> found[] = {
+      {Find(diagnosis, "relative"), -0.1},      {Find(diagnosis, "offset_px", "x"), 12},
+      {Find(diagnosis, "offset_px", "y"), -7}, {Find(diagnosis, "k1"), -0.28},
+      {Find(diagnosis, "k2"), 0.08}};
+  for (const auto& [estimate, truth] : found) {
+    ASSERT_NE(estimate, nullptr);
+    EXPECT_LT(std::abs(estimate->value - truth), 4 * estimate->std_error) << estimate->name;
+    EXPECT_GT(estimate->std_error, 0);
+    EXPECT_LT(estimate->lower, estimate->value);
+  }
+  EXPECT_LT(std::abs(Find(diagnosis, "k1")->value + 0.28), 0.02);
+  for (const BoardStep& step : diagnosis.steps) EXPECT_GT(step.probability, 0.99) << step.effect;
+  // Through the improved model nothing is missing any more.
+  const absl::StatusOr<model::Model> improved =
+      model::ParseModel(diagnosis.improved_model_yaml, "improved", effects::Catalogue());
+  ASSERT_TRUE(improved.ok()) << improved.status();
+  EXPECT_EQ(Diagnosed(set, *improved).verdict, Verdict::kAdequate);
+}
+
+TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {
+  int covered = 0, count = 0;
+  for (uint64_t seed = 0; seed < 25; ++seed) {
+    const BoardDiagnosis diagnosis =
+        Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}, {kK2, 0.05}}), 20, 0.2, 200 + seed));
+    for (const auto& [name, truth] : {std::pair("k1", -0.2), std::pair("k2", 0.05)}) {
+      const inference::ParameterEstimate* estimate = Find(diagnosis, name);
+      ASSERT_NE(estimate, nullptr);
+      covered += estimate->lower <= truth && truth <= estimate->upper;
+      ++count;
+    }
+  }
+  EXPECT_GE(covered, 0.84 * count);
+}
+
+TEST(BoardDiagnosis, LeavesWhatHasNoEffectNameless) {
+  const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}, {kP1, 0.01}, {kP2, -0.008}}), 14, 0.2, 9));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kUnexplained);
+  ASSERT_FALSE(diagnosis.rest.empty());
+  EXPECT_EQ(diagnosis.rest[0].name, "tangential distortion");
+  EXPECT_THAT(diagnosis.summary, HasSubstr("p1 0.0"));
+  EXPECT_LT(diagnosis.rest.back().quality.heldout_rmse_px, diagnosis.final->heldout_rmse_px);
+}
+
+TEST(BoardDiagnosis, SaysThatThereAreTooFewPictures) {
+  const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}}), 4, 0.2, 10));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kTooLittleData);
+  EXPECT_TRUE(diagnosis.steps.empty());
+  EXPECT_THAT(diagnosis.summary, HasSubstr("found in 4 pictures; 5 are needed"));
+}
+
+TEST(BoardDiagnosis, IsTheSameEveryTimeAndErrorsFollowTheSeed) {
+  const BoardSet set = MakeBoardSet(LensWith({{kK1, -0.2}}), 10, 0.2, 11);
+  const BoardDiagnosis one = Diagnosed(set), again = Diagnosed(set), other = Diagnosed(set, model::NominalModel(), 1);
+  EXPECT_EQ(Find(one, "k1")->std_error, Find(again, "k1")->std_error);
+  EXPECT_NE(Find(one, "k1")->std_error, Find(other, "k1")->std_error);
+  EXPECT_EQ(one.summary, again.summary);
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::boards
