@@ -20,13 +20,17 @@ namespace boards = diagnosis::boards;
 // What belongs to touches or needs more than a folder of pictures is refused rather than left aside.
 absl::Status CheckBoardOptions(const Cli& cli, const ComparisonOptions& options, const BoardOptions& board) {
   if (board.square_mm == 0)
-    return absl::InvalidArgumentError("--board: how large is a square? Give --square-mm, for instance --square-mm 25");
+    return absl::InvalidArgumentError(
+        "--board: how large is a square? Give --square-mm, for instance --square-mm 25");
   if (!options.html.empty())
-    return absl::InvalidArgumentError("--html: there is no page for pictures of a board; --json writes the report");
+    return absl::InvalidArgumentError(
+        "--html: there is no page for pictures of a board; --json writes the report");
   if (!cli.source().servers.empty())
-    return absl::InvalidArgumentError("--server: pictures of a board are diagnosed by this program; leave --server out");
+    return absl::InvalidArgumentError(
+        "--server: pictures of a board are diagnosed by this program; leave --server out");
   if (!options.also.empty())
-    return absl::InvalidArgumentError("--also: effects of your own take no part in the diagnosis of a board; leave it out");
+    return absl::InvalidArgumentError(
+        "--also: effects of your own take no part in the diagnosis of a board; leave it out");
   return absl::OkStatus();
 }
 
@@ -54,13 +58,15 @@ std::string VerdictWords(const v1::Report& report) {
 std::string BoardReportInWords(const v1::Report& report) {
   std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n");
   for (const v1::Step& step : report.steps()) {
-    absl::StrAppend(&words, "\n", step.effect(), "  probability ", absl::StrFormat("%.3f", step.probability()), "\n");
+    absl::StrAppend(&words, "\n", step.effect(), "  probability ",
+                    absl::StrFormat("%.3f", step.probability()), "\n");
     for (const v1::ParameterValue& value : step.parameters())
-      absl::StrAppendFormat(&words, "  %-10s %-2s %10.5g +- %.2g %s\n", value.name(), value.finger(), value.value(),
-                            value.std_error(), value.unit());
+      absl::StrAppendFormat(&words, "  %-10s %-2s %10.5g +- %.2g %s\n", value.name(), value.finger(),
+                            value.value(), value.std_error(), value.unit());
     absl::StrAppend(&words, "  ", step.words(), "\n");
     if (step.equivalent_size() > 0)
-      absl::StrAppend(&words, "  these pictures cannot tell it from ", absl::StrJoin(step.equivalent(), ", "), "\n");
+      absl::StrAppend(&words, "  these pictures cannot tell it from ", absl::StrJoin(step.equivalent(), ", "),
+                      "\n");
   }
   for (const std::string& warning : report.warnings()) absl::StrAppend(&words, "\nNote: ", warning, "\n");
   return words;
@@ -70,9 +76,10 @@ std::string BoardReportInWords(const v1::Report& report) {
 
 void AddBoardOptions(CLI::App* command, BoardOptions* options) {
   command
-      ->add_option("--board", options->corners,
-                   "SET is a folder of PNG and JPEG pictures of a chessboard with so many inner corners, for instance "
-                   "9x6: what the lens differs from a pinhole by (camera.yaml in the folder, else a guess)")
+      ->add_option(
+          "--board", options->corners,
+          "SET is a folder of PNG and JPEG pictures of a chessboard with so many inner corners, for instance "
+          "9x6: what the lens differs from a pinhole by (camera.yaml in the folder, else a guess)")
       ->type_name("NxM")
       ->group("Board");
   command->add_option("--square-mm", options->square_mm, "Side of one square of the board")
@@ -96,8 +103,8 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   if (save_model.empty()) return absl::OkStatus();
   model::Model improved = model;
   if (!diagnosis.improved_model_yaml.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        improved, model::ParseModel(diagnosis.improved_model_yaml, "the improved model", effects::Catalogue()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(improved, model::ParseModel(diagnosis.improved_model_yaml,
+                                                            "the improved model", effects::Catalogue()));
     improved.name = std::filesystem::path(save_model).stem().string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", save_model, improved));

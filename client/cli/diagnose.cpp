@@ -72,9 +72,11 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
 }
 
 absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
-  if (!options.board.corners.empty()) return RunBoardDiagnosis(cli, options, options.board, options.save_model);
+  if (!options.board.corners.empty())
+    return RunBoardDiagnosis(cli, options, options.board, options.save_model);
   if (options.board.square_mm != 0)
-    return absl::InvalidArgumentError("--square-mm: the side of a square of what board? Give --board, for instance 9x6");
+    return absl::InvalidArgumentError(
+        "--square-mm: the side of a square of what board? Give --board, for instance 9x6");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(
       cli, {{"--html", options.html}, {"--json", options.json}, {"--save-model", options.save_model}}));
   if (!options.keep_as.empty() && cli.source().servers.empty())

@@ -113,7 +113,8 @@ std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now) {
   for (;;) {
     std::optional<LensChoice> best;
     for (int term = 0; term < static_cast<int>(LensTerms().size()); ++term) {
-      if (LensTerms()[term].named || std::find(now.terms.begin(), now.terms.end(), term) != now.terms.end()) continue;
+      if (LensTerms()[term].named || std::find(now.terms.begin(), now.terms.end(), term) != now.terms.end())
+        continue;
       std::vector<int> terms = now.terms;
       terms.push_back(term);
       LensChoice tried = FitChoice(set, now.fit, terms);
@@ -127,7 +128,8 @@ std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now) {
     found.name = term.name;
     found.gain_nats = gain;
     found.quality = QualityOf(set, *best);
-    for (const int entry : term.entries) found.values.emplace_back(NameOf(entry).parameter, best->fit.lens[entry]);
+    for (const int entry : term.entries)
+      found.values.emplace_back(NameOf(entry).parameter, best->fit.lens[entry]);
     rest.push_back(std::move(found));
     now = std::move(*best);
   }
@@ -159,17 +161,20 @@ absl::Status ImproveModel(const model::Model& model, BoardDiagnosis* diagnosis) 
 
 std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
   const auto error = [](const BoardQuality& quality) {
-    return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse_px, quality.heldout_rmse_px);
+    return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse_px,
+                           quality.heldout_rmse_px);
   };
   if (diagnosis.verdict == selection::Verdict::kTooLittleData)
     return absl::StrFormat("The board was found in %d pictures; %d are needed, from different sides.",
                            diagnosis.pictures, diagnosis.pictures_needed);
-  std::string words = absl::StrFormat("Reprojection error of %d corners in %d pictures: %s with the nominal lens%s.",
-                                      diagnosis.corners, diagnosis.pictures, error(*diagnosis.initial),
-                                      set.camera_is_guess ? ", which is a guess (no camera.yaml)" : "");
+  std::string words =
+      absl::StrFormat("Reprojection error of %d corners in %d pictures: %s with the nominal lens%s.",
+                      diagnosis.corners, diagnosis.pictures, error(*diagnosis.initial),
+                      set.camera_is_guess ? ", which is a guess (no camera.yaml)" : "");
   for (const BoardStep& step : diagnosis.steps) {
     const auto value = [](const inference::ParameterEstimate& p) {
-      return absl::StrFormat("%s%s%s %.5g +- %.2g", p.name, p.entry.empty() ? "" : " ", p.entry, p.value, p.std_error);
+      return absl::StrFormat("%s%s%s %.5g +- %.2g", p.name, p.entry.empty() ? "" : " ", p.entry, p.value,
+                             p.std_error);
     };
     absl::StrAppend(&words, " With ", step.effect, " (",
                     absl::StrJoin(step.parameters, ", ",
@@ -190,8 +195,8 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
 void AddSteps(const BoardSet& set, const LensSearch& search, uint64_t seed, BoardDiagnosis* diagnosis) {
   const LensChoice& last = search.ladder.back();
   const LensVector errors = ResampledErrors(set, last, seed);
-  const double t = boost::math::quantile(
-      boost::math::students_t(static_cast<double>(set.pictures.size()) - 1), 0.975);
+  const double t =
+      boost::math::quantile(boost::math::students_t(static_cast<double>(set.pictures.size()) - 1), 0.975);
   for (size_t k = 0; k < last.terms.size(); ++k) {
     const LensTerm& term = LensTerms()[last.terms[k]];
     BoardStep step;
@@ -235,8 +240,8 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   diagnosis.corners = diagnosis.pictures * set.board.corners();
   if (!set.without_board.empty())
     diagnosis.warnings.push_back(absl::StrCat(set.without_board.size(), " pictures show no whole board of ",
-                                              set.board.columns, "x", set.board.rows, " inner corners: ",
-                                              absl::StrJoin(set.without_board, ", ")));
+                                              set.board.columns, "x", set.board.rows,
+                                              " inner corners: ", absl::StrJoin(set.without_board, ", ")));
   if (diagnosis.pictures < kMinBoardPictures) {
     diagnosis.verdict = selection::Verdict::kTooLittleData;
     diagnosis.pictures_needed = kMinBoardPictures;

@@ -26,7 +26,7 @@ inline constexpr double kMinGainNats = 3;
 
 // Reprojection error: sqrt(sum ||measured - predicted||^2 / corners), px, as cv::calibrateCamera gives it.
 struct BoardQuality {
-  double rmse_px = 0;         // lens and poses fitted to all corners
+  double rmse_px = 0;          // lens and poses fitted to all corners
   double heldout_rmse_px = 0;  // of left-out pictures, as above
 };
 
@@ -35,7 +35,7 @@ struct BoardStep {
   std::vector<std::string> equivalent;  // that these pictures cannot tell from it
   double probability = 0, gain_nats = 0;
   std::vector<inference::ParameterEstimate> parameters;  // standard errors from resampled pictures
-  BoardQuality quality;  // with this step and all earlier ones, fitted anew
+  BoardQuality quality;                                  // with this step and all earlier ones, fitted anew
   std::string meaning, check_on_rig, remedy;
 };
 
@@ -43,7 +43,7 @@ struct BoardStep {
 struct BoardRest {
   std::string name;  // "tangential distortion"
   double gain_nats = 0;
-  BoardQuality quality;  // with it beside all steps
+  BoardQuality quality;                                // with it beside all steps
   std::vector<std::pair<std::string, double>> values;  // "p1", ...
 };
 
@@ -54,7 +54,7 @@ struct BoardDiagnosis {
   std::optional<BoardQuality> initial, final;
   std::vector<BoardStep> steps;
   std::vector<BoardRest> rest;
-  int pictures_needed = 0;  // with kTooLittleData
+  int pictures_needed = 0;               // with kTooLittleData
   LensVector lens = LensVector::Zero();  // beside the nominal one, with all steps
   std::string improved_model_yaml, improved_model_hash;
   std::string summary;

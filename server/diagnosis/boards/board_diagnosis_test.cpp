@@ -15,7 +15,8 @@ using selection::Verdict;
 using ::testing::HasSubstr;
 using ::testing::UnorderedElementsAre;
 
-BoardDiagnosis Diagnosed(const BoardSet& set, const model::Model& model = model::NominalModel(), uint64_t seed = 0) {
+BoardDiagnosis Diagnosed(const BoardSet& set, const model::Model& model = model::NominalModel(),
+                         uint64_t seed = 0) {
   absl::StatusOr<BoardDiagnosis> diagnosis = DiagnoseBoards(set, model, seed);
   EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
   return diagnosis.ok() ? *std::move(diagnosis) : BoardDiagnosis();
@@ -63,13 +64,16 @@ TEST(BoardDiagnosis, NamesEachEffectOfTheProjectionAlone) {
 }
 
 TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
-  const LensVector lens = LensWith({{kFocal, -0.1}, {kOffsetX, 12}, {kOffsetY, -7}, {kK1, -0.28}, {kK2, 0.08}});
+  const LensVector lens =
+      LensWith({{kFocal, -0.1}, {kOffsetX, 12}, {kOffsetY, -7}, {kK1, -0.28}, {kK2, 0.08}});
   const BoardSet set = MakeBoardSet(lens, 14, 0.2, 8);
   const BoardDiagnosis diagnosis = Diagnosed(set);
   EXPECT_THAT(Named(diagnosis), UnorderedElementsAre("focal_error", "principal_point", "radial_distortion"));
   const std::pair<const inference::ParameterEstimate*, double> found[] = {
-      {Find(diagnosis, "relative"), -0.1},      {Find(diagnosis, "offset_px", "x"), 12},
-      {Find(diagnosis, "offset_px", "y"), -7}, {Find(diagnosis, "k1"), -0.28},
+      {Find(diagnosis, "relative"), -0.1},
+      {Find(diagnosis, "offset_px", "x"), 12},
+      {Find(diagnosis, "offset_px", "y"), -7},
+      {Find(diagnosis, "k1"), -0.28},
       {Find(diagnosis, "k2"), 0.08}};
   for (const auto& [estimate, truth] : found) {
     ASSERT_NE(estimate, nullptr);
@@ -102,7 +106,8 @@ TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {
 }
 
 TEST(BoardDiagnosis, LeavesWhatHasNoEffectNameless) {
-  const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}, {kP1, 0.01}, {kP2, -0.008}}), 14, 0.2, 9));
+  const BoardDiagnosis diagnosis =
+      Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}, {kP1, 0.01}, {kP2, -0.008}}), 14, 0.2, 9));
   EXPECT_EQ(diagnosis.verdict, Verdict::kUnexplained);
   ASSERT_FALSE(diagnosis.rest.empty());
   EXPECT_EQ(diagnosis.rest[0].name, "tangential distortion");
@@ -119,7 +124,8 @@ TEST(BoardDiagnosis, SaysThatThereAreTooFewPictures) {
 
 TEST(BoardDiagnosis, IsTheSameEveryTimeAndErrorsFollowTheSeed) {
   const BoardSet set = MakeBoardSet(LensWith({{kK1, -0.2}}), 10, 0.2, 11);
-  const BoardDiagnosis one = Diagnosed(set), again = Diagnosed(set), other = Diagnosed(set, model::NominalModel(), 1);
+  const BoardDiagnosis one = Diagnosed(set), again = Diagnosed(set),
+                       other = Diagnosed(set, model::NominalModel(), 1);
   EXPECT_EQ(Find(one, "k1")->std_error, Find(again, "k1")->std_error);
   EXPECT_NE(Find(one, "k1")->std_error, Find(other, "k1")->std_error);
   EXPECT_EQ(one.summary, again.summary);

@@ -24,7 +24,8 @@ bool TakesPart(const BoardLayout& board, int corner, CornerHalf half) {
 }
 
 // Sum of squares over the half of a picture's corners; infinite if one does not lie before the camera.
-double Squares(const BoardSet& set, const LensVector& lens, const BoardPose& pose, int picture, CornerHalf half) {
+double Squares(const BoardSet& set, const LensVector& lens, const BoardPose& pose, int picture,
+               CornerHalf half) {
   double sum = 0;
   ProjectedCorner projected;
   for (int corner = 0; corner < set.board.corners(); ++corner) {
@@ -37,8 +38,8 @@ double Squares(const BoardSet& set, const LensVector& lens, const BoardPose& pos
 
 // Normal equations of one picture.
 struct PictureEquations {
-  Eigen::MatrixXd lens;        // free x free
-  Eigen::MatrixXd lens_pose;   // free x 6
+  Eigen::MatrixXd lens;       // free x free
+  Eigen::MatrixXd lens_pose;  // free x 6
   Matrix6 pose = Matrix6::Zero();
   Eigen::VectorXd lens_right;
   Vector6 pose_right = Vector6::Zero();
@@ -90,8 +91,8 @@ void Step(const std::vector<PictureEquations>& equations, const std::vector<doub
     solvers[i].compute(damped);
     left += weights[i] * (equations[i].lens -
                           equations[i].lens_pose * solvers[i].solve(equations[i].lens_pose.transpose()));
-    right += weights[i] * (equations[i].lens_right -
-                           equations[i].lens_pose * solvers[i].solve(equations[i].pose_right));
+    right += weights[i] *
+             (equations[i].lens_right - equations[i].lens_pose * solvers[i].solve(equations[i].pose_right));
     diagonal += weights[i] * equations[i].lens.diagonal();
   }
   Eigen::VectorXd step = Eigen::VectorXd::Zero(count);
@@ -146,7 +147,8 @@ BoardFit FitHalf(const BoardSet& set, BoardFit fit, const std::vector<int>& free
 bool Homography(const BoardSet& set, int picture, Eigen::Matrix3d* homography) {
   const int count = set.board.corners();
   const double size = set.board.square_m * std::max(set.board.columns, set.board.rows);
-  const Eigen::Vector2d middle = set.board.square_m * 0.5 * Eigen::Vector2d(set.board.columns - 1, set.board.rows - 1);
+  const Eigen::Vector2d middle =
+      set.board.square_m * 0.5 * Eigen::Vector2d(set.board.columns - 1, set.board.rows - 1);
   Eigen::MatrixXd rows(2 * count, 9);
   for (int corner = 0; corner < count; ++corner) {
     const Eigen::Vector2d from = (set.board.CornerM(corner) - middle) / size;
@@ -175,8 +177,9 @@ absl::StatusOr<BoardFit> StartFit(const BoardSet& set) {
   for (size_t i = 0; i < set.pictures.size(); ++i) {
     Eigen::Matrix3d h;
     if (!Homography(set, static_cast<int>(i), &h))
-      return absl::FailedPreconditionError(absl::StrCat(
-          set.pictures[i].file, ": the corners of the board lie on a line; a picture of its face was expected"));
+      return absl::FailedPreconditionError(
+          absl::StrCat(set.pictures[i].file,
+                       ": the corners of the board lie on a line; a picture of its face was expected"));
     double scale = 1 / std::sqrt(h.col(0).norm() * h.col(1).norm());
     if (h(2, 2) < 0) scale = -scale;  // before the camera
     Eigen::Matrix3d axes;
@@ -190,7 +193,8 @@ absl::StatusOr<BoardFit> StartFit(const BoardSet& set) {
   return FitBoards(set, std::move(fit), {});
 }
 
-BoardFit FitBoards(const BoardSet& set, BoardFit fit, const std::vector<int>& free, const std::vector<double>& weights) {
+BoardFit FitBoards(const BoardSet& set, BoardFit fit, const std::vector<int>& free,
+                   const std::vector<double>& weights) {
   return FitHalf(set, std::move(fit), free,
                  weights.empty() ? std::vector<double>(set.pictures.size(), 1.0) : weights, CornerHalf::kAll);
 }
@@ -199,8 +203,8 @@ double UnseenSquares(const BoardSet& set, const BoardFit& fit, int picture) {
   std::vector<double> only(set.pictures.size(), 0.0);
   only[picture] = 1;
   double sum = 0;
-  for (const auto& [seen, unseen] : {std::pair(CornerHalf::kEven, CornerHalf::kOdd),
-                                     std::pair(CornerHalf::kOdd, CornerHalf::kEven)}) {
+  for (const auto& [seen, unseen] :
+       {std::pair(CornerHalf::kEven, CornerHalf::kOdd), std::pair(CornerHalf::kOdd, CornerHalf::kEven)}) {
     const BoardFit half = FitHalf(set, fit, {}, only, seen);
     sum += Squares(set, half.lens, half.poses[picture], picture, unseen);
   }

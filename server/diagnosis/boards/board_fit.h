@@ -15,9 +15,10 @@ enum class CornerHalf { kAll, kEven, kOdd };  // like the colours of a chessboar
 
 struct BoardFit {
   LensVector lens = LensVector::Zero();
-  std::vector<BoardPose> poses;   // of every picture of the set, fitted or not
-  std::vector<double> squares_px2;  // by picture: sum over its corners of the squared distance; 0 if it has no weight
-  double sum_px2 = 0;             // with the weights
+  std::vector<BoardPose> poses;  // of every picture of the set, fitted or not
+  std::vector<double>
+      squares_px2;     // by picture: sum over its corners of the squared distance; 0 if it has no weight
+  double sum_px2 = 0;  // with the weights
 };
 
 // Poses from the homography of each picture, for a lens without distortion. FAILED_PRECONDITION names a picture whose

@@ -8,8 +8,15 @@
 namespace touchstone::diagnosis::boards {
 namespace {
 
-const LensVector kAllEntries = LensWith({{kFocal, 0.03}, {kOffsetX, 4}, {kOffsetY, -6}, {kK1, -0.25}, {kK2, 0.1},
-                                         {kP1, 0.004}, {kP2, -0.003}, {kK3, -0.05}, {kAspect, 0.01}});
+const LensVector kAllEntries = LensWith({{kFocal, 0.03},
+                                         {kOffsetX, 4},
+                                         {kOffsetY, -6},
+                                         {kK1, -0.25},
+                                         {kK2, 0.1},
+                                         {kP1, 0.004},
+                                         {kP2, -0.003},
+                                         {kK3, -0.05},
+                                         {kAspect, 0.01}});
 
 BoardPose SomePose() {
   BoardPose pose;
@@ -22,8 +29,8 @@ TEST(BoardProjection, IsOpenCvsWithPixelCentresAtHalfIntegers) {
   BoardSet set = MakeBoardSet(LensVector::Zero(), 1, 0, 1);
   set.camera.k1 = 0.05, set.camera.p2 = 0.001;
   const BoardPose pose = SomePose();
-  const cv::Mat lens = (cv::Mat_<double>(3, 3) << 540 * 1.03 * 1.01, 0, 320 + 4 - 0.5, 0, 540 * 1.03, 240 - 6 - 0.5, 0,
-                        0, 1);
+  const cv::Mat lens =
+      (cv::Mat_<double>(3, 3) << 540 * 1.03 * 1.01, 0, 320 + 4 - 0.5, 0, 540 * 1.03, 240 - 6 - 0.5, 0, 0, 1);
   const cv::Mat distortion = (cv::Mat_<double>(5, 1) << -0.25 + 0.05, 0.1, 0.004, -0.003 + 0.001, -0.05);
   const Eigen::AngleAxisd turn(pose.rotation);
   const Eigen::Vector3d w = turn.angle() * turn.axis();
@@ -32,8 +39,8 @@ TEST(BoardProjection, IsOpenCvsWithPixelCentresAtHalfIntegers) {
     points.emplace_back(set.board.CornerM(k).x(), set.board.CornerM(k).y(), 0);
   std::vector<cv::Point2d> theirs;
   cv::projectPoints(points, cv::Vec3d(w.x(), w.y(), w.z()),
-                    cv::Vec3d(pose.translation_m.x(), pose.translation_m.y(), pose.translation_m.z()), lens, distortion,
-                    theirs);
+                    cv::Vec3d(pose.translation_m.x(), pose.translation_m.y(), pose.translation_m.z()), lens,
+                    distortion, theirs);
   for (int k = 0; k < set.board.corners(); ++k) {
     ProjectedCorner ours;
     ASSERT_TRUE(ProjectCorner(set.camera, kAllEntries, pose, set.board.CornerM(k), &ours));
@@ -59,7 +66,8 @@ TEST(BoardProjection, DerivativesAreThoseOfFiniteDifferences) {
     const auto moved = [&](double by) {
       BoardPose other = pose;
       if (entry < 3)
-        other.rotation = Eigen::AngleAxisd(by, Eigen::Vector3d::Unit(entry)).toRotationMatrix() * pose.rotation;
+        other.rotation =
+            Eigen::AngleAxisd(by, Eigen::Vector3d::Unit(entry)).toRotationMatrix() * pose.rotation;
       else
         other.translation_m[entry - 3] += by;
       return other;

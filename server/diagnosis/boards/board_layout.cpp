@@ -23,8 +23,8 @@ absl::StatusOr<BoardLayout> ParseBoardLayout(const std::string& corners, double 
   if (sides.size() != 2 || !absl::SimpleAtoi(sides[0], &board.columns) ||
       !absl::SimpleAtoi(sides[1], &board.rows) || std::min(board.columns, board.rows) < 3 ||
       std::max(board.columns, board.rows) > 100)
-    return absl::InvalidArgumentError(
-        absl::StrCat("--board: '", corners, "' is no number of inner corners; for instance 9x6, from 3x3 to 100x100"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--board: '", corners, "' is no number of inner corners; for instance 9x6, from 3x3 to 100x100"));
   if (!(square_mm >= 0.01 && square_mm <= 10000))
     return absl::InvalidArgumentError(
         absl::StrCat("--square-mm: ", square_mm, " is no side of a square; must be from 0.01 to 10000"));

@@ -33,7 +33,9 @@ absl::StatusOr<std::vector<fs::path>> PicturesOf(const std::string& folder) {
     const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
     if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") files.push_back(entry.path());
   }
-  if (error) return absl::NotFoundError(absl::StrCat(folder, ": ", error.message(), "; a folder of pictures was expected"));
+  if (error)
+    return absl::NotFoundError(
+        absl::StrCat(folder, ": ", error.message(), "; a folder of pictures was expected"));
   if (files.empty()) return absl::NotFoundError(absl::StrCat(folder, ": holds no picture (.png, .jpg)"));
   if (files.size() > kMaxPictures)
     return absl::InvalidArgumentError(
@@ -45,7 +47,8 @@ absl::StatusOr<std::vector<fs::path>> PicturesOf(const std::string& folder) {
 double SmallestStep(const std::vector<cv::Point2f>& corners, const BoardLayout& board) {
   double smallest = INFINITY;
   for (int k = 0; k < board.corners(); ++k) {
-    if (k % board.columns + 1 < board.columns) smallest = std::min(smallest, cv::norm(corners[k + 1] - corners[k]));
+    if (k % board.columns + 1 < board.columns)
+      smallest = std::min(smallest, cv::norm(corners[k + 1] - corners[k]));
     if (k + board.columns < board.corners())
       smallest = std::min(smallest, cv::norm(corners[k + board.columns] - corners[k]));
   }
@@ -53,7 +56,8 @@ double SmallestStep(const std::vector<cv::Point2f>& corners, const BoardLayout& 
 }
 
 // None: the whole board is not in the picture.
-std::optional<BoardPicture> FindCorners(const cv::Mat& grey, const BoardLayout& board, const std::string& file) {
+std::optional<BoardPicture> FindCorners(const cv::Mat& grey, const BoardLayout& board,
+                                        const std::string& file) {
   std::vector<cv::Point2f> corners;
   if (!cv::findChessboardCorners(grey, cv::Size(board.columns, board.rows), corners) ||
       static_cast<int>(corners.size()) != board.corners())
@@ -72,13 +76,14 @@ std::optional<BoardPicture> FindCorners(const cv::Mat& grey, const BoardLayout& 
 absl::Status ReadCamera(const fs::path& file, BoardSet* set) {
   std::ifstream stream(file, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(stream)), {});
-  if (!stream.good() && !stream.eof()) return absl::InvalidArgumentError(absl::StrCat(file.string(), ": cannot be read"));
+  if (!stream.good() && !stream.eof())
+    return absl::InvalidArgumentError(absl::StrCat(file.string(), ": cannot be read"));
   const session::CameraIntrinsics guessed = set->camera;
   TOUCHSTONE_ASSIGN_OR_RETURN(set->camera, session::ParseCameraYaml(text, file.string()));
   if (set->camera.width_px != guessed.width_px || set->camera.height_px != guessed.height_px)
-    return absl::InvalidArgumentError(absl::StrCat(file.string(), ": is of pictures of ", set->camera.width_px, " x ",
-                                                   set->camera.height_px, " px, but those of the folder have ",
-                                                   guessed.width_px, " x ", guessed.height_px));
+    return absl::InvalidArgumentError(absl::StrCat(
+        file.string(), ": is of pictures of ", set->camera.width_px, " x ", set->camera.height_px,
+        " px, but those of the folder have ", guessed.width_px, " x ", guessed.height_px));
   set->camera_is_guess = false;
   return absl::OkStatus();
 }
@@ -100,8 +105,8 @@ absl::StatusOr<BoardSet> ReadBoardPictures(const std::string& folder, const Boar
       if (set.camera.width_px == 0) set.camera = GuessedCamera(grey.cols, grey.rows);
       if (grey.cols != set.camera.width_px || grey.rows != set.camera.height_px)
         return absl::InvalidArgumentError(absl::StrCat(
-            file.string(), ": has ", grey.cols, " x ", grey.rows, " px, those before it ", set.camera.width_px, " x ",
-            set.camera.height_px, "; pictures of one camera were expected"));
+            file.string(), ": has ", grey.cols, " x ", grey.rows, " px, those before it ",
+            set.camera.width_px, " x ", set.camera.height_px, "; pictures of one camera were expected"));
       std::optional<BoardPicture> picture = FindCorners(grey, board, file.filename().string());
       if (picture.has_value())
         set.pictures.push_back(*std::move(picture));

@@ -40,7 +40,8 @@ cv::Mat DrawBoard(const BoardLayout& board, const session::CameraIntrinsics& cam
         const Eigen::Vector3d ray((column + (k % 4 + 0.5) / 4 - camera.cx_px) / camera.fx_px,
                                   (row + (k / 4 + 0.5) / 4 - camera.cy_px) / camera.fy_px, 1);
         const Eigen::Vector3d place =
-            pose.rotation.transpose() * (ray * normal.dot(pose.translation_m) / normal.dot(ray) - pose.translation_m);
+            pose.rotation.transpose() *
+            (ray * normal.dot(pose.translation_m) / normal.dot(ray) - pose.translation_m);
         // Squares begin one before the first inner corner; white paper round them.
         const int x = static_cast<int>(std::floor(place.x() / board.square_m)) + 1;
         const int y = static_cast<int>(std::floor(place.y() / board.square_m)) + 1;
@@ -73,7 +74,8 @@ TEST(BoardPictures, CornersAreFoundWhereTheyWereDrawn) {
     double here = 0;
     for (int k = 0; k < board.corners(); ++k) {
       ProjectedCorner drawn;
-      ASSERT_TRUE(ProjectCorner(camera, LensVector::Zero(), pose, board.CornerM(turned ? board.corners() - 1 - k : k), &drawn));
+      ASSERT_TRUE(ProjectCorner(camera, LensVector::Zero(), pose,
+                                board.CornerM(turned ? board.corners() - 1 - k : k), &drawn));
       here += (set->pictures[0].corners_px[k] - drawn.px).squaredNorm() / board.corners();
     }
     smallest = std::min(smallest, std::sqrt(here));
@@ -84,17 +86,22 @@ TEST(BoardPictures, CornersAreFoundWhereTheyWereDrawn) {
 TEST(BoardPictures, RefusalsSayWhatWasExpected) {
   const TestFolder folder;
   const BoardLayout board{9, 6, 0.025};
-  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()), HasSubstr("holds no picture"));
+  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()),
+              HasSubstr("holds no picture"));
   EXPECT_THAT(std::string(ReadBoardPictures(folder.Path("absent"), board).status().message()),
               HasSubstr("a folder of pictures was expected"));
   cv::imwrite(folder.Path("a.png"), cv::Mat(48, 64, CV_8U, cv::Scalar(9)));
   cv::imwrite(folder.Path("b.png"), cv::Mat(48, 32, CV_8U, cv::Scalar(9)));
-  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()), HasSubstr("b.png: has 32 x 48 px"));
+  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()),
+              HasSubstr("b.png: has 32 x 48 px"));
   std::ofstream(folder.Path("b.png")) << "no picture";
-  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()), HasSubstr("b.png: cannot be read"));
+  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()),
+              HasSubstr("b.png: cannot be read"));
   fs::remove(folder.Path("b.png"));
-  std::ofstream(folder.Path("camera.yaml")) << "{width_px: 65, height_px: 48, fx_px: 9, fy_px: 9, cx_px: 9, cy_px: 9}";
-  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()), HasSubstr("is of pictures of 65 x 48"));
+  std::ofstream(folder.Path("camera.yaml"))
+      << "{width_px: 65, height_px: 48, fx_px: 9, fy_px: 9, cx_px: 9, cy_px: 9}";
+  EXPECT_THAT(std::string(ReadBoardPictures(folder.path(), board).status().message()),
+              HasSubstr("is of pictures of 65 x 48"));
   for (const char* wrong : {"9", "9x", "9x2", "x6", "9x6x1", "1000x6", "a"})
     EXPECT_FALSE(ParseBoardLayout(wrong, 25).ok()) << wrong;
   EXPECT_FALSE(ParseBoardLayout("9x6", 0).ok());
@@ -119,7 +126,8 @@ std::vector<cv::Point2f> CornersOf(const BoardSet& set, size_t picture, int pari
   std::vector<cv::Point2f> corners;
   for (int k = 0; k < set.board.corners(); ++k)
     if (parity < 0 || (k % set.board.columns + k / set.board.columns) % 2 == parity)
-      corners.emplace_back(set.pictures[picture].corners_px[k].x() - 0.5, set.pictures[picture].corners_px[k].y() - 0.5);
+      corners.emplace_back(set.pictures[picture].corners_px[k].x() - 0.5,
+                           set.pictures[picture].corners_px[k].y() - 0.5);
   return corners;
 }
 
@@ -134,8 +142,8 @@ OpenCvLens Calibrate(const BoardSet& set, size_t without) {
   }
   OpenCvLens lens;
   std::vector<cv::Mat> turns, shifts;
-  lens.rmse_px = cv::calibrateCamera(points, corners, cv::Size(set.camera.width_px, set.camera.height_px), lens.matrix,
-                                     lens.distortion, turns, shifts);
+  lens.rmse_px = cv::calibrateCamera(points, corners, cv::Size(set.camera.width_px, set.camera.height_px),
+                                     lens.matrix, lens.distortion, turns, shifts);
   return lens;
 }
 
@@ -144,7 +152,8 @@ double OpenCvUnseenSquares(const BoardSet& set, const OpenCvLens& lens, size_t p
   double sum = 0;
   for (const int seen : {0, 1}) {
     cv::Mat turn, shift;
-    cv::solvePnP(PointsOf(set.board, seen), CornersOf(set, picture, seen), lens.matrix, lens.distortion, turn, shift);
+    cv::solvePnP(PointsOf(set.board, seen), CornersOf(set, picture, seen), lens.matrix, lens.distortion, turn,
+                 shift);
     std::vector<cv::Point2f> expected;
     cv::projectPoints(PointsOf(set.board, 1 - seen), turn, shift, lens.matrix, lens.distortion, expected);
     const std::vector<cv::Point2f> corners = CornersOf(set, picture, 1 - seen);
@@ -172,15 +181,18 @@ TEST(BoardPictures, RealPicturesNameRadialDistortionAndAgreeWithOpenCvsCalibrati
   const double their_k1 = theirs.distortion.at<double>(0);
   EXPECT_NEAR(radial->parameters[0].value, their_k1, 0.02);
   double their_squares = 0;
-  for (size_t i = 0; i < set->pictures.size(); ++i) their_squares += OpenCvUnseenSquares(*set, Calibrate(*set, i), i);
+  for (size_t i = 0; i < set->pictures.size(); ++i)
+    their_squares += OpenCvUnseenSquares(*set, Calibrate(*set, i), i);
   const double their_unseen = std::sqrt(their_squares / diagnosis->corners);
   EXPECT_LT(diagnosis->final->heldout_rmse_px, 1.05 * their_unseen);
   EXPECT_GT(diagnosis->initial->heldout_rmse_px, 3 * their_unseen);
-  std::printf("k1 %.4f +- %.4f, OpenCV %.4f; left-out pictures %.4f px before, %.4f after, OpenCV %.4f; all pictures %.4f, "
-              "%.4f, OpenCV %.4f\n%s\n",
-              radial->parameters[0].value, radial->parameters[0].std_error, their_k1,
-              diagnosis->initial->heldout_rmse_px, diagnosis->final->heldout_rmse_px, their_unseen,
-              diagnosis->initial->rmse_px, diagnosis->final->rmse_px, theirs.rmse_px, diagnosis->summary.c_str());
+  std::printf(
+      "k1 %.4f +- %.4f, OpenCV %.4f; left-out pictures %.4f px before, %.4f after, OpenCV %.4f; all pictures "
+      "%.4f, "
+      "%.4f, OpenCV %.4f\n%s\n",
+      radial->parameters[0].value, radial->parameters[0].std_error, their_k1,
+      diagnosis->initial->heldout_rmse_px, diagnosis->final->heldout_rmse_px, their_unseen,
+      diagnosis->initial->rmse_px, diagnosis->final->rmse_px, theirs.rmse_px, diagnosis->summary.c_str());
 }
 
 }  // namespace

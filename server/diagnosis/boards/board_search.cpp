@@ -48,7 +48,8 @@ LensChoice FitChoice(const BoardSet& set, const BoardFit& start, const std::vect
   const double readings = 2.0 * pictures * set.board.corners();
   // Corners that are met exactly (made up ones) have no likelihood: nothing is better than a thousandth of a pixel.
   const double variance = std::max(choice.fit.sum_px2 / readings, 1e-6);
-  choice.log_evidence = -0.5 * readings * std::log(variance) - 0.5 * static_cast<double>(free.size()) * std::log(readings);
+  choice.log_evidence =
+      -0.5 * readings * std::log(variance) - 0.5 * static_cast<double>(free.size()) * std::log(readings);
   for (int i = 0; i < pictures; ++i) {
     std::vector<double> others(pictures, 1.0);
     others[i] = 0;
@@ -101,8 +102,8 @@ LensSearch SearchNamed(const BoardSet& set, const BoardFit& start) {
     search.ladder.resize(1);
     search.gain_nats.clear();
     for (size_t count = 1; count <= fewer.size(); ++count) {
-      search.ladder.push_back(
-          FitChoice(set, search.ladder.back().fit, {fewer.begin(), fewer.begin() + static_cast<long>(count)}));
+      search.ladder.push_back(FitChoice(set, search.ladder.back().fit,
+                                        {fewer.begin(), fewer.begin() + static_cast<long>(count)}));
       search.gain_nats.push_back(search.ladder.back().log_evidence - search.ladder[count - 1].log_evidence);
     }
     k = 0;

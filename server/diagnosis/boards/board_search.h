@@ -11,7 +11,7 @@ namespace touchstone::diagnosis::boards {
 struct LensChoice {
   std::vector<int> terms;  // indices, in the order of choice
   BoardFit fit;
-  double log_evidence = 0;  // up to a constant: BIC over the readings, noise of unknown sigma
+  double log_evidence = 0;         // up to a constant: BIC over the readings, noise of unknown sigma
   std::vector<double> unseen_px2;  // by picture: UnseenSquares with a lens that was fitted without it
 };
 

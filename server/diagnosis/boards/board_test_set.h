@@ -16,12 +16,13 @@ inline BoardSet MakeBoardSet(const LensVector& lens, int pictures, double sigma_
   while (static_cast<int>(set.pictures.size()) < pictures) {
     BoardPose pose;
     // Tilted by up to 35 deg, the board's middle before the camera.
-    const Eigen::Vector3d turn(random.Uniform(-0.6, 0.6), random.Uniform(-0.6, 0.6), random.Uniform(-0.4, 0.4));
+    const Eigen::Vector3d turn(random.Uniform(-0.6, 0.6), random.Uniform(-0.6, 0.6),
+                               random.Uniform(-0.4, 0.4));
     pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
     const Eigen::Vector3d middle(0.1, 0.0625, 0);
-    pose.translation_m = Eigen::Vector3d(random.Uniform(-0.08, 0.08), random.Uniform(-0.05, 0.05),
-                                         random.Uniform(0.3, 0.5)) -
-                         pose.rotation * middle;
+    pose.translation_m =
+        Eigen::Vector3d(random.Uniform(-0.08, 0.08), random.Uniform(-0.05, 0.05), random.Uniform(0.3, 0.5)) -
+        pose.rotation * middle;
     BoardPicture picture;
     picture.file = std::to_string(set.pictures.size()) + ".png";
     bool inside = true;
@@ -29,7 +30,8 @@ inline BoardSet MakeBoardSet(const LensVector& lens, int pictures, double sigma_
       ProjectedCorner projected;
       inside = inside && ProjectCorner(set.camera, lens, pose, set.board.CornerM(corner), &projected) &&
                projected.px.minCoeff() > 0 && projected.px.x() < 640 && projected.px.y() < 480;
-      picture.corners_px.push_back(projected.px + sigma_px * Eigen::Vector2d(random.Normal(), random.Normal()));
+      picture.corners_px.push_back(projected.px +
+                                   sigma_px * Eigen::Vector2d(random.Normal(), random.Normal()));
     }
     if (inside) set.pictures.push_back(std::move(picture));
   }

@@ -44,8 +44,9 @@ bool ProjectCorner(const session::CameraIntrinsics& nominal, const LensVector& l
 
   // By the point: through the lens, then the division by depth.
   Eigen::Matrix2d by_slopes;
-  by_slopes << radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x, 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y,
-      2 * x * y * slope + 2 * p1 * x + 2 * p2 * y, radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;
+  by_slopes << radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x,
+      2 * x * y * slope + 2 * p1 * x + 2 * p2 * y, 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y,
+      radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;
   by_slopes.row(0) *= fx;
   by_slopes.row(1) *= fy;
   Eigen::Matrix<double, 2, 3> by_point;

@@ -50,6 +50,12 @@ class Mark:
     errors: list = dataclasses.field(default_factory=list)  # of each value, in standard errors
     missed_fall: bool = False  # `compare` does not find the error that the report says the model falls to
     seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+
+def _number(value):
+    """Of a report: numbers that are not known are the string "NaN"."""
+    return float(value if value is not None else math.nan)
 
 
 def _steps(report):
@@ -73,12 +79,12 @@ def _cover(step, values, mark):
     values = [values] if not isinstance(values, (list, tuple)) else values
     for key, truth in zip(PARAMETERS[step["effect"]], values):
         estimate = found.get(key)
-        if estimate is None or not estimate.get("std_error"):
+        value, error = (_number((estimate or {}).get(field)) for field in ("value", "std_error"))
+        if not error > 0:
             continue
-        value, error = estimate.get("value", 0.0), estimate["std_error"]
         if key[0] == "angle_deg":  # a direction without a sign
             truth = value + (truth - value + 90) % 180 - 90
-        low, high = estimate.get("lower", value - 1.96 * error), estimate.get("upper", value + 1.96 * error)
+        low, high = _number(estimate["lower"]), _number(estimate["upper"])
         mark.covered.append(bool(low <= truth <= high))
         mark.errors.append((value - truth) / error)
 
@@ -91,17 +97,17 @@ def judge(report, truth, seconds):
     mark.report, mark.verdict = True, report.get("verdict", "")
     steps = _steps(report)
     mark.claims = [s["effect"] for s in steps]
-    mark.probability = steps[0].get("probability", 0.0) if steps else 0.0
+    mark.probability = _number(steps[0].get("probability")) if steps else 0.0
     hidden = truth["effects"]
-    floor = report.get("noise_floor_grey", 0)
-    if floor and report.get("final"):
-        mark.over_floor = report["final"].get("rmse_grey", 0) / floor
+    floor = _number(report.get("noise_floor_grey"))
+    if floor > 0 and report.get("final"):
+        mark.over_floor = _number(report["final"].get("rmse_grey")) / floor
 
     true_step = lambda s: any(_is(s, e) for e in hidden)
     wrong_steps = [s for s in steps if not true_step(s)]
     # A step that holds the truth among its equivalents blames nothing.
     blames = [s for s in wrong_steps
-              if s.get("probability", 0) > CONFIDENT and not set(s.get("equivalent", [])) & set(hidden)]
+              if _number(s.get("probability")) > CONFIDENT and not set(s.get("equivalent", [])) & set(hidden)]
     mistakes = [p["kind"] for p in report.get("data_problems", [])]
     mark.right_first = bool(steps) and true_step(steps[0])
     mark.all_found = (all(any(_is(s, e) for s in steps) for e in hidden) and not wrong_steps

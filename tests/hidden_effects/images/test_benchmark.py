@@ -83,7 +83,8 @@ def a_truth(**fields):
 
 def a_step(effect, value=1.0, error=0.1, name="stops", probability=0.99, **fields):
     return {"effect": effect, "probability": probability,
-            "parameters": [{"name": name, "value": value, "std_error": error}], **fields}
+            "parameters": [{"name": name, "value": value, "std_error": error, "lower": value - 2 * error,
+                            "upper": value + 2 * error}], **fields}
 
 
 def test_the_judge_marks_what_is_right_and_what_is_confidently_wrong():
