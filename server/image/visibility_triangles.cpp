@@ -13,6 +13,10 @@
 namespace touchstone::image {
 namespace {
 
+// Up to this many triangles for a pixel of the object's box, drawing is faster than casting: measured, 2.7
+// times as fast at one or two, 1.4 times at 27; open meshes, which show both sides, gain less.
+constexpr double kTrianglesAPixel = 20.0;
+
 // GCC's vectors: compiled to whatever the target has.
 constexpr int kWide = 8;
 typedef float Floats __attribute__((vector_size(kWide * sizeof(float))));
@@ -39,14 +43,15 @@ struct Corner {
 std::vector<Corner> ProjectVertices(const CpuFrame& frame) {
   const View& view = frame.view;
   // Composed in double precision: what is large cancels before it is rounded.
-  const Eigen::Vector3d right = view.right / view.step, down = -view.up / view.step, forward = view.forward;
+  const Eigen::Vector3d right = view.right / frame.step_x, down = -view.up / frame.step_y,
+                        forward = view.forward;
   const float rx = static_cast<float>(right.x()), ry = static_cast<float>(right.y()),
               rz = static_cast<float>(right.z()), rc = static_cast<float>(-right.dot(view.eye_m));
   const float dx = static_cast<float>(down.x()), dy = static_cast<float>(down.y()),
               dz = static_cast<float>(down.z()), dc = static_cast<float>(-down.dot(view.eye_m));
   const float fx = static_cast<float>(forward.x()), fy = static_cast<float>(forward.y()),
               fz = static_cast<float>(forward.z()), fc = static_cast<float>(-forward.dot(view.eye_m));
-  const float middle_x = 0.5f * view.width, middle_y = 0.5f * view.height;
+  const float middle_x = static_cast<float>(frame.middle_x), middle_y = static_cast<float>(frame.middle_y);
   const std::vector<ShadingMesh::Vertex>& vertices = frame.mesh->vertices;
   std::vector<Corner> corners(vertices.size());
   for (size_t i = 0; i < vertices.size(); ++i) {
@@ -73,6 +78,12 @@ Edge MakeEdge(Corner a, Corner b, float inside) {
 
 }  // namespace
 
+bool IsCoarse(const CpuFrame& frame) {
+  const double pixels = static_cast<double>(frame.box.last_column - frame.box.first_column) *
+                        (frame.box.last_row - frame.box.first_row);
+  return static_cast<double>(frame.mesh->corners.size() / 3) <= kTrianglesAPixel * pixels;
+}
+
 bool CanDrawTriangles(const CpuFrame& frame) {
   // Nothing to be clipped, no corner so far beside the image that its pixel is blurred, and depths that
   // differ.
@@ -85,7 +96,11 @@ bool CanDrawTriangles(const CpuFrame& frame) {
                                    (i & 4) ? bounds.max_m.z() : bounds.min_m.z());
     const double depth_m = frame.view.DepthM(corner_m);
     if (depth_m < frame.view.near_m || depth_m > frame.view.far_m) return false;
-    if (frame.view.Project(corner_m).cwiseAbs().maxCoeff() > kFarthestPixel) return false;
+    const Eigen::Vector3d from_eye = corner_m - frame.view.eye_m;
+    if (std::abs(frame.middle_x + from_eye.dot(frame.view.right) / (depth_m * frame.step_x)) >
+            kFarthestPixel ||
+        std::abs(frame.middle_y - from_eye.dot(frame.view.up) / (depth_m * frame.step_y)) > kFarthestPixel)
+      return false;
   }
   return true;
 }
