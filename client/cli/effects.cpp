@@ -184,10 +184,12 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
                  WithUnit(p.default_value(), p.unit()), WithUnit(p.typical(), p.unit()), p.meaning()});
     absl::StrAppend(&text, "\n", table.Text());
     const v1::Parameter& first = effect.parameters(0);
-    const std::string value = first.arity() == v1::PARAMETER_ARITY_SCALAR ? ShortestNumber(first.typical())
-                              : first.sum_zero() ? absl::StrCat(ShortestNumber(first.typical()), ",0,",
-                                                                ShortestNumber(-first.typical()))
-                                                 : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
+    const std::string value =
+        first.arity() == v1::PARAMETER_ARITY_SCALAR    ? ShortestNumber(first.typical())
+        : first.arity() == v1::PARAMETER_ARITY_VECTOR2 ? absl::StrCat(ShortestNumber(first.typical()), ",0")
+        : first.sum_zero()
+            ? absl::StrCat(ShortestNumber(first.typical()), ",0,", ShortestNumber(-first.typical()))
+            : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
     absl::StrAppend(&text, "\nAdd it:  touchstone model add nominal ", effect.name(), " ", first.name(), "=",
                     value, " -o better.yaml\n");
   }
