@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from typing import Any, Iterator, Sequence
 
 import numpy as np
@@ -244,16 +245,23 @@ class Client:
         with self.lease() as lease:
             yield lease
 
-    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, lease_token: str = "") -> Batch:
+    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, normalize: bool = False,
+                lease_token: str = "") -> Batch:
         """Photographs: one for each touch (its camera) or each touchstone.Camera.
+
+        Args:
+          normalize: as image(normalize=True): dark objects on white.
 
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
         """
+        options = image or default_image()
+        if normalize:
+            options = dataclasses.replace(options, normalize=True)
         with contextlib.ExitStack() as stack:
             token = lease_token or stack.enter_context(self.holding_lease())
             request = source_pb2.CaptureRequest(
-                object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=token
+                object=object, views=to_views(views), image=options.to_proto(), lease_token=token
             )
             reply = self._connection.call(_SOURCE, "Capture", request, repeat=not token)
         return Batch.from_columns(0, reply.rows, reply.columns)
