@@ -8,6 +8,7 @@ namespace touchstone::diagnosis::images {
 // The scatter of single pixels: variance sigma^2 + gain * grey, rounding to 8 bits included.
 struct PixelNoise {
   double sigma_grey = 0, gain = 0;
+  double sigma_error = 0, gain_error = 0;  // standard errors, where it was estimated
 
   double Variance(double grey) const { return sigma_grey * sigma_grey + gain * grey; }
 };
@@ -15,8 +16,25 @@ struct PixelNoise {
 // What a clipped 8-bit pixel of this grey level records: its mean and variance.
 struct RecordedPixel {
   double mean_grey = 0, variance = 0;
+  double clipped = 0;  // share of its records
 };
 RecordedPixel Record(double grey, const PixelNoise& noise);
+
+// The same from a table, for many pixels.
+class RecordTable {
+ public:
+  explicit RecordTable(const PixelNoise& noise);
+  float Mean(float grey) const;
+  // Of a pixel that records `mean` on average.
+  double Variance(double mean) const { return At(variance_, mean); }
+  double Clipped(double mean) const { return At(clipped_, mean); }
+
+ private:
+  double At(const std::vector<float>& values, double mean) const;
+  PixelNoise noise_;
+  std::vector<float> mean_;                // by grey level
+  std::vector<float> variance_, clipped_;  // by what is recorded on average
+};
 
 // Gathers second differences of images along their rows, by grey level.
 class NoiseGatherer {
