@@ -172,6 +172,7 @@ void AddTouch(Cli* cli);
 void AddCapture(Cli* cli);
 void AddStream(Cli* cli);
 void AddMesh(Cli* cli);
+void AddNormalize(Cli* cli);
 void AddCompare(Cli* cli);
 void AddDiagnose(Cli* cli);
 void AddPropose(Cli* cli);

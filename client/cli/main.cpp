@@ -17,6 +17,7 @@ void AddCommands(Cli* cli) {
   AddCapture(cli);
   AddStream(cli);
   AddMesh(cli);
+  AddNormalize(cli);
   AddCompare(cli);
   AddDiagnose(cli);
   AddPropose(cli);

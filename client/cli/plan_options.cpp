@@ -158,6 +158,10 @@ void AddImageOptions(CLI::App* command, ImageFlags* options) {
   command
       ->add_flag("--depth", options->depth, "Also depth along the viewing axis, in mm, 0 where no object is")
       ->group(kImageGroup);
+  command
+      ->add_flag("--normalize", options->normalize,
+                 "A dark object on white, without ground and shadows; --mask is then the one that this finds")
+      ->group(kImageGroup);
   command->add_flag("--mask", options->mask, "Also the object's mask, 255 on the object, 0 beside it")
       ->group(kImageGroup);
 }
@@ -193,6 +197,7 @@ absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& o,
   spec.set_vertical_fov_rad(ToSi(Unit::kDegree, o.fov_deg));
   spec.set_depth(o.depth);
   spec.set_mask(o.mask);
+  spec.set_normalize(o.normalize);
   TOUCHSTONE_ASSIGN_OR_RETURN(const image::RendererOptions renderer, cli.Renderer());
   if (renderer.kind == image::RendererKind::kEgl) spec.set_renderer(v1::RENDERER_KIND_EGL);
   if (renderer.kind == image::RendererKind::kCpu) spec.set_renderer(v1::RENDERER_KIND_CPU);

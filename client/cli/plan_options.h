@@ -31,6 +31,7 @@ struct ImageFlags {
   std::string shading_style = "shaded";
   bool depth = false;
   bool mask = false;
+  bool normalize = false;
   int jpeg_quality = 90;
   double fov_deg = 45;
 };

@@ -5,6 +5,7 @@
 
 #include "server/base/status.h"
 #include "server/image/encode.h"
+#include "server/image/normalize.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::dataset {
@@ -124,12 +125,20 @@ void BatchColumns::PutTouches(const TouchSampler::Block& block) const {
   for (const auto& [writer, put] : puts_) put(writer, block);
 }
 
-absl::Status BatchColumns::AppendPicture(const image::Image& picture, const DatasetImage& image,
+absl::Status BatchColumns::AppendPicture(image::Image taken, const DatasetImage& image,
                                          DatasetBatch* batch) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture, AsAsked(std::move(taken), image));
   for (size_t column = 0; column < columns_.size(); ++column)
     TOUCHSTONE_RETURN_IF_ERROR(touchstone::dataset::AppendPicture(
         picture, image, columns_[column].name, &batch->data[column], &batch->offsets[column]));
   return absl::OkStatus();
+}
+
+absl::StatusOr<image::Image> AsAsked(image::Image picture, const DatasetImage& image) {
+  if (!image.normalize) return picture;
+  TOUCHSTONE_ASSIGN_OR_RETURN(image::Image normalized, image::Normalize(picture));
+  normalized.depth_m = std::move(picture.depth_m);
+  return normalized;
 }
 
 absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image, const std::string& column,

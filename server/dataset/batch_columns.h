@@ -33,8 +33,7 @@ class BatchColumns {
   void PutTouches(const TouchSampler::Block& block) const;
 
   // What a picture gives to the columns of images: called sample after sample.
-  absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image,
-                             DatasetBatch* batch) const;
+  absl::Status AppendPicture(image::Image picture, const DatasetImage& image, DatasetBatch* batch) const;
 
   // Writes numbers of one column at the row of a sample, whichever of the batches it falls into.
   class Writer {
@@ -62,7 +61,10 @@ class BatchColumns {
   std::vector<std::pair<Writer, PutColumn>> puts_;
 };
 
-// Appends what a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
+// The picture of a renderer or camera as it was asked for, normalised where `image` says so: the same for every source.
+absl::StatusOr<image::Image> AsAsked(image::Image picture, const DatasetImage& image);
+
+// Appends what such a picture gives for one column ("image", "depth_m" or "mask"; any other gets nothing): raw
 // values, or an encoded file and the offset of its end, the first one after a 0.
 absl::Status AppendPicture(const image::Image& picture, const DatasetImage& image, const std::string& column,
                            std::string* data, std::vector<uint64_t>* offsets);

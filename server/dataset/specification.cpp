@@ -5,6 +5,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/image/normalize.h"
 #include "server/image/photo_image.h"
 
 namespace touchstone::dataset {
@@ -33,6 +34,7 @@ absl::Status ValidateImage(const DatasetImage& image, ImageOrigin origin) {
   if (image.jpeg_quality < 1 || image.jpeg_quality > 100)
     return absl::InvalidArgumentError(
         absl::StrCat("image.jpeg_quality = ", image.jpeg_quality, ": must be from 1 to 100"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckNormalize(image));
   if (image.renderer == nullptr && origin == ImageOrigin::kRendered)
     return absl::FailedPreconditionError(
         "images were asked for, but this source has no renderer: see `touchstone doctor`");
@@ -40,6 +42,20 @@ absl::Status ValidateImage(const DatasetImage& image, ImageOrigin origin) {
 }
 
 }  // namespace
+
+absl::Status CheckNormalize(const DatasetImage& image) {
+  if (!image.normalize) return absl::OkStatus();
+  if (image.options.format != image::PixelFormat::kGrey)
+    return absl::InvalidArgumentError("image.format: a normalised picture is grey; ask for that");
+  if (image.options.shading_style != image::ShadingStyle::kShaded)
+    return absl::InvalidArgumentError(
+        "image.shading_style: what is normalised is a shaded picture; leave it unspecified");
+  if (image.options.width < image::kMinNormalizedSide || image.options.height < image::kMinNormalizedSide)
+    return absl::InvalidArgumentError(
+        absl::StrCat("image.normalize: a picture of ", image.options.width, " x ", image.options.height,
+                     " pixels is too small; each side must be from ", image::kMinNormalizedSide));
+  return absl::OkStatus();
+}
 
 absl::StatusOr<ColumnChoice> ColumnChoice::FromNames(const std::vector<std::string>& names) {
   ColumnChoice choice;

@@ -23,6 +23,7 @@ struct DatasetImage {
   image::ImageOptions options;
   ImageEncoding encoding = ImageEncoding::kRaw;
   int jpeg_quality = 90;
+  bool normalize = false;  // image/normalize.h: a grey picture; options.mask is then the mask that it finds
   double vertical_fov_rad = 0.78539816339744831;
   image::RendererKind renderer_kind = image::RendererKind::kAuto;  // asked for
   std::shared_ptr<image::Renderer> renderer;  // that renders; null where a camera takes the images
@@ -66,6 +67,9 @@ absl::Status ValidateDataset(DatasetSpecification* specification,
 inline uint64_t PlanNumber(uint64_t index, size_t objects, bool plan_ends) {
   return plan_ends ? index / objects : index;
 }
+
+// Whether what was asked for can be normalised: shaded pictures, in grey, not too small.
+absl::Status CheckNormalize(const DatasetImage& image);
 
 // One column of a batch: little endian, packed, C order; the first dimension is the sample.
 enum class ColumnType { kFloat32, kUint8, kInt32, kUint64, kBytes };

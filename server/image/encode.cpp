@@ -55,6 +55,17 @@ tjhandle ThreadCompressor() {
   return compressor.handle;
 }
 
+tjhandle ThreadDecompressor() {
+  struct Decompressor {
+    tjhandle handle = tjInitDecompress();
+    ~Decompressor() {
+      if (handle != nullptr) tjDestroy(handle);
+    }
+  };
+  static thread_local Decompressor decompressor;
+  return decompressor.handle;
+}
+
 struct OpenPng {
   SpngContext context;
   spng_ihdr header{};
@@ -158,6 +169,28 @@ absl::StatusOr<Image> DecodePng(const std::string& png) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
   const bool grey = open.header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && open.header.bit_depth <= 8;
   return Decode(open, grey);
+}
+
+absl::StatusOr<Image> DecodePicture(const std::string& bytes) {
+  if (absl::StartsWith(bytes, "\x89PNG")) return DecodePng(bytes);
+  if (!absl::StartsWith(bytes, "\xFF\xD8"))
+    return absl::InvalidArgumentError("is neither PNG nor JPEG; one of them was expected");
+  const tjhandle handle = ThreadDecompressor();
+  if (handle == nullptr) return absl::ResourceExhaustedError("JPEG: no memory for a decoder");
+  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
+  Image image;
+  int sampling = 0, colours = 0;
+  if (tjDecompressHeader3(handle, data, bytes.size(), &image.width, &image.height, &sampling, &colours) != 0)
+    return absl::InvalidArgumentError(absl::StrCat("JPEG: header: ", tjGetErrorStr2(handle)));
+  if (image.width < 1 || image.width > kMaxImageSide || image.height < 1 || image.height > kMaxImageSide)
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "JPEG: is %d x %d pixels; each side must be from 1 to %d", image.width, image.height, kMaxImageSide));
+  image.channels = colours == TJCS_GRAY ? 1 : 3;
+  image.pixels.resize(static_cast<size_t>(image.width) * image.height * image.channels);
+  if (tjDecompress2(handle, data, bytes.size(), image.pixels.data(), image.width, 0, image.height,
+                    image.channels == 1 ? TJPF_GRAY : TJPF_RGB, TJFLAG_ACCURATEDCT) != 0)
+    return absl::InvalidArgumentError(absl::StrCat("JPEG: pixels: ", tjGetErrorStr2(handle)));
+  return image;
 }
 
 absl::StatusOr<Image> DecodePlainPng(absl::string_view png) {

@@ -18,6 +18,9 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 // For tests and clients; refuses more than kMaxImageSide per side.
 absl::StatusOr<Image> DecodePng(const std::string& png);
 
+// A PNG or JPEG file, whichever its first bytes say.
+absl::StatusOr<Image> DecodePicture(const std::string& bytes);
+
 // What was measured must not be converted on the way: a PNG of 8-bit grey or RGB as it is, whole to its last chunk.
 // INVALID_ARGUMENT says what the file is otherwise (16 bits, palette, transparency, damaged).
 absl::StatusOr<Image> DecodePlainPng(absl::string_view png);

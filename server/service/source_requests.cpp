@@ -97,6 +97,7 @@ absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message) {
                                                                    : dataset::ImageEncoding::kRaw;
   if (message.jpeg_quality() != 0)
     image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
+  image.normalize = message.normalize();
   if (message.vertical_fov_rad() != 0) image.vertical_fov_rad = message.vertical_fov_rad();
   for (const auto& [value, valid, name] :
        {std::tuple<int, bool, const char*>(message.format(), v1::PixelFormat_IsValid(message.format()),

@@ -37,9 +37,10 @@ std::string NewTouchId() {
 }  // namespace
 
 absl::Status CheckPhotograph(const dataset::DatasetImage& wanted) {
-  if (wanted.options.depth || wanted.options.mask)
+  if (wanted.options.depth || (wanted.options.mask && !wanted.normalize))
     return absl::InvalidArgumentError(
-        "image.depth, image.mask: this source's camera sees colours only; ask for none");
+        "image.depth, image.mask: this source's camera sees colours only; ask for none, or for the mask of a "
+        "normalised picture (image.normalize)");
   if (wanted.options.shading_style != image::ShadingStyle::kShaded)
     return absl::InvalidArgumentError(
         "image.shading_style: this source's camera shows what it sees; leave it unspecified");

@@ -53,6 +53,7 @@ absl::Status CheckViews(size_t views, const dataset::DatasetImage& image, const 
   if (views > static_cast<size_t>(limits.max_images_per_request))
     return absl::InvalidArgumentError(
         absl::StrCat("views has ", views, ": at most ", limits.max_images_per_request, " a request"));
+  TOUCHSTONE_RETURN_IF_ERROR(dataset::CheckNormalize(image));
   const uint64_t bytes =
       uint64_t{3} * image.options.width * image.options.height * views * (image.options.depth ? 3 : 1);
   if (bytes > kMaxAnswerBytes)

@@ -55,7 +55,8 @@ absl::StatusOr<CaptureResults> Source::Capture(const CaptureRequest& request, co
   results.columns = dataset::ColumnsOf(images_only, request.image, 0);  // the same columns as in a dataset
   results.batch.data.resize(results.columns.size());
   results.batch.offsets.resize(results.columns.size());
-  const auto take = [&](const image::Image& picture, const PhotographPose* pose) -> absl::Status {
+  const auto take = [&](const image::Image& taken, const PhotographPose* pose) -> absl::Status {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture, dataset::AsAsked(taken, request.image));
     for (size_t k = 0; k < results.columns.size(); ++k)
       TOUCHSTONE_RETURN_IF_ERROR(dataset::AppendPicture(picture, request.image, results.columns[k].name,
                                                         &results.batch.data[k], &results.batch.offsets[k]));

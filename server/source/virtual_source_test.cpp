@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "server/effects/all_effects.h"
+#include "server/image/normalize.h"
 #include "server/source/test_source.h"
 
 namespace touchstone::source {
@@ -167,6 +168,57 @@ TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
   for (size_t k = 0; k < times_s.size(); ++k)
     EXPECT_EQ(times_s[k], static_cast<float>(touched->contact_time_s[k]));
   EXPECT_FALSE((*stream)->Next(NoObjection)->has_value());
+}
+
+// What Normalize makes of the plain picture that `data` begins with.
+image::Image NormalizedOf(const std::string& data) {
+  image::Image plain;
+  plain.width = plain.height = 64, plain.channels = 1;
+  plain.pixels.assign(data.begin(), data.begin() + 64 * 64);
+  auto normalized = image::Normalize(plain);
+  EXPECT_TRUE(normalized.ok() && image::FoundObject(*normalized)) << normalized.status();
+  return *std::move(normalized);
+}
+std::string BytesOf(const std::vector<uint8_t>& values) {
+  return {values.begin(), values.end()};
+}
+
+TEST_F(VirtualSourceTest, CapturesAndSamplesAreNormalizedAlike) {
+  CaptureRequest capture;
+  capture.object = "lat00";
+  capture.image.options.width = capture.image.options.height = 64;
+  capture.image.renderer_kind = image::RendererKind::kCpu;
+  const touch::CommandedTouch touch = FromAbove(0);
+  capture.cameras = {image::CameraOfTouch(touch.target_m, touch.approach, touch.lateral, 0.3)};
+  const auto plain = source_.Capture(capture, NoObjection);
+  ASSERT_TRUE(plain.ok()) << plain.status();
+  capture.image.normalize = capture.image.options.mask = true;
+  const auto normalized = source_.Capture(capture, NoObjection);
+  ASSERT_TRUE(normalized.ok()) << normalized.status();
+  const image::Image expected = NormalizedOf(plain->batch.data[0]);
+  ASSERT_EQ(normalized->columns.size(), 2u);
+  EXPECT_EQ(normalized->batch.data[0], BytesOf(expected.pixels));
+  EXPECT_EQ(normalized->batch.data[1], BytesOf(expected.mask)) << "the mask that was found";
+
+  SampleRequest samples;
+  samples.objects = {"lat00"};
+  samples.specification.plan.kind = touch::Plan::Kind::kList;
+  samples.specification.plan.list = {touch};
+  samples.specification.plan.list[0].standoff_m = 0.3;
+  samples.specification.columns = *dataset::ColumnChoice::FromNames({"image"});
+  samples.specification.image = capture.image;
+  auto stream = source_.Stream(samples);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  const auto batch = (*stream)->Next(NoObjection);
+  ASSERT_TRUE(batch.ok() && batch->has_value());
+  EXPECT_EQ((*batch)->data[0], normalized->batch.data[0]);
+
+  capture.image.options.format = image::PixelFormat::kRgb;
+  EXPECT_THAT(std::string(source_.Capture(capture, NoObjection).status().message()), HasSubstr("is grey"));
+  capture.image.options.format = image::PixelFormat::kGrey;
+  capture.image.options.width = 8;
+  EXPECT_THAT(std::string(source_.Capture(capture, NoObjection).status().message()),
+              HasSubstr("is too small"));
 }
 
 TEST_F(VirtualSourceTest, ExpandsPlansInParts) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from typing import Any, Iterator, Sequence
 
 import numpy as np
@@ -244,11 +245,12 @@ class Client:
         with self.lease() as lease:
             yield lease
 
-    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, model: ModelLike = None,
-                seed: int = 0, start: int = 0, lease_token: str = "") -> Batch:
+    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, normalize: bool = False,
+                model: ModelLike = None, seed: int = 0, start: int = 0, lease_token: str = "") -> Batch:
         """Photographs: one for each touch (its camera) or each touchstone.Camera.
 
         Args:
+          normalize: as image(normalize=True): dark objects on white.
           model: whose effects of photographs act on a virtual source's pictures (shaded style only); default: the
             source's. A name, a hash, a path to a model file, its text, or a Model.
           seed, start: view k draws the pixels' noise of index start + k.
@@ -256,10 +258,13 @@ class Client:
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
         """
+        options = image or default_image()
+        if normalize:
+            options = dataclasses.replace(options, normalize=True)
         with contextlib.ExitStack() as stack:
             token = lease_token or stack.enter_context(self.holding_lease())
             request = source_pb2.CaptureRequest(
-                object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=token,
+                object=object, views=to_views(views), image=options.to_proto(), lease_token=token,
                 model=model_ref(model), seed=checks.uint64("seed", seed), first_index=checks.uint64("start", start),
             )
             reply = self._connection.call(_SOURCE, "Capture", request, repeat=not token)

@@ -46,6 +46,7 @@ class ImageOptions:
     renderer: str
     jpeg_quality: int
     vertical_fov_deg: float
+    normalize: bool = False
 
     def to_proto(self) -> types_pb2.ImageSpec:
         return types_pb2.ImageSpec(
@@ -57,6 +58,7 @@ class ImageOptions:
             shading_style=checks.choice("shading style", self.shading_style, _SHADING_STYLES),
             depth=bool(self.depth),
             mask=bool(self.mask),
+            normalize=bool(self.normalize),
             renderer=checks.choice("image renderer", self.renderer, _RENDERERS),
             vertical_fov_rad=units.si_value(
                 "vertical_fov_rad", checks.positive("vertical_fov_deg", self.vertical_fov_deg)
@@ -66,7 +68,7 @@ class ImageOptions:
 
 def image(width: int = 224, height: int = 224, format: str = "grey", encoding: str = "raw", *, depth: bool = False,
           mask: bool = False, shading_style: str = "shaded", renderer: str = "auto", jpeg_quality: int = 90,
-          vertical_fov_deg: float = 45.0) -> ImageOptions:
+          vertical_fov_deg: float = 45.0, normalize: bool = False) -> ImageOptions:
     """How the column "image" is made.
 
     Args:
@@ -77,9 +79,11 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
       mask: also "mask", uint8 (rows, height, width, 1), 255 where the object is.
       shading_style: "shaded" (white lights, black background) or "dark_on_white".
       renderer: "egl", "cpu", or "auto": the source's choice. Two renderers may differ by 1/255.
+      normalize: a dark object on white, without ground and shadows, whatever was photographed, in grey; "mask" is
+        then the one that this found.
     """
     return ImageOptions(
-        width, height, format, encoding, depth, mask, shading_style, renderer, jpeg_quality, vertical_fov_deg
+        width, height, format, encoding, depth, mask, shading_style, renderer, jpeg_quality, vertical_fov_deg, normalize
     )
 
 
