@@ -278,7 +278,7 @@ void FindPoints(const geometry::Surface& surface, const ShadingMesh& mesh, const
     Visibility visibility(frame.box);
     // Straight edges stay straight without distortion: then triangles can be drawn.
     if (!lens.Distorts() && IsCoarse(frame) && CanDrawTriangles(frame)) {
-      DrawTriangles(frame, &visibility);
+      DrawTriangles(frame, BestKernels(), &visibility);
     } else {
       CastPhotoPixels(frame, lens, slopes, &visibility);
     }
