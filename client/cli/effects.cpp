@@ -29,6 +29,8 @@ std::string ArityWord(v1::ParameterArity arity) {
       return "scalar";
     case v1::PARAMETER_ARITY_VECTOR3:
       return "vector3";
+    case v1::PARAMETER_ARITY_VECTOR2:
+      return "vector2";
     case v1::PARAMETER_ARITY_PER_FINGER:
       return "finger";
     default:

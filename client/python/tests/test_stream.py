@@ -124,9 +124,10 @@ def test_a_list_of_touches_is_a_dataset(client):
 def test_the_catalogue_and_the_store_are_readable(client, tmp_path):
     effects = {e.name: e for e in client.effects()}
     assert effects["tip_radius"].parameters[0].unit == "mm" and effects["tip_radius"].stage == "contact"
-    assert {e.stage for e in effects.values()} == {"pose", "contact", "motion", "sensor"}
-    assert [effects[name].parameters[0].arity for name in ("tip_radius", "object_pose", "finger_length")] == [
-        "scalar", "vector3", "finger"]
+    assert {e.stage for e in effects.values()} == {
+        "pose", "contact", "motion", "sensor", "camera pose", "projection", "shading", "image sensor"}
+    assert [effects[name].parameters[0].arity for name in (
+        "tip_radius", "object_pose", "finger_length", "principal_point")] == ["scalar", "vector3", "finger", "vector2"]
     nominal = client.model()
     assert nominal.fingers == 3 and nominal.name in {m.name for m in client.models()}
     path = tmp_path / "round.yaml"
@@ -179,3 +180,17 @@ def test_an_interrupt_ends_a_stream_at_once(server):
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=10)
     assert "interrupted" in out and "Traceback" not in err and process.returncode == 0
+
+
+def test_a_capture_shows_the_models_effects_of_photographs(client):
+    camera = touchstone.Camera(eye_mm=(300, 0, 80))
+    picture = touchstone.image(48, 32, shading_style="shaded")
+    nominal = client.capture("lat20", [camera], image=picture)["image"]
+    ground = nominal == 0
+    assert ground.sum() > 100
+    text = ("touchstone: model/1\nname: seen\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
+            "  - background_level: {grey: 50}\n  - image_noise: {sigma_grey: 2}\n")
+    first = client.capture("lat20", [camera, camera], image=picture, model=text, seed=5)["image"]
+    again = client.capture("lat20", [camera], image=picture, model=text, seed=5, start=1)["image"]
+    assert abs(first[0][ground[0]].mean() - 50) < 0.5
+    assert (again[0] == first[1]).all() and (first[0] != first[1]).any()

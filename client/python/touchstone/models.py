@@ -77,6 +77,7 @@ def _corner_mm(v: types_pb2.Vector3) -> tuple[float, float, float]:
 _ARITIES = {
     types_pb2.PARAMETER_ARITY_SCALAR: "scalar",
     types_pb2.PARAMETER_ARITY_VECTOR3: "vector3",
+    types_pb2.PARAMETER_ARITY_VECTOR2: "vector2",
     types_pb2.PARAMETER_ARITY_PER_FINGER: "finger",
 }
 _STAGES = {
@@ -97,7 +98,7 @@ class Parameter:
 
     name: str
     unit: str
-    arity: str  # "scalar", "vector3" (object frame) or "finger" (one value per finger)
+    arity: str  # "scalar", "vector3" (object frame unless said), "vector2" (image) or "finger" (one value per finger)
     min: float
     max: float
     default: float
@@ -111,7 +112,7 @@ class Effect:
     """An effect of the catalogue."""
 
     name: str
-    stage: str  # "pose", "contact", "motion" or "sensor"
+    stage: str  # "pose", "contact", "motion", "sensor", or a photograph's: "camera pose", ..., "image sensor"
     meaning: str
     signature: str
     check_on_rig: str
