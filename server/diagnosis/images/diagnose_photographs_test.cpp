@@ -1,5 +1,7 @@
 #include "server/diagnosis/images/diagnose_photographs.h"
 
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_split.h>
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -46,6 +48,69 @@ TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
   EXPECT_TRUE(d.steps.empty());
 }
 
+TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
+  HiddenCamera rig;
+  rig.unlisted = [](int, int column, int row, const image::Photo& photo, size_t) {
+    const double x = (column - 0.65 * photo.width) / (0.12 * photo.width), y = (row - 0.4 * photo.height) / (0.12 * photo.height);
+    return 8 * std::exp(-0.5 * (x * x + y * y));
+  };
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+  EXPECT_TRUE(d.steps.empty());
+}
+
+TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
+  HiddenCamera rig;
+  rig.unlisted = [](int, int, int, const image::Photo& photo, size_t pixel) {
+    if (!photo.mask[pixel]) return 0.0;
+    const Eigen::Vector3f& p = photo.point_m[pixel];
+    return 0.03 * photo.grey[pixel] * (std::sin(130 * p.x() + 1) + std::sin(110 * p.y()) + std::sin(150 * p.z() + 2));
+  };
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_TRUE(d.steps.empty());
+  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+}
+
+TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
+  HiddenCamera rig;
+  rig.unlisted = [](int photograph, int, int, const image::Photo& photo, size_t pixel) {
+    RandomStream random(5, RandomDomain::kTest, photograph);
+    return 0.02 * random.Normal() * photo.grey[pixel];
+  };
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_TRUE(d.steps.empty());
+  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+}
+
+TEST(DiagnosePhotographs, NamesBothOfAPair) {
+  HiddenCamera rig;
+  rig.hidden = {{"camera_rotation", {"rotation_deg=0.3,-0.2,0.4"}}, {"exposure", {"stops=0.15"}}};
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
+  ASSERT_EQ(d.steps.size(), 2u);
+}
+
+TEST(DiagnosePhotographs, NamesAPoseThatDiffersFromObjectToObject) {
+  HiddenCamera rig;
+  rig.hidden_on["lat00"] = {{"object_pose", {"translation_mm=1,0.5,0", "rotation_deg=0,0,1"}}};
+  rig.hidden_on["lat10"] = {{"object_pose", {"translation_mm=-0.5,1,0", "rotation_deg=0,0,-0.5"}}};
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  ASSERT_EQ(d.steps.size(), 1u);
+  EXPECT_EQ(d.steps[0].effect, "object_pose");
+}
+
+TEST(DiagnosePhotographs, GivesAnEffectOfTheModelItsRightValue) {
+  HiddenCamera rig;
+  rig.known = {{"exposure", {"stops=0.2"}}};
+  DiagnosisInput input = MakePhotoInput(rig);
+  input.model = std::make_shared<const model::Model>(WithPhotoEffects(
+      model::NominalModel(), {{"image_noise", {"sigma_grey=2"}}, {"exposure", {"stops=0.1"}}}));
+  const PhotographDiagnosis d = Diagnosed(input);
+  EXPECT_EQ(d.verdict, selection::Verdict::kWrongValues);
+  ASSERT_EQ(d.refitted.size(), 1u);
+  EXPECT_NEAR(d.refitted[0].parameters[0].value, 0.2, 0.002);
+}
+
 struct Hidden {
   const char* effect;
   std::vector<std::string> values;
@@ -60,6 +125,18 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
   EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
   ASSERT_EQ(d.steps.size(), 1u);
   EXPECT_EQ(d.steps[0].effect, GetParam().effect);
+  // Each value within three standard errors, and a pixel's share for what contours tell.
+  for (const inference::ParameterEstimate& e : d.steps[0].parameters) {
+    double hidden = 0;
+    for (const std::string& text : GetParam().values) {
+      const std::vector<std::string> parts = absl::StrSplit(text, '=');
+      if (parts[0] != e.name) continue;
+      const std::vector<std::string> entries = absl::StrSplit(parts[1], ',');
+      EXPECT_TRUE(absl::SimpleAtod(entries[e.entry.empty() ? 0 : e.entry[0] - 'x'], &hidden));
+    }
+    EXPECT_NEAR(e.value, hidden, 3 * e.std_error) << e.name << e.entry;
+  }
+  EXPECT_LT(d.final->rmse_grey, 1.1 * d.noise_floor.sigma_grey);
 }
 
 INSTANTIATE_TEST_SUITE_P(Photographs, OneHidden,

@@ -11,7 +11,6 @@ namespace {
 constexpr double kMinStepGrey = 4;    // between neighbouring pixels, from which it is a contour
 // The mean of a clipped pixel is as good as what is known of its noise there: it counts as if it scattered so much.
 constexpr double kClippedSigmas = 15;
-constexpr double kWithinPixel = 1.0 / 12;  // variance of a place within a pixel, px^2
 
 // The largest over each pixel and its neighbours.
 std::vector<float> LargestAround(const std::vector<float>& image, int width, int height) {
@@ -31,8 +30,8 @@ std::vector<float> LargestAround(const std::vector<float>& image, int width, int
   return around;
 }
 
-// Variance that a contour's place within a pixel adds, at the contour and around it, grey^2.
-std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height) {
+// Variance that a contour's place adds, at the contour and around it, grey^2.
+std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height, double contour_px2) {
   const std::vector<float> most = LargestAround(grey, width, height);
   std::vector<float> negative(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) negative[i] = -grey[i];
@@ -40,7 +39,7 @@ std::vector<float> ContourVariance(const std::vector<float>& grey, int width, in
   std::vector<float> variance(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) {
     const double step = std::max(static_cast<double>(most[i]) + least[i] - kMinStepGrey, 0.0);
-    variance[i] = static_cast<float>(kWithinPixel * step * step);
+    variance[i] = static_cast<float>(contour_px2 * step * step);
   }
   return LargestAround(variance, width, height);
 }
@@ -54,8 +53,8 @@ CellGrid GridOfPicture(int width, int height, int cells) {
 }
 
 Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey,
-                            const RecordTable& record) {
-  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height);
+                            const RecordTable& record, double contour_px2) {
+  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height, contour_px2);
   Eigen::VectorXf variance = Eigen::VectorXf::Zero(grid.size());
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {

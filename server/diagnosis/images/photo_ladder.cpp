@@ -31,13 +31,14 @@ class PhotoLadder {
         photographs_(photographs),
         selection_(selection),
         fit_(selection.fit),
+        values_(selection.polished),
         before_(before),
         d_(*diagnosis),
         after_(after) {}
 
   absl::Status Run() {
-    improved_ = fit_.model.base();
-    selection::RoundValues(fit_, &improved_);
+    improved_ = values_.model.base();
+    selection::RoundValues(values_, &improved_);
     if (selection_.field >= 0) improved_.effects.erase(improved_.effects.begin() + selection_.field);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGivenEffects());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
@@ -77,7 +78,7 @@ class PhotoLadder {
       if (!fit_.model.IsFree(index)) continue;
       const model::Effect& effect = *before.effects[index].effect;
       selection::RefittedEffect refit{inference::NameOf(effect),
-                                      fit_.model.Describe(index, fit_.point, selection_.covariance)};
+                                      values_.model.Describe(index, values_.point, selection_.covariance)};
       const auto old = initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
       bool zero = true;
       for (size_t j = 0; j < refit.parameters.size(); ++j) {
@@ -118,7 +119,9 @@ class PhotoLadder {
         chosen = j;
       }
       kept.push_back(open[chosen]->effect);
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], *next));
+      // The last step is the whole explanation.
+      const bool last = open.size() == 1 && selection_.field < 0;
+      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next));
       open.erase(open.begin() + static_cast<long>(chosen));
     }
     return absl::OkStatus();
@@ -142,7 +145,7 @@ class PhotoLadder {
     step.remedy = instance.effect->remedy;
     step.probability = from.probability;
     step.gain_nats = from.gain_nats;
-    step.parameters = fit_.model.Describe(from.effect, fit_.point, selection_.covariance);
+    step.parameters = values_.model.Describe(from.effect, values_.point, selection_.covariance);
     if (const std::string only = fit_.model.OnlyObject(from.effect); !only.empty())
       step.words = absl::StrCat("on ", only, " only");
     std::vector<std::string> names = {step.effect};
@@ -220,7 +223,8 @@ class PhotoLadder {
   ThreadPool* pool_;
   const Photographs& photographs_;
   const PhotoSelection& selection_;
-  const inference::Fit& fit_;
+  const inference::Fit& fit_;     // that was selected
+  const inference::Fit& values_;  // the same effects, on every photograph
   const std::vector<image::Photo>& before_;
   PhotographDiagnosis& d_;
   std::vector<image::Photo>* after_;

@@ -17,8 +17,10 @@ namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 40};
+constexpr PhotoRowsOptions kPolish = {12544, 1, 100, 0.01};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
+constexpr int kBlocksPerValue = 4;  // that the scatter between them needs
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -100,11 +102,25 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
   return absl::OkStatus();
 }
 
+// The explanation on every photograph, near where it was found.
+absl::Status Polish(const Photographs& photographs, const DiagnosisContext& context, PhotoSelection* selection) {
+  selection->polished = selection->fit;
+  if (selection->fit.model.size() == 0) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const PhotoSearch all, MakePhotoSearch(photographs, selection->fit.model.base(), {}, kPolish, context));
+  const inference::Likelihood plain(all.rows->GroupRows(), nullptr, 0, nullptr);
+  inference::Experiment experiment = *all.experiment;
+  if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, inference::FitModel(experiment, selection->fit.model));
+  selection->covariance = CovarianceBetweenBlocks(experiment, selection->polished, false);
+  return absl::OkStatus();
+}
+
 // Steps whose values the scatter between pictures could make go.
 absl::Status DropUnsteady(PhotoSelection* selection) {
   for (bool dropped = true; dropped;) {
     dropped = false;
-    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
+    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit, true);
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
       if (IsSeen(selection->fit, index, selection->covariance)) continue;
@@ -174,7 +190,8 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   return made;
 }
 
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
+Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit,
+                                        bool cautious) {
   const int p = fit.model.size(), n = experiment.observations->rows();
   if (p == 0) return fit.covariance;
   const Eigen::VectorXd left =
@@ -189,9 +206,11 @@ Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment,
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(p, p);
   for (const auto& [block, score] : scores) meat += score * score.transpose();
   const double blocks = static_cast<double>(scores.size());
-  meat *= blocks / std::max(blocks - 1, 1.0);
+  // Each value leaves one block less to judge it by.
+  meat *= blocks / std::max(blocks - p, 1.0);
   const double variance = fit.sigma * fit.sigma;
   Eigen::MatrixXd between = fit.covariance * meat * fit.covariance / (variance * variance);
+  if (!cautious && blocks >= kBlocksPerValue * p) return between;
   // Few blocks know little of many values: of each value the larger variance, with the fit's correlations.
   Eigen::MatrixXd covariance = fit.covariance;
   for (int i = 0; i < p; ++i) {
@@ -234,6 +253,8 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
     if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
       selection.field = static_cast<int>(e);
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
+  TOUCHSTONE_RETURN_IF_ERROR(Polish(photographs, context, &selection));
   const inference::Likelihood& likelihood = *selection.fine.likelihood;
   const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
   std::vector<double> with;

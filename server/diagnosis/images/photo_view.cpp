@@ -236,7 +236,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
   photo.grey = RecordedGrey(photo, *photographs_.record);
-  view->weights = CellWeights(grid_, photo.grey, *photographs_.record);
+  view->weights = CellWeights(grid_, photo.grey, *photographs_.record, options.contour_px2);
   const double pixel_squares = SquaresOfAPixel(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
   std::vector<Eigen::VectorXf> slopes;
