@@ -2,6 +2,7 @@
 
 #include <boost/math/special_functions/gamma.hpp>
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -17,10 +18,11 @@ namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 40};
-constexpr PhotoRowsOptions kPolish = {12544, 1, 100, 0.01};
+constexpr PhotoRowsOptions kPolish = {12544, 1, 100, true, 0.01};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
-constexpr int kBlocksPerValue = 4;  // that the scatter between them needs
+constexpr int kValleys = 2;
+constexpr double kRoughSquares = 0.5;  // of the squares, that contours move by chance
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -102,6 +104,52 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
   return absl::OkStatus();
 }
 
+// Along the directions that the rows say least of, contours that cross single pixels hide the slope: there the error at
+// several places, a few standard errors apart, shows where its minimum lies.
+absl::Status SearchValleys(const inference::Experiment& experiment, inference::Fit* fit) {
+  const int p = fit->model.size();
+  if (p < 2) return absl::OkStatus();
+  const inference::ObservationModel& rows = *experiment.observations;
+  Eigen::VectorXd scale(p);
+  for (int i = 0; i < p; ++i) scale[i] = fit->model.parameters()[i].scale;
+  const Eigen::MatrixXd scaled = fit->columns.values.rightCols(p) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
+  const auto squares_at = [&](const Eigen::VectorXd& point) -> absl::StatusOr<double> {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted, rows.Predict(fit->model.At(fit->model.Clip(point))));
+    return rows.Residual(predicted).squaredNorm();
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double start, squares_at(fit->point));
+  Eigen::VectorXd best = fit->point;
+  double least = start;
+  for (int valley = 0; valley < std::min(p, kValleys); ++valley) {
+    if (!(eigen.eigenvalues()[valley] > 0)) continue;
+    const Eigen::VectorXd way =
+        scale.cwiseProduct(eigen.eigenvectors().col(valley)) / std::sqrt(eigen.eigenvalues()[valley]);
+    // squares = a + b t + c t^2 through all places
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    const Eigen::VectorXd from = best;
+    for (const double t : {-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0}) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_at(from + t * way));
+      const Eigen::Vector3d term(1, t, t * t);
+      normal += term * term.transpose();
+      right += squares * term;
+      if (squares < least) least = squares, best = fit->model.Clip(from + t * way);
+    }
+    const Eigen::Vector3d curve = normal.ldlt().solve(right);
+    if (!(curve[2] > 0)) continue;
+    const Eigen::VectorXd lowest = from + std::clamp(-0.5 * curve[1] / curve[2], -12.0, 12.0) * way;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_at(lowest));
+    // The curve's minimum is surer than any one place, whose contours may happen to lie well.
+    if (squares < start || squares < least + kRoughSquares) least = std::min(least, squares), best = fit->model.Clip(lowest);
+  }
+  inference::Parameterization there = fit->model;
+  there.MoveTo(best);
+  TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit again, inference::FitModel(experiment, there));
+  if (again.columns.values.col(0).squaredNorm() < start + kRoughSquares) *fit = std::move(again);
+  return absl::OkStatus();
+}
+
 // The explanation on every photograph, near where it was found.
 absl::Status Polish(const Photographs& photographs, const DiagnosisContext& context, PhotoSelection* selection) {
   selection->polished = selection->fit;
@@ -112,7 +160,8 @@ absl::Status Polish(const Photographs& photographs, const DiagnosisContext& cont
   inference::Experiment experiment = *all.experiment;
   if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;
   TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, inference::FitModel(experiment, selection->fit.model));
-  selection->covariance = CovarianceBetweenBlocks(experiment, selection->polished, false);
+  TOUCHSTONE_RETURN_IF_ERROR(SearchValleys(experiment, &selection->polished));
+  selection->covariance = CovarianceBetweenBlocks(experiment, selection->polished);
   return absl::OkStatus();
 }
 
@@ -120,7 +169,7 @@ absl::Status Polish(const Photographs& photographs, const DiagnosisContext& cont
 absl::Status DropUnsteady(PhotoSelection* selection) {
   for (bool dropped = true; dropped;) {
     dropped = false;
-    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit, true);
+    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
       if (IsSeen(selection->fit, index, selection->covariance)) continue;
@@ -190,8 +239,7 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   return made;
 }
 
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit,
-                                        bool cautious) {
+Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
   const int p = fit.model.size(), n = experiment.observations->rows();
   if (p == 0) return fit.covariance;
   const Eigen::VectorXd left =
@@ -210,7 +258,6 @@ Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment,
   meat *= blocks / std::max(blocks - p, 1.0);
   const double variance = fit.sigma * fit.sigma;
   Eigen::MatrixXd between = fit.covariance * meat * fit.covariance / (variance * variance);
-  if (!cautious && blocks >= kBlocksPerValue * p) return between;
   // Few blocks know little of many values: of each value the larger variance, with the fit's correlations.
   Eigen::MatrixXd covariance = fit.covariance;
   for (int i = 0; i < p; ++i) {

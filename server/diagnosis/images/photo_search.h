@@ -46,9 +46,8 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
 
-// The covariance of the free parameters that the scatter between blocks shows; `cautious`: of each value the fit's, where
+// The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where
 // that is larger.
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit,
-                                        bool cautious);
+Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit);
 
 }  // namespace touchstone::diagnosis::images

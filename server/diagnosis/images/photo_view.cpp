@@ -261,6 +261,19 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         if (!rays || tries > 0 || (move_px > kLeastMovePx && move_px < kMostMovePx) || move_px == 0) break;
         step *= std::clamp(kMovePx / move_px, 0.1, 5.0);
       }
+      if (rays && options.central) {
+        // The same way in all, half of it to each side.
+        std::vector<float> sides[2];
+        for (const int side : {0, 1}) {
+          model::Model moved = direction.base;
+          MoveValue(&moved.effects[direction.instance], direction.value, (side == 0 ? -0.5 : 0.5) * step,
+                    direction.lower, direction.upper);
+          const absl::StatusOr<image::Photo> there = simulate(moved, false);
+          if (there.ok()) sides[side] = RecordedGrey(*there, *photographs_.record);
+        }
+        if (!sides[0].empty() && !sides[1].empty())
+          for (size_t i = 0; i < photo.grey.size(); ++i) change.difference[i] = sides[1][i] - sides[0][i];
+      }
       const Eigen::VectorXf cells = columns.Add(change.difference);
       if (rays) slopes.push_back(cells / static_cast<float>(step));
     }
