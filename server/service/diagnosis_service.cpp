@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -79,10 +80,18 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   provenance->set_seed(input.seed);
   if (evidence.measurements_case() == v1::Evidence::kCsv)
     provenance->set_set_sha256(Sha256Hex(evidence.csv()));
-  if (evidence.measurements_case() == v1::Evidence::kSession)
-    if (const auto csv = resources.sessions->Bytes(evidence.session()); csv.ok())
-      provenance->set_set_sha256(Sha256Hex(**csv));
-  for (const std::string& object : input.set->objects) {
+  if (evidence.measurements_case() == v1::Evidence::kSession) {
+    if (const auto session = resources.sessions->Find(evidence.session()); session.ok())
+      provenance->set_set_sha256(session->hash());
+  } else if (input.images != nullptr && input.set == nullptr) {
+    provenance->set_set_sha256(input.images->sha256);
+  }
+  std::vector<std::string> objects;
+  if (input.set != nullptr) objects = input.set->objects;
+  if (input.images != nullptr)
+    for (const std::string& object : input.images->objects)
+      if (std::find(objects.begin(), objects.end(), object) == objects.end()) objects.push_back(object);
+  for (const std::string& object : objects) {
     const auto surface = input.surfaces.find(object);
     if (surface == input.surfaces.end()) continue;
     v1::MeshProvenance* mesh = provenance->add_meshes();
@@ -107,6 +116,9 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
         if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources));
+        if (input.set == nullptr)
+          return absl::UnimplementedError(
+              "photographs alone are not diagnosed here yet; send touches with them");
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, work(input, how));
         v1::Report report = diagnosis::report::ToReport(diagnosis);
         AddProvenance(evidence, input, *resources, &report);

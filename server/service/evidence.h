@@ -11,7 +11,7 @@
 
 namespace touchstone::service {
 
-// Objects of the set are looked up among the evidence's own meshes first, then among the server's. Errors
+// The input has a set, images or both. Their objects are looked up among the evidence's own meshes first, then among the server's. Errors
 // name the field, or file and line of what was sent.
 absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
                                                        const Resources& resources);
