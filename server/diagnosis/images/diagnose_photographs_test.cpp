@@ -18,10 +18,11 @@ PhotographDiagnosis Diagnosed(const DiagnosisInput& input) {
   const absl::StatusOr<PhotographDiagnosis> diagnosis = DiagnosePhotographs(input, context);
   EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
   if (!diagnosis.ok()) return {};
-  std::cout << "verdict " << static_cast<int>(diagnosis->verdict) << ", floor " << diagnosis->noise_floor.sigma_grey
-            << ", rmse " << diagnosis->initial->rmse_grey << " -> "
+  std::cout << "verdict " << static_cast<int>(diagnosis->verdict) << ", floor "
+            << diagnosis->noise_floor.sigma_grey << ", rmse " << diagnosis->initial->rmse_grey << " -> "
             << (diagnosis->final ? diagnosis->final->rmse_grey : 0) << ", p "
-            << (diagnosis->final ? diagnosis->final->lack_of_fit_p : 0) << ", " << diagnosis->duration_s << " s\n";
+            << (diagnosis->final ? diagnosis->final->lack_of_fit_p : 0) << ", " << diagnosis->duration_s
+            << " s\n";
   for (const PhotographStep& step : diagnosis->steps) {
     std::cout << "  + " << step.effect << " " << step.probability << " gain " << step.gain_nats;
     for (const auto& e : step.parameters)
@@ -31,12 +32,14 @@ PhotographDiagnosis Diagnosed(const DiagnosisInput& input) {
   }
   for (const auto& refit : diagnosis->refitted) {
     std::cout << "  refit " << refit.effect;
-    for (const auto& e : refit.parameters) std::cout << "  " << e.name << e.entry << " = " << e.value << " +- " << e.std_error;
+    for (const auto& e : refit.parameters)
+      std::cout << "  " << e.name << e.entry << " = " << e.value << " +- " << e.std_error;
     std::cout << "\n";
   }
   if (diagnosis->unexplained) {
     std::cout << "  unexplained: " << diagnosis->unexplained->words << "\n";
-    for (const auto& c : diagnosis->unexplained->covariates) std::cout << "    " << c.name << " p " << c.p << "\n";
+    for (const auto& c : diagnosis->unexplained->covariates)
+      std::cout << "    " << c.name << " p " << c.p << "\n";
   }
   return *diagnosis;
 }
@@ -50,7 +53,8 @@ TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
 TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
   HiddenCamera rig;
   rig.unlisted = [](int, int column, int row, const image::Photo& photo, size_t) {
-    const double x = (column - 0.65 * photo.width) / (0.12 * photo.width), y = (row - 0.4 * photo.height) / (0.12 * photo.height);
+    const double x = (column - 0.65 * photo.width) / (0.12 * photo.width),
+                 y = (row - 0.4 * photo.height) / (0.12 * photo.height);
     return 8 * std::exp(-0.5 * (x * x + y * y));
   };
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
@@ -63,7 +67,8 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
   rig.unlisted = [](int, int, int, const image::Photo& photo, size_t pixel) {
     if (!photo.mask[pixel]) return 0.0;
     const Eigen::Vector3f& p = photo.point_m[pixel];
-    return 0.03 * photo.grey[pixel] * (std::sin(130 * p.x() + 1) + std::sin(110 * p.y()) + std::sin(150 * p.z() + 2));
+    return 0.03 * photo.grey[pixel] *
+           (std::sin(130 * p.x() + 1) + std::sin(110 * p.y()) + std::sin(150 * p.z() + 2));
   };
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   EXPECT_TRUE(d.steps.empty());
@@ -150,23 +155,20 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
   EXPECT_LT(d.final->rmse_grey, 1.15 * d.noise_floor.sigma_grey);
 }
 
-INSTANTIATE_TEST_SUITE_P(Photographs, OneHidden,
-                         ::testing::Values(Hidden{"exposure", {"stops=0.1"}}, Hidden{"focal_error", {"relative=0.01"}},
-                                           Hidden{"radial_distortion", {"k1=0.05"}},
-                                           Hidden{"camera_rotation", {"rotation_deg=0.2,-0.3,0.4"}},
-                                           Hidden{"camera_translation", {"offset_mm=1,-2,0.5"}},
-                                           Hidden{"principal_point", {"offset_px=2,-1"}},
-                                           Hidden{"gamma", {"exponent=1.1"}}, Hidden{"vignetting", {"strength=0.2"}},
-                                           Hidden{"defocus_blur", {"sigma_px=0.8"}},
-                                           Hidden{"motion_blur", {"length_px=3", "angle_deg=60"}},
-                                           Hidden{"light_position", {"offset_mm=20,0,-10"}},
-                                           Hidden{"ambient_light", {"level=0.04"}},
-                                           Hidden{"cast_shadow", {"strength=0.4"}},
-                                           Hidden{"specular", {"strength=0.2", "exponent=30"}},
-                                           Hidden{"background_level", {"grey=12"}},
-                                           Hidden{"object_pose", {"translation_mm=1,-1,0.5", "rotation_deg=0.3,0,-0.5"}},
-                                           Hidden{"object_scale", {"relative=0.01"}}),
-                         [](const auto& info) { return std::string(info.param.effect); });
+INSTANTIATE_TEST_SUITE_P(
+    Photographs, OneHidden,
+    ::testing::Values(
+        Hidden{"exposure", {"stops=0.1"}}, Hidden{"focal_error", {"relative=0.01"}},
+        Hidden{"radial_distortion", {"k1=0.05"}}, Hidden{"camera_rotation", {"rotation_deg=0.2,-0.3,0.4"}},
+        Hidden{"camera_translation", {"offset_mm=1,-2,0.5"}}, Hidden{"principal_point", {"offset_px=2,-1"}},
+        Hidden{"gamma", {"exponent=1.1"}}, Hidden{"vignetting", {"strength=0.2"}},
+        Hidden{"defocus_blur", {"sigma_px=0.8"}}, Hidden{"motion_blur", {"length_px=3", "angle_deg=60"}},
+        Hidden{"light_position", {"offset_mm=20,0,-10"}}, Hidden{"ambient_light", {"level=0.04"}},
+        Hidden{"cast_shadow", {"strength=0.4"}}, Hidden{"specular", {"strength=0.2", "exponent=30"}},
+        Hidden{"background_level", {"grey=12"}},
+        Hidden{"object_pose", {"translation_mm=1,-1,0.5", "rotation_deg=0.3,0,-0.5"}},
+        Hidden{"object_scale", {"relative=0.01"}}),
+    [](const auto& info) { return std::string(info.param.effect); });
 
 }  // namespace
 }  // namespace touchstone::diagnosis::images

@@ -14,9 +14,9 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMisfitRows = 1.1;     // root mean square of rows, in noise, from which a rest counts
+constexpr double kMisfitRows = 1.1;  // root mean square of rows, in noise, from which a rest counts
 constexpr double kRestP = 1e-4;
-constexpr double kCurveGain = 0.01;     // of the mean square residual of pictures that a curve did not see
+constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures that a curve did not see
 constexpr double kAlbedoNats = 5;
 constexpr double kDoubted = 0.5, kMostBesideRest = 0.9;
 constexpr double kZeroWithinErrors = 2;
@@ -51,16 +51,17 @@ class PhotoLadder {
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
     SetHeldOut(fit_, &*d_.final);
     for (PhotographStep& step : d_.steps) SetHeldOut(fit_, &step.quality);
-    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), initial2 = std::pow(d_.initial->rmse_grey, 2);
+    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2),
+                 initial2 = std::pow(d_.initial->rmse_grey, 2);
     d_.reducible_share = initial2 > floor2 ? 1 - floor2 / initial2 : 0;
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
     JudgeRest(best);
-    d_.verdict = d_.unexplained                ? selection::Verdict::kUnexplained
-                 : !d_.steps.empty()           ? selection::Verdict::kMissingEffects
-                 : values_wrong_               ? selection::Verdict::kWrongValues
-                                               : selection::Verdict::kAdequate;
+    d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
+                 : !d_.steps.empty() ? selection::Verdict::kMissingEffects
+                 : values_wrong_     ? selection::Verdict::kWrongValues
+                                     : selection::Verdict::kAdequate;
     if (!expectations_changed) after_->clear();
     if (!changed_) return absl::OkStatus();
     if (!improved_.name.empty()) improved_.name += "_better";
@@ -93,7 +94,6 @@ class PhotoLadder {
       if (zero) {
         d_.superfluous.push_back(refit.effect);
         improved_.effects.erase(improved_.effects.begin() + index);
-        ++removed_;
       } else {
         d_.refitted.insert(d_.refitted.begin(), std::move(refit));
       }
@@ -130,7 +130,8 @@ class PhotoLadder {
   // The explanation with only these of its steps.
   inference::Parameterization Only(const std::vector<int>& kept) const {
     inference::Parameterization part = fit_.model;
-    for (int index = static_cast<int>(part.base().effects.size()) - 1; index >= selection_.initial_effects; --index)
+    for (int index = static_cast<int>(part.base().effects.size()) - 1; index >= selection_.initial_effects;
+         --index)
       if (std::find(kept.begin(), kept.end(), index) == kept.end()) part = part.Without(index);
     return part;
   }
@@ -192,20 +193,24 @@ class PhotoLadder {
     if (!curves.empty() && curves[0].p < kRestP && curves[0].unseen_gain > kCurveGain) {
       rest.lookup_yaml = LookupYaml(curves[0]);
       const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), all2 = std::pow(rest.rmse_grey, 2);
-      rest.heldout_gain = all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
+      rest.heldout_gain =
+          all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
       rest.heldout_rmse_grey = rest.heldout_rmse_grey * std::sqrt(std::max(1 - curves[0].unseen_gain, 0.0));
     }
     if (selection_.field >= 0)
-      absl::StrAppend(&rest.words,
-                      "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
-                      "reflection, stray light. Photograph a plain white sheet.");
+      absl::StrAppend(
+          &rest.words,
+          "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
+          "reflection, stray light. Photograph a plain white sheet.");
     if (albedo)
-      absl::StrAppend(&rest.words, rest.words.empty() ? "" : " ",
-                      "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
-                      "dirt, or a shape that departs from its mesh.");
+      absl::StrAppend(
+          &rest.words, rest.words.empty() ? "" : " ",
+          "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
+          "dirt, or a shape that departs from its mesh.");
     if (misfit && rest.words.empty())
       rest.words =
-          "Pictures differ from what is expected by more than their pixels scatter, and nothing in the catalogue "
+          "Pictures differ from what is expected by more than their pixels scatter, and nothing in the "
+          "catalogue "
           "explains it.";
     d_.unexplained = std::move(rest);
     const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
@@ -230,7 +235,6 @@ class PhotoLadder {
   std::vector<image::Photo>* after_;
   model::Model improved_;
   bool changed_ = false, values_wrong_ = false;
-  int removed_ = 0;
 };
 
 }  // namespace

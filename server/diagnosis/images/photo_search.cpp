@@ -1,12 +1,10 @@
 #include "server/diagnosis/images/photo_search.h"
 
-#include <boost/math/special_functions/gamma.hpp>
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
@@ -18,11 +16,8 @@ namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 40};
-constexpr PhotoRowsOptions kPolish = {12544, 1, 100, true, 0.01};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
-constexpr int kValleys = 2;
-constexpr double kRoughSquares = 0.5;  // of the squares, that contours move by chance
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -87,81 +82,19 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
       const double evidence = other.fit.log_evidence - fit.log_evidence;
       const bool same = other.name == inference::NameOf(own);
       const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
-      const bool equivalent =
-          evidence > -search.rules().equivalent_nats ||
-          (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
-                         other.fit.model.size() <= fit.model.size()));
+      const bool equivalent = evidence > -search.rules().equivalent_nats ||
+                              (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
+                                             other.fit.model.size() <= fit.model.size()));
       all.push_back(evidence);
       if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (!same && other.name != kImageFieldName)
-        step.competing.push_back(
-            {other.name, other.per_object, other.object, evidence, equivalent, false, other.fit.model.base()});
+        step.competing.push_back({other.name, other.per_object, other.object, evidence, equivalent, false,
+                                  other.fit.model.base()});
     }
     step.probability =
         selection::ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     selection->steps.push_back(std::move(step));
   }
-  return absl::OkStatus();
-}
-
-// Along the directions that the rows say least of, contours that cross single pixels hide the slope: there the error at
-// several places, a few standard errors apart, shows where its minimum lies.
-absl::Status SearchValleys(const inference::Experiment& experiment, inference::Fit* fit) {
-  const int p = fit->model.size();
-  if (p < 2) return absl::OkStatus();
-  const inference::ObservationModel& rows = *experiment.observations;
-  Eigen::VectorXd scale(p);
-  for (int i = 0; i < p; ++i) scale[i] = fit->model.parameters()[i].scale;
-  const Eigen::MatrixXd scaled = fit->columns.values.rightCols(p) * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
-  const auto squares_at = [&](const Eigen::VectorXd& point) -> absl::StatusOr<double> {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted, rows.Predict(fit->model.At(fit->model.Clip(point))));
-    return rows.Residual(predicted).squaredNorm();
-  };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const double start, squares_at(fit->point));
-  Eigen::VectorXd best = fit->point;
-  double least = start;
-  for (int valley = 0; valley < std::min(p, kValleys); ++valley) {
-    if (!(eigen.eigenvalues()[valley] > 0)) continue;
-    const Eigen::VectorXd way =
-        scale.cwiseProduct(eigen.eigenvectors().col(valley)) / std::sqrt(eigen.eigenvalues()[valley]);
-    // squares = a + b t + c t^2 through all places
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    const Eigen::VectorXd from = best;
-    for (const double t : {-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0}) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_at(from + t * way));
-      const Eigen::Vector3d term(1, t, t * t);
-      normal += term * term.transpose();
-      right += squares * term;
-      if (squares < least) least = squares, best = fit->model.Clip(from + t * way);
-    }
-    const Eigen::Vector3d curve = normal.ldlt().solve(right);
-    if (!(curve[2] > 0)) continue;
-    const Eigen::VectorXd lowest = from + std::clamp(-0.5 * curve[1] / curve[2], -12.0, 12.0) * way;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_at(lowest));
-    // The curve's minimum is surer than any one place, whose contours may happen to lie well.
-    if (squares < start || squares < least + kRoughSquares) least = std::min(least, squares), best = fit->model.Clip(lowest);
-  }
-  inference::Parameterization there = fit->model;
-  there.MoveTo(best);
-  TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit again, inference::FitModel(experiment, there));
-  if (again.columns.values.col(0).squaredNorm() < start + kRoughSquares) *fit = std::move(again);
-  return absl::OkStatus();
-}
-
-// The explanation on every photograph, near where it was found.
-absl::Status Polish(const Photographs& photographs, const DiagnosisContext& context, PhotoSelection* selection) {
-  selection->polished = selection->fit;
-  if (selection->fit.model.size() == 0) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const PhotoSearch all, MakePhotoSearch(photographs, selection->fit.model.base(), {}, kPolish, context));
-  const inference::Likelihood plain(all.rows->GroupRows(), nullptr, 0, nullptr);
-  inference::Experiment experiment = *all.experiment;
-  if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;
-  TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, inference::FitModel(experiment, selection->fit.model));
-  TOUCHSTONE_RETURN_IF_ERROR(SearchValleys(experiment, &selection->polished));
-  selection->covariance = CovarianceBetweenBlocks(experiment, selection->polished);
   return absl::OkStatus();
 }
 
@@ -173,9 +106,8 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
       if (IsSeen(selection->fit, index, selection->covariance)) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          selection->fit,
-          inference::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
+                                                                      selection->fit.model.Without(index)));
       dropped = true;
     }
   }
@@ -193,7 +125,8 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
   for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
   effects.push_back(ImageFieldEffect());
   for (const auto& effect : effects) {
-    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect)) continue;
+    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect))
+      continue;
     selection::Candidate candidate;
     candidate.effect = effect;
     candidates.push_back(candidate);
@@ -220,53 +153,23 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
 
 absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
                                             const std::vector<selection::Candidate>& candidates,
-                                            const PhotoRowsOptions& options, const DiagnosisContext& context) {
+                                            const PhotoRowsOptions& options,
+                                            const DiagnosisContext& context) {
   PhotoSearch made;
   std::vector<std::shared_ptr<const model::Effect>> effects;
   for (const selection::Candidate& candidate : candidates) effects.push_back(candidate.effect);
   TOUCHSTONE_ASSIGN_OR_RETURN(made.rows,
                               PhotoRows::Make(photographs, anchor, effects, options, context.pool));
-  made.likelihood = std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0,
-                                                            context.pool);
+  made.likelihood =
+      std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0, context.pool);
   made.likelihood->SetLeastNoise(1);
   made.experiment = std::make_unique<inference::Experiment>();
   made.experiment->observations = made.rows.get();
   made.experiment->likelihood = made.likelihood.get();
   made.experiment->pool = context.pool;
-  made.search = std::make_unique<selection::StepwiseSearch>(*made.experiment, candidates,
-                                                            selection::SearchRules(),
-                                                            [](const std::string&) {});
+  made.search = std::make_unique<selection::StepwiseSearch>(
+      *made.experiment, candidates, selection::SearchRules(), [](const std::string&) {});
   return made;
-}
-
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
-  const int p = fit.model.size(), n = experiment.observations->rows();
-  if (p == 0) return fit.covariance;
-  const Eigen::VectorXd left =
-      fit.columns.values.col(0) -
-      experiment.likelihood->FieldMean(inference::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
-  std::map<int, Eigen::VectorXd> scores;
-  for (int row = 0; row < n; ++row) {
-    Eigen::VectorXd& score =
-        scores.emplace(experiment.observations->BlockOfRow(row), Eigen::VectorXd::Zero(p)).first->second;
-    score += left[row] * fit.columns.values.row(row).tail(p).transpose();
-  }
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(p, p);
-  for (const auto& [block, score] : scores) meat += score * score.transpose();
-  const double blocks = static_cast<double>(scores.size());
-  // Each value leaves one block less to judge it by.
-  meat *= blocks / std::max(blocks - p, 1.0);
-  const double variance = fit.sigma * fit.sigma;
-  Eigen::MatrixXd between = fit.covariance * meat * fit.covariance / (variance * variance);
-  // Few blocks know little of many values: of each value the larger variance, with the fit's correlations.
-  Eigen::MatrixXd covariance = fit.covariance;
-  for (int i = 0; i < p; ++i) {
-    if (!(fit.covariance(i, i) > 0)) continue;
-    const double factor = std::sqrt(std::max(between(i, i) / fit.covariance(i, i), 1.0));
-    covariance.row(i) *= factor;
-    covariance.col(i) *= factor;
-  }
-  return covariance;
 }
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
@@ -275,8 +178,9 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   const std::vector<selection::Candidate> candidates = PhotoCandidates(input, photographs);
   const inference::Parameterization base(*input.model, photographs.objects);
   const auto enter = [&](const char* stage, double done) {
-    return !context.progress || context.progress(stage, done) ? absl::OkStatus()
-                                                              : absl::CancelledError("the diagnosis was cancelled");
+    return !context.progress || context.progress(stage, done)
+               ? absl::OkStatus()
+               : absl::CancelledError("the diagnosis was cancelled");
   };
   PhotoSelection selection;
   selection.initial_effects = static_cast<int>(input.model->effects.size());
@@ -301,11 +205,12 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
       selection.field = static_cast<int>(e);
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
-  TOUCHSTONE_RETURN_IF_ERROR(Polish(photographs, context, &selection));
+  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, &selection));
   const inference::Likelihood& likelihood = *selection.fine.likelihood;
   const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
   std::vector<double> with;
-  const double none = likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
+  const double none =
+      likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
   for (int s = 1; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
     with.push_back(likelihood.LogPrior(s) + likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
   selection.albedo_nats = inference::LogSum(with) - none;

@@ -39,12 +39,16 @@ struct PhotoSelection {
   int field = -1;                              // index of the image field's effect; -1: none
   std::vector<selection::SelectedStep> steps;  // named effects
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
-  double albedo_nats = 0;                      // evidence of a smooth error of the albedo over none
+  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
+
+// Fits the explanation to every photograph: `polished` and `covariance`.
+absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
+                               PhotoSelection* selection);
 
 // The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where
 // that is larger.

@@ -11,7 +11,7 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typical size
+constexpr double kRayStep = 0.3, kSensorStep = 0.5;                 // over a parameter's typical size
 constexpr double kLeastMovePx = 0.5, kMostMovePx = 2, kMovePx = 1;  // of contours, by a step
 constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
 constexpr int kObjectWaves = 2, kPatchPx = 12;
@@ -232,7 +232,8 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   const auto simulate = [&](const model::Model& model, bool details) {
     image::PhotoOutputs outputs;
     outputs.details = details;
-    return image::PhotoSimulator(std::make_shared<const model::Model>(model)).Run(request, outputs, &workspace);
+    return image::PhotoSimulator(std::make_shared<const model::Model>(model))
+        .Run(request, outputs, &workspace);
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
   photo.grey = RecordedGrey(photo, *photographs_.record);
@@ -280,7 +281,8 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   const Eigen::MatrixXf functions = ImageFieldFunctions(width, height);
   std::vector<Eigen::VectorXf> field;
   for (int f = 0; f < kImageFieldSize; ++f)
-    field.push_back(columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
+    field.push_back(
+        columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
   AddDisplacements(photo.grey, width, height, &columns);
   AddObjectLight(photo, &columns);
 
