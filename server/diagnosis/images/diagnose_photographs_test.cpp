@@ -50,6 +50,16 @@ TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
   EXPECT_TRUE(d.steps.empty());
 }
 
+// Twenty sets: a minute.
+TEST(DiagnosePhotographs, DISABLED_FindsNothingInManySetsWhereNothingIsMissing) {
+  for (uint64_t seed = 100; seed < 120; ++seed) {
+    HiddenCamera rig;
+    rig.seed = seed;
+    rig.sigma_grey = seed % 2 == 0 ? 1 : 3;
+    EXPECT_EQ(Diagnosed(MakePhotoInput(rig)).verdict, selection::Verdict::kAdequate) << seed;
+  }
+}
+
 TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
   HiddenCamera rig;
   rig.unlisted = [](int, int column, int row, const image::Photo& photo, size_t) {
