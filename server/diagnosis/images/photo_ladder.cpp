@@ -57,7 +57,7 @@ class PhotoLadder {
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
-    JudgeRest(best);
+    JudgeRest();
     d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
                  : !d_.steps.empty() ? selection::Verdict::kMissingEffects
                  : values_wrong_     ? selection::Verdict::kWrongValues
@@ -171,8 +171,14 @@ class PhotoLadder {
     quality->heldout_rmse_grey = std::sqrt(quality->rmse_grey * quality->rmse_grey + excess);
   }
 
+  // On what the improved model leaves, expected with the noise that it leaves.
+  std::vector<PhotoCovariate> CovariatesOf(const model::Model& model) const {
+    const auto expected = ExpectPhotographs(*selection_.photographs, model, true, pool_);
+    return expected.ok() ? TestCovariates(*selection_.photographs, *expected) : std::vector<PhotoCovariate>();
+  }
+
   // A structure that no named effect explains.
-  void JudgeRest(const std::vector<image::Photo>& best) {
+  void JudgeRest() {
     const inference::Likelihood& likelihood = *selection_.fine.likelihood;
     const double q = likelihood.Gram(inference::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
@@ -180,7 +186,7 @@ class PhotoLadder {
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
     const bool misfit = p < kRestP && std::sqrt(q / freedom) > kMisfitRows;
     const bool albedo = fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats;
-    const std::vector<PhotoCovariate> curves = TestCovariates(photographs_, best);
+    const std::vector<PhotoCovariate> curves = CovariatesOf(improved_);
     const bool curve = std::any_of(curves.begin(), curves.end(), [](const PhotoCovariate& c) {
       return c.p < kRestP && c.unseen_gain > kCurveGain;
     });

@@ -8,6 +8,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/effects/all_effects.h"
 
@@ -18,6 +19,7 @@ constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 40};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
+constexpr double kFaint = 0.1;  // of the noise
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -94,6 +96,24 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
     step.probability =
         selection::ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     selection->steps.push_back(std::move(step));
+  }
+  return absl::OkStatus();
+}
+
+// A field that is small against the noise is what simulation and noise are known to, not dirt.
+absl::Status DropFaintField(PhotoSelection* selection) {
+  const std::vector<model::EffectInstance>& effects = selection->fit.model.base().effects;
+  for (int index = 0; index < static_cast<int>(effects.size()); ++index) {
+    if (effects[index].effect->name != kImageFieldName) continue;
+    const int side = 64;  // of a coarse picture
+    const Eigen::VectorXf values =
+        Eigen::Map<const Eigen::VectorXd>(effects[index].values.data(), kImageFieldSize).cast<float>();
+    const Eigen::VectorXf field = ImageFieldFunctions(side, side) * values;
+    const double rms = field.norm() / side;
+    if (rms > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
+                                                                    selection->fit.model.Without(index)));
+    return absl::OkStatus();
   }
   return absl::OkStatus();
 }
@@ -192,20 +212,29 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
   }
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
+  // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is hangs on the noise.
+  selection.photographs = std::make_unique<Photographs>(photographs);
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      selection.fine, MakePhotoSearch(photographs, explanation.fit.model.base(), candidates, kFine, context));
+      const std::vector<image::Photo> expected,
+      ExpectPhotographs(photographs, explanation.fit.model.base(), false, context.pool));
+  selection.photographs->noise = NoiseOfResiduals(photographs, expected, context.pool);
+  selection.photographs->record = std::make_shared<const RecordTable>(selection.photographs->noise);
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.fine,
+      MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, kFine, context));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
+  TOUCHSTONE_RETURN_IF_ERROR(DropFaintField(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(DropUnsteady(&selection));
   for (size_t e = 0; e < selection.fit.model.base().effects.size(); ++e)
     if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
       selection.field = static_cast<int>(e);
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
-  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, &selection));
+  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(*selection.photographs, context, &selection));
   const inference::Likelihood& likelihood = *selection.fine.likelihood;
   const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
   std::vector<double> with;

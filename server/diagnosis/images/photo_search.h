@@ -30,6 +30,8 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
                                             const PhotoRowsOptions& options, const DiagnosisContext& context);
 
 struct PhotoSelection {
+  // The same photographs, with the noise of what the coarse search leaves: what the fine one and its fits work on.
+  std::unique_ptr<Photographs> photographs;
   PhotoSearch fine;
   inference::Fit initial;  // the given model, in fine rows
   inference::Fit fit;      // the explanation; the image field among its effects where it takes part
