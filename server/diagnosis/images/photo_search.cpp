@@ -16,7 +16,7 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
-constexpr PhotoRowsOptions kFine = {12544, 1, 40};
+constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
 constexpr double kFaint = 0.1;  // of the noise
