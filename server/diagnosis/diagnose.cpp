@@ -60,6 +60,34 @@ double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// The model's effects of photographs are no business of touches: a diagnosis works without them, and they come back
+// as they were into every model that it gives.
+struct PhotographEffects {
+  explicit PhotographEffects(const DiagnosisInput& input) : touches(input), given(input.model) {
+    model::Model without = *input.model;
+    without.effects.clear();
+    for (const model::EffectInstance& instance : input.model->effects)
+      (instance.effect->of_photos() ? effects : without.effects).push_back(instance);
+    if (!effects.empty()) touches.model = std::make_shared<const model::Model>(std::move(without));
+  }
+  model::Model With(model::Model model) const {
+    model.effects.insert(model.effects.end(), effects.begin(), effects.end());
+    return model;
+  }
+  void NameGiven(report::Diagnosis* diagnosis) const {
+    if (diagnosis->pose_free) {
+      diagnosis->pose_free->input.model = given;
+      return;
+    }
+    diagnosis->model_name = given->name;
+    diagnosis->model_hash = given->Hash();
+  }
+
+  DiagnosisInput touches;  // the input without them
+  std::shared_ptr<const model::Model> given;
+  std::vector<model::EffectInstance> effects;
+};
+
 // The residuals of the initial and of the improved model, described.
 residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
                                         const std::vector<double>& before,
@@ -135,26 +163,30 @@ absl::StatusOr<report::Diagnosis> DiagnosePoseFree(const DiagnosisInput& input,
 }
 
 // What a selection says, without the residuals.
-void AddLadder(const selection::Ladder& ladder, report::Diagnosis* diagnosis) {
+void AddLadder(const selection::Ladder& ladder, const PhotographEffects& photographs,
+               report::Diagnosis* diagnosis) {
   diagnosis->verdict = ladder.verdict;
   diagnosis->noise_floor = ladder.noise_floor;
   diagnosis->final = ladder.final;
   diagnosis->reducible_share = ReducibleShare(ladder.noise_floor, *diagnosis->initial);
   diagnosis->refitted = ladder.refitted;
   diagnosis->steps = ladder.steps;
+  for (selection::LadderStep& step : diagnosis->steps) step.model = photographs.With(std::move(step.model));
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
   diagnosis->candidates = ladder.candidates;
   diagnosis->unexplained = ladder.unexplained;
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (!ladder.changed) return;
-  diagnosis->improved_model_yaml = model::FormatModel(ladder.improved);
-  diagnosis->improved_model_hash = ladder.improved.Hash();
+  const model::Model improved = photographs.With(ladder.improved);
+  diagnosis->improved_model_yaml = model::FormatModel(improved);
+  diagnosis->improved_model_hash = improved.Hash();
 }
 
 // `always`: Propose, which names touches even where nothing is confounded.
-absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, int max_touches, bool always,
-                                                  const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> DiagnoseTouches(const PhotographEffects& photographs, int max_touches,
+                                                  bool always, const DiagnosisContext& context) {
+  const DiagnosisInput& input = photographs.touches;
   if (!input.set->has_poses) return DiagnosePoseFree(input, context, true);
   const double began = Now();
   ProgressGate gate(context);
@@ -190,7 +222,7 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
                               selection::QualityOf(*workspace, selection.initial_model, before));
   selection::SetError(compared_s, &*diagnosis.initial);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
-  AddLadder(ladder, &diagnosis);
+  AddLadder(ladder, photographs, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   diagnosis.residuals =
       DescribeBoth(*workspace, before, ladder.prediction, ladder.residuals, ladder.noise_floor.sigma_s);
@@ -210,7 +242,9 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input, i
 
 }  // namespace
 
-absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& given, const DiagnosisContext& context) {
+  const PhotographEffects photographs(given);
+  const DiagnosisInput& input = photographs.touches;
   if (!input.set->has_poses) return DiagnosePoseFree(input, context, false);
   const double began = Now();
   ProgressGate gate(context);
@@ -226,18 +260,27 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const Dia
   if (diagnosis.data.touches > 0)
     diagnosis.residuals =
         DescribeBoth(*workspace, residuals, workspace->nominal, residuals, diagnosis.noise_floor->sigma_s);
+  photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);
   diagnosis.duration_s = Now() - began;
   return diagnosis;
 }
 
 absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
-  return DiagnoseTouches(input, kDefaultTouches, false, context);
+  const PhotographEffects photographs(input);
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis diagnosis,
+                              DiagnoseTouches(photographs, kDefaultTouches, false, context));
+  photographs.NameGiven(&diagnosis);
+  return diagnosis;
 }
 
 absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
                                           const DiagnosisContext& context) {
-  return DiagnoseTouches(input, max_touches, true, context);
+  const PhotographEffects photographs(input);
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis diagnosis,
+                              DiagnoseTouches(photographs, max_touches, true, context));
+  photographs.NameGiven(&diagnosis);
+  return diagnosis;
 }
 
 }  // namespace touchstone::diagnosis

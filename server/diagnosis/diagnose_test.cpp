@@ -127,6 +127,28 @@ TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
   EXPECT_EQ(better->effects.back().effect->name, "tip_radius");
 }
 
+TEST(Diagnose, LeavesTheModelsEffectsOfPhotographsAsTheyAre) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  input.model = std::make_shared<const model::Model>(
+      touches::WithEffects(*input.model, {{"exposure", {"stops=0.25"}}, {"image_noise", {"sigma_grey=3"}}}));
+  const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->model_hash, input.model->Hash());
+  EXPECT_EQ(StepNames(*report), std::vector<std::string>{"tip_radius"});
+  const absl::StatusOr<model::Model> improved =
+      model::ParseModel(report->improved_model_yaml, "better", effects::Catalogue());
+  ASSERT_TRUE(improved.ok()) << improved.status();
+  EXPECT_EQ(improved->Hash(), report->improved_model_hash);
+  int kept = 0;
+  for (const model::EffectInstance& instance : improved->effects) {
+    kept += instance.effect->name == "exposure" && instance.values[0] == 0.25;
+    kept += instance.effect->name == "image_noise" && instance.values[0] == 3;
+  }
+  EXPECT_EQ(kept, 2);
+}
+
 TEST(Diagnose, FindsTwoEffectsAtOnce) {
   touches::HiddenRig rig;
   rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}, {"object_push", {"shift_mm=0.4"}}};

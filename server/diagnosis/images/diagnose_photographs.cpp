@@ -42,7 +42,8 @@ absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const Dia
   diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
   if (!diagnosis.noise_floor.from_repeats)
     diagnosis.warnings.push_back(
-        "No picture was taken twice: the noise floor is an upper bound, from what neighbouring pixels differ by. "
+        "No picture was taken twice: the noise floor is an upper bound, from what neighbouring pixels differ "
+        "by. "
         "Repeat a few pictures.");
   return diagnosis;
 }
@@ -86,7 +87,8 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
 absl::StatusOr<PhotographDiagnosis> ProposePhotographs(const DiagnosisInput& input, int max_photographs,
                                                        const DiagnosisContext& context,
                                                        Expectation* expectation) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, DiagnosePhotographs(input, context, expectation));
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis,
+                              DiagnosePhotographs(input, context, expectation));
   diagnosis.warnings.push_back("No further photographs are proposed yet.");
   return diagnosis;
 }

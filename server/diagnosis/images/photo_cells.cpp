@@ -8,10 +8,9 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMinStepGrey = 4;    // between neighbouring pixels, from which it is a contour
+constexpr double kMinStepGrey = 4;  // between neighbouring pixels, from which it is a contour
 // The mean of a clipped pixel is as good as what is known of its noise there: it counts as if it scattered so much.
 constexpr double kClippedSigmas = 15;
-constexpr double kWithinPixel = 1.0 / 12;  // variance of a place within a pixel, px^2
 
 // The largest over each pixel and its neighbours.
 std::vector<float> LargestAround(const std::vector<float>& image, int width, int height) {
@@ -31,8 +30,9 @@ std::vector<float> LargestAround(const std::vector<float>& image, int width, int
   return around;
 }
 
-// Variance that a contour's place within a pixel adds, at the contour and around it, grey^2.
-std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height) {
+// Variance that a contour's place adds, at the contour and around it, grey^2.
+std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height,
+                                   double contour_px2) {
   const std::vector<float> most = LargestAround(grey, width, height);
   std::vector<float> negative(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) negative[i] = -grey[i];
@@ -40,7 +40,7 @@ std::vector<float> ContourVariance(const std::vector<float>& grey, int width, in
   std::vector<float> variance(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) {
     const double step = std::max(static_cast<double>(most[i]) + least[i] - kMinStepGrey, 0.0);
-    variance[i] = static_cast<float>(kWithinPixel * step * step);
+    variance[i] = static_cast<float>(contour_px2 * step * step);
   }
   return LargestAround(variance, width, height);
 }
@@ -53,9 +53,9 @@ CellGrid GridOfPicture(int width, int height, int cells) {
   return grid;
 }
 
-Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey,
-                            const RecordTable& record) {
-  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height);
+Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey, const RecordTable& record,
+                            double contour_px2) {
+  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height, contour_px2);
   Eigen::VectorXf variance = Eigen::VectorXf::Zero(grid.size());
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {
@@ -84,14 +84,14 @@ Eigen::VectorXf Smooth(const CellGrid& grid, const Eigen::VectorXf& cells) {
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
       const int row = y * columns;
-      along[row + x] = 0.5f * cells[row + x] + 0.25f * (cells[row + std::max(x - 1, 0)] +
-                                                        cells[row + std::min(x + 1, columns - 1)]);
+      along[row + x] = 0.5f * cells[row + x] +
+                       0.25f * (cells[row + std::max(x - 1, 0)] + cells[row + std::min(x + 1, columns - 1)]);
     }
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x)
-      both[y * columns + x] = 0.5f * along[y * columns + x] +
-                              0.25f * (along[std::max(y - 1, 0) * columns + x] +
-                                       along[std::min(y + 1, rows - 1) * columns + x]);
+      both[y * columns + x] =
+          0.5f * along[y * columns + x] +
+          0.25f * (along[std::max(y - 1, 0) * columns + x] + along[std::min(y + 1, rows - 1) * columns + x]);
   return both;
 }
 
@@ -107,9 +107,8 @@ Eigen::MatrixXf OrthonormalSpan(const Eigen::MatrixXf& columns, double tolerance
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
   int kept = 0;
   for (int i = 0; i < used; ++i) kept += eigen.eigenvalues()[i] > tolerance;
-  const Eigen::MatrixXd turned =
-      eigen.eigenvectors().rightCols(kept) *
-      eigen.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd turned = eigen.eigenvectors().rightCols(kept) *
+                                 eigen.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   return unit * turned.cast<float>();
 }
 

@@ -14,8 +14,9 @@ namespace {
 
 constexpr int kBinsOfCurve = 10, kCurveFolds = 5;
 constexpr double kMaxClipped = 0.001;  // of a pixel's records
-constexpr double kMinShare = 1e-3;  // of the pixels, that a bin holds
-constexpr const char* kNames[] = {"radius", "row", "column", "grey", "incidence_deg", "depth_mm", "session_time_s"};
+constexpr double kMinShare = 1e-3;     // of the pixels, that a bin holds
+constexpr const char* kNames[] = {"radius",        "row",      "column",        "grey",
+                                  "incidence_deg", "depth_mm", "session_time_s"};
 constexpr int kNamed = 7;
 
 double ValueOf(int covariate, const Photographs& p, const image::Photo& photo, int k, int x, int y) {
@@ -67,7 +68,8 @@ PhotoCovariate Judge(const std::string& name, const BinSums& bins, double low, d
     result.mean_grey.push_back(mean);
     if (error > 0) {
       const double t = std::abs(mean) / error;
-      smallest = std::min(smallest, 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(with - 1), t)));
+      smallest = std::min(
+          smallest, 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(with - 1), t)));
       explained += 0.5 * t * t;
     }
     // What the mean of the other folds takes from each fold.
@@ -113,7 +115,8 @@ std::vector<PhotoCovariate> TestCovariates(const Photographs& p, const std::vect
         for (int x = 0; x < p.width(); ++x) {
           const double value = ValueOf(covariate, p, expected[k], k, x, y);
           if (std::isnan(value)) continue;
-          const int b = std::clamp(static_cast<int>((value - low) / (high - low) * kBinsOfCurve), 0, kBinsOfCurve - 1);
+          const int b =
+              std::clamp(static_cast<int>((value - low) / (high - low) * kBinsOfCurve), 0, kBinsOfCurve - 1);
           const size_t at = static_cast<size_t>(y) * p.width() + x;
           if (p.record->Clipped(expected[k].grey[at]) > kMaxClipped) continue;
           bins.sum[p.pose[k]][b] += static_cast<double>(p.measured_grey[k][at]) - expected[k].grey[at];
@@ -121,8 +124,9 @@ std::vector<PhotoCovariate> TestCovariates(const Photographs& p, const std::vect
         }
     tests.push_back(Judge(kNames[covariate], bins, low, high, squares));
   }
-  std::stable_sort(tests.begin(), tests.end(),
-                   [](const PhotoCovariate& a, const PhotoCovariate& b) { return a.unseen_gain > b.unseen_gain; });
+  std::stable_sort(tests.begin(), tests.end(), [](const PhotoCovariate& a, const PhotoCovariate& b) {
+    return a.unseen_gain > b.unseen_gain;
+  });
   return tests;
 }
 
@@ -132,8 +136,9 @@ std::string LookupYaml(const PhotoCovariate& covariate) {
     absl::StrAppendFormat(&knots, "%s%.6g", i > 0 ? ", " : "", covariate.knots[i]);
     absl::StrAppendFormat(&values, "%s%.4g", i > 0 ? ", " : "", covariate.mean_grey[i]);
   }
-  return absl::StrCat("- lookup:\n    name: rest_", covariate.name, "\n    adds: grey\n    covariate: ",
-                      covariate.name, "\n    knots: [", knots, "]\n    values: [", values, "]\n");
+  return absl::StrCat("- lookup:\n    name: rest_", covariate.name,
+                      "\n    adds: grey\n    covariate: ", covariate.name, "\n    knots: [", knots,
+                      "]\n    values: [", values, "]\n");
 }
 
 }  // namespace touchstone::diagnosis::images

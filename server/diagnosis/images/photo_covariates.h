@@ -11,9 +11,11 @@ namespace touchstone::diagnosis::images {
 
 struct PhotoCovariate {
   std::string name;  // as formulas and lookups name it
-  double p = 1;      // of the largest deviation of a bin if nothing depended on it, corrected for all bins and covariates
+  double p =
+      1;  // of the largest deviation of a bin if nothing depended on it, corrected for all bins and covariates
   double gain_nats = 0;
-  double unseen_gain = 0;          // share of the mean square residual that the curve takes from pictures it did not see
+  double unseen_gain =
+      0;  // share of the mean square residual that the curve takes from pictures it did not see
   std::vector<double> knots, mean_grey;  // of the bins
 };
 

@@ -14,9 +14,9 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMisfitRows = 1.1;     // root mean square of rows, in noise, from which a rest counts
+constexpr double kMisfitRows = 1.1;  // root mean square of rows, in noise, from which a rest counts
 constexpr double kRestP = 1e-4;
-constexpr double kCurveGain = 0.01;     // of the mean square residual of pictures that a curve did not see
+constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures that a curve did not see
 constexpr double kAlbedoNats = 5;
 constexpr double kDoubted = 0.5, kMostBesideRest = 0.9;
 constexpr double kZeroWithinErrors = 2;
@@ -31,13 +31,14 @@ class PhotoLadder {
         photographs_(photographs),
         selection_(selection),
         fit_(selection.fit),
+        values_(selection.polished),
         before_(before),
         d_(*diagnosis),
         after_(after) {}
 
   absl::Status Run() {
-    improved_ = fit_.model.base();
-    selection::RoundValues(fit_, &improved_);
+    improved_ = values_.model.base();
+    selection::RoundValues(values_, &improved_);
     if (selection_.field >= 0) improved_.effects.erase(improved_.effects.begin() + selection_.field);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGivenEffects());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
@@ -50,16 +51,17 @@ class PhotoLadder {
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
     SetHeldOut(fit_, &*d_.final);
     for (PhotographStep& step : d_.steps) SetHeldOut(fit_, &step.quality);
-    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), initial2 = std::pow(d_.initial->rmse_grey, 2);
+    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2),
+                 initial2 = std::pow(d_.initial->rmse_grey, 2);
     d_.reducible_share = initial2 > floor2 ? 1 - floor2 / initial2 : 0;
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
-    JudgeRest(best);
-    d_.verdict = d_.unexplained                ? selection::Verdict::kUnexplained
-                 : !d_.steps.empty()           ? selection::Verdict::kMissingEffects
-                 : values_wrong_               ? selection::Verdict::kWrongValues
-                                               : selection::Verdict::kAdequate;
+    JudgeRest();
+    d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
+                 : !d_.steps.empty() ? selection::Verdict::kMissingEffects
+                 : values_wrong_     ? selection::Verdict::kWrongValues
+                                     : selection::Verdict::kAdequate;
     if (!expectations_changed) after_->clear();
     if (!changed_) return absl::OkStatus();
     if (!improved_.name.empty()) improved_.name += "_better";
@@ -77,7 +79,7 @@ class PhotoLadder {
       if (!fit_.model.IsFree(index)) continue;
       const model::Effect& effect = *before.effects[index].effect;
       selection::RefittedEffect refit{inference::NameOf(effect),
-                                      fit_.model.Describe(index, fit_.point, selection_.covariance)};
+                                      values_.model.Describe(index, values_.point, selection_.covariance)};
       const auto old = initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
       bool zero = true;
       for (size_t j = 0; j < refit.parameters.size(); ++j) {
@@ -92,7 +94,6 @@ class PhotoLadder {
       if (zero) {
         d_.superfluous.push_back(refit.effect);
         improved_.effects.erase(improved_.effects.begin() + index);
-        ++removed_;
       } else {
         d_.refitted.insert(d_.refitted.begin(), std::move(refit));
       }
@@ -118,7 +119,9 @@ class PhotoLadder {
         chosen = j;
       }
       kept.push_back(open[chosen]->effect);
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], *next));
+      // The last step is the whole explanation.
+      const bool last = open.size() == 1 && selection_.field < 0;
+      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next));
       open.erase(open.begin() + static_cast<long>(chosen));
     }
     return absl::OkStatus();
@@ -127,7 +130,8 @@ class PhotoLadder {
   // The explanation with only these of its steps.
   inference::Parameterization Only(const std::vector<int>& kept) const {
     inference::Parameterization part = fit_.model;
-    for (int index = static_cast<int>(part.base().effects.size()) - 1; index >= selection_.initial_effects; --index)
+    for (int index = static_cast<int>(part.base().effects.size()) - 1; index >= selection_.initial_effects;
+         --index)
       if (std::find(kept.begin(), kept.end(), index) == kept.end()) part = part.Without(index);
     return part;
   }
@@ -142,7 +146,7 @@ class PhotoLadder {
     step.remedy = instance.effect->remedy;
     step.probability = from.probability;
     step.gain_nats = from.gain_nats;
-    step.parameters = fit_.model.Describe(from.effect, fit_.point, selection_.covariance);
+    step.parameters = values_.model.Describe(from.effect, values_.point, selection_.covariance);
     if (const std::string only = fit_.model.OnlyObject(from.effect); !only.empty())
       step.words = absl::StrCat("on ", only, " only");
     std::vector<std::string> names = {step.effect};
@@ -167,8 +171,14 @@ class PhotoLadder {
     quality->heldout_rmse_grey = std::sqrt(quality->rmse_grey * quality->rmse_grey + excess);
   }
 
+  // On what the improved model leaves, expected with the noise that it leaves.
+  std::vector<PhotoCovariate> CovariatesOf(const model::Model& model) const {
+    const auto expected = ExpectPhotographs(*selection_.photographs, model, true, pool_);
+    return expected.ok() ? TestCovariates(*selection_.photographs, *expected) : std::vector<PhotoCovariate>();
+  }
+
   // A structure that no named effect explains.
-  void JudgeRest(const std::vector<image::Photo>& best) {
+  void JudgeRest() {
     const inference::Likelihood& likelihood = *selection_.fine.likelihood;
     const double q = likelihood.Gram(inference::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
@@ -176,7 +186,7 @@ class PhotoLadder {
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
     const bool misfit = p < kRestP && std::sqrt(q / freedom) > kMisfitRows;
     const bool albedo = fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats;
-    const std::vector<PhotoCovariate> curves = TestCovariates(photographs_, best);
+    const std::vector<PhotoCovariate> curves = CovariatesOf(improved_);
     const bool curve = std::any_of(curves.begin(), curves.end(), [](const PhotoCovariate& c) {
       return c.p < kRestP && c.unseen_gain > kCurveGain;
     });
@@ -189,20 +199,24 @@ class PhotoLadder {
     if (!curves.empty() && curves[0].p < kRestP && curves[0].unseen_gain > kCurveGain) {
       rest.lookup_yaml = LookupYaml(curves[0]);
       const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), all2 = std::pow(rest.rmse_grey, 2);
-      rest.heldout_gain = all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
+      rest.heldout_gain =
+          all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
       rest.heldout_rmse_grey = rest.heldout_rmse_grey * std::sqrt(std::max(1 - curves[0].unseen_gain, 0.0));
     }
     if (selection_.field >= 0)
-      absl::StrAppend(&rest.words,
-                      "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
-                      "reflection, stray light. Photograph a plain white sheet.");
+      absl::StrAppend(
+          &rest.words,
+          "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
+          "reflection, stray light. Photograph a plain white sheet.");
     if (albedo)
-      absl::StrAppend(&rest.words, rest.words.empty() ? "" : " ",
-                      "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
-                      "dirt, or a shape that departs from its mesh.");
+      absl::StrAppend(
+          &rest.words, rest.words.empty() ? "" : " ",
+          "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
+          "dirt, or a shape that departs from its mesh.");
     if (misfit && rest.words.empty())
       rest.words =
-          "Pictures differ from what is expected by more than their pixels scatter, and nothing in the catalogue "
+          "Pictures differ from what is expected by more than their pixels scatter, and nothing in the "
+          "catalogue "
           "explains it.";
     d_.unexplained = std::move(rest);
     const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
@@ -220,13 +234,13 @@ class PhotoLadder {
   ThreadPool* pool_;
   const Photographs& photographs_;
   const PhotoSelection& selection_;
-  const inference::Fit& fit_;
+  const inference::Fit& fit_;     // that was selected
+  const inference::Fit& values_;  // the same effects, on every photograph
   const std::vector<image::Photo>& before_;
   PhotographDiagnosis& d_;
   std::vector<image::Photo>* after_;
   model::Model improved_;
   bool changed_ = false, values_wrong_ = false;
-  int removed_ = 0;
 };
 
 }  // namespace

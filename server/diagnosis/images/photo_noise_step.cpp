@@ -36,8 +36,9 @@ void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& qua
   const double error = sigma > 0 ? found.sigma_error * found.sigma_grey / sigma : found.sigma_error;
   std::vector<inference::ParameterEstimate> parameters = {
       Estimate(effect->parameters[0], sigma, error), Estimate(effect->parameters[1], gain, found.gain_error)};
-  const auto own = std::find_if(improved->effects.begin(), improved->effects.end(),
-                                [&](const model::EffectInstance& instance) { return instance.effect->name == effect->name; });
+  const auto own = std::find_if(
+      improved->effects.begin(), improved->effects.end(),
+      [&](const model::EffectInstance& instance) { return instance.effect->name == effect->name; });
   if (own == improved->effects.end()) {
     if (sigma < kMinSigmaGrey && gain == 0) return;
     model::EffectInstance instance;

@@ -13,14 +13,15 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kPatches = 1600;          // of a picture
+constexpr int kPatches = 1600;           // of a picture
 constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
 constexpr double kMinRepeatPixels = 1000;
 constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
 
 }  // namespace
 
-PixelNoise NoiseOfResiduals(const Photographs& p, const std::vector<image::Photo>& expected, ThreadPool* pool) {
+PixelNoise NoiseOfResiduals(const Photographs& p, const std::vector<image::Photo>& expected,
+                            ThreadPool* pool) {
   std::vector<NoiseGatherer> gathered(p.size());
   ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
@@ -45,7 +46,8 @@ GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<i
     if (members.size() < 2) continue;
     for (size_t i = 0; i < p.measured_grey[members[0]].size(); ++i) {
       double sum = 0, sum_of_squares = 0;
-      for (const int k : members) sum += p.measured_grey[k][i], sum_of_squares += std::pow(p.measured_grey[k][i], 2);
+      for (const int k : members)
+        sum += p.measured_grey[k][i], sum_of_squares += std::pow(p.measured_grey[k][i], 2);
       squares += sum_of_squares - sum * sum / static_cast<double>(members.size());
     }
     floor.degrees_of_freedom += pixels * static_cast<double>(members.size() - 1);
@@ -75,8 +77,9 @@ double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expec
     for (int k = begin; k < end; ++k) {
       std::vector<float> residual = p.measured_grey[k];
       for (size_t i = 0; i < residual.size(); ++i) residual[i] -= expected[k].grey[i];
-      squares[k] =
-          CellSums(grid, residual.data(), CellWeights(grid, expected[k].grey, *p.record)).cast<double>().squaredNorm();
+      squares[k] = CellSums(grid, residual.data(), CellWeights(grid, expected[k].grey, *p.record))
+                       .cast<double>()
+                       .squaredNorm();
     }
   });
   double sum = 0;
@@ -100,7 +103,8 @@ double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const
   const double seen = fit.columns.values.col(0).squaredNorm();
   const double unseen = std::max(inference::HeldOutRmse(*search.experiment, fit),
                                  inference::HeldOutRmseByBlock(*search.experiment, fit));
-  const double pixels = static_cast<double>(photographs.width()) * photographs.height() * search.rows->photographs();
+  const double pixels =
+      static_cast<double>(photographs.width()) * photographs.height() * search.rows->photographs();
   return std::max(rows * unseen * unseen - seen, 0.0) * floor_grey * floor_grey / pixels;
 }
 

@@ -1,14 +1,14 @@
 #include "server/diagnosis/images/photo_search.h"
 
-#include <boost/math/special_functions/gamma.hpp>
 #include <Eigen/Cholesky>
+#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/effects/all_effects.h"
 
@@ -16,9 +16,10 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
-constexpr PhotoRowsOptions kFine = {12544, 1, 40};
+constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
+constexpr double kFaint = 0.1;  // of the noise
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -83,19 +84,36 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
       const double evidence = other.fit.log_evidence - fit.log_evidence;
       const bool same = other.name == inference::NameOf(own);
       const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
-      const bool equivalent =
-          evidence > -search.rules().equivalent_nats ||
-          (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
-                         other.fit.model.size() <= fit.model.size()));
+      const bool equivalent = evidence > -search.rules().equivalent_nats ||
+                              (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
+                                             other.fit.model.size() <= fit.model.size()));
       all.push_back(evidence);
       if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (!same && other.name != kImageFieldName)
-        step.competing.push_back(
-            {other.name, other.per_object, other.object, evidence, equivalent, false, other.fit.model.base()});
+        step.competing.push_back({other.name, other.per_object, other.object, evidence, equivalent, false,
+                                  other.fit.model.base()});
     }
     step.probability =
         selection::ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
     selection->steps.push_back(std::move(step));
+  }
+  return absl::OkStatus();
+}
+
+// A field that is small against the noise is what simulation and noise are known to, not dirt.
+absl::Status DropFaintField(PhotoSelection* selection) {
+  const std::vector<model::EffectInstance>& effects = selection->fit.model.base().effects;
+  for (int index = 0; index < static_cast<int>(effects.size()); ++index) {
+    if (effects[index].effect->name != kImageFieldName) continue;
+    const int side = 64;  // of a coarse picture
+    const Eigen::VectorXf values =
+        Eigen::Map<const Eigen::VectorXd>(effects[index].values.data(), kImageFieldSize).cast<float>();
+    const Eigen::VectorXf field = ImageFieldFunctions(side, side) * values;
+    const double rms = field.norm() / side;
+    if (rms > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
+                                                                    selection->fit.model.Without(index)));
+    return absl::OkStatus();
   }
   return absl::OkStatus();
 }
@@ -108,9 +126,8 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
       if (IsSeen(selection->fit, index, selection->covariance)) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          selection->fit,
-          inference::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
+                                                                      selection->fit.model.Without(index)));
       dropped = true;
     }
   }
@@ -128,7 +145,8 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
   for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
   effects.push_back(ImageFieldEffect());
   for (const auto& effect : effects) {
-    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect)) continue;
+    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect))
+      continue;
     selection::Candidate candidate;
     candidate.effect = effect;
     candidates.push_back(candidate);
@@ -155,52 +173,23 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
 
 absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
                                             const std::vector<selection::Candidate>& candidates,
-                                            const PhotoRowsOptions& options, const DiagnosisContext& context) {
+                                            const PhotoRowsOptions& options,
+                                            const DiagnosisContext& context) {
   PhotoSearch made;
   std::vector<std::shared_ptr<const model::Effect>> effects;
   for (const selection::Candidate& candidate : candidates) effects.push_back(candidate.effect);
   TOUCHSTONE_ASSIGN_OR_RETURN(made.rows,
                               PhotoRows::Make(photographs, anchor, effects, options, context.pool));
-  made.likelihood = std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0,
-                                                            context.pool);
+  made.likelihood =
+      std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0, context.pool);
   made.likelihood->SetLeastNoise(1);
   made.experiment = std::make_unique<inference::Experiment>();
   made.experiment->observations = made.rows.get();
   made.experiment->likelihood = made.likelihood.get();
   made.experiment->pool = context.pool;
-  made.search = std::make_unique<selection::StepwiseSearch>(*made.experiment, candidates,
-                                                            selection::SearchRules(),
-                                                            [](const std::string&) {});
+  made.search = std::make_unique<selection::StepwiseSearch>(
+      *made.experiment, candidates, selection::SearchRules(), [](const std::string&) {});
   return made;
-}
-
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
-  const int p = fit.model.size(), n = experiment.observations->rows();
-  if (p == 0) return fit.covariance;
-  const Eigen::VectorXd left =
-      fit.columns.values.col(0) -
-      experiment.likelihood->FieldMean(inference::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
-  std::map<int, Eigen::VectorXd> scores;
-  for (int row = 0; row < n; ++row) {
-    Eigen::VectorXd& score =
-        scores.emplace(experiment.observations->BlockOfRow(row), Eigen::VectorXd::Zero(p)).first->second;
-    score += left[row] * fit.columns.values.row(row).tail(p).transpose();
-  }
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(p, p);
-  for (const auto& [block, score] : scores) meat += score * score.transpose();
-  const double blocks = static_cast<double>(scores.size());
-  meat *= blocks / std::max(blocks - 1, 1.0);
-  const double variance = fit.sigma * fit.sigma;
-  Eigen::MatrixXd between = fit.covariance * meat * fit.covariance / (variance * variance);
-  // Few blocks know little of many values: of each value the larger variance, with the fit's correlations.
-  Eigen::MatrixXd covariance = fit.covariance;
-  for (int i = 0; i < p; ++i) {
-    if (!(fit.covariance(i, i) > 0)) continue;
-    const double factor = std::sqrt(std::max(between(i, i) / fit.covariance(i, i), 1.0));
-    covariance.row(i) *= factor;
-    covariance.col(i) *= factor;
-  }
-  return covariance;
 }
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
@@ -209,8 +198,9 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   const std::vector<selection::Candidate> candidates = PhotoCandidates(input, photographs);
   const inference::Parameterization base(*input.model, photographs.objects);
   const auto enter = [&](const char* stage, double done) {
-    return !context.progress || context.progress(stage, done) ? absl::OkStatus()
-                                                              : absl::CancelledError("the diagnosis was cancelled");
+    return !context.progress || context.progress(stage, done)
+               ? absl::OkStatus()
+               : absl::CancelledError("the diagnosis was cancelled");
   };
   PhotoSelection selection;
   selection.initial_effects = static_cast<int>(input.model->effects.size());
@@ -222,22 +212,34 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
   }
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
+  // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is hangs on the noise.
+  selection.photographs = std::make_unique<Photographs>(photographs);
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      selection.fine, MakePhotoSearch(photographs, explanation.fit.model.base(), candidates, kFine, context));
+      const std::vector<image::Photo> expected,
+      ExpectPhotographs(photographs, explanation.fit.model.base(), false, context.pool));
+  selection.photographs->noise = NoiseOfResiduals(photographs, expected, context.pool);
+  selection.photographs->record = std::make_shared<const RecordTable>(selection.photographs->noise);
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.fine,
+      MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, kFine, context));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
+  TOUCHSTONE_RETURN_IF_ERROR(DropFaintField(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(DropUnsteady(&selection));
   for (size_t e = 0; e < selection.fit.model.base().effects.size(); ++e)
     if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
       selection.field = static_cast<int>(e);
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
+  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(*selection.photographs, context, &selection));
   const inference::Likelihood& likelihood = *selection.fine.likelihood;
   const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
   std::vector<double> with;
-  const double none = likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
+  const double none =
+      likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
   for (int s = 1; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
     with.push_back(likelihood.LogPrior(s) + likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
   selection.albedo_nats = inference::LogSum(with) - none;

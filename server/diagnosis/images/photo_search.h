@@ -30,21 +30,30 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
                                             const PhotoRowsOptions& options, const DiagnosisContext& context);
 
 struct PhotoSelection {
+  // The same photographs, with the noise of what the coarse search leaves: what the fine one and its fits work on.
+  std::unique_ptr<Photographs> photographs;
   PhotoSearch fine;
   inference::Fit initial;  // the given model, in fine rows
   inference::Fit fit;      // the explanation; the image field among its effects where it takes part
+  // The explanation fitted to every photograph, contours trusted to a tenth of a pixel: what its values are taken from.
+  inference::Fit polished;
   int initial_effects = 0;
   int field = -1;                              // index of the image field's effect; -1: none
   std::vector<selection::SelectedStep> steps;  // named effects
-  Eigen::MatrixXd covariance;                  // of the fit's free parameters, pictures left to differ
-  double albedo_nats = 0;                      // evidence of a smooth error of the albedo over none
+  Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
+  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
 
-// The covariance of the free parameters that the scatter between blocks shows, or the fit's where that is larger.
+// Fits the explanation to every photograph: `polished` and `covariance`.
+absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
+                               PhotoSelection* selection);
+
+// The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where
+// that is larger.
 Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit);
 
 }  // namespace touchstone::diagnosis::images

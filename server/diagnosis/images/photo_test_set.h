@@ -46,7 +46,8 @@ inline std::shared_ptr<const geometry::Surface> PhotoTestSurface(const std::stri
   static std::map<std::string, std::shared_ptr<const geometry::Surface>> made;
   std::shared_ptr<const geometry::Surface>& surface = made[name];
   if (surface == nullptr)
-    surface = *geometry::Surface::Create(name, *geometry::MakeSupershape(*geometry::NamedSupershape(name), 4000));
+    surface =
+        *geometry::Surface::Create(name, *geometry::MakeSupershape(*geometry::NamedSupershape(name), 4000));
   return surface;
 }
 
@@ -60,9 +61,10 @@ inline DiagnosisInput MakePhotoInput(const HiddenCamera& rig) {
   set->camera.cx_px = set->camera.cy_px = 0.5 * rig.side_px;
   set->objects = rig.objects;
   set->has_session_time = true;
-  const model::Model nominal = WithPhotoEffects(
-      WithPhotoEffects(model::NominalModel(), {{"image_noise", {"sigma_grey=" + std::to_string(rig.sigma_grey)}}}),
-      rig.known);
+  const model::Model nominal =
+      WithPhotoEffects(WithPhotoEffects(model::NominalModel(),
+                                        {{"image_noise", {"sigma_grey=" + std::to_string(rig.sigma_grey)}}}),
+                       rig.known);
   const model::Model real = WithPhotoEffects(nominal, rig.hidden);
   RandomStream random(rig.seed, RandomDomain::kTest);
   for (size_t object = 0; object < rig.objects.size(); ++object) {

@@ -11,7 +11,7 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typical size
+constexpr double kRayStep = 0.3, kSensorStep = 0.5;                 // over a parameter's typical size
 constexpr double kLeastMovePx = 0.5, kMostMovePx = 2, kMovePx = 1;  // of contours, by a step
 constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
 constexpr int kObjectWaves = 2, kPatchPx = 12;
@@ -232,11 +232,12 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   const auto simulate = [&](const model::Model& model, bool details) {
     image::PhotoOutputs outputs;
     outputs.details = details;
-    return image::PhotoSimulator(std::make_shared<const model::Model>(model)).Run(request, outputs, &workspace);
+    return image::PhotoSimulator(std::make_shared<const model::Model>(model))
+        .Run(request, outputs, &workspace);
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
   photo.grey = RecordedGrey(photo, *photographs_.record);
-  view->weights = CellWeights(grid_, photo.grey, *photographs_.record);
+  view->weights = CellWeights(grid_, photo.grey, *photographs_.record, options.contour_px2);
   const double pixel_squares = SquaresOfAPixel(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
   std::vector<Eigen::VectorXf> slopes;
@@ -261,13 +262,27 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         if (!rays || tries > 0 || (move_px > kLeastMovePx && move_px < kMostMovePx) || move_px == 0) break;
         step *= std::clamp(kMovePx / move_px, 0.1, 5.0);
       }
+      if (rays && options.central) {
+        // The same way in all, half of it to each side.
+        std::vector<float> sides[2];
+        for (const int side : {0, 1}) {
+          model::Model moved = direction.base;
+          MoveValue(&moved.effects[direction.instance], direction.value, (side == 0 ? -0.5 : 0.5) * step,
+                    direction.lower, direction.upper);
+          const absl::StatusOr<image::Photo> there = simulate(moved, false);
+          if (there.ok()) sides[side] = RecordedGrey(*there, *photographs_.record);
+        }
+        if (!sides[0].empty() && !sides[1].empty())
+          for (size_t i = 0; i < photo.grey.size(); ++i) change.difference[i] = sides[1][i] - sides[0][i];
+      }
       const Eigen::VectorXf cells = columns.Add(change.difference);
       if (rays) slopes.push_back(cells / static_cast<float>(step));
     }
   const Eigen::MatrixXf functions = ImageFieldFunctions(width, height);
   std::vector<Eigen::VectorXf> field;
   for (int f = 0; f < kImageFieldSize; ++f)
-    field.push_back(columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
+    field.push_back(
+        columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
   AddDisplacements(photo.grey, width, height, &columns);
   AddObjectLight(photo, &columns);
 

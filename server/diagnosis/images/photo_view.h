@@ -27,11 +27,11 @@ struct PhotoRows::View {
 // A way in which a picture may change.
 struct PhotoRows::Direction {
   std::shared_ptr<const model::Effect> effect;
-  int instance = 0;        // of the effect in `base`
-  int value = -1;          // of its flat values, that alone moves; -1: several do
-  double step = 0;         // of that value, SI
+  int instance = 0;  // of the effect in `base`
+  int value = -1;    // of its flat values, that alone moves; -1: several do
+  double step = 0;   // of that value, SI
   double lower = 0, upper = 0;
-  model::Model base;       // the anchor, with the effect where it lacks it
+  model::Model base;  // the anchor, with the effect where it lacks it
   model::Model moved;
 };
 

@@ -28,9 +28,9 @@ absl::Status CheckPhotographs(const DiagnosisInput& input) {
   const size_t pixels = static_cast<size_t>(set.camera.width_px) * set.camera.height_px;
   for (const session::PhotographRow& row : set.photographs)
     if (row.pixels.size() != pixels * row.channels)
-      return absl::InvalidArgumentError(absl::StrCat(set.origin, ": photograph ", row.image, " (", row.file,
-                                                     ") has ", row.pixels.size(), " values; camera.yaml says ",
-                                                     set.camera.width_px, " x ", set.camera.height_px));
+      return absl::InvalidArgumentError(
+          absl::StrCat(set.origin, ": photograph ", row.image, " (", row.file, ") has ", row.pixels.size(),
+                       " values; camera.yaml says ", set.camera.width_px, " x ", set.camera.height_px));
   return absl::OkStatus();
 }
 

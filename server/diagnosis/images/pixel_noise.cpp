@@ -11,11 +11,12 @@ constexpr double kWhite = 255, kGreyLevels = 256;
 constexpr int kPerGrey = 8;  // entries of a table
 constexpr int kEntries = 255 * kPerGrey + 1;
 constexpr double kRoundingVariance = 1.0 / 12;
-constexpr double kKept = 0.8;           // share of the differences that counts
+constexpr double kKept = 0.8;             // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
-constexpr double kClipped = 4;          // standard deviations from black or white
-constexpr double kTrimmedEfficiency = 0.35;    // of a trimmed difference that shares pixels, as a degree of freedom
-constexpr double kMinCount = 200;       // differences that a bin needs
+constexpr double kClipped = 4;            // standard deviations from black or white
+constexpr double kTrimmedEfficiency =
+    0.35;                          // of a trimmed difference that shares pixels, as a degree of freedom
+constexpr double kMinCount = 200;  // differences that a bin needs
 
 // Of the smallest kKept of a histogram: their mean square, scaled to a normal number's variance.
 double TrimmedVariance(const double* counts, const double* squares, int steps) {
@@ -52,8 +53,8 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
   const double second = inside + low * Density(low) - high * Density(high);
   const double at_white = Tail(high);
   const double mean = grey * inside + sigma * first + kWhite * at_white;
-  const double square = grey * grey * inside + 2 * grey * sigma * first + variance * second +
-                        kWhite * kWhite * at_white;
+  const double square =
+      grey * grey * inside + 2 * grey * sigma * first + variance * second + kWhite * kWhite * at_white;
   return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance, 1 - inside};
 }
 

@@ -1,0 +1,48 @@
+#include "server/diagnosis/images/pixel_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/base/random.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+TEST(PixelNoise, RecordsWhatClippedDrawsDoOnAverage) {
+  PixelNoise noise;
+  noise.sigma_grey = 3;
+  const RecordTable table(noise);
+  for (const double grey : {0.0, 2.0, 6.0, 120.0, 254.0}) {
+    RandomStream random(3, RandomDomain::kTest);
+    constexpr int kDraws = 200000;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      const double drawn = std::min(std::max(grey + 3 * random.Normal(), 0.0), 255.0);
+      sum += drawn, squares += drawn * drawn;
+    }
+    const double mean = sum / kDraws, variance = squares / kDraws - mean * mean;
+    EXPECT_NEAR(table.Mean(static_cast<float>(grey)), mean, 0.03) << grey;
+    EXPECT_NEAR(table.Variance(mean), variance, 0.15) << grey;
+  }
+}
+
+TEST(PixelNoise, IsFoundInPicturesOfSmoothShades) {
+  constexpr int kSide = 300;
+  RandomStream random(4, RandomDomain::kTest);
+  std::vector<float> image(kSide * kSide);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const double grey = 30 + 0.6 * x, sigma = std::sqrt(4 + 0.05 * grey);
+      image[static_cast<size_t>(y) * kSide + x] =
+          static_cast<float>(std::lround(grey + sigma * random.Normal()));
+    }
+  NoiseGatherer gathered;
+  gathered.Add(image, image, kSide, kSide, 1);
+  const PixelNoise found = gathered.Estimate();
+  EXPECT_NEAR(found.gain, 0.05, 5 * found.gain_error);
+  EXPECT_NEAR(found.Variance(120), 4 + 1.0 / 12 + 0.05 * 120, 0.3);
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::images
