@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <spng.h>
@@ -52,6 +53,56 @@ tjhandle ThreadCompressor() {
   };
   static thread_local Compressor compressor;
   return compressor.handle;
+}
+
+struct OpenPng {
+  SpngContext context;
+  spng_ihdr header{};
+};
+
+absl::StatusOr<OpenPng> Open(absl::string_view png) {
+  OpenPng open;
+  open.context.reset(spng_ctx_new(0));
+  spng_ctx* context = open.context.get();
+  if (context == nullptr) return absl::ResourceExhaustedError("PNG: no memory for a decoder");
+  spng_set_image_limits(context, kMaxImageSide, kMaxImageSide);
+  spng_set_chunk_limits(context, 1 << 20, 1 << 22);
+  spng_set_crc_action(context, SPNG_CRC_ERROR, SPNG_CRC_ERROR);
+  if (int code = spng_set_png_buffer(context, png.data(), png.size()); code != 0)
+    return BadPng("no data", code);
+  if (int code = spng_get_ihdr(context, &open.header); code != 0)
+    return BadPng(absl::StrFormat("header (each side must be from 1 to %d)", kMaxImageSide).c_str(), code);
+  return open;
+}
+
+absl::StatusOr<Image> Decode(const OpenPng& open, bool grey) {
+  Image image;
+  image.width = static_cast<int>(open.header.width);
+  image.height = static_cast<int>(open.header.height);
+  image.channels = grey ? 1 : 3;
+  const spng_format format = grey ? SPNG_FMT_G8 : SPNG_FMT_RGB8;
+  size_t bytes = 0;
+  if (int code = spng_decoded_image_size(open.context.get(), format, &bytes); code != 0)
+    return BadPng("size", code);
+  image.pixels.resize(bytes);
+  if (int code = spng_decode_image(open.context.get(), image.pixels.data(), bytes, format, 0); code != 0)
+    return BadPng("pixels", code);
+  return image;
+}
+
+const char* ColourWords(int color_type) {
+  switch (color_type) {
+    case SPNG_COLOR_TYPE_GRAYSCALE:
+      return "grey";
+    case SPNG_COLOR_TYPE_TRUECOLOR:
+      return "RGB";
+    case SPNG_COLOR_TYPE_INDEXED:
+      return "with a palette";
+    case SPNG_COLOR_TYPE_GRAYSCALE_ALPHA:
+      return "grey with transparency";
+    default:
+      return "RGB with transparency";
+  }
 }
 
 }  // namespace
@@ -104,29 +155,27 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 }
 
 absl::StatusOr<Image> DecodePng(const std::string& png) {
-  SpngContext context(spng_ctx_new(0));
-  if (context == nullptr) return absl::ResourceExhaustedError("PNG: no memory for a decoder");
-  spng_set_image_limits(context.get(), kMaxImageSide, kMaxImageSide);
-  spng_set_chunk_limits(context.get(), 1 << 20, 1 << 22);
-  spng_set_crc_action(context.get(), SPNG_CRC_ERROR, SPNG_CRC_ERROR);
-  if (int code = spng_set_png_buffer(context.get(), png.data(), png.size()); code != 0)
-    return BadPng("no data", code);
-  spng_ihdr header{};
-  if (int code = spng_get_ihdr(context.get(), &header); code != 0)
-    return BadPng(absl::StrFormat("header (each side must be from 1 to %d)", kMaxImageSide).c_str(), code);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
+  const bool grey = open.header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && open.header.bit_depth <= 8;
+  return Decode(open, grey);
+}
 
-  Image image;
-  image.width = static_cast<int>(header.width);
-  image.height = static_cast<int>(header.height);
-  const bool grey = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && header.bit_depth <= 8;
-  image.channels = grey ? 1 : 3;
-  const spng_format format = grey ? SPNG_FMT_G8 : SPNG_FMT_RGB8;
-  size_t bytes = 0;
-  if (int code = spng_decoded_image_size(context.get(), format, &bytes); code != 0)
-    return BadPng("size", code);
-  image.pixels.resize(bytes);
-  if (int code = spng_decode_image(context.get(), image.pixels.data(), bytes, format, 0); code != 0)
-    return BadPng("pixels", code);
+absl::StatusOr<Image> DecodePlainPng(absl::string_view png) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
+  const bool grey = open.header.color_type == SPNG_COLOR_TYPE_GRAYSCALE;
+  if (open.header.bit_depth != 8 || (!grey && open.header.color_type != SPNG_COLOR_TYPE_TRUECOLOR))
+    return absl::InvalidArgumentError(
+        absl::StrFormat("PNG: is %d-bit %s; 8-bit grey or RGB without transparency was expected",
+                        open.header.bit_depth, ColourWords(open.header.color_type)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Image image, Decode(open, grey));
+  // The pixels may be whole although the end of the file is missing, whose checksum libspng does not look at.
+  static constexpr absl::string_view kEnd("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
+  if (!absl::EndsWith(png, kEnd))
+    return absl::InvalidArgumentError("PNG: does not end with its last chunk (IEND); is the file cut off?");
+  if (int code = spng_decode_chunks(open.context.get()); code != 0) return BadPng("after the pixels", code);
+  spng_trns transparency{};
+  if (spng_get_trns(open.context.get(), &transparency) == 0)
+    return absl::InvalidArgumentError("PNG: has transparency; opaque grey or RGB was expected");
   return image;
 }
 

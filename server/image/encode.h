@@ -4,6 +4,7 @@
 #include <string>
 
 #include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
 
 #include "server/image/image.h"
 
@@ -16,5 +17,9 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 
 // For tests and clients; refuses more than kMaxImageSide per side.
 absl::StatusOr<Image> DecodePng(const std::string& png);
+
+// What was measured must not be converted on the way: a PNG of 8-bit grey or RGB as it is, whole to its last chunk.
+// INVALID_ARGUMENT says what the file is otherwise (16 bits, palette, transparency, damaged).
+absl::StatusOr<Image> DecodePlainPng(absl::string_view png);
 
 }  // namespace touchstone::image

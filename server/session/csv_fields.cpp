@@ -1,15 +1,72 @@
 #include "server/session/csv_fields.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/escaping.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 
 #include "server/base/status.h"
-#include "server/session/measurement_columns.h"
 
 namespace touchstone::session {
+namespace {
+
+constexpr size_t kMaxShown = 48;
+
+}  // namespace
+
+absl::StatusOr<CsvLines> CsvLines::Open(absl::string_view text, const std::string& origin) {
+  if (absl::StartsWith(text, "\xFF\xFE") || absl::StartsWith(text, "\xFE\xFF"))
+    return absl::InvalidArgumentError(
+        absl::StrCat(origin, ":1: is UTF-16; UTF-8 was expected (CSV UTF-8 in spreadsheets)"));
+  absl::ConsumePrefix(&text, "\xEF\xBB\xBF");
+  CsvLines lines;
+  lines.rest_ = text;
+  return lines;
+}
+
+bool CsvLines::Next(absl::string_view* line) {
+  if (rest_.empty()) return false;
+  const size_t end = std::min(rest_.find('\n'), rest_.size());
+  *line = rest_.substr(0, end);
+  rest_.remove_prefix(std::min(end + 1, rest_.size()));
+  ++number_;
+  return true;
+}
+
+size_t CsvLines::left() const {
+  return std::count(rest_.begin(), rest_.end(), '\n') + 1;
+}
+
+absl::StatusOr<double> FieldNumber(absl::string_view field) {
+  if (field.empty()) return absl::InvalidArgumentError("is empty; a number was expected");
+  absl::string_view digits = field;
+  if (digits[0] == '+') digits.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error == std::errc::result_out_of_range && end == digits.data() + digits.size())
+    return absl::InvalidArgumentError(absl::StrCat("'", Shown(field), "' is beyond what a double holds"));
+  const bool doubled_sign = field[0] == '+' && !digits.empty() && (digits[0] == '-' || digits[0] == '+');
+  if (error != std::errc() || end != digits.data() + digits.size() || doubled_sign)
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", Shown(field), "' is not a number; one like 12.5 was expected"));
+  return value;
+}
+
+std::string QuotedField(const std::string& field) {
+  if (field.find_first_of(",\"") == std::string::npos) return field;
+  return absl::StrCat("\"", absl::StrReplaceAll(field, {{"\"", "\"\""}}), "\"");
+}
+
+std::string Shown(absl::string_view field) {
+  const bool cut = field.size() > kMaxShown;
+  return absl::StrCat(absl::CHexEscape(field.substr(0, kMaxShown)), cut ? "..." : "");
+}
 
 bool IsText(absl::string_view text) {
   for (size_t i = 0; i < text.size();) {

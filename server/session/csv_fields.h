@@ -26,6 +26,31 @@ class CsvFields {
   std::vector<std::unique_ptr<std::string>> unquoted_;
 };
 
+// The lines of a CSV file, header first, whichever way they end.
+class CsvLines {
+ public:
+  // INVALID_ARGUMENT for UTF-16. A byte-order mark, with which files from spreadsheets begin, is skipped.
+  static absl::StatusOr<CsvLines> Open(absl::string_view text, const std::string& origin);
+  // False at the end. Lines are counted from 1.
+  bool Next(absl::string_view* line);
+  int number() const { return number_; }
+  size_t left() const;  // lines to come, at most: empty ones count
+
+ private:
+  absl::string_view rest_;
+  int number_ = 0;
+};
+
+// The number that a field holds, infinities and NaN among them: whether those are right depends on the column. The
+// error says what the field is and what was expected, not where.
+absl::StatusOr<double> FieldNumber(absl::string_view field);
+
+// A field for a file: in quotes where a reader would take it apart.
+std::string QuotedField(const std::string& field);
+
+// A field for a message: its start if it is long, bytes that are no text escaped.
+std::string Shown(absl::string_view field);
+
 // Valid UTF-8 without control characters: names go into messages and reports.
 bool IsText(absl::string_view text);
 

@@ -1,7 +1,6 @@
 #include "server/session/measurement_columns.h"
 
 #include <absl/strings/ascii.h>
-#include <absl/strings/escaping.h>
 #include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -12,12 +11,11 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/model.h"
+#include "server/session/csv_fields.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone::session {
 namespace {
-
-constexpr size_t kMaxShown = 48;
 
 // The columns of a touch's pose, in the order in which files are written. All or none.
 struct PoseColumn {
@@ -74,12 +72,8 @@ bool ColumnOf(const std::string& name, Column* column) {
     column->index = finger;
     return true;
   }
-  // A formula uses a covariate by its name.
-  const bool plain =
-      absl::StartsWith(name, "cov_") && name.size() > 4 &&
-      std::all_of(name.begin(), name.end(), [](char c) { return absl::ascii_isalnum(c) || c == '_'; });
   column->kind = ColumnKind::kCovariate;
-  return plain;
+  return IsCovariateName(name);
 }
 
 std::vector<std::string> KnownNames() {
@@ -137,9 +131,9 @@ absl::Status CheckComplete(const Columns& columns, const std::string& place) {
 
 }  // namespace
 
-std::string Shown(absl::string_view field) {
-  const bool cut = field.size() > kMaxShown;
-  return absl::StrCat(absl::CHexEscape(field.substr(0, kMaxShown)), cut ? "..." : "");
+bool IsCovariateName(absl::string_view name) {
+  return absl::StartsWith(name, "cov_") && name.size() > 4 &&
+         std::all_of(name.begin(), name.end(), [](char c) { return absl::ascii_isalnum(c) || c == '_'; });
 }
 
 absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const std::string& origin) {

@@ -46,7 +46,7 @@ struct Columns {
 // Reads the header, whose fields are already apart. Errors name the origin, line 1 and the column.
 absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const std::string& origin);
 
-// A field for a message: its start if it is long, bytes that are no text escaped.
-std::string Shown(absl::string_view field);
+// "cov_" and letters, digits and '_': a formula uses a covariate by its name.
+bool IsCovariateName(absl::string_view name);
 
 }  // namespace touchstone::session

@@ -1,7 +1,6 @@
 #include "server/session/measurement_csv.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_replace.h>
 
 #include <cmath>
 #include <set>
@@ -10,6 +9,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/model/parameter_values.h"
+#include "server/session/csv_fields.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone::session {
@@ -17,12 +17,6 @@ namespace {
 
 std::string Millimetres(double metres) {
   return model::FileNumber(Unit::kMillimetre, metres);
-}
-
-// In quotes where a reader would take it apart.
-std::string Name(const std::string& name) {
-  if (name.find_first_of(",\"") == std::string::npos) return name;
-  return absl::StrCat("\"", absl::StrReplaceAll(name, {{"\"", "\"\""}}), "\"");
 }
 
 void AppendVector(const v1::Vector3& v, std::string* row) {
@@ -64,7 +58,7 @@ std::string MeasurementHeader(int fingers, const MeasurementColumns& columns) {
 
 std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns& columns) {
   const v1::CommandedTouch& c = touch.commanded;
-  std::string row = absl::StrCat(touch.touch, ",", Name(touch.object), ",",
+  std::string row = absl::StrCat(touch.touch, ",", QuotedField(touch.object), ",",
                                  model::FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
                                  Millimetres(c.standoff_m()), ",", Millimetres(c.target_m().x()), ",",
                                  Millimetres(c.target_m().y()), ",", Millimetres(c.target_m().z()));

@@ -2,12 +2,9 @@
 
 #include <absl/container/flat_hash_map.h>
 #include <absl/strings/ascii.h>
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/strip.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
@@ -149,17 +146,10 @@ class RowReader {
   }
 
   absl::StatusOr<double> Number(size_t i) const {
-    absl::string_view field = (*fields_)[i];
-    if (field.empty()) return WrongField(i, "is empty; a number was expected");
-    absl::string_view digits = field;
-    if (digits[0] == '+') digits.remove_prefix(1);
-    double value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error == std::errc::result_out_of_range && end == digits.data() + digits.size())
-      return WrongField(i, absl::StrCat("'", Shown(field), "' is beyond what a double holds"));
-    const bool doubled_sign = field[0] == '+' && !digits.empty() && (digits[0] == '-' || digits[0] == '+');
-    if (error != std::errc() || end != digits.data() + digits.size() || doubled_sign)
-      return WrongField(i, absl::StrCat("'", Shown(field), "' is not a number; one like 12.5 was expected"));
+    const absl::string_view field = (*fields_)[i];
+    const absl::StatusOr<double> read = FieldNumber(field);
+    if (!read.ok()) return WrongField(i, std::string(read.status().message()));
+    const double value = *read;
     if (!std::isfinite(value))
       return WrongField(i, absl::StrCat("'", Shown(field), "' is not a finite number",
                                         columns_.all[i].kind == ColumnKind::kTime
@@ -244,21 +234,10 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   const auto wrong = [&](int line, absl::string_view what) {
     return absl::InvalidArgumentError(absl::StrCat(origin, ":", line, ": ", what));
   };
-  if (absl::ConsumePrefix(&csv, "\xEF\xBB\xBF")) {
-    // A file from a spreadsheet may begin with a byte-order mark.
-  } else if (absl::StartsWith(csv, "\xFF\xFE") || absl::StartsWith(csv, "\xFE\xFF")) {
-    return wrong(1, "is UTF-16; UTF-8 was expected (CSV UTF-8 in spreadsheets)");
-  }
-
-  const auto next_line = [&csv] {
-    const size_t end = std::min(csv.find('\n'), csv.size());
-    const absl::string_view line = csv.substr(0, end);
-    csv.remove_prefix(std::min(end + 1, csv.size()));
-    return line;
-  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(CsvLines lines, CsvLines::Open(csv, origin));
   CsvFields fields;
-  const absl::string_view header = next_line();
-  if (absl::StripAsciiWhitespace(header).empty())
+  absl::string_view header;
+  if (!lines.Next(&header) || absl::StripAsciiWhitespace(header).empty())
     return wrong(1, "a header line was expected (touch,object,...)");
   if (absl::Status status = fields.Cut(header); !status.ok()) return wrong(1, status.message());
   if (fields.all().size() > kMaxColumns)
@@ -269,18 +248,17 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   set.fingers = columns.fingers;
   set.has_poses = columns.has_poses;
   set.has_session_time = columns.has_session_time;
-  const size_t rows = std::count(csv.begin(), csv.end(), '\n') + 1;
+  const size_t rows = lines.left();
   if (rows >= std::numeric_limits<int>::max())
     return absl::InvalidArgumentError(
         absl::StrCat(origin, ": has ", rows, " lines; at most 2^31 - 2 are read"));
   Reserve(rows, columns, &set);
 
   RowReader reader(columns, &set);
-  for (int line = 2; !csv.empty(); ++line) {
-    const absl::string_view row = next_line();
+  for (absl::string_view row; lines.Next(&row);) {
     if (absl::StripAsciiWhitespace(row).empty()) continue;
-    if (absl::Status status = fields.Cut(row); !status.ok()) return wrong(line, status.message());
-    TOUCHSTONE_RETURN_IF_ERROR(reader.Read(fields.all(), line));
+    if (absl::Status status = fields.Cut(row); !status.ok()) return wrong(lines.number(), status.message());
+    TOUCHSTONE_RETURN_IF_ERROR(reader.Read(fields.all(), lines.number()));
   }
   if (set.size() == 0)
     return absl::InvalidArgumentError(

@@ -1,0 +1,208 @@
+#include "server/session/image_set_file.h"
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/strings/str_cat.h>
+
+#include <filesystem>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/image/encode.h"
+#include "server/session/camera_yaml.h"
+#include "server/session/csv_fields.h"
+#include "server/session/images_csv.h"
+
+namespace touchstone::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+using PicturesByName = absl::flat_hash_map<absl::string_view, const std::string*>;
+
+std::string PathIn(const std::string& folder, const std::string& file) {
+  return (fs::path(folder) / file).string();
+}
+
+absl::Status WrongPicture(const ImageSet& set, const PhotographRow& row, absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat(PathIn(set.origin, kImagesCsv), ":", row.line,
+                                                 ": column file: '", Shown(row.file), "' ", what));
+}
+
+// images.csv with the name of its folder as origin.
+absl::StatusOr<ImageSet> ParseRows(absl::string_view csv, const std::string& folder) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(ImageSet set, ParseImagesCsv(csv, PathIn(folder, kImagesCsv)));
+  set.origin = folder;
+  return set;
+}
+
+absl::Status TooLarge(const std::string& origin, const char* what) {
+  return absl::InvalidArgumentError(absl::StrCat(origin, ": ", what, " of the image set come to more than ",
+                                                 kMaxImageSetBytes >> 20,
+                                                 " MiB; fewer or smaller pictures were expected"));
+}
+
+// The pictures of a message by name; each belongs to a row.
+absl::StatusOr<PicturesByName> NamedPictures(const v1::ImageSetFiles& files, const ImageSet& rows) {
+  PicturesByName named;
+  uint64_t bytes = files.images_csv().size() + files.camera_yaml().size();
+  for (const v1::ImageFile& file : files.files()) {
+    if (!named.emplace(file.name(), &file.png()).second)
+      return absl::InvalidArgumentError(
+          absl::StrCat(rows.origin, ": two pictures are named '", Shown(file.name()), "'; one was expected"));
+    if (file.png().size() > kMaxPictureBytes)
+      return absl::InvalidArgumentError(absl::StrCat(rows.origin, ": picture '", Shown(file.name()), "' has ",
+                                                     file.png().size(), " bytes; at most ", kMaxPictureBytes,
+                                                     " are read"));
+    bytes += file.png().size();
+  }
+  if (bytes > kMaxImageSetBytes) return TooLarge(rows.origin, "the files");
+  for (const PhotographRow& row : rows.photographs)
+    if (named.count(row.file) == 0)
+      return WrongPicture(rows, row, "is not among the pictures; a PNG file was expected");
+  if (named.size() == rows.size()) return named;
+  absl::flat_hash_map<absl::string_view, int> in_rows;
+  for (const PhotographRow& row : rows.photographs) in_rows[row.file] = row.line;
+  for (const v1::ImageFile& file : files.files())
+    if (in_rows.count(file.name()) == 0)
+      return absl::InvalidArgumentError(absl::StrCat(
+          rows.origin, ": picture '", Shown(file.name()),
+          "' stands in no row of images.csv, so its pose is unknown; one ", "row per picture was expected"));
+  return named;
+}
+
+absl::Status DecodePictures(const PicturesByName& named, ImageSet* set) {
+  uint64_t pixel_bytes = 0;
+  for (PhotographRow& row : set->photographs) {
+    absl::StatusOr<image::Image> picture = image::DecodePlainPng(*named.at(row.file));
+    if (!picture.ok())
+      return WrongPicture(*set, row, absl::StrCat("cannot be read: ", picture.status().message()));
+    if (picture->width != set->camera.width_px || picture->height != set->camera.height_px)
+      return WrongPicture(
+          *set, row,
+          absl::StrCat("is ", picture->width, " x ", picture->height, " pixels; ", set->camera.width_px,
+                       " x ", set->camera.height_px, ", as camera.yaml says, were expected"));
+    row.channels = picture->channels;
+    row.pixels = std::move(picture->pixels);
+    pixel_bytes += row.pixels.size();
+    if (pixel_bytes > kMaxImageSetBytes) return TooLarge(set->origin, "the pixels");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+bool IsImageSetFolder(const std::string& path) {
+  std::error_code error;
+  return fs::is_regular_file(fs::path(path) / kImagesCsv, error);
+}
+
+bool HasTouches(const std::string& folder) {
+  std::error_code error;
+  return fs::is_regular_file(fs::path(folder) / kTouchesCsv, error);
+}
+
+absl::StatusOr<v1::ImageSetFiles> ReadImageSetFiles(const std::string& folder) {
+  v1::ImageSetFiles files;
+  files.set_origin(folder);
+  TOUCHSTONE_ASSIGN_OR_RETURN(*files.mutable_images_csv(),
+                              ReadFile(PathIn(folder, kImagesCsv), kMaxImagesCsvBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ImageSet rows, ParseRows(files.images_csv(), folder));
+  const std::string camera = PathIn(folder, kCameraYaml);
+  absl::StatusOr<std::string> yaml = ReadFile(camera, kMaxImagesCsvBytes);
+  if (!yaml.ok())
+    return absl::Status(
+        yaml.status().code(),
+        absl::StrCat(yaml.status().message(),
+                     "; an image set needs it: {width_px: .., height_px: .., fx_px: .., fy_px: .., ",
+                     "cx_px: .., cy_px: ..}"));
+  *files.mutable_camera_yaml() = *std::move(yaml);
+  uint64_t bytes = files.images_csv().size() + files.camera_yaml().size();
+  for (const PhotographRow& row : rows.photographs) {
+    absl::StatusOr<std::string> png = ReadFile(PathIn(folder, row.file), kMaxPictureBytes);
+    if (!png.ok()) return WrongPicture(rows, row, absl::StrCat("cannot be read: ", png.status().message()));
+    bytes += png->size();
+    if (bytes > kMaxImageSetBytes) return TooLarge(folder, "the files");
+    v1::ImageFile* file = files.add_files();
+    file->set_name(row.file);
+    file->set_png(*std::move(png));
+  }
+  return files;
+}
+
+absl::StatusOr<ImageSet> ParseImageSet(const v1::ImageSetFiles& files) {
+  const std::string origin = files.origin().empty() ? "images" : files.origin();
+  if (files.images_csv().size() > kMaxImagesCsvBytes)
+    return absl::InvalidArgumentError(absl::StrCat(PathIn(origin, kImagesCsv), ": has ",
+                                                   files.images_csv().size(), " bytes; at most ",
+                                                   kMaxImagesCsvBytes, " are read"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(ImageSet set, ParseRows(files.images_csv(), origin));
+  TOUCHSTONE_ASSIGN_OR_RETURN(set.camera, ParseCameraYaml(files.camera_yaml(), PathIn(origin, kCameraYaml)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PicturesByName named, NamedPictures(files, set));
+  TOUCHSTONE_RETURN_IF_ERROR(DecodePictures(named, &set));
+  set.sha256 = ImageSetHash(set, files);
+  return set;
+}
+
+absl::StatusOr<ImageSet> ReadImageSet(const std::string& folder) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ImageSetFiles files, ReadImageSetFiles(folder));
+  return ParseImageSet(files);
+}
+
+absl::StatusOr<v1::ImageSetFiles> FormatImageSet(const ImageSet& set) {
+  v1::ImageSetFiles files;
+  files.set_origin(set.origin);
+  files.set_images_csv(FormatImagesCsv(set));
+  files.set_camera_yaml(FormatCameraYaml(set.camera));
+  const size_t pixels = static_cast<size_t>(set.camera.width_px) * set.camera.height_px;
+  for (const PhotographRow& row : set.photographs) {
+    if (row.pixels.size() != pixels * row.channels)
+      return absl::InvalidArgumentError(absl::StrCat("photograph ", row.image, " has ", row.pixels.size(),
+                                                     " bytes of pixels; ", pixels * row.channels,
+                                                     " were expected"));
+    v1::ImageFile* file = files.add_files();
+    file->set_name(row.file);
+    TOUCHSTONE_ASSIGN_OR_RETURN(*file->mutable_png(), image::EncodePng(row.pixels.data(), set.camera.width_px,
+                                                                       set.camera.height_px, row.channels));
+  }
+  return files;
+}
+
+absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::string& folder) {
+  if (IsImageSetFolder(folder))
+    return absl::AlreadyExistsError(
+        absl::StrCat(PathIn(folder, kImagesCsv), " exists already; a new folder was expected"));
+  const auto make_folder = [](const std::string& path) {
+    std::error_code error;
+    fs::create_directories(path, error);
+    if (!error) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrCat(path, " cannot be made: ", error.message()));
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(make_folder(folder));
+  for (const v1::ImageFile& file : files.files()) {
+    // The names may come from another machine.
+    if (absl::Status status = CheckPictureName(file.name()); !status.ok())
+      return absl::InvalidArgumentError(absl::StrCat(folder, ": picture ", status.message()));
+    const std::string path = PathIn(folder, file.name());
+    TOUCHSTONE_RETURN_IF_ERROR(make_folder(fs::path(path).parent_path().string()));
+    TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(path, file.png()));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(PathIn(folder, kCameraYaml), files.camera_yaml()));
+  return WriteFileAtomically(PathIn(folder, kImagesCsv), files.images_csv());
+}
+
+absl::Status WriteImageSet(const ImageSet& set, const std::string& folder) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ImageSetFiles files, FormatImageSet(set));
+  return WriteImageSetFiles(files, folder);
+}
+
+std::string ImageSetHash(const ImageSet& rows, const v1::ImageSetFiles& files) {
+  absl::flat_hash_map<absl::string_view, const std::string*> named;
+  for (const v1::ImageFile& file : files.files()) named[file.name()] = &file.png();
+  std::string lines = absl::StrCat(Sha256Hex(files.images_csv()), "  ", kImagesCsv, "\n",
+                                   Sha256Hex(files.camera_yaml()), "  ", kCameraYaml, "\n");
+  for (const PhotographRow& row : rows.photographs)
+    absl::StrAppend(&lines, Sha256Hex(*named.at(row.file)), "  ", row.file, "\n");
+  return Sha256Hex(lines);
+}
+
+}  // namespace touchstone::session
