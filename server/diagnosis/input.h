@@ -1,4 +1,4 @@
-// What a diagnosis is asked: a model, a measurement set and the surfaces that were touched.
+// What a diagnosis is asked: a model, a measurement set or photographs, and the surfaces of the objects.
 #pragma once
 
 #include <functional>
@@ -10,13 +10,15 @@
 #include "server/base/thread_pool.h"
 #include "server/geometry/surface.h"
 #include "server/model/model.h"
+#include "server/session/image_set.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone::diagnosis {
 
 struct DiagnosisInput {
   std::shared_ptr<const model::Model> model;
-  std::shared_ptr<const session::MeasurementSet> set;
+  std::shared_ptr<const session::MeasurementSet> set;    // null: photographs alone
+  std::shared_ptr<const session::ImageSet> images = {};  // null: touches alone
   std::map<std::string, std::shared_ptr<const geometry::Surface>> surfaces;  // by the set's object names
   std::vector<std::shared_ptr<const model::Effect>>
       also;  // formulas of the user that compete with the catalogue
