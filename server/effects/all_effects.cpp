@@ -40,7 +40,27 @@
   EFFECT(PositionNoise)                  \
   EFFECT(FingerNoise)
 
-#define TOUCHSTONE_PHOTO_EFFECTS(EFFECT)
+#define TOUCHSTONE_PHOTO_EFFECTS(EFFECT) \
+  /* camera pose */                      \
+  EFFECT(CameraTranslation)              \
+  EFFECT(CameraRotation)                 \
+  /* projection */                       \
+  EFFECT(FocalError)                     \
+  EFFECT(PrincipalPoint)                 \
+  EFFECT(RadialDistortion)               \
+  /* shading */                          \
+  EFFECT(LightPosition)                  \
+  EFFECT(AmbientLight)                   \
+  EFFECT(Specular)                       \
+  EFFECT(CastShadow)                     \
+  EFFECT(BackgroundLevel)                \
+  /* image sensor */                     \
+  EFFECT(Vignetting)                     \
+  EFFECT(DefocusBlur)                    \
+  EFFECT(MotionBlur)                     \
+  EFFECT(Exposure)                       \
+  EFFECT(Gamma)                          \
+  EFFECT(ImageNoise)
 
 // Of any stage.
 #define TOUCHSTONE_USER_EFFECTS(EFFECT) \

@@ -237,8 +237,8 @@ TEST(Catalogue, HasOneEffectForEachPropertyOfTheScatter) {
   for (const model::EffectRole role :
        {model::EffectRole::kNoiseLevel, model::EffectRole::kNoiseGrowth, model::EffectRole::kNoiseTails,
         model::EffectRole::kQuantisation, model::EffectRole::kDropout, model::EffectRole::kSmoothError,
-        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength,
-        model::EffectRole::kNoiseByFinger})
+        model::EffectRole::kNoiseMemory, model::EffectRole::kNoiseOfLength, model::EffectRole::kNoiseByFinger,
+        model::EffectRole::kPixelNoise})
     EXPECT_EQ(effects[role], 1) << static_cast<int>(role);
 }
 
@@ -255,7 +255,10 @@ TEST(Catalogue, HasTheEffectsOfTheDesignInItsOrder) {
                                   "oblique_slip", "channel_latency", "thermal_drift", "return_hysteresis",
                                   "clock_skew", "poll_interval", "gaussian_noise", "incidence_noise",
                                   "heavy_tail_noise", "missed_contact", "correlated_noise", "position_noise",
-                                  "finger_noise", "formula", "lookup"));
+                                  "finger_noise", "camera_translation", "camera_rotation", "focal_error",
+                                  "principal_point", "radial_distortion", "light_position", "ambient_light",
+                                  "specular", "cast_shadow", "background_level", "vignetting", "defocus_blur",
+                                  "motion_blur", "exposure", "gamma", "image_noise", "formula", "lookup"));
 }
 
 TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {

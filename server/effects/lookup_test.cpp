@@ -11,8 +11,10 @@ namespace touchstone::effects {
 namespace {
 
 model::LookupSpec WarmUp() {
-  return {"warm_up",        true,          model::Stage::kSensor,
-          "session_time_s", {0, 300, 900}, {{0, 3000, 6000}, {0, 0, 0}, {0, -3000, -6000}}};
+  return {{"warm_up", true, model::Stage::kSensor},
+          "session_time_s",
+          {0, 300, 900},
+          {{0, 3000, 6000}, {0, 0, 0}, {0, -3000, -6000}}};
 }
 
 TEST(Lookup, IsLinearBetweenKnotsAndConstantBeyond) {
@@ -30,7 +32,7 @@ TEST(Lookup, AddsTimeAndTravelByFinger) {
   (*MakeLookupEffect(WarmUp()))->apply({}, after);
   EXPECT_NEAR(after.reported_time_s[after.At(0, 1)] - before.reported_time_s[after.At(0, 1)], 3e-3, 1e-12);
   EXPECT_NEAR(after.reported_time_s[after.At(2, 2)] - before.reported_time_s[after.At(2, 2)], -6e-3, 1e-12);
-  model::LookupSpec travel = {"wave", false, model::Stage::kMotion, "incidence_deg", {0, 90}, {{1, 1}}};
+  model::LookupSpec travel = {{"wave", false, model::Stage::kMotion}, "incidence_deg", {0, 90}, {{1, 1}}};
   after = before;
   (*MakeLookupEffect(travel))->apply({}, after);
   for (size_t e = 0; e < before.travel_m.size(); ++e)

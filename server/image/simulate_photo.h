@@ -1,6 +1,9 @@
 // A photograph as a model expects it: commanded camera pose -> camera pose -> projection -> shading -> image sensor. A
 // pure function of the request and the model. Computed by rays on the processor, so that every pixel of a distorted
 // lens looks along its own ray; without effects it is the picture of the CPU renderer.
+//
+// The lamps stand where the commanded camera and the nominal object put them (shading.h): an error of the camera's pose
+// or of the object's moves no lamp, and `light_position` counts in the axes of the commanded camera.
 #pragma once
 
 #include <memory>
@@ -36,7 +39,7 @@ struct Photo {
   std::vector<uint8_t> mask;    // 255: the object
   // Of the surface at each pixel, only if asked; 0 on the background.
   std::vector<float> depth_m, incidence_rad, light;
-  std::vector<Eigen::Vector3f> point_m;  // object frame
+  std::vector<Eigen::Vector3f> point_m;  // of the mesh, before effects move it: object frame of the nominal object
 };
 
 struct PhotoOutputs {

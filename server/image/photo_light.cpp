@@ -1,0 +1,130 @@
+#include "server/image/photo_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <embree3/rtcore.h>
+
+#include "server/image/photo_rays.h"
+#include "server/image/shading.h"
+
+namespace touchstone::image {
+namespace {
+
+// Shadow rays start this far above the flat triangle, in radii of the bounding sphere: well above what single precision
+// makes of a point, well below anything that is seen.
+constexpr float kShadowOffsetRadii = 1e-4f;
+
+}  // namespace
+
+LampPlaces PlaceLamps(const Camera& commanded, const geometry::Bounds& bounds,
+                      const effects::PhotoSettings& settings, const SurfacePlace& place) {
+  const View view = MakeView(commanded, bounds, ImageOptions());
+  const double radius_m = 0.5 * bounds.DiagonalM();
+  const auto position = [&](const LightPlace& lamp, const Eigen::Vector3d& offset_m) {
+    const Eigen::Vector3d along =
+        radius_m * Eigen::Vector3d(lamp.right, lamp.up, lamp.towards_eye) + offset_m;
+    return place.ToMesh(bounds.Centre() + along.x() * view.right + along.y() * view.up -
+                        along.z() * view.forward);
+  };
+  return {position(kLights[0], settings.key_light_offset_m), position(kLights[1], Eigen::Vector3d::Zero())};
+}
+
+void FindLamps(const PhotoPoints& points, const LampPlaces& lamps, PhotoLamps* result) {
+  const size_t room = points.depth_m.size();
+  result->key_cosine.resize(room);
+  result->fill_cosine.resize(room);
+  result->half_cosine.resize(room);
+  result->in_shadow.clear();
+  const Eigen::Vector3f key = lamps.key_m.cast<float>(), fill = lamps.fill_m.cast<float>();
+  const float key_x = key.x(), key_y = key.y(), key_z = key.z();
+  const float fill_x = fill.x(), fill_y = fill.y(), fill_z = fill.z();
+  const float* const px = points.point_m[0].data();
+  const float* const py = points.point_m[1].data();
+  const float* const pz = points.point_m[2].data();
+  const float* const nx = points.normal[0].data();
+  const float* const ny = points.normal[1].data();
+  const float* const nz = points.normal[2].data();
+  const float* const vx = points.to_eye[0].data();
+  const float* const vy = points.to_eye[1].data();
+  const float* const vz = points.to_eye[2].data();
+  float* const key_cosine = result->key_cosine.data();
+  float* const fill_cosine = result->fill_cosine.data();
+  float* const half_cosine = result->half_cosine.data();
+#pragma GCC ivdep
+  for (int i = 0; i < points.count; ++i) {
+    const float kx = key_x - px[i], ky = key_y - py[i], kz = key_z - pz[i];
+    const float fx = fill_x - px[i], fy = fill_y - py[i], fz = fill_z - pz[i];
+    const float k = 1.0f / std::sqrt(kx * kx + ky * ky + kz * kz + 1e-30f);
+    const float f = 1.0f / std::sqrt(fx * fx + fy * fy + fz * fz + 1e-30f);
+    const float nk = (nx[i] * kx + ny[i] * ky + nz[i] * kz) * k;
+    const float nf = (nx[i] * fx + ny[i] * fy + nz[i] * fz) * f;
+    const float hx = kx * k + vx[i], hy = ky * k + vy[i], hz = kz * k + vz[i];
+    const float nh = (nx[i] * hx + ny[i] * hy + nz[i] * hz) / std::sqrt(hx * hx + hy * hy + hz * hz + 1e-30f);
+    key_cosine[i] = nk > 0.0f ? nk : 0.0f;
+    fill_cosine[i] = nf > 0.0f ? nf : 0.0f;
+    half_cosine[i] = nk > 0.0f && nh > 0.0f ? nh : 0.0f;
+  }
+}
+
+void FindShadows(const geometry::Surface& surface, const PhotoPoints& points, const LampPlaces& lamps,
+                 PhotoLamps* result) {
+  const RayPackets packets(static_cast<RTCScene>(surface.embree_scene()));
+  const float offset_m = kShadowOffsetRadii * static_cast<float>(0.5 * surface.bounds().DiagonalM());
+  const Eigen::Vector3f key = lamps.key_m.cast<float>();
+  result->in_shadow.assign(points.depth_m.size(), 0);
+  alignas(64) int valid[16];
+  alignas(64) RTCRay16 rays;
+  std::memset(&rays, 0, sizeof rays);
+  int lane_point[16];
+  int lanes = 0;
+  const auto cast = [&] {
+    for (int i = 0; i < 16; ++i) valid[i] = i < lanes ? -1 : 0;
+    packets.Occluded(valid, &rays);
+    for (int i = 0; i < lanes; ++i) result->in_shadow[lane_point[i]] = rays.tfar[i] < 0.0f;
+    lanes = 0;
+  };
+  for (int i = 0; i < points.count; ++i) {
+    if (!(result->key_cosine[i] > 0.0f)) continue;  // has no key light to lose
+    const float x = points.point_m[0][i] + offset_m * points.face[0][i];
+    const float y = points.point_m[1][i] + offset_m * points.face[1][i];
+    const float z = points.point_m[2][i] + offset_m * points.face[2][i];
+    rays.org_x[lanes] = x, rays.org_y[lanes] = y, rays.org_z[lanes] = z;
+    rays.dir_x[lanes] = key.x() - x, rays.dir_y[lanes] = key.y() - y, rays.dir_z[lanes] = key.z() - z;
+    rays.tnear[lanes] = 0.0f;
+    rays.tfar[lanes] = 1.0f;  // up to the light
+    rays.mask[lanes] = 0xFFFFFFFFu;
+    lane_point[lanes++] = i;
+    if (lanes == 16) cast();
+  }
+  if (lanes > 0) cast();
+}
+
+void FillLight(const PhotoPoints& points, const PhotoLamps& lamps, const effects::PhotoSettings& settings,
+               std::vector<float>* light) {
+  light->resize(points.depth_m.size());
+  const float ambient = static_cast<float>(kAmbient + settings.ambient);
+  const float* const key_cosine = lamps.key_cosine.data();
+  const float* const fill_cosine = lamps.fill_cosine.data();
+  float* const result = light->data();
+  const bool shadows = settings.shadow_strength > 0;
+  const bool shines = settings.specular_strength != 0;
+  if (!shadows && !shines) {
+    for (int i = 0; i < points.count; ++i)
+      result[i] = ambient + kLights[0].strength * key_cosine[i] + kLights[1].strength * fill_cosine[i];
+    return;
+  }
+  const float lost = static_cast<float>(settings.shadow_strength);
+  const float strength = static_cast<float>(settings.specular_strength);
+  const float exponent = static_cast<float>(settings.specular_exponent);
+  for (int i = 0; i < points.count; ++i) {
+    float key = kLights[0].strength * key_cosine[i];
+    if (shines && lamps.half_cosine[i] > 0.0f)
+      key += strength * std::exp(exponent * std::log(lamps.half_cosine[i]));
+    if (shadows && lamps.in_shadow[i] != 0) key *= 1.0f - lost;
+    result[i] = ambient + key + kLights[1].strength * fill_cosine[i];
+  }
+}
+
+}  // namespace touchstone::image
