@@ -7,18 +7,12 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/images/pixel_noise.h"
 #include "server/diagnosis/input.h"
 #include "server/image/simulate_photo.h"
 #include "server/session/image_set.h"
 
 namespace touchstone::diagnosis::images {
-
-// The scatter of single pixels: variance sigma^2 + gain * grey, rounding to 8 bits included.
-struct PixelNoise {
-  double sigma_grey = 0, gain = 0;
-
-  double Variance(double grey) const { return sigma_grey * sigma_grey + gain * grey; }
-};
 
 // Photographs k = 0 .. size()-1: those of one object follow each other, each object's in the order of the session.
 struct Photographs {
@@ -41,9 +35,6 @@ struct Photographs {
 
 // Checks that set, model and surfaces belong together. Errors name what is missing.
 absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadPool* pool);
-
-// What is recorded on average: a pixel near black or white is clipped, which moves its mean.
-float RecordedMean(float grey, const PixelNoise& noise);
 
 // What `model` expects of every photograph; `grey` is what is recorded on average. `details`: also depth_m, ...,
 // point_m of each pixel. The same whatever the number of threads.

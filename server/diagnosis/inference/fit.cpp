@@ -10,7 +10,6 @@
 namespace touchstone::diagnosis::inference {
 namespace {
 
-constexpr double kStep = 0.02;  // of a parameter's scale, for derivatives
 constexpr int kMaxHalvings = 5;
 constexpr double kConverged = 0.02;  // nats
 constexpr double kSmallStep = 0.05;  // standard errors
@@ -24,12 +23,13 @@ absl::Status DifferentiateShape(const Experiment& experiment, const Parameteriza
   std::vector<double> steps;
   for (const int i : members) {
     const FreeParameter& c = model.parameters()[i];
-    double step = kStep * c.scale;
+    double step = observations.DerivativeStep() * c.scale;
     if (point[i] + step > c.upper) step = -step;
     moved[i] += step;
     steps.push_back(step);
   }
-  const absl::StatusOr<std::vector<double>> prediction = observations.Predict(model.At(moved));
+  const absl::StatusOr<std::vector<double>> prediction = 
+      observations.PredictNear(model.At(moved), model.At(point), predicted);
   if (!prediction.ok()) return prediction.status();
   const Eigen::VectorXd column = observations.Change(predicted, *prediction);
   for (size_t j = 0; j < members.size(); ++j) {

@@ -71,6 +71,11 @@ class WithoutRows : public ObservationModel {
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
     return all_.Predict(model);
   }
+  absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model& at,
+                                                  const std::vector<double>& predicted) const override {
+    return all_.PredictNear(moved, at, predicted);
+  }
+  double DerivativeStep() const override { return all_.DerivativeStep(); }
   Eigen::VectorXd Residual(const std::vector<double>& predicted) const override {
     return Without(all_.Residual(predicted));
   }

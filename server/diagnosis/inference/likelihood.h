@@ -36,6 +36,10 @@ class Likelihood {
   Likelihood(std::vector<int> group_rows, const SmoothErrorGeometry* geometry, double floor,
              ThreadPool* pool);
 
+  // The noise cannot be less than this, in the unit of the rows, however small the residuals are: where something else
+  // than the rows has measured it. Default 0: it is whatever they show.
+  void SetLeastNoise(double sigma) { least_sigma_ = sigma; }
+
   // The first is that there is no smooth error.
   const std::vector<SurfaceErrorHypothesis>& hypotheses() const { return hypotheses_; }
   int rows() const { return group_rows_.back(); }
@@ -61,7 +65,8 @@ class Likelihood {
   Eigen::MatrixXd Cross(const Columns& a, const Columns& b, int s) const;
   Eigen::VectorXd Norms(const Columns& columns, int s) const;
 
-  // -(N/2) log(Q/N + floor^2) - (1/2) log det, for a quadratic form Q.
+  // -(N/2) log(Q/N + floor^2) - (1/2) log det, for a quadratic form Q; with noise of at least s, the same where Q/N is
+  // larger than s^2, else the normal density of noise s.
   double LogLikelihood(double q, int s) const;
   double Sigma(double q, int parameters) const;  // in the unit of the rows
   // The prior weight of hypothesis s, in nats: half for "none", the rest even.
@@ -84,6 +89,7 @@ class Likelihood {
 
   std::vector<int> group_rows_;
   double floor_;
+  double least_sigma_ = 0;
   std::vector<Basis> bases_;
   std::vector<SurfaceErrorHypothesis> hypotheses_;
 };

@@ -37,6 +37,15 @@ class ObservationModel {
   // met) count as unchanged.
   virtual Eigen::VectorXd Change(const std::vector<double>& predicted,
                                  const std::vector<double>& moved) const = 0;
+
+  // For derivatives: what `moved` expects, near `at`, of which `predicted` is known. Simulations that are dear answer
+  // by what they have seen nearby. Called from tasks of a thread pool.
+  virtual absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model&,
+                                                          const std::vector<double>&) const {
+    return Predict(moved);
+  }
+  // How far a value moves for a derivative, over its parameter's scale.
+  virtual double DerivativeStep() const { return 0.02; }
 };
 
 }  // namespace touchstone::diagnosis::inference

@@ -206,6 +206,13 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit,
       extension.start.Add(candidates_[c].effect, candidates_[c].per_object);
     else
       extension.start.AddOn(candidates_[c].effect, extension.object);
+    if (!candidates_[c].starts_at.empty()) {
+      Eigen::VectorXd point = extension.start.Start();
+      const std::vector<double>& values = candidates_[c].starts_at;
+      point.tail(static_cast<int>(values.size())) =
+          Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
+      extension.start.MoveTo(point);
+    }
     extensions.push_back(std::move(extension));
   }
   return extensions;

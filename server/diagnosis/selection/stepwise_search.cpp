@@ -216,11 +216,31 @@ absl::StatusOr<Explanation> StepwiseSearch::Run(inference::Parameterization star
     if (!added) break;
     // Two true effects together may have let in a third that mixes them.
     if (explanation.fit.model.base().effects.size() < 2) continue;
-    for (int tries = 0; tries < 3; ++tries) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool swapped, SwapStep(&explanation));
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool removed, RemoveStep(&explanation));
-      if (!swapped && !removed) break;
-    }
+    TOUCHSTONE_RETURN_IF_ERROR(Improve(&explanation));
+  }
+  return explanation;
+}
+
+absl::Status StepwiseSearch::Improve(Explanation* explanation) const {
+  for (int tries = 0; tries < 3; ++tries) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool swapped, SwapStep(explanation));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool removed, RemoveStep(explanation));
+    if (!swapped && !removed) break;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Explanation> StepwiseSearch::Continue(Explanation explanation) const {
+  const int initial_effects = explanation.initial_effects;
+  TOUCHSTONE_ASSIGN_OR_RETURN(explanation.fit, inference::FitModel(experiment_, explanation.fit.model));
+  const auto has_steps = [&] {
+    return static_cast<int>(explanation.fit.model.base().effects.size()) > initial_effects;
+  };
+  if (has_steps()) TOUCHSTONE_RETURN_IF_ERROR(Improve(&explanation));
+  for (int step = 0; step < rules_.max_steps; ++step) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool added, AddStep(&explanation));
+    if (!added) break;
+    TOUCHSTONE_RETURN_IF_ERROR(Improve(&explanation));
   }
   return explanation;
 }

@@ -65,6 +65,10 @@ class StepwiseSearch {
   // From a start (the initial model, perhaps with a formula), the best explanation.
   absl::StatusOr<Explanation> Run(inference::Parameterization start, int initial_effects) const;
 
+  // The same from an explanation that was found elsewhere: what it has beyond the initial model is tried against others
+  // first, and goes where it is not worth its values.
+  absl::StatusOr<Explanation> Continue(Explanation explanation) const;
+
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts. Of effects on one
   // object that are far behind, only an estimate (candidate_scores.cpp).
   absl::StatusOr<std::vector<Extension>> Score(const inference::Fit& fit, int initial_effects) const;
@@ -88,6 +92,7 @@ class StepwiseSearch {
   absl::StatusOr<bool> AddStep(Explanation* explanation) const;
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
+  absl::Status Improve(Explanation* explanation) const;  // swaps and removals, as long as there are any
   bool Accepts(const inference::Fit& before, const inference::Fit& after, size_t extensions, bool rare) const;
   double EnterNats(bool rare) const { return rare ? rules_.enter_rare_nats : rules_.enter_nats; }
 

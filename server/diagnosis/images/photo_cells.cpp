@@ -1,0 +1,111 @@
+#include "server/diagnosis/images/photo_cells.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr double kMinStepGrey = 4;    // between neighbouring pixels, from which it is a contour
+constexpr double kWithinPixel = 1.0 / 12;  // variance of a place within a pixel, px^2
+
+// The largest over each pixel and its neighbours.
+std::vector<float> LargestAround(const std::vector<float>& image, int width, int height) {
+  std::vector<float> along(image.size()), around(image.size());
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const float* row = &image[static_cast<size_t>(y) * width];
+      along[static_cast<size_t>(y) * width + x] =
+          std::max({row[std::max(x - 1, 0)], row[x], row[std::min(x + 1, width - 1)]});
+    }
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const auto at = [&](int row) { return along[static_cast<size_t>(row) * width + x]; };
+      around[static_cast<size_t>(y) * width + x] =
+          std::max({at(std::max(y - 1, 0)), at(y), at(std::min(y + 1, height - 1))});
+    }
+  return around;
+}
+
+// Variance that a contour's place within a pixel adds, at the contour and around it, grey^2.
+std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height) {
+  const std::vector<float> most = LargestAround(grey, width, height);
+  std::vector<float> negative(grey.size());
+  for (size_t i = 0; i < grey.size(); ++i) negative[i] = -grey[i];
+  const std::vector<float> least = LargestAround(negative, width, height);
+  std::vector<float> variance(grey.size());
+  for (size_t i = 0; i < grey.size(); ++i) {
+    const double step = std::max(static_cast<double>(most[i]) + least[i] - kMinStepGrey, 0.0);
+    variance[i] = static_cast<float>(kWithinPixel * step * step);
+  }
+  return LargestAround(variance, width, height);
+}
+
+}  // namespace
+
+CellGrid GridOfPicture(int width, int height, int cells) {
+  CellGrid grid{width, height, 1};
+  while (grid.size() > cells) ++grid.cell;
+  return grid;
+}
+
+Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey, const PixelNoise& noise) {
+  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height);
+  Eigen::VectorXf variance = Eigen::VectorXf::Zero(grid.size());
+  for (int y = 0; y < grid.height; ++y)
+    for (int x = 0; x < grid.width; ++x) {
+      const size_t pixel = static_cast<size_t>(y) * grid.width + x;
+      variance[y / grid.cell * grid.columns() + x / grid.cell] +=
+          contour[pixel] + static_cast<float>(Record(grey[pixel], noise).variance);
+    }
+  return variance.cwiseSqrt().cwiseInverse();
+}
+
+Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights) {
+  Eigen::VectorXf sums = Eigen::VectorXf::Zero(grid.size());
+  for (int y = 0; y < grid.height; ++y) {
+    float* row = &sums[y / grid.cell * grid.columns()];
+    const float* from = image + static_cast<size_t>(y) * grid.width;
+    for (int x = 0; x < grid.width; ++x) row[x / grid.cell] += from[x];
+  }
+  return sums.cwiseProduct(weights);
+}
+
+Eigen::VectorXf Smooth(const CellGrid& grid, const Eigen::VectorXf& cells) {
+  const int columns = grid.columns(), rows = grid.rows();
+  Eigen::VectorXf along(cells.size()), both(cells.size());
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const int row = y * columns;
+      along[row + x] = 0.5f * cells[row + x] + 0.25f * (cells[row + std::max(x - 1, 0)] +
+                                                        cells[row + std::min(x + 1, columns - 1)]);
+    }
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x)
+      both[y * columns + x] = 0.5f * along[y * columns + x] +
+                              0.25f * (along[std::max(y - 1, 0) * columns + x] +
+                                       along[std::min(y + 1, rows - 1) * columns + x]);
+  return both;
+}
+
+Eigen::MatrixXf OrthonormalSpan(const Eigen::MatrixXf& columns, double tolerance) {
+  Eigen::MatrixXf unit = columns;
+  int used = 0;
+  for (int c = 0; c < columns.cols(); ++c) {
+    const float norm = columns.col(c).norm();
+    if (norm > 1e-6f) unit.col(used++) = columns.col(c) / norm;
+  }
+  unit.conservativeResize(Eigen::NoChange, used);
+  const Eigen::MatrixXd gram = (unit.transpose() * unit).cast<double>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
+  int kept = 0;
+  for (int i = 0; i < used; ++i) kept += eigen.eigenvalues()[i] > tolerance;
+  const Eigen::MatrixXd turned =
+      eigen.eigenvectors().rightCols(kept) *
+      eigen.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  return unit * turned.cast<float>();
+}
+
+}  // namespace touchstone::diagnosis::images

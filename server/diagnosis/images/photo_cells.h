@@ -1,0 +1,39 @@
+// A photograph in cells of some pixels: sums over a cell, in units of the cell's own noise. What effects do to a picture
+// is smooth over a few pixels, so cells hold what tells effects apart, and a contour that crosses a pixel no longer
+// makes it jump.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "server/diagnosis/images/pixel_noise.h"
+
+namespace touchstone::diagnosis::images {
+
+struct CellGrid {
+  int width = 0, height = 0;  // of the picture
+  int cell = 1;               // pixels along a side
+  int columns() const { return (width + cell - 1) / cell; }
+  int rows() const { return (height + cell - 1) / cell; }
+  int size() const { return columns() * rows(); }
+};
+
+// The grid of a picture with about `cells` cells.
+CellGrid GridOfPicture(int width, int height, int cells);
+
+// 1 over the standard deviation of each cell's sum: noise of the pixels, and, near contours of the expected picture,
+// what the place of a contour within a pixel is worth. [cell]
+Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& expected_grey,
+                            const PixelNoise& noise);
+
+// Sums over cells, times their weights. [cell]
+Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights);
+
+// Over neighbouring cells, 1 2 1 in both directions.
+Eigen::VectorXf Smooth(const CellGrid& grid, const Eigen::VectorXf& cells);
+
+// Orthonormal columns that span the given ones, as far as these differ by more than `tolerance` of their length.
+Eigen::MatrixXf OrthonormalSpan(const Eigen::MatrixXf& columns, double tolerance);
+
+}  // namespace touchstone::diagnosis::images

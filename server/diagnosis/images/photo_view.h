@@ -1,0 +1,39 @@
+// One photograph of PhotoRows. Part of photo_rows.cpp and photo_view.cpp only.
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include "server/diagnosis/images/photo_rows.h"
+
+namespace touchstone::diagnosis::images {
+
+struct PhotoRows::View {
+  int k = 0;
+  Eigen::VectorXf weights;   // of the cells
+  Eigen::MatrixXf basis;     // cells x rows
+  Eigen::VectorXd measured;  // rows
+  Eigen::MatrixXd slopes;    // rows x directions that move rays, per SI unit
+  Eigen::MatrixXd field;     // rows x functions of the image field
+  std::vector<inference::SmoothErrorSite> sites;
+  mutable std::mutex mutex;  // of the workspace
+  mutable image::PhotoWorkspace workspace;
+
+  Eigen::VectorXd Project(const CellGrid& grid, const std::vector<float>& grey) const {
+    return (basis.transpose() * CellSums(grid, grey.data(), weights)).cast<double>();
+  }
+};
+
+// One value of one effect that a picture is differentiated by.
+struct PhotoRows::Direction {
+  std::shared_ptr<const model::Effect> effect;
+  int value = 0;          // of its flat values
+  double step = 0;        // SI
+  model::Model at, base;  // the anchor with the effect, moved along the direction and not
+  int instance = 0;       // of the effect in them
+};
+
+// What is recorded on average where this photo is expected.
+std::vector<float> RecordedGrey(const image::Photo& photo, const PixelNoise& noise);
+
+}  // namespace touchstone::diagnosis::images

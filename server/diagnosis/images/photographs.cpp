@@ -1,0 +1,167 @@
+#include "server/diagnosis/images/photographs.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "server/base/status.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+absl::Status CheckPhotographs(const DiagnosisInput& input) {
+  if (input.images == nullptr) return absl::InvalidArgumentError("the input holds no photographs");
+  const session::ImageSet& set = *input.images;
+  if (set.size() == 0) return absl::InvalidArgumentError(absl::StrCat(set.origin, ": no photograph"));
+  std::vector<std::string> missing;
+  for (const std::string& object : set.objects)
+    if (input.surfaces.count(object) == 0) missing.push_back(object);
+  if (!missing.empty())
+    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '",
+                                            absl::StrJoin(missing, "', '"), "'; give it with --mesh ",
+                                            missing[0], "=FILE, or all of a folder with --mesh-dir DIR"));
+  const size_t pixels = static_cast<size_t>(set.camera.width_px) * set.camera.height_px;
+  for (const session::PhotographRow& row : set.photographs)
+    if (row.pixels.size() != pixels * row.channels)
+      return absl::InvalidArgumentError(absl::StrCat(set.origin, ": photograph ", row.image, " (", row.file,
+                                                     ") has ", row.pixels.size(), " values; camera.yaml says ",
+                                                     set.camera.width_px, " x ", set.camera.height_px));
+  return absl::OkStatus();
+}
+
+image::PhotoRequest RequestOf(const session::ImageSet& set, int row, const Photographs& photographs,
+                              uint64_t seed) {
+  const session::PhotographRow& from = set.photographs[row];
+  const session::CameraIntrinsics& lens = set.camera;
+  image::PhotoRequest request;
+  request.surface = photographs.surfaces[from.object];
+  request.object = set.objects[from.object];
+  request.camera.eye_m = from.commanded.eye_m;
+  request.camera.at_m = from.commanded.at_m;
+  request.camera.up = from.commanded.up;
+  request.lens.width = lens.width_px;
+  request.lens.height = lens.height_px;
+  request.lens.fx_px = lens.fx_px;
+  request.lens.fy_px = lens.fy_px;
+  request.lens.cx_px = lens.cx_px;
+  request.lens.cy_px = lens.cy_px;
+  if (lens.k1 != 0 || lens.k2 != 0 || lens.p1 != 0 || lens.p2 != 0 || lens.k3 != 0)
+    request.lens.distortion = {lens.k1, lens.k2, lens.p1, lens.p2, lens.k3};
+  request.session_time_s = from.session_time_s;
+  request.seed = seed;
+  request.index = from.image;
+  return request;
+}
+
+void FindPosesOfPhotographs(Photographs* photographs) {
+  std::map<std::array<double, 10>, int> poses;
+  for (int k = 0; k < photographs->size(); ++k) {
+    const session::CameraPlacement& camera = photographs->set->photographs[photographs->row[k]].commanded;
+    std::array<double, 10> key = {static_cast<double>(photographs->object[k])};
+    for (int axis = 0; axis < 3; ++axis) {
+      key[1 + axis] = camera.eye_m[axis];
+      key[4 + axis] = camera.at_m[axis];
+      key[7 + axis] = camera.up[axis];
+    }
+    photographs->pose.push_back(poses.emplace(key, static_cast<int>(poses.size())).first->second);
+  }
+  photographs->poses = static_cast<int>(poses.size());
+}
+
+// From repeats where there are any, else from neighbouring pixels.
+PixelNoise NoiseOf(const Photographs& p, ThreadPool* pool) {
+  std::vector<int> first(p.poses, -1), partner(p.size(), -1);
+  int pairs = 0;
+  for (int k = 0; k < p.size(); ++k) {
+    int& other = first[p.pose[k]];
+    if (other >= 0) partner[k] = other, ++pairs;
+    other = other >= 0 ? -1 : k;
+  }
+  std::vector<NoiseGatherer> gathered(p.size());
+  ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      if (pairs == 0) {
+        gathered[k].Add(p.measured_grey[k], p.measured_grey[k], p.width(), p.height(), 1);
+      } else if (partner[k] >= 0) {
+        std::vector<float> difference = p.measured_grey[k];
+        for (size_t i = 0; i < difference.size(); ++i) difference[i] -= p.measured_grey[partner[k]][i];
+        gathered[k].Add(difference, p.measured_grey[k], p.width(), p.height(), 0.5);
+      }
+    }
+  });
+  NoiseGatherer all;
+  for (const NoiseGatherer& one : gathered) all.Add(one);
+  return all.Estimate();
+}
+
+}  // namespace
+
+double Photographs::TimeOf(int k) const {
+  return set->has_session_time ? set->photographs[row[k]].session_time_s : row[k];
+}
+
+absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadPool* pool) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPhotographs(input));
+  Photographs photographs;
+  photographs.set = input.images;
+  const session::ImageSet& set = *input.images;
+  photographs.objects = set.objects;
+  for (const std::string& object : set.objects) photographs.surfaces.push_back(input.surfaces.at(object));
+  photographs.row.resize(set.size());
+  std::iota(photographs.row.begin(), photographs.row.end(), 0);
+  std::stable_sort(photographs.row.begin(), photographs.row.end(), [&](int a, int b) {
+    const session::PhotographRow &one = set.photographs[a], &other = set.photographs[b];
+    if (one.object != other.object) return one.object < other.object;
+    return set.has_session_time && one.session_time_s < other.session_time_s;
+  });
+  for (const int row : photographs.row) {
+    photographs.object.push_back(set.photographs[row].object);
+    photographs.measured_grey.push_back(set.Grey(row));
+    photographs.requests.push_back(RequestOf(set, row, photographs, input.seed));
+  }
+  FindPosesOfPhotographs(&photographs);
+  photographs.noise = NoiseOf(photographs, pool);
+  return photographs;
+}
+
+absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& photographs,
+                                                            const model::Model& model, bool details,
+                                                            ThreadPool* pool) {
+  const image::PhotoSimulator simulator(std::make_shared<const model::Model>(model));
+  std::vector<image::Photo> photos(photographs.size());
+  std::vector<absl::Status> statuses(photographs.size());
+  image::PhotoOutputs outputs;
+  outputs.details = details;
+  ParallelFor(pool, photographs.size(), 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      image::PhotoWorkspace workspace;
+      absl::StatusOr<image::Photo> photo = simulator.Run(photographs.requests[k], outputs, &workspace);
+      statuses[k] = photo.status();
+      if (!photo.ok()) continue;
+      for (float& grey : photo->grey) grey = static_cast<float>(Record(grey, photographs.noise).mean_grey);
+      photos[k] = *std::move(photo);
+    }
+  });
+  for (const absl::Status& status : statuses) TOUCHSTONE_RETURN_IF_ERROR(status);
+  return photos;
+}
+
+double RmseGrey(const Photographs& photographs, const std::vector<image::Photo>& expected) {
+  double squares = 0, count = 0;
+  for (int k = 0; k < photographs.size(); ++k) {
+    const std::vector<float>& measured = photographs.measured_grey[k];
+    for (size_t i = 0; i < measured.size(); ++i) {
+      const double residual = static_cast<double>(measured[i]) - expected[k].grey[i];
+      squares += residual * residual;
+    }
+    count += static_cast<double>(measured.size());
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+}  // namespace touchstone::diagnosis::images

@@ -1,0 +1,120 @@
+#include "server/diagnosis/images/pixel_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr double kStepGrey = 0.125;
+constexpr double kWhite = 255, kGreyLevels = 256;
+constexpr double kRoundingVariance = 1.0 / 12;
+constexpr double kKept = 0.8;           // share of the differences that counts
+constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
+constexpr double kClipped = 4;          // standard deviations from black or white
+constexpr double kMinCount = 200;       // differences that a bin needs
+
+// Of the smallest kKept of a histogram: their mean square, scaled to a normal number's variance.
+double TrimmedVariance(const double* counts, const double* squares, int steps) {
+  double total = 0;
+  for (int s = 0; s < steps; ++s) total += counts[s];
+  double left = kKept * total, sum = 0;
+  for (int s = 0; s < steps && left > 0; ++s) {
+    if (counts[s] == 0) continue;
+    const double taken = std::min(left, counts[s]);
+    sum += squares[s] * taken / counts[s];
+    left -= taken;
+  }
+  return total > 0 ? sum / (kKept * total) / kKeptVariance : 0;
+}
+
+double Density(double z) {
+  return 0.3989422804014327 * std::exp(-0.5 * z * z);
+}
+
+double Tail(double z) {  // P(Z > z)
+  return 0.5 * std::erfc(z * 0.7071067811865476);
+}
+
+}  // namespace
+
+RecordedPixel Record(double grey, const PixelNoise& noise) {
+  const double variance = std::max(noise.Variance(grey), kRoundingVariance);
+  const double sigma = std::sqrt(variance);
+  const double low = -grey / sigma, high = (kWhite - grey) / sigma;
+  if (low < -kClipped && high > kClipped) return {grey, variance};
+  // x = min(max(grey + sigma z, 0), white): moments of the part between the ends, and what lies at them.
+  const double inside = Tail(low) - Tail(high);
+  const double first = Density(low) - Density(high);
+  const double second = inside + low * Density(low) - high * Density(high);
+  const double at_white = Tail(high);
+  const double mean = grey * inside + sigma * first + kWhite * at_white;
+  const double square = grey * grey * inside + 2 * grey * sigma * first + variance * second +
+                        kWhite * kWhite * at_white;
+  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance};
+}
+
+void NoiseGatherer::Add(const std::vector<float>& image, const std::vector<float>& grey, int width,
+                        int height, double share) {
+  const double scale = std::sqrt(share / 6);  // 1 + 4 + 1
+  for (int y = 0; y < height; ++y) {
+    const float* row = &image[static_cast<size_t>(y) * width];
+    const float* level = &grey[static_cast<size_t>(y) * width];
+    for (int x = 1; x + 1 < width; x += 2) {
+      const float least = std::min({level[x - 1], level[x], level[x + 1]});
+      const float most = std::max({level[x - 1], level[x], level[x + 1]});
+      if (least < 1 || most > kWhite - 1) continue;
+      const double difference = std::abs(row[x - 1] - 2.0 * row[x] + row[x + 1]) * scale;
+      const int step = std::min(static_cast<int>(difference / kStepGrey), kSteps - 1);
+      const int bin = std::clamp(static_cast<int>(level[x] * kBins / kGreyLevels), 0, kBins - 1);
+      const size_t at = static_cast<size_t>(bin) * kSteps + step;
+      counts_[at] += 1;
+      squares_[at] += difference * difference;
+    }
+  }
+}
+
+void NoiseGatherer::Add(const NoiseGatherer& other) {
+  for (size_t i = 0; i < counts_.size(); ++i) {
+    counts_[i] += other.counts_[i];
+    squares_[i] += other.squares_[i];
+  }
+}
+
+double NoiseGatherer::count() const {
+  double sum = 0;
+  for (const double count : counts_) sum += count;
+  return sum;
+}
+
+PixelNoise NoiseGatherer::Estimate() const {
+  // variance = sigma^2 + gain * grey over the bins, each weighed by count / variance^2.
+  std::vector<double> grey, variance, weight;
+  for (int bin = 0; bin < kBins; ++bin) {
+    double count = 0;
+    for (int s = 0; s < kSteps; ++s) count += counts_[static_cast<size_t>(bin) * kSteps + s];
+    // The darkest bin holds what is left of clipped pixels.
+    if (count < kMinCount || bin == 0) continue;
+    const size_t at = static_cast<size_t>(bin) * kSteps;
+    grey.push_back((bin + 0.5) * kGreyLevels / kBins);
+    variance.push_back(std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance));
+    weight.push_back(count / (variance.back() * variance.back()));
+  }
+  if (grey.empty()) return {std::sqrt(kRoundingVariance), 0};
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (size_t i = 0; i < grey.size(); ++i) {
+    n += weight[i], sx += weight[i] * grey[i], sy += weight[i] * variance[i];
+    sxx += weight[i] * grey[i] * grey[i], sxy += weight[i] * grey[i] * variance[i];
+  }
+  const double determinant = n * sxx - sx * sx;
+  double gain = grey.size() > 1 && determinant > 0 ? (n * sxy - sx * sy) / determinant : 0;
+  double square = (sy - gain * sx) / n;
+  if (gain < 0) gain = 0, square = sy / n;
+  if (square < kRoundingVariance) {
+    square = kRoundingVariance;
+    gain = std::max((sxy - square * sx) / sxx, 0.0);
+  }
+  return {std::sqrt(square), gain};
+}
+
+}  // namespace touchstone::diagnosis::images

@@ -1,0 +1,42 @@
+// How much single pixels scatter, as images themselves show it: from what neighbouring pixels differ by.
+#pragma once
+
+#include <vector>
+
+namespace touchstone::diagnosis::images {
+
+// The scatter of single pixels: variance sigma^2 + gain * grey, rounding to 8 bits included.
+struct PixelNoise {
+  double sigma_grey = 0, gain = 0;
+
+  double Variance(double grey) const { return sigma_grey * sigma_grey + gain * grey; }
+};
+
+// What a clipped 8-bit pixel of this grey level records: its mean and variance.
+struct RecordedPixel {
+  double mean_grey = 0, variance = 0;
+};
+RecordedPixel Record(double grey, const PixelNoise& noise);
+
+// Gathers second differences of images along their rows, by grey level.
+class NoiseGatherer {
+ public:
+  // `image`: what scatters (a picture, a residual, a difference of two repeats); `grey`: the grey levels of the same
+  // pixels, which choose the bin and tell clipped pixels. `share`: of the image's variance that one picture's noise has
+  // (a difference of two repeats: 0.5). Width x height each.
+  void Add(const std::vector<float>& image, const std::vector<float>& grey, int width, int height,
+           double share);
+  void Add(const NoiseGatherer& other);
+
+  // The noise of the smoother four fifths of the pixels: edges and texture take no part, where they are fewer.
+  PixelNoise Estimate() const;
+  double count() const;
+
+ private:
+  static constexpr int kBins = 16;
+  static constexpr int kSteps = 400;  // of a histogram of absolute second differences, kStepGrey wide
+  std::vector<double> counts_ = std::vector<double>(static_cast<size_t>(kBins) * kSteps, 0.0);
+  std::vector<double> squares_ = std::vector<double>(static_cast<size_t>(kBins) * kSteps, 0.0);
+};
+
+}  // namespace touchstone::diagnosis::images
