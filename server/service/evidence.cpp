@@ -14,6 +14,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/service/convert.h"
 #include "server/service/measured_set_message.h"
+#include "server/session/image_set_file.h"
 
 namespace touchstone::service {
 namespace {
@@ -37,7 +38,7 @@ absl::StatusOr<session::MeasurementSet> ReadSet(const v1::Evidence& message, con
     case v1::Evidence::MEASUREMENTS_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("evidence.measurements is empty: set session, csv or set");
+  return absl::InvalidArgumentError("evidence is empty: set session, csv, set or images");
 }
 
 absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::MeshFile& file) {
@@ -58,6 +59,23 @@ absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::M
   return surface;
 }
 
+// Where a file has an object first: "set.csv:2".
+std::string PlaceOfObject(const diagnosis::DiagnosisInput& input, const std::string& name) {
+  const auto place = [&name](const std::vector<std::string>& objects) {
+    return static_cast<int>(std::find(objects.begin(), objects.end(), name) - objects.begin());
+  };
+  if (input.set != nullptr && place(input.set->objects) < static_cast<int>(input.set->objects.size())) {
+    const session::MeasurementSet& set = *input.set;
+    const auto row = std::find(set.object.begin(), set.object.end(), place(set.objects)) - set.object.begin();
+    return absl::StrCat(set.origin, ":", set.line[row]);
+  }
+  const int object = place(input.images->objects);
+  for (const session::PhotographRow& row : input.images->photographs)
+    if (row.object == object)
+      return absl::StrCat(input.images->origin, "/", session::kImagesCsv, ":", row.line);
+  return input.images->origin;
+}
+
 // With the objects of a set at most so many others are looked at.
 constexpr size_t kMaxKnownSurfaces = 24;
 
@@ -70,7 +88,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
       return absl::InvalidArgumentError(
           absl::StrCat("meshes: two are named '", file.name(), "'; one per object was expected"));
   std::vector<std::string> missing;
-  for (const std::string& name : input->set->objects) {
+  for (const std::string& name : ObjectsOf(*input)) {
     const auto file = files.find(name);
     const auto served = resources.objects.all().find(name);
     if (file != files.end()) {
@@ -96,10 +114,6 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
   for (const auto& [name, file] : files) known.push_back(name);
   for (const auto& [name, object] : resources.objects.all())
     if (files.count(name) == 0) known.push_back(name);
-  // Where the name stands in the file.
-  const session::MeasurementSet& set = *input->set;
-  const auto object = std::find(set.objects.begin(), set.objects.end(), missing[0]) - set.objects.begin();
-  const auto row = std::find(set.object.begin(), set.object.end(), object) - set.object.begin();
   const std::string others =
       missing.size() == 1
           ? ""
@@ -107,7 +121,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
                          absl::StrJoin(missing.begin() + 1,
                                        missing.begin() + std::min(missing.size(), kMaxNamed), ", "),
                          missing.size() > kMaxNamed ? ", ..." : "", ")");
-  return absl::NotFoundError(absl::StrCat(set.origin, ":", set.line[row], ": column object: '", missing[0],
+  return absl::NotFoundError(absl::StrCat(PlaceOfObject(*input, missing[0]), ": column object: '", missing[0],
                                           "' has no mesh", others, "; give it with --mesh ", missing[0],
                                           "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
 }
@@ -132,6 +146,15 @@ absl::Status ReadAlso(const v1::Evidence& message, diagnosis::DiagnosisInput* in
 }
 
 }  // namespace
+
+std::vector<std::string> ObjectsOf(const diagnosis::DiagnosisInput& input) {
+  std::vector<std::string> objects;
+  if (input.set != nullptr) objects = input.set->objects;
+  if (input.images != nullptr)
+    for (const std::string& name : input.images->objects)
+      if (std::find(objects.begin(), objects.end(), name) == objects.end()) objects.push_back(name);
+  return objects;
+}
 
 std::string AsModelFile(const std::string& yaml) {
   const std::vector<std::string> lines = absl::StrSplit(yaml, '\n');
@@ -158,11 +181,17 @@ absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& messa
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
   TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, &input));
-  TOUCHSTONE_ASSIGN_OR_RETURN(session::MeasurementSet set, ReadSet(message, resources));
-  if (set.fingers == 0)
-    return absl::InvalidArgumentError(
-        absl::StrCat(set.origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
-  input.set = std::make_shared<const session::MeasurementSet>(std::move(set));
+  if (message.has_images()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(session::ImageSet images, session::ParseImageSet(message.images()));
+    input.images = std::make_shared<const session::ImageSet>(std::move(images));
+  }
+  if (!message.has_images() || message.measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(session::MeasurementSet set, ReadSet(message, resources));
+    if (set.fingers == 0)
+      return absl::InvalidArgumentError(
+          absl::StrCat(set.origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
+    input.set = std::make_shared<const session::MeasurementSet>(std::move(set));
+  }
   TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
   return input;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <absl/status/statusor.h>
 
@@ -15,6 +16,9 @@ namespace touchstone::service {
 // name the field, or file and line of what was sent.
 absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
                                                        const Resources& resources);
+
+// Of touches and photographs, each once, in order of appearance.
+std::vector<std::string> ObjectsOf(const diagnosis::DiagnosisInput& input);
 
 // The user's own effects as a model file: `yaml` itself if it is one, else a model file round an effect that
 // stands alone as it would under `effects:` ("formula:" and what belongs to it).

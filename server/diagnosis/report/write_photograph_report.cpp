@@ -112,7 +112,7 @@ void WriteMap(const images::PhotographMap& map, v1::PhotographMap* message) {
   for (float& size : sizes) size = std::abs(size);
   const size_t place = std::min(sizes.size() - 1, static_cast<size_t>(kScaleShare * sizes.size()));
   std::nth_element(sizes.begin(), sizes.begin() + place, sizes.end());
-  const double scale = std::max(kMinScaleGrey, std::ceil(sizes[place]));
+  const double scale = std::max(kMinScaleGrey, std::ceil(static_cast<double>(sizes[place])));
   message->set_residual_scale_grey(scale);
   message->set_residual_before_png(PngOf(ResidualColours(map.residual_before_grey, scale), width, height, 3));
   message->set_residual_after_png(PngOf(ResidualColours(map.residual_after_grey, scale), width, height, 3));
