@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "server/geometry/surface.h"
+#include "server/image/cpu_kernels.h"
+#include "server/image/renderer.h"
 #include "server/image/shading.h"
 #include "server/image/shading_mesh.h"
 #include "server/image/view.h"
@@ -43,7 +45,8 @@ CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh,
 
 // The triangle seen through each pixel's centre, for the pixels of a frame's box.
 struct Visibility {
-  static constexpr int kPadding = 8;  // columns beyond the box that may be written, and mean nothing
+  static constexpr int kPadding =
+      kKernelWidth;  // columns beyond the box that may be written, and mean nothing
 
   explicit Visibility(const PixelBox& pixel_box);
   uint32_t* Row(int row) { return &triangle[static_cast<size_t>(row - box.first_row) * stride]; }
@@ -55,13 +58,21 @@ struct Visibility {
 
 // Two ways to find it. Rays (Embree packets) cost the same for every pixel and hardly more for more
 // triangles; drawing triangles costs the same for every triangle and hardly more for more pixels.
-void CastPixels(const CpuFrame& frame, Visibility* visibility);     // visibility_rays.cpp
-void DrawTriangles(const CpuFrame& frame, Visibility* visibility);  // visibility_triangles.cpp
+void CastPixels(const CpuFrame& frame, Visibility* visibility);  // visibility_rays.cpp
+void DrawTriangles(const CpuFrame& frame, const CpuKernels& kernels,
+                   Visibility* visibility);  // visibility_triangles.cpp
 
 // Whether triangles can be drawn as they are, without clipping, in single precision.
 bool CanDrawTriangles(const CpuFrame& frame);
 
 // Shades what is seen into the image, whose arrays have their background already.
-void ShadeVisible(const CpuFrame& frame, Visibility& visibility, Image* image);  // cpu_shading.cpp
+void ShadeVisible(const CpuFrame& frame, const CpuKernels& kernels, Visibility& visibility,
+                  Image* image);  // cpu_shading.cpp
+
+// The frame's mesh as kernels read it.
+DrawnMesh DrawnMeshOf(const CpuFrame& frame);
+
+// The CPU renderer with kernels of one's choice, for tests.
+std::shared_ptr<Renderer> CreateCpuRendererOf(const CpuKernels& kernels);  // renderer_cpu.cpp
 
 }  // namespace touchstone::image

@@ -1,4 +1,4 @@
-// The shading model of shading.h in GLSL, statement by statement as in cpu_shading.cpp.
+// The shading model of shading.h in GLSL, statement by statement as in cpu_kernels_template.h.
 #pragma once
 
 namespace touchstone::image {

@@ -28,10 +28,12 @@ bool IsCoarse(const CpuFrame& frame) {
 
 class CpuRenderer final : public Renderer {
  public:
+  explicit CpuRenderer(const CpuKernels& kernels) : kernels_(kernels) {}
+
   std::string name() const override { return "cpu"; }
   std::string description() const override {
-    return absl::StrCat("CPU: coarse meshes by triangles, fine ones by rays (", geometry::EmbreeDescription(),
-                        ")");
+    return absl::StrCat("CPU: coarse meshes by triangles (", kernels_.name, "), fine ones by rays (",
+                        geometry::EmbreeDescription(), ")");
   }
 
   absl::StatusOr<Image> Render(const std::shared_ptr<const geometry::Surface>& surface, const Camera& camera,
@@ -53,22 +55,27 @@ class CpuRenderer final : public Renderer {
 
     Visibility visibility(frame.box);
     if (IsCoarse(frame) && CanDrawTriangles(frame)) {
-      DrawTriangles(frame, &visibility);
+      DrawTriangles(frame, kernels_, &visibility);
     } else {
       CastPixels(frame, &visibility);
     }
-    ShadeVisible(frame, visibility, &image);
+    ShadeVisible(frame, kernels_, visibility, &image);
     return image;
   }
 
  private:
+  const CpuKernels& kernels_;
   ShadingMeshCache meshes_;
 };
 
 }  // namespace
 
+std::shared_ptr<Renderer> CreateCpuRendererOf(const CpuKernels& kernels) {
+  return std::make_shared<CpuRenderer>(kernels);
+}
+
 absl::StatusOr<std::shared_ptr<Renderer>> CreateCpuRenderer() {
-  return std::shared_ptr<Renderer>(std::make_shared<CpuRenderer>());
+  return std::shared_ptr<Renderer>(std::make_shared<CpuRenderer>(BestKernels()));
 }
 
 }  // namespace touchstone::image

@@ -1,5 +1,5 @@
 // How a surface point becomes a grey level: one model for both renderers, in words here, in C++ in
-// cpu_shading.cpp and in GLSL in egl_shader.h. Who changes one changes all three; the image tests compare
+// cpu_kernels_template.h and in GLSL in egl_shader.h. Who changes one changes all three; the image tests compare
 // them.
 //
 //   shade = kAmbient + sum over lights of strength * max(0, n . l) / (|n| |l|)

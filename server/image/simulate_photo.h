@@ -39,7 +39,8 @@ struct Photo {
   std::vector<uint8_t> mask;    // 255: the object
   // Of the surface at each pixel, only if asked; 0 on the background.
   std::vector<float> depth_m, incidence_rad, light;
-  std::vector<Eigen::Vector3f> point_m;  // of the mesh, before effects move it: object frame of the nominal object
+  std::vector<Eigen::Vector3f>
+      point_m;  // of the mesh, before effects move it: object frame of the nominal object
 };
 
 struct PhotoOutputs {

@@ -37,7 +37,7 @@ TEST(Visibility, OfDrawnTrianglesIsThatOfRays) {
     ASSERT_TRUE(CanDrawTriangles(frame));
     Visibility cast(frame.box), drawn(frame.box);
     CastPixels(frame, &cast);
-    DrawTriangles(frame, &drawn);
+    DrawTriangles(frame, BestKernels(), &drawn);
     int hits = 0, different = 0;
     for (int y = frame.box.first_row; y < frame.box.last_row; ++y) {
       for (int x = frame.box.first_column; x < frame.box.last_column; ++x) {
@@ -65,7 +65,7 @@ TEST(Visibility, HasNoHoleInAClosedSurface) {
     const Camera camera = CameraAt({0.2 * std::cos(i), 0.2 * std::sin(i), 0.03 * i});
     const CpuFrame frame = MakeCpuFrame(*surface, mesh, camera, options);
     Visibility drawn(frame.box);
-    DrawTriangles(frame, &drawn);
+    DrawTriangles(frame, BestKernels(), &drawn);
     for (int y = frame.box.first_row; y < frame.box.last_row; ++y) {
       for (int x = frame.box.first_column; x < frame.box.last_column; ++x) {
         const Eigen::Vector3d ray = frame.view.PixelVector(x, y).normalized();

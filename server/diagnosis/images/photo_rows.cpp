@@ -38,6 +38,10 @@ bool MovesRays(const model::Effect& effect) {
          effect.stage == model::Stage::kProjection;
 }
 
+PhotoRows::PhotoRows(const Photographs& photographs, ThreadPool* pool)
+    : photographs_(photographs), pool_(pool) {}
+PhotoRows::~PhotoRows() = default;
+
 absl::StatusOr<std::unique_ptr<PhotoRows>> PhotoRows::Make(
     const Photographs& photographs, const model::Model& anchor,
     const std::vector<std::shared_ptr<const model::Effect>>& effects, const PhotoRowsOptions& options,
@@ -79,7 +83,7 @@ void PhotoRows::Number(const std::vector<Direction>& directions) {
   first_row_of_group_.assign(objects + 1, 0);
   for (size_t v = 0; v < views_.size(); ++v) {
     const int rows = static_cast<int>(views_[v]->basis.cols());
-    view_of_row_.insert(view_of_row_.end(), rows, static_cast<int>(v));
+    photograph_of_row_.insert(photograph_of_row_.end(), rows, views_[v]->k);
     first_row_.push_back(first_row_.back() + rows);
     first_row_of_group_[photographs_.object[views_[v]->k] + 1] = first_row_.back();
   }

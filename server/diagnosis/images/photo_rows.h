@@ -39,6 +39,8 @@ class PhotoRows : public inference::ObservationModel {
       const std::vector<std::shared_ptr<const model::Effect>>& effects, const PhotoRowsOptions& options,
       ThreadPool* pool);
 
+  ~PhotoRows() override;
+
   int rows() const override { return first_row_.back(); }
   const std::vector<std::string>& groups() const override { return photographs_.objects; }
   int FirstRowOfGroup(int group) const override { return first_row_of_group_[group]; }
@@ -57,14 +59,13 @@ class PhotoRows : public inference::ObservationModel {
   // Where a smooth error of the objects' albedo enters: a share h of the light of a place.
   const inference::SmoothErrorGeometry& albedo() const { return albedo_; }
   std::vector<int> GroupRows() const { return first_row_of_group_; }
-  int PhotographOfRow(int row) const { return views_[view_of_row_[row]]->k; }
+  int PhotographOfRow(int row) const { return photograph_of_row_[row]; }
   int photographs() const { return static_cast<int>(views_.size()); }
 
  private:
   struct View;
   struct Direction;
-  explicit PhotoRows(const Photographs& photographs, ThreadPool* pool)
-      : photographs_(photographs), pool_(pool) {}
+  PhotoRows(const Photographs& photographs, ThreadPool* pool);
 
   void Choose(int max_photographs);
   static std::vector<Direction> DirectionsOf(
@@ -80,7 +81,7 @@ class PhotoRows : public inference::ObservationModel {
   ThreadPool* pool_;
   CellGrid grid_;
   std::vector<std::unique_ptr<View>> views_;
-  std::vector<int> first_row_, first_row_of_group_, view_of_row_;
+  std::vector<int> first_row_, first_row_of_group_, photograph_of_row_;
   std::map<std::pair<std::string, int>, int> slope_of_;  // (effect, value) -> column of the views' slopes
   Eigen::VectorXd measured_;
   inference::SmoothErrorGeometry albedo_;

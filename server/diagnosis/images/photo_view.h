@@ -24,13 +24,15 @@ struct PhotoRows::View {
   }
 };
 
-// One value of one effect that a picture is differentiated by.
+// A way in which a picture may change.
 struct PhotoRows::Direction {
   std::shared_ptr<const model::Effect> effect;
-  int value = 0;          // of its flat values
-  double step = 0;        // SI
-  model::Model at, base;  // the anchor with the effect, moved along the direction and not
-  int instance = 0;       // of the effect in them
+  int instance = 0;        // of the effect in `base`
+  int value = -1;          // of its flat values, that alone moves; -1: several do
+  double step = 0;         // of that value, SI
+  double lower = 0, upper = 0;
+  model::Model base;       // the anchor, with the effect where it lacks it
+  model::Model moved;
 };
 
 // What is recorded on average where this photo is expected.

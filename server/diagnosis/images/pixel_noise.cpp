@@ -12,6 +12,7 @@ constexpr double kRoundingVariance = 1.0 / 12;
 constexpr double kKept = 0.8;           // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
 constexpr double kClipped = 4;          // standard deviations from black or white
+constexpr double kTrimmedEfficiency = 0.35;    // of a trimmed difference that shares pixels, as a degree of freedom
 constexpr double kMinCount = 200;       // differences that a bin needs
 
 // Of the smallest kKept of a histogram: their mean square, scaled to a normal number's variance.
@@ -100,7 +101,7 @@ PixelNoise NoiseGatherer::Estimate() const {
     variance.push_back(std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance));
     weight.push_back(count / (variance.back() * variance.back()));
   }
-  if (grey.empty()) return {std::sqrt(kRoundingVariance), 0};
+  if (grey.empty()) return {std::sqrt(kRoundingVariance), 0, 0, 0};
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
   for (size_t i = 0; i < grey.size(); ++i) {
     n += weight[i], sx += weight[i] * grey[i], sy += weight[i] * variance[i];
@@ -114,7 +115,18 @@ PixelNoise NoiseGatherer::Estimate() const {
     square = kRoundingVariance;
     gain = std::max((sxy - square * sx) / sxx, 0.0);
   }
-  return {std::sqrt(square), gain};
+  // A bin's variance is known to its share sqrt(2 / (kTrimmedEfficiency * count)).
+  const double variance_scale = 2 / kTrimmedEfficiency;
+  PixelNoise noise;
+  noise.sigma_grey = std::sqrt(square);
+  noise.gain = gain;
+  if (grey.size() > 1 && determinant > 0) {
+    noise.sigma_error = std::sqrt(variance_scale * sxx / determinant) / (2 * noise.sigma_grey);
+    noise.gain_error = std::sqrt(variance_scale * n / determinant);
+  } else {
+    noise.sigma_error = std::sqrt(variance_scale / n) / (2 * noise.sigma_grey);
+  }
+  return noise;
 }
 
 }  // namespace touchstone::diagnosis::images

@@ -8,6 +8,7 @@ namespace touchstone::diagnosis::images {
 // The scatter of single pixels: variance sigma^2 + gain * grey, rounding to 8 bits included.
 struct PixelNoise {
   double sigma_grey = 0, gain = 0;
+  double sigma_error = 0, gain_error = 0;  // standard errors, where it was estimated
 
   double Variance(double grey) const { return sigma_grey * sigma_grey + gain * grey; }
 };

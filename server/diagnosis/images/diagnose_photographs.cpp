@@ -1,0 +1,94 @@
+#include "server/diagnosis/images/diagnose_photographs.h"
+
+#include <chrono>
+#include <set>
+
+#include "server/base/status.h"
+#include "server/diagnosis/images/photo_ladder.h"
+#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/photo_search.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr int kMinPoses = 6;  // that a verdict needs
+
+double SecondsNow() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+absl::Status Enter(const DiagnosisContext& context, const char* stage, double done) {
+  if (!context.progress || context.progress(stage, done)) return absl::OkStatus();
+  return absl::CancelledError("the diagnosis was cancelled");
+}
+
+// What every answer begins with: how wrong the given model is.
+absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const DiagnosisContext& context,
+                                          Expectation* expectation) {
+  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "reading", 0));
+  TOUCHSTONE_ASSIGN_OR_RETURN(expectation->photographs, MakePhotographs(input, context.pool));
+  const Photographs& photographs = expectation->photographs;
+  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "predicting", 0.02));
+  TOUCHSTONE_ASSIGN_OR_RETURN(expectation->before,
+                              ExpectPhotographs(photographs, *input.model, true, context.pool));
+  PhotographDiagnosis diagnosis;
+  diagnosis.model_name = input.model->name;
+  diagnosis.model_hash = input.model->Hash();
+  diagnosis.images = photographs.size();
+  diagnosis.objects = photographs.objects;
+  diagnosis.noise_floor = NoiseFloorOfPhotographs(photographs, expectation->before, context.pool);
+  diagnosis.initial = QualityOfPhotographs(photographs, expectation->before, 0, context.pool);
+  const double floor = diagnosis.noise_floor.sigma_grey, rmse = diagnosis.initial->rmse_grey;
+  diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
+  if (!diagnosis.noise_floor.from_repeats)
+    diagnosis.warnings.push_back(
+        "No picture was taken twice: the noise floor is an upper bound, from what neighbouring pixels differ by. "
+        "Repeat a few pictures.");
+  return diagnosis;
+}
+
+}  // namespace
+
+absl::StatusOr<PhotographDiagnosis> ComparePhotographs(const DiagnosisInput& input,
+                                                       const DiagnosisContext& context,
+                                                       Expectation* expectation) {
+  const double began = SecondsNow();
+  Expectation own;
+  if (expectation == nullptr) expectation = &own;
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, Begin(input, context, expectation));
+  diagnosis.duration_s = SecondsNow() - began;
+  return diagnosis;
+}
+
+absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& input,
+                                                        const DiagnosisContext& context,
+                                                        Expectation* expectation) {
+  const double began = SecondsNow();
+  Expectation own;
+  if (expectation == nullptr) expectation = &own;
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, Begin(input, context, expectation));
+  if (expectation->photographs.poses < kMinPoses) {
+    diagnosis.verdict = selection::Verdict::kTooLittleData;
+    diagnosis.images_needed = kMinPoses;
+  } else {
+    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
+                                SelectPhotoExplanation(input, expectation->photographs, context));
+    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,
+                                                   expectation->before, &diagnosis, &expectation->after));
+  }
+  diagnosis.duration_s = SecondsNow() - began;
+  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "done", 1));
+  return diagnosis;
+}
+
+absl::StatusOr<PhotographDiagnosis> ProposePhotographs(const DiagnosisInput& input, int max_photographs,
+                                                       const DiagnosisContext& context,
+                                                       Expectation* expectation) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, DiagnosePhotographs(input, context, expectation));
+  diagnosis.warnings.push_back("No further photographs are proposed yet.");
+  return diagnosis;
+}
+
+}  // namespace touchstone::diagnosis::images

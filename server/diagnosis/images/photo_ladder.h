@@ -1,0 +1,21 @@
+// From a selected explanation to what is said of it: the error after each step, refits, what remains, the improved model.
+#pragma once
+
+#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/photograph_diagnosis.h"
+
+namespace touchstone::diagnosis::images {
+
+// Fills verdict, noise floor, errors, steps, refits, unexplained and the improved model of `diagnosis`; `after`: the
+// pictures that the improved model expects, empty if nothing changed.
+absl::Status DescribeExplanation(const DiagnosisInput& input, const DiagnosisContext& context,
+                                 const Photographs& photographs, const PhotoSelection& selection,
+                                 const std::vector<image::Photo>& before, PhotographDiagnosis* diagnosis,
+                                 std::vector<image::Photo>* after);
+
+// The noise of the pixels as a step or a refit of the improved model.
+void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& quality, bool* refitted,
+                   model::Model* improved, PhotographDiagnosis* diagnosis);
+
+}  // namespace touchstone::diagnosis::images

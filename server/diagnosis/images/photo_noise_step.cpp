@@ -1,0 +1,71 @@
+// The noise of the pixels, as an effect of the model.
+#include <algorithm>
+#include <cmath>
+
+#include "server/diagnosis/images/photo_ladder.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr double kRounding = 1.0 / 12;  // variance of rounding to 8 bits
+constexpr double kMinSigmaGrey = 0.15;  // less is rounding
+constexpr double kSeenErrors = 4;       // standard errors from where a difference counts
+constexpr double kSeenShare = 0.05;     // ... and of the value
+
+inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter, double value, double error) {
+  inference::ParameterEstimate estimate;
+  estimate.name = parameter.name;
+  estimate.unit = std::string(UnitSymbol(parameter.unit));
+  estimate.value = value;
+  estimate.std_error = error;
+  estimate.lower = std::max(value - 1.96 * error, parameter.lower);
+  estimate.upper = std::min(value + 1.96 * error, parameter.upper);
+  return estimate;
+}
+
+}  // namespace
+
+void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& quality, bool* refitted,
+                   model::Model* improved, PhotographDiagnosis* diagnosis) {
+  const std::shared_ptr<const model::Effect> effect = effects::FindByRole(model::EffectRole::kPixelNoise);
+  const double sigma =
+      std::sqrt(std::max(found.sigma_grey * found.sigma_grey - kRounding / std::max(channels, 1), 0.0));
+  const bool grows = found.gain > kSeenErrors * found.gain_error;
+  const double gain = grows ? found.gain : 0;
+  const double error = sigma > 0 ? found.sigma_error * found.sigma_grey / sigma : found.sigma_error;
+  std::vector<inference::ParameterEstimate> parameters = {
+      Estimate(effect->parameters[0], sigma, error), Estimate(effect->parameters[1], gain, found.gain_error)};
+  const auto own = std::find_if(improved->effects.begin(), improved->effects.end(),
+                                [&](const model::EffectInstance& instance) { return instance.effect->name == effect->name; });
+  if (own == improved->effects.end()) {
+    if (sigma < kMinSigmaGrey && gain == 0) return;
+    model::EffectInstance instance;
+    instance.effect = effect;
+    instance.values = {sigma, gain};
+    improved->effects.push_back(instance);
+    PhotographStep step;
+    step.effect = effect->name;
+    step.probability = selection::kMaxProbability;
+    step.parameters = parameters;
+    step.quality = quality;
+    step.model = *improved;
+    step.meaning = effect->meaning;
+    step.check_on_rig = effect->check_on_rig;
+    step.remedy = effect->remedy;
+    diagnosis->steps.push_back(std::move(step));
+    *refitted = true;
+    return;
+  }
+  const double at_middle = 127;
+  const double before = std::sqrt(own->values[0] * own->values[0] + own->values[1] * at_middle);
+  const double after = std::sqrt(sigma * sigma + gain * at_middle);
+  if (std::abs(after - before) < std::max(kSeenShare * before, kSeenErrors * found.sigma_error)) return;
+  parameters[0].before = own->values[0];
+  parameters[1].before = own->values[1];
+  diagnosis->refitted.push_back({effect->name, parameters});
+  own->values = {sigma, gain};
+  *refitted = true;
+}
+
+}  // namespace touchstone::diagnosis::images

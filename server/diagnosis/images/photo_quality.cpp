@@ -1,0 +1,107 @@
+#include "server/diagnosis/images/photo_quality.h"
+
+#include <boost/math/special_functions/gamma.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/normal.h"
+#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/inference/held_out.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr int kPatches = 1600;          // of a picture
+constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
+constexpr double kMinRepeatPixels = 1000;
+constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
+
+}  // namespace
+
+PixelNoise NoiseOfResiduals(const Photographs& p, const std::vector<image::Photo>& expected, ThreadPool* pool) {
+  std::vector<NoiseGatherer> gathered(p.size());
+  ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      std::vector<float> residual = p.measured_grey[k];
+      for (size_t i = 0; i < residual.size(); ++i) residual[i] -= expected[k].grey[i];
+      gathered[k].Add(residual, p.measured_grey[k], p.width(), p.height(), 1);
+    }
+  });
+  NoiseGatherer all;
+  for (const NoiseGatherer& one : gathered) all.Add(one);
+  return all.Estimate();
+}
+
+GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<image::Photo>& expected,
+                                       ThreadPool* pool) {
+  GreyNoiseFloor floor;
+  const double pixels = static_cast<double>(p.width()) * p.height();
+  std::map<int, std::vector<int>> poses;
+  for (int k = 0; k < p.size(); ++k) poses[p.pose[k]].push_back(k);
+  double squares = 0;
+  for (const auto& [pose, members] : poses) {
+    if (members.size() < 2) continue;
+    for (size_t i = 0; i < p.measured_grey[members[0]].size(); ++i) {
+      double sum = 0, sum_of_squares = 0;
+      for (const int k : members) sum += p.measured_grey[k][i], sum_of_squares += std::pow(p.measured_grey[k][i], 2);
+      squares += sum_of_squares - sum * sum / static_cast<double>(members.size());
+    }
+    floor.degrees_of_freedom += pixels * static_cast<double>(members.size() - 1);
+  }
+  floor.from_repeats = floor.degrees_of_freedom >= kMinRepeatPixels;
+  if (floor.from_repeats) {
+    floor.sigma_grey = std::sqrt(squares / floor.degrees_of_freedom);
+  } else {
+    const PixelNoise noise = NoiseOfResiduals(p, expected, pool);
+    double variance = 0;
+    for (int k = 0; k < p.size(); ++k)
+      for (const float grey : expected[k].grey) variance += Record(grey, noise).variance;
+    floor.degrees_of_freedom = kEfficiency * pixels * p.size();
+    floor.sigma_grey = std::sqrt(variance / (pixels * std::max(p.size(), 1)));
+  }
+  const double share = kNormalQuantile975 / std::sqrt(2 * floor.degrees_of_freedom);
+  floor.lower_grey = floor.sigma_grey * (1 - share);
+  floor.upper_grey = floor.sigma_grey * (1 + share);
+  return floor;
+}
+
+double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expected, int parameters,
+                    ThreadPool* pool) {
+  const CellGrid grid = GridOfPicture(p.width(), p.height(), kPatches);
+  std::vector<double> squares(p.size());
+  ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      std::vector<float> residual = p.measured_grey[k];
+      for (size_t i = 0; i < residual.size(); ++i) residual[i] -= expected[k].grey[i];
+      squares[k] =
+          CellSums(grid, residual.data(), CellWeights(grid, expected[k].grey, p.noise)).cast<double>().squaredNorm();
+    }
+  });
+  double sum = 0;
+  for (const double square : squares) sum += square;
+  const double freedom = static_cast<double>(grid.size()) * p.size() - parameters;
+  return freedom > 0 ? boost::math::gamma_q(0.5 * freedom, 0.5 * sum / kVarianceKnown) : 1;
+}
+
+GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
+                                 int parameters, ThreadPool* pool) {
+  GreyQuality quality;
+  quality.rmse_grey = quality.heldout_rmse_grey = RmseGrey(photographs, expected);
+  quality.lack_of_fit_p = PatchMisfitP(photographs, expected, parameters, pool);
+  return quality;
+}
+
+double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+                     double floor_grey) {
+  if (fit.model.size() == 0) return 0;
+  const double rows = search.rows->rows();
+  const double seen = fit.columns.values.col(0).squaredNorm();
+  const double unseen = std::max(inference::HeldOutRmse(*search.experiment, fit),
+                                 inference::HeldOutRmseByBlock(*search.experiment, fit));
+  const double pixels = static_cast<double>(photographs.width()) * photographs.height() * search.rows->photographs();
+  return std::max(rows * unseen * unseen - seen, 0.0) * floor_grey * floor_grey / pixels;
+}
+
+}  // namespace touchstone::diagnosis::images

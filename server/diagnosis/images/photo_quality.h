@@ -1,0 +1,32 @@
+// How good a model of photographs is: errors over all pixels, the floor below which none can go, lack of fit.
+#pragma once
+
+#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/photograph_diagnosis.h"
+#include "server/diagnosis/images/photographs.h"
+
+namespace touchstone::diagnosis::images {
+
+// From repeats of a pose where there are enough, else from what neighbouring pixels of the residuals differ by.
+// `expected`: of the best model.
+GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& photographs,
+                                       const std::vector<image::Photo>& expected, ThreadPool* pool);
+
+// The noise of single pixels of what `expected` leaves, rounding to 8 bits included.
+PixelNoise NoiseOfResiduals(const Photographs& photographs, const std::vector<image::Photo>& expected,
+                            ThreadPool* pool);
+
+// P of at least this misfit of patches of some pixels if nothing but noise were there; the noise's variance is taken to
+// be known to a twentieth. `parameters` were fitted.
+double PatchMisfitP(const Photographs& photographs, const std::vector<image::Photo>& expected, int parameters,
+                    ThreadPool* pool);
+
+// Error and lack of fit; the held-out error is the same error.
+GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
+                                 int parameters, ThreadPool* pool);
+
+// What pictures that a fit did not see have beyond those that it saw, as mean square grey levels.
+double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+                     double floor_grey);
+
+}  // namespace touchstone::diagnosis::images

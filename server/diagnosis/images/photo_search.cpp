@@ -1,0 +1,247 @@
+#include "server/diagnosis/images/photo_search.h"
+
+#include <boost/math/special_functions/gamma.hpp>
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/status.h"
+#include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/inference/held_out.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
+constexpr PhotoRowsOptions kFine = {12544, 1, 40};
+constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
+constexpr double kSameLikelihoodNats = 1;
+
+bool HasEffect(const model::Model& model, const model::Effect& effect) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
+    return inference::NameOf(*instance.effect) == inference::NameOf(effect);
+  });
+}
+
+// Where the last of several parameters changes nothing until the first does, further places to start from.
+void AddStarts(const selection::Candidate& candidate, int fingers, std::vector<selection::Candidate>* all) {
+  const model::Effect& effect = *candidate.effect;
+  if (MovesRays(effect) || effect.parameters.size() < 2 || effect.formula != nullptr) return;
+  const model::ParameterInfo& last = effect.parameters.back();
+  std::vector<double> tried = {last.neutral};
+  for (const double times : {-1.0, 1.0, 2.0}) {
+    const double value = std::clamp(last.neutral + times * last.typical, last.lower, last.upper);
+    if (std::find(tried.begin(), tried.end(), value) != tried.end()) continue;
+    tried.push_back(value);
+    selection::Candidate further = candidate;
+    further.starts_at = effect.NeutralValues(fingers);
+    further.starts_at.back() = value * SiFactor(last.unit);
+    all->push_back(std::move(further));
+  }
+}
+
+// Whether the values of effect `index` differ from what changes nothing, under this covariance.
+bool IsSeen(const inference::Fit& fit, int index, const Eigen::MatrixXd& covariance) {
+  std::vector<int> own;
+  for (int i = 0; i < fit.model.size(); ++i)
+    if (fit.model.parameters()[i].effect == index && covariance(i, i) > 0) own.push_back(i);
+  const int n = static_cast<int>(own.size());
+  if (n == 0) return false;
+  Eigen::VectorXd value(n);
+  Eigen::MatrixXd part(n, n);
+  for (int a = 0; a < n; ++a) {
+    value[a] = fit.point[own[a]] - fit.model.parameters()[own[a]].neutral;
+    for (int b = 0; b < n; ++b) part(a, b) = covariance(own[a], own[b]);
+  }
+  // Correlated values are scaled before they are solved for.
+  const Eigen::VectorXd scale = part.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scaled = scale.cwiseProduct(value);
+  const Eigen::MatrixXd correlation = scale.asDiagonal() * part * scale.asDiagonal();
+  const double wald = scaled.dot(correlation.ldlt().solve(scaled));
+  return wald > 0 && boost::math::gamma_q(0.5 * n, 0.5 * wald) < kStepP;
+}
+
+absl::Status FindCompetitors(PhotoSelection* selection) {
+  const selection::StepwiseSearch& search = *selection->fine.search;
+  const selection::Explanation whole{selection->fit, selection->initial_effects};
+  const inference::Fit& fit = selection->fit;
+  for (int index = selection->initial_effects; index < static_cast<int>(fit.model.base().effects.size());
+       ++index) {
+    if (index == selection->field) continue;
+    selection::SelectedStep step;
+    step.effect = index;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without, search.WithoutEffect(whole, index));
+    step.gain_nats = fit.log_evidence - without.log_evidence;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::CompetingFit> competing,
+                                search.CompetingFits(whole, index));
+    const model::Effect& own = *fit.model.base().effects[index].effect;
+    std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
+    for (const selection::CompetingFit& other : competing) {
+      const double evidence = other.fit.log_evidence - fit.log_evidence;
+      const bool same = other.name == inference::NameOf(own);
+      const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
+      const bool equivalent =
+          evidence > -search.rules().equivalent_nats ||
+          (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
+                         other.fit.model.size() <= fit.model.size()));
+      all.push_back(evidence);
+      if (same || equivalent) same_or_equivalent.push_back(evidence);
+      if (!same && other.name != kImageFieldName)
+        step.competing.push_back(
+            {other.name, other.per_object, other.object, evidence, equivalent, false, other.fit.model.base()});
+    }
+    step.probability =
+        selection::ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
+    selection->steps.push_back(std::move(step));
+  }
+  return absl::OkStatus();
+}
+
+// Steps whose values the scatter between pictures could make go.
+absl::Status DropUnsteady(PhotoSelection* selection) {
+  for (bool dropped = true; dropped;) {
+    dropped = false;
+    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
+    for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
+         index >= selection->initial_effects && !dropped; --index) {
+      if (IsSeen(selection->fit, index, selection->covariance)) continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          selection->fit,
+          inference::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+      dropped = true;
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
+                                                  const Photographs& photographs) {
+  std::vector<selection::Candidate> candidates;
+  std::vector<std::shared_ptr<const model::Effect>> effects;
+  for (const auto& effect : effects::TouchEffects())
+    if (effect->moves_surface) effects.push_back(effect);
+  for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
+  effects.push_back(ImageFieldEffect());
+  for (const auto& effect : effects) {
+    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect)) continue;
+    selection::Candidate candidate;
+    candidate.effect = effect;
+    candidates.push_back(candidate);
+    if (effect->name == kImageFieldName) continue;
+    AddStarts(candidate, input.model->fingers, &candidates);
+    if (!effect->often_per_object || photographs.objects.size() < 2) continue;
+    candidate.per_object = true;
+    candidates.push_back(candidate);
+    for (const std::string& object : photographs.objects) {
+      candidate.object = object;
+      candidate.rare = true;
+      candidates.push_back(candidate);
+    }
+  }
+  for (const auto& effect : input.also)
+    if (ShowsInPhotographs(*effect) && effect->of_photos() && !HasEffect(*input.model, *effect)) {
+      selection::Candidate candidate;
+      candidate.effect = effect;
+      candidate.of_user = true;
+      candidates.push_back(candidate);
+    }
+  return candidates;
+}
+
+absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
+                                            const std::vector<selection::Candidate>& candidates,
+                                            const PhotoRowsOptions& options, const DiagnosisContext& context) {
+  PhotoSearch made;
+  std::vector<std::shared_ptr<const model::Effect>> effects;
+  for (const selection::Candidate& candidate : candidates) effects.push_back(candidate.effect);
+  TOUCHSTONE_ASSIGN_OR_RETURN(made.rows,
+                              PhotoRows::Make(photographs, anchor, effects, options, context.pool));
+  made.likelihood = std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0,
+                                                            context.pool);
+  made.likelihood->SetLeastNoise(1);
+  made.experiment = std::make_unique<inference::Experiment>();
+  made.experiment->observations = made.rows.get();
+  made.experiment->likelihood = made.likelihood.get();
+  made.experiment->pool = context.pool;
+  made.search = std::make_unique<selection::StepwiseSearch>(*made.experiment, candidates,
+                                                            selection::SearchRules(),
+                                                            [](const std::string&) {});
+  return made;
+}
+
+Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
+  const int p = fit.model.size(), n = experiment.observations->rows();
+  if (p == 0) return fit.covariance;
+  const Eigen::VectorXd left =
+      fit.columns.values.col(0) -
+      experiment.likelihood->FieldMean(inference::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
+  std::map<int, Eigen::VectorXd> scores;
+  for (int row = 0; row < n; ++row) {
+    Eigen::VectorXd& score =
+        scores.emplace(experiment.observations->BlockOfRow(row), Eigen::VectorXd::Zero(p)).first->second;
+    score += left[row] * fit.columns.values.row(row).tail(p).transpose();
+  }
+  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(p, p);
+  for (const auto& [block, score] : scores) meat += score * score.transpose();
+  const double blocks = static_cast<double>(scores.size());
+  meat *= blocks / std::max(blocks - 1, 1.0);
+  const double variance = fit.sigma * fit.sigma;
+  Eigen::MatrixXd between = fit.covariance * meat * fit.covariance / (variance * variance);
+  // Few blocks know little of many values: of each value the larger variance, with the fit's correlations.
+  Eigen::MatrixXd covariance = fit.covariance;
+  for (int i = 0; i < p; ++i) {
+    if (!(fit.covariance(i, i) > 0)) continue;
+    const double factor = std::sqrt(std::max(between(i, i) / fit.covariance(i, i), 1.0));
+    covariance.row(i) *= factor;
+    covariance.col(i) *= factor;
+  }
+  return covariance;
+}
+
+absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
+                                                      const Photographs& photographs,
+                                                      const DiagnosisContext& context) {
+  const std::vector<selection::Candidate> candidates = PhotoCandidates(input, photographs);
+  const inference::Parameterization base(*input.model, photographs.objects);
+  const auto enter = [&](const char* stage, double done) {
+    return !context.progress || context.progress(stage, done) ? absl::OkStatus()
+                                                              : absl::CancelledError("the diagnosis was cancelled");
+  };
+  PhotoSelection selection;
+  selection.initial_effects = static_cast<int>(input.model->effects.size());
+  selection::Explanation explanation;
+  {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch coarse,
+                                MakePhotoSearch(photographs, *input.model, candidates, kCoarse, context));
+    TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
+    TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.fine, MakePhotoSearch(photographs, explanation.fit.model.base(), candidates, kFine, context));
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
+  TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
+  selection.fit = std::move(explanation.fit);
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
+  TOUCHSTONE_RETURN_IF_ERROR(DropUnsteady(&selection));
+  for (size_t e = 0; e < selection.fit.model.base().effects.size(); ++e)
+    if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
+      selection.field = static_cast<int>(e);
+  TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
+  const inference::Likelihood& likelihood = *selection.fine.likelihood;
+  const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
+  std::vector<double> with;
+  const double none = likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
+  for (int s = 1; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
+    with.push_back(likelihood.LogPrior(s) + likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
+  selection.albedo_nats = inference::LogSum(with) - none;
+  return selection;
+}
+
+}  // namespace touchstone::diagnosis::images

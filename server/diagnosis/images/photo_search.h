@@ -1,0 +1,50 @@
+// The search for what photographs lack, first in coarse cells, which see displacements of many pixels, then in fine ones.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/selection/selection.h"
+#include "server/diagnosis/selection/stepwise_search.h"
+
+namespace touchstone::diagnosis::images {
+
+// What one search works on. The parts point to one another.
+struct PhotoSearch {
+  std::unique_ptr<PhotoRows> rows;
+  std::unique_ptr<inference::Likelihood> likelihood;
+  std::unique_ptr<inference::Experiment> experiment;
+  std::unique_ptr<selection::StepwiseSearch> search;
+};
+
+// Effects of photographs, those of touches that move the surface, and the nameless image field, as far as the model
+// lacks them; and the user's own.
+std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
+                                                  const Photographs& photographs);
+
+absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
+                                            const std::vector<selection::Candidate>& candidates,
+                                            const PhotoRowsOptions& options, const DiagnosisContext& context);
+
+struct PhotoSelection {
+  PhotoSearch fine;
+  inference::Fit initial;  // the given model, in fine rows
+  inference::Fit fit;      // the explanation; the image field among its effects where it takes part
+  int initial_effects = 0;
+  int field = -1;                              // index of the image field's effect; -1: none
+  std::vector<selection::SelectedStep> steps;  // named effects
+  Eigen::MatrixXd covariance;                  // of the fit's free parameters, pictures left to differ
+  double albedo_nats = 0;                      // evidence of a smooth error of the albedo over none
+};
+
+absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
+                                                      const Photographs& photographs,
+                                                      const DiagnosisContext& context);
+
+// The covariance of the free parameters that the scatter between blocks shows, or the fit's where that is larger.
+Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit);
+
+}  // namespace touchstone::diagnosis::images

@@ -1,0 +1,286 @@
+#include "server/diagnosis/images/photo_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/inference/parameterization.h"
+#include "server/model/parameter_values.h"
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typical size
+constexpr double kLeastMovePx = 0.5, kMostMovePx = 2, kMovePx = 1;  // of contours, by a step
+constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
+constexpr int kObjectWaves = 2, kPatchPx = 12;
+constexpr double kMinPatch = 0.25;  // of a patch's pixels that see the object
+
+// Moves one flat value, of every object.
+void MoveValue(model::EffectInstance* instance, int value, double step, double lower, double upper) {
+  const auto move = [&](std::vector<double>& values) {
+    values[value] = std::clamp(values[value] + step, lower, upper);
+  };
+  move(instance->values);
+  for (auto& [object, values] : instance->object_values) move(values);
+}
+
+// The flat value's parameter.
+const model::ParameterInfo& ParameterOf(const model::Effect& effect, int fingers, int value) {
+  int next = 0;
+  for (const model::ParameterInfo& parameter : effect.parameters) {
+    next += parameter.Count(fingers);
+    if (value < next) return parameter;
+  }
+  return effect.parameters.back();
+}
+
+struct ImageChange {
+  std::vector<float> difference;
+  double MovePx(double squares_of_a_pixel) const {
+    double sum = 0;
+    for (const float value : difference) sum += static_cast<double>(value) * value;
+    return squares_of_a_pixel > 0 ? sum / squares_of_a_pixel : 0;
+  }
+};
+
+// Sum of squares by which the picture changes where it moves by a pixel: a contour's grows as the way.
+double SquaresOfAPixel(const std::vector<float>& grey, int width, int height) {
+  double sum = 0;
+  for (int y = 0; y + 1 < height; ++y)
+    for (int x = 0; x + 1 < width; ++x) {
+      const size_t at = static_cast<size_t>(y) * width + x;
+      const double right = grey[at + 1] - grey[at], down = grey[at + width] - grey[at];
+      sum += 0.5 * (right * right + down * down);
+    }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<float> RecordedGrey(const image::Photo& photo, const PixelNoise& noise) {
+  std::vector<float> grey = photo.grey;
+  for (float& value : grey) value = static_cast<float>(Record(value, noise).mean_grey);
+  return grey;
+}
+
+std::vector<PhotoRows::Direction> PhotoRows::DirectionsOf(
+    const model::Model& anchor, const std::vector<std::shared_ptr<const model::Effect>>& effects) {
+  std::vector<std::shared_ptr<const model::Effect>> all;
+  for (const model::EffectInstance& instance : anchor.effects) all.push_back(instance.effect);
+  for (const auto& effect : effects)
+    if (std::none_of(all.begin(), all.end(), [&](const auto& other) {
+          return inference::NameOf(*other) == inference::NameOf(*effect);
+        }))
+      all.push_back(effect);
+  std::vector<Direction> directions;
+  for (size_t e = 0; e < all.size(); ++e) {
+    const model::Effect& effect = *all[e];
+    if (!ShowsInPhotographs(effect) || effect.parameters.empty() || effect.name == kImageFieldName) continue;
+    Direction direction;
+    direction.effect = all[e];
+    direction.base = anchor;
+    direction.instance = static_cast<int>(e);
+    if (e >= anchor.effects.size()) {
+      direction.instance = static_cast<int>(anchor.effects.size());
+      model::EffectInstance instance;
+      instance.effect = all[e];
+      instance.values = effect.NeutralValues(anchor.fingers);
+      direction.base.effects.push_back(std::move(instance));
+    }
+    const bool rays = MovesRays(effect);
+    const int values = effect.ValueCount(anchor.fingers);
+    for (int value = 0; value < values; ++value) {
+      const model::ParameterInfo& parameter = ParameterOf(effect, anchor.fingers, value);
+      const double si = SiFactor(parameter.unit);
+      direction.value = value;
+      direction.lower = parameter.lower * si, direction.upper = parameter.upper * si;
+      direction.step = (rays ? kRayStep : kSensorStep) * parameter.typical * si;
+      const double now = direction.base.effects[direction.instance].values[value];
+      if (now + direction.step > direction.upper) direction.step = -direction.step;
+      direction.moved = direction.base;
+      MoveValue(&direction.moved.effects[direction.instance], value, direction.step, direction.lower,
+                direction.upper);
+      directions.push_back(direction);
+    }
+    // Where the last parameter changes nothing until the first does (a direction, an exponent).
+    if (rays || effect.parameters.size() < 2) continue;
+    const model::ParameterInfo &first = effect.parameters.front(), &last = effect.parameters.back();
+    for (const double times : {-1.0, 1.0, 2.0}) {
+      direction.value = -1;
+      direction.moved = direction.base;
+      model::EffectInstance& instance = direction.moved.effects[direction.instance];
+      MoveValue(&instance, 0, kSensorStep * first.typical * SiFactor(first.unit),
+                first.lower * SiFactor(first.unit), first.upper * SiFactor(first.unit));
+      MoveValue(&instance, values - 1, times * last.typical * SiFactor(last.unit),
+                last.lower * SiFactor(last.unit), last.upper * SiFactor(last.unit));
+      directions.push_back(direction);
+    }
+  }
+  return directions;
+}
+
+// The columns that a view's basis spans, gathered one after the other.
+class DirectionColumns {
+ public:
+  DirectionColumns(const CellGrid& grid, const Eigen::VectorXf& weights, int smoothing)
+      : grid_(grid), weights_(weights), smoothing_(smoothing) {}
+
+  // Returns the cells of the image before they are smoothed.
+  Eigen::VectorXf Add(const std::vector<float>& image) {
+    Eigen::VectorXf cells = CellSums(grid_, image.data(), weights_);
+    Eigen::VectorXf smooth = cells;
+    for (int pass = 0; pass < smoothing_; ++pass) smooth = Smooth(grid_, smooth);
+    columns_.push_back(std::move(smooth));
+    return cells;
+  }
+  Eigen::MatrixXf All() const {
+    Eigen::MatrixXf all(grid_.size(), columns_.size());
+    for (size_t c = 0; c < columns_.size(); ++c) all.col(static_cast<int>(c)) = columns_[c];
+    return all;
+  }
+
+ private:
+  const CellGrid& grid_;
+  const Eigen::VectorXf& weights_;
+  int smoothing_;
+  std::vector<Eigen::VectorXf> columns_;
+};
+
+namespace {
+
+// Smooth displacements of the picture: nameless optics, up to second order of the place.
+void AddDisplacements(const std::vector<float>& grey, int width, int height, DirectionColumns* columns) {
+  std::vector<float> image(grey.size());
+  for (int axis = 0; axis < 2; ++axis)
+    for (int order = 0; order < 6; ++order) {
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+          const auto at = [&](int column, int row) {
+            return grey[static_cast<size_t>(std::clamp(row, 0, height - 1)) * width +
+                        std::clamp(column, 0, width - 1)];
+          };
+          const double slope = axis == 0 ? at(x + 1, y) - at(x - 1, y) : at(x, y + 1) - at(x, y - 1);
+          const double u = 2 * (x + 0.5) / width - 1, v = 2 * (y + 0.5) / height - 1;
+          const double terms[] = {1, u, v, u * u, u * v, v * v};
+          image[static_cast<size_t>(y) * width + x] = static_cast<float>(0.5 * slope * terms[order]);
+        }
+      columns->Add(image);
+    }
+}
+
+// Smooth light over the object: nameless albedo or lamps.
+void AddObjectLight(const image::Photo& photo, DirectionColumns* columns) {
+  std::vector<float> image(photo.grey.size());
+  for (int across = 0; across <= kObjectWaves; ++across)
+    for (int down = 0; down <= kObjectWaves; ++down) {
+      for (int y = 0; y < photo.height; ++y)
+        for (int x = 0; x < photo.width; ++x) {
+          const size_t at = static_cast<size_t>(y) * photo.width + x;
+          image[at] = photo.mask[at] == 0
+                          ? 0
+                          : static_cast<float>(photo.grey[at] *
+                                               std::cos(2 * M_PI * across * (x + 0.5) / photo.width) *
+                                               std::cos(2 * M_PI * down * (y + 0.5) / photo.height));
+        }
+      columns->Add(image);
+    }
+}
+
+// Patches of the surface as the picture sees them: where a smooth error of the albedo enters the rows.
+std::vector<inference::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const image::Photo& photo,
+                                                    const Eigen::VectorXf& weights,
+                                                    const Eigen::MatrixXf& basis) {
+  const int side = std::max(kPatchPx / grid.cell, 1);  // cells
+  std::vector<inference::SmoothErrorSite> sites;
+  for (int top = 0; top < grid.rows(); top += side)
+    for (int left = 0; left < grid.columns(); left += side) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      Eigen::VectorXf row = Eigen::VectorXf::Zero(basis.cols());
+      int seen = 0;
+      for (int cy = top; cy < std::min(top + side, grid.rows()); ++cy)
+        for (int cx = left; cx < std::min(left + side, grid.columns()); ++cx) {
+          float light = 0;
+          for (int y = cy * grid.cell; y < std::min((cy + 1) * grid.cell, grid.height); ++y)
+            for (int x = cx * grid.cell; x < std::min((cx + 1) * grid.cell, grid.width); ++x) {
+              const size_t at = static_cast<size_t>(y) * grid.width + x;
+              if (photo.mask[at] == 0) continue;
+              light += photo.grey[at];
+              sum += photo.point_m[at].cast<double>();
+              ++seen;
+            }
+          const int cell = cy * grid.columns() + cx;
+          if (light > 0) row += light * weights[cell] * basis.row(cell).transpose();
+        }
+      if (seen < kMinPatch * side * side * grid.cell * grid.cell) continue;
+      inference::SmoothErrorSite site;
+      site.position_m = sum / seen;
+      for (int q = 0; q < row.size(); ++q) site.row_per_m.push_back(row[q]);
+      sites.push_back(std::move(site));
+    }
+  return sites;
+}
+
+}  // namespace
+
+absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<Direction>& directions,
+                                 const PhotoRowsOptions& options, View* view) const {
+  const image::PhotoRequest& request = photographs_.requests[view->k];
+  const int width = grid_.width, height = grid_.height;
+  image::PhotoWorkspace workspace;
+  const auto simulate = [&](const model::Model& model, bool details) {
+    image::PhotoOutputs outputs;
+    outputs.details = details;
+    return image::PhotoSimulator(std::make_shared<const model::Model>(model)).Run(request, outputs, &workspace);
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
+  photo.grey = RecordedGrey(photo, photographs_.noise);
+  view->weights = CellWeights(grid_, photo.grey, photographs_.noise);
+  const double pixel_squares = SquaresOfAPixel(photo.grey, width, height);
+  DirectionColumns columns(grid_, view->weights, options.smoothing);
+  std::vector<Eigen::VectorXf> slopes;
+  // What moves no rays first: the workspace keeps them.
+  for (const bool rays : {false, true})
+    for (const Direction& direction : directions) {
+      if (MovesRays(*direction.effect) != rays) continue;
+      ImageChange change{std::vector<float>(photo.grey.size(), 0.0f)};
+      double step = direction.step;
+      for (int tries = 0; tries < 2; ++tries) {
+        model::Model moved = direction.moved;
+        if (tries > 0) {
+          moved = direction.base;
+          MoveValue(&moved.effects[direction.instance], direction.value, step, direction.lower,
+                    direction.upper);
+        }
+        const absl::StatusOr<image::Photo> there = simulate(moved, false);
+        if (!there.ok()) break;
+        const std::vector<float> grey = RecordedGrey(*there, photographs_.noise);
+        for (size_t i = 0; i < grey.size(); ++i) change.difference[i] = grey[i] - photo.grey[i];
+        const double move_px = change.MovePx(pixel_squares);
+        if (!rays || tries > 0 || (move_px > kLeastMovePx && move_px < kMostMovePx) || move_px == 0) break;
+        step *= std::clamp(kMovePx / move_px, 0.1, 5.0);
+      }
+      const Eigen::VectorXf cells = columns.Add(change.difference);
+      if (rays) slopes.push_back(cells / static_cast<float>(step));
+    }
+  const Eigen::MatrixXf functions = ImageFieldFunctions(width, height);
+  std::vector<Eigen::VectorXf> field;
+  for (int f = 0; f < kImageFieldSize; ++f)
+    field.push_back(columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
+  AddDisplacements(photo.grey, width, height, &columns);
+  AddObjectLight(photo, &columns);
+
+  view->basis = OrthonormalSpan(columns.All(), kTolerance);
+  view->slopes.resize(view->basis.cols(), slopes.size());
+  for (size_t s = 0; s < slopes.size(); ++s)
+    view->slopes.col(static_cast<int>(s)) = (view->basis.transpose() * slopes[s]).cast<double>();
+  view->field.resize(view->basis.cols(), kImageFieldSize);
+  for (int f = 0; f < kImageFieldSize; ++f)
+    view->field.col(f) = (view->basis.transpose() * field[f]).cast<double>();
+  view->measured = view->Project(grid_, photographs_.measured_grey[view->k]);
+  view->sites = AlbedoSites(grid_, photo, view->weights, view->basis);
+  return absl::OkStatus();
+}
+
+}  // namespace touchstone::diagnosis::images
