@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""Makes image sets, has `touchstone diagnose` report on them, marks the reports, prints the table."""
+import argparse
+import concurrent.futures
+import dataclasses
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import arms as all_arms  # noqa: E402
+import judge  # noqa: E402
+import sets  # noqa: E402
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+LIMIT_S = 600
+
+
+def diagnose(program, folder, model, meshes, out):
+    """The report and the seconds; the report is None if there is none, with what the program said."""
+    report = pathlib.Path(out)
+    command = [str(program), "diagnose", str(folder), "--model", str(model), "--mesh-dir", str(meshes), "--json",
+               str(report), "--save-model", str(report.with_suffix(".better.yaml"))]
+    began = time.monotonic()
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+        said = done.stderr[-2000:]
+    except subprocess.TimeoutExpired:
+        said = f"no answer after {LIMIT_S} s"
+    seconds = time.monotonic() - began
+    if not report.exists():
+        return None, seconds, said
+    return json.loads(report.read_text()), seconds, said
+
+
+def falls_as_said(program, folder, report, meshes, out):
+    """Whether `compare` with the improved model finds the error that the report says, within 5 %."""
+    better = pathlib.Path(out).with_suffix(".better.yaml")
+    final = report.get("final", {}).get("rmse_grey")
+    if not report.get("steps") or final is None or not better.exists():
+        return True
+    found = pathlib.Path(out).with_suffix(".compared.json")
+    subprocess.run([str(program), "compare", str(folder), "--model", str(better), "--mesh-dir", str(meshes), "--json",
+                    str(found)], capture_output=True, timeout=LIMIT_S)
+    if not found.exists():
+        return False
+    rmse = json.loads(found.read_text()).get("initial", {}).get("rmse_grey", math.inf)
+    return abs(rmse / final - 1) <= 0.05
+
+
+def run_one(job):
+    arm_index, number, seeds, program, keep, common = job
+    arm = all_arms.ARMS[arm_index]
+    seed = all_arms.seed_of(arm, number, seeds)
+    with tempfile.TemporaryDirectory() as temporary:
+        base = pathlib.Path(keep or temporary)
+        base.mkdir(parents=True, exist_ok=True)
+        folder = base / f"{arm.name.replace(' ', '_').replace('_+_', '+')}-{seed}"
+        files = arm.make(seed)
+        sets.write_set(files, folder)
+        meshes, model = pathlib.Path(common) / "meshes", pathlib.Path(common) / "nominal.yaml"
+        report_file = folder.with_suffix(".report.json")
+        for old in (report_file, report_file.with_suffix(".better.yaml"), report_file.with_suffix(".compared.json")):
+            old.unlink(missing_ok=True)
+        report, seconds, said = diagnose(program, folder, model, meshes, report_file)
+        truth = dataclasses.asdict(files.truth)
+        mark = judge.judge(report, truth, seconds)
+        if report is not None and not falls_as_said(program, folder, report, meshes, report_file):
+            mark.missed_fall = True
+            mark.confidently_wrong = True
+            mark.right = mark.honest = False
+    return arm.name, arm.group, seed, truth, mark, "" if report is not None else said
+
+
+TARGETS = {  # group -> (figure, target in %, whether at most)
+    "nothing": [("false claim", 1, True)],
+    "noise": [("false claim", None, True)],
+    "weak": [("right first", 88, False), ("none added", None, False), ("confidently wrong", None, True)],
+    "realistic": [("right first", 97, False), ("none added", None, False), ("within 1.1 of the floor", None, False),
+                  ("confidently wrong", None, True)],
+    "pairs": [("right first", None, False), ("none added", None, False), ("within 1.1 of the floor", None, False),
+              ("confidently wrong", None, True)],
+    "albedo": [("right", None, False), ("confidently wrong", None, True)],
+    "unlisted": [("right", None, False), ("confidently wrong", 2, True)],
+    "blunders": [("right", None, False), ("confidently wrong", None, True)],
+}
+FIGURES = {
+    "false claim": lambda m: m.false_claim,
+    "right first": lambda m: m.right_first,
+    "none added": lambda m: m.all_found,
+    "confidently wrong": lambda m: m.confidently_wrong,
+    "within 1.1 of the floor": lambda m: m.over_floor <= judge.OVER_FLOOR,
+    "right": lambda m: m.right,
+}
+
+
+def share(hits, count):
+    low, high = judge.interval(hits, count)
+    return f"{100 * hits / count:.3g}", f"{100 * low:.3g} - {100 * high:.3g}"
+
+
+def table(results):
+    lines = ["| arm | measure | target, % | sets | diagnose, % | 95 % interval | |", "| --- | --- | --- | --- | --- | --- | --- |"]
+
+    def row(arm, figure, target, at_most, hits, count):
+        if count == 0:
+            return
+        rate, bounds = share(hits, count)
+        goal = "" if target is None else ("<= " if at_most else ">= ") + str(target)
+        passed = target is None or (100 * hits / count <= target if at_most else 100 * hits / count >= target)
+        lines.append(f"| {arm} | {figure} | {goal} | {count} | {rate} | {bounds} | "
+                     f"{'' if target is None else 'pass' if passed else '**miss**'} |")
+
+    for group, figures in TARGETS.items():
+        marks = [r[4] for r in results if r[1] == group]
+        for figure, target, at_most in figures:
+            row(group, figure, target, at_most, sum(FIGURES[figure](m) for m in marks), len(marks))
+    covered = [c for r in results for c in r[4].covered]
+    if covered:
+        rate, bounds = share(sum(covered), len(covered))
+        passed = 92 <= 100 * sum(covered) / len(covered) <= 98
+        lines.append(f"| all steps named rightly | interval covers | 92 to 98 | {len(covered)} values | {rate} | {bounds} | "
+                     f"{'pass' if passed else '**miss**'} |")
+    missed = sum(r[4].missed_fall for r in results)
+    row("all", "error found again by compare", 100, False, len(results) - missed, len(results))
+    reports = sum(r[4].report for r in results)
+    row("all", "a report", 100, False, reports, len(results))
+    seconds = sorted(r[4].seconds for r in results)
+    lines.append("")
+    lines.append(f"Seconds a diagnosis of 100 pictures, beside one other: median {np.median(seconds):.1f}, "
+                 f"90 % within {seconds[int(0.9 * (len(seconds) - 1))]:.1f}, longest {seconds[-1]:.1f} (target 20).")
+    lines += ["", "| set of arms | sets | right, % | honest, % | confidently wrong, % |", "| --- | --- | --- | --- | --- |"]
+    for name in dict.fromkeys(r[0] for r in results):
+        marks = [r[4] for r in results if r[0] == name]
+        cells = [f"{a} ({b})" for a, b in (share(sum(f(m) for m in marks), len(marks))
+                                          for f in (lambda m: m.right, lambda m: m.honest, lambda m: m.confidently_wrong))]
+        lines.append(f"| {name} | {len(marks)} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--program", default=ROOT / "build/release/bin/touchstone")
+    parser.add_argument("--seeds", choices=all_arms.SEEDS, default="tuning")
+    parser.add_argument("--share", type=float, default=1.0, help="of the sets of each arm; at least one each")
+    parser.add_argument("--arm", action="append", default=[], help="only arms whose name or group holds this; repeatable")
+    parser.add_argument("--threads", type=int, default=1, help="sets at once")
+    parser.add_argument("--keep", help="folder for sets, truths and reports; default: they are removed")
+    parser.add_argument("--results", help="append a line of JSON for each set to this file")
+    parser.add_argument("--verbose", action="store_true", help="a line for each set (tuning seeds only)")
+    options = parser.parse_args()
+    if options.verbose and options.seeds != "tuning":
+        parser.error("--verbose: single sets are looked at on tuning seeds only")
+    common = options.keep or tempfile.mkdtemp()
+    sets.write_meshes(pathlib.Path(common) / "meshes")
+    sets.write_model(pathlib.Path(common) / "nominal.yaml")
+    jobs = []
+    for index, arm in enumerate(all_arms.ARMS):
+        if options.arm and not any(text in arm.name or text == arm.group for text in options.arm):
+            continue
+        jobs += [(index, k, options.seeds, str(options.program), options.keep, common)
+                 for k in range(max(1, round(arm.sets * options.share)))]
+    results = []
+    with concurrent.futures.ProcessPoolExecutor(options.threads) as pool:
+        for result in pool.map(run_one, jobs):
+            results.append(result)
+            name, group, seed, truth, mark, said = result
+            if options.results:
+                with open(options.results, "a") as out:
+                    out.write(json.dumps({"arm": name, "group": group, "seed": seed, "truth": truth,
+                                          "mark": dataclasses.asdict(mark), "said": said}, default=str) + "\n")
+            if options.verbose:
+                print(f"{'ok   ' if mark.right else 'WRONG' if mark.confidently_wrong else 'not  '} {name} seed {seed}: "
+                      f"{truth['effects'] or truth['unlisted'] or truth['blunder']} -> {mark.verdict} {mark.claims} "
+                      f"p {mark.probability:.3f} errors {[round(float(e), 1) for e in mark.errors]} "
+                      f"floor x {mark.over_floor:.3f} {mark.seconds:.1f} s {said}", file=sys.stderr, flush=True)
+    if not options.keep:
+        shutil.rmtree(common)
+    print(table(results))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
