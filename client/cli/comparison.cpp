@@ -359,10 +359,9 @@ absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes)
 absl::Status Comparison::AddImages(v1::ImageSetFiles images) {
   const size_t bytes = images.ByteSizeLong();
   if (bytes + evidence_.ByteSizeLong() + kMaxInline > static_cast<size_t>(client::kMaxMessageBytes))
-    return absl::InvalidArgumentError(
-        absl::StrCat("SET: the pictures of ", images.origin(), " have ", bytes >> 20,
-                     " MiB, too much for one request (", client::kMaxMessageBytes >> 20,
-                     " MiB with everything); diagnose a part of them"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "SET: the pictures of ", images.origin(), " have ", bytes >> 20, " MiB, too much for one request (",
+        client::kMaxMessageBytes >> 20, " MiB with everything); diagnose a part of them"));
   *evidence_.mutable_images() = std::move(images);
   return absl::OkStatus();
 }

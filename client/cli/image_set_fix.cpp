@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -28,7 +29,8 @@ absl::Status ReadImageNumbers(const std::string& text, session::ImageSetFix* fix
     uint64_t first = 0, last = 0;
     if (ends.size() > 2 || !absl::SimpleAtoi(ends.front(), &first) || !absl::SimpleAtoi(ends.back(), &last) ||
         last < first)
-      return BadValue("--images", range, "an image's number, or the first and the last of several (12-20), was");
+      return BadValue("--images", range,
+                      "an image's number, or the first and the last of several (12-20), was");
     fix->images.emplace_back(first, last);
   }
   return absl::OkStatus();
@@ -78,15 +80,17 @@ absl::Status ReadImageFix(const ImageSetFixOptions& options, session::ImageSetFi
 void AddImageSetFixOptions(CLI::App* command, ImageSetFixOptions* options) {
   const char* const group = "Photographs";
   command
-      ->add_option("--images", options->images,
-                   "Fix these pictures alone, by their numbers; for --rotate, --mirror, --swap-channels and poses. "
-                   "Default: all")
+      ->add_option(
+          "--images", options->images,
+          "Fix these pictures alone, by their numbers; for --rotate, --mirror, --swap-channels and poses. "
+          "Default: all")
       ->type_name("A-B,...")
       ->group(group);
   command->add_option("--rotate", options->rotate_deg, "Turn the pictures clockwise by 90, 180 or 270 deg")
       ->type_name("DEG")
       ->group(group);
-  command->add_option("--mirror", options->mirror, "Mirror the pictures: left-right or up-down (after --rotate)")
+  command
+      ->add_option("--mirror", options->mirror, "Mirror the pictures: left-right or up-down (after --rotate)")
       ->type_name("HOW")
       ->group(group);
   command->add_flag("--swap-channels", options->swap_channels, "Exchange red and blue")->group(group);
@@ -99,13 +103,16 @@ void AddImageSetFixOptions(CLI::App* command, ImageSetFixOptions* options) {
       ->type_name("F")
       ->group(group);
   command->add_flag("--swap-eye-at", options->swap_eye_at, "Exchange eye and at")->group(group);
-  command->add_option("--up", options->up, "The camera's up in every picture")->type_name("X,Y,Z")->group(group);
+  command->add_option("--up", options->up, "The camera's up in every picture")
+      ->type_name("X,Y,Z")
+      ->group(group);
 }
 
 absl::Status FixImageSetFolder(const Cli& cli, const std::string& folder, const std::string& output,
                                const ImageSetFixOptions& options, session::ImageSetFix fix) {
   TOUCHSTONE_RETURN_IF_ERROR(ReadImageFix(options, &fix));
-  if (output == "-") return absl::InvalidArgumentError("-o: a folder was expected: pictures cannot go to stdout");
+  if (output == "-")
+    return absl::InvalidArgumentError("-o: a folder was expected: pictures cannot go to stdout");
   TOUCHSTONE_ASSIGN_OR_RETURN(v1::ImageSetFiles files, session::ReadImageSetFiles(folder));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet set, session::ParseImageSet(files));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::FixedImageSet fixed,
@@ -120,6 +127,14 @@ absl::Status FixImageSetFolder(const Cli& cli, const std::string& folder, const 
     TOUCHSTONE_ASSIGN_OR_RETURN(*file.mutable_png(), image::EncodePng(changed->second.data(), camera.width_px,
                                                                       camera.height_px, channels));
   }
+  // Pictures of rows that were dropped go with them.
+  auto* const kept = files.mutable_files();
+  kept->erase(std::remove_if(kept->begin(), kept->end(),
+                             [&](const v1::ImageFile& file) {
+                               return std::none_of(fixed.set.photographs.begin(), fixed.set.photographs.end(),
+                                                   [&](const auto& row) { return row.file == file.name(); });
+                             }),
+              kept->end());
   files.set_origin(output);
   // What is written is read like any other folder: a factor may have taken a number out of its range.
   const absl::StatusOr<session::ImageSet> after = session::ParseImageSet(files);
@@ -131,7 +146,8 @@ absl::Status FixImageSetFolder(const Cli& cli, const std::string& folder, const 
     std::error_code error;
     fs::copy_file(fs::path(folder) / session::kTouchesCsv, fs::path(output) / session::kTouchesCsv, error);
     if (error)
-      return absl::InternalError(absl::StrCat(output, ": touches.csv could not be copied: ", error.message()));
+      return absl::InternalError(
+          absl::StrCat(output, ": touches.csv could not be copied: ", error.message()));
     cli.Log("note: touches.csv is copied as it is");
   }
   const size_t dropped = set.size() - after->size();

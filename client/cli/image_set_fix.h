@@ -10,8 +10,9 @@ namespace touchstone::cli {
 
 // What only photographs need, as it stands on the command line.
 struct ImageSetFixOptions {
-  static constexpr const char* kNames[] = {"--images",       "--rotate",       "--mirror",      "--swap-channels",
-                                           "--scale-camera", "--focal-factor", "--swap-eye-at", "--up"};
+  static constexpr const char* kNames[] = {
+      "--images",       "--rotate",       "--mirror",      "--swap-channels",
+      "--scale-camera", "--focal-factor", "--swap-eye-at", "--up"};
   std::string images, mirror, up;
   int rotate_deg = 0;
   bool swap_channels = false, swap_eye_at = false;

@@ -115,7 +115,8 @@ absl::Status CheckFactors(const FixOptions& options) {
 absl::Status ReadAxes(const FixOptions& options, std::optional<Eigen::Matrix3d>* fixed) {
   if (options.axes.empty()) return absl::OkStatus();
   absl::StatusOr<Eigen::Matrix3d> axes = session::ParseAxes(options.axes);
-  if (!axes.ok()) return absl::InvalidArgumentError(absl::StrCat("--permute-axes: ", axes.status().message()));
+  if (!axes.ok())
+    return absl::InvalidArgumentError(absl::StrCat("--permute-axes: ", axes.status().message()));
   *fixed = *axes;
   return absl::OkStatus();
 }
@@ -144,12 +145,12 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
 // What a folder of photographs and a measurement file both may need, for a folder.
 absl::Status RunFolderFix(const Cli& cli, const CLI::App& command, const FixOptions& options) {
   // In the order of the help.
-  for (const char* option : {"--touches", "--drop-duplicates", "--swap-fingers", "--finger-order", "--scale-times",
-                             "--scale-targets", "--scale-standoff", "--scale-speed", "--reverse-approach",
-                             "--reverse-lateral", "--move-object"})
+  for (const char* option : {"--touches", "--drop-duplicates", "--swap-fingers", "--finger-order",
+                             "--scale-times", "--scale-targets", "--scale-standoff", "--scale-speed",
+                             "--reverse-approach", "--reverse-lateral", "--move-object"})
     if (command.count(option) > 0)
-      return absl::InvalidArgumentError(
-          absl::StrCat(option, ": is for measurement files, and ", options.file, " is a folder of photographs"));
+      return absl::InvalidArgumentError(absl::StrCat(option, ": is for measurement files, and ", options.file,
+                                                     " is a folder of photographs"));
   session::MeasurementFix shared;
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &shared));
   session::ImageSetFix fix;
@@ -191,22 +192,22 @@ absl::Status RunFix(const Cli& cli, const CLI::App& command, const FixOptions& o
 
 void AddSessionFix(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<FixOptions>();
-  CLI::App* command =
-      cli->AddCommand(group, "fix",
-                      "Fixes a discrete mistake of a measurement file or of a folder of photographs, as touchstone "
-                      "diagnose names it (verdict CHECK_DATA). Numbers "
-                      "that do not change keep their digits; several options are done in the order in which "
-                      "they stand below.",
-                      "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
-                      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
-                      "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
-                      "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
-                      "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
-                      "touchstone session fix set.csv --permute-axes=-y,x,z -o fixed.csv\n"
-                      "touchstone session fix set.csv --move-object cup=0,0,-20 -o fixed.csv\n"
-                      "touchstone session fix photos --mirror left-right -o fixed\n"
-                      "touchstone session fix photos --focal-factor 2 -o fixed",
-                      [cli, options, group] { return RunFix(*cli, *group->get_subcommand("fix"), *options); });
+  CLI::App* command = cli->AddCommand(
+      group, "fix",
+      "Fixes a discrete mistake of a measurement file or of a folder of photographs, as touchstone "
+      "diagnose names it (verdict CHECK_DATA). Numbers "
+      "that do not change keep their digits; several options are done in the order in which "
+      "they stand below.",
+      "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
+      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
+      "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
+      "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
+      "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
+      "touchstone session fix set.csv --permute-axes=-y,x,z -o fixed.csv\n"
+      "touchstone session fix set.csv --move-object cup=0,0,-20 -o fixed.csv\n"
+      "touchstone session fix photos --mirror left-right -o fixed\n"
+      "touchstone session fix photos --focal-factor 2 -o fixed",
+      [cli, options, group] { return RunFix(*cli, *group->get_subcommand("fix"), *options); });
   cli->AddInput(
       command,
       command->add_option("FILE", options->file, "The measurement file (CSV), or the folder of photographs")
@@ -219,10 +220,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command
-      ->add_option(
-          "--shift-rows", options->shift_rows,
-          "The times (the picture) of each row belong N rows further down (up: N below 0); rows that get none are "
-          "dropped")
+      ->add_option("--shift-rows", options->shift_rows,
+                   "The times (the picture) of each row belong N rows further down (up: N below 0); rows "
+                   "that get none are "
+                   "dropped")
       ->type_name("N");
   CLI::Option* swap =
       command->add_option("--swap-fingers", options->swap_fingers, "Exchange the times of two fingers")
@@ -244,13 +245,15 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
     command->add_option(option, *value, text)->type_name("F");
   };
   scale("--scale-times", &options->scale_times, "Multiply all times");
-  scale("--scale-lengths", &options->scale_lengths, "Multiply targets and standoffs; of photographs eye and at");
+  scale("--scale-lengths", &options->scale_lengths,
+        "Multiply targets and standoffs; of photographs eye and at");
   scale("--scale-targets", &options->scale_targets, "Multiply targets alone");
   scale("--scale-standoff", &options->scale_standoff, "Multiply standoffs alone");
   scale("--scale-speed", &options->scale_speed, "Multiply speeds");
   command
       ->add_option("--permute-axes", options->axes,
-                   "The file's axes that are the object's x, y and z, of targets and vectors; of photographs of eye, at and up")
+                   "The file's axes that are the object's x, y and z, of targets and vectors; of photographs "
+                   "of eye, at and up")
       ->type_name("-y,x,z");
   command->add_flag("--reverse-approach", options->reverse_approach, "Turn the approach vectors round");
   command->add_flag("--reverse-lateral", options->reverse_lateral, "Turn the lateral vectors round");

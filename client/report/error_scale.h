@@ -42,9 +42,9 @@ class ErrorScale {
   double Before(const v1::DataProblem& p) const { return grey_ ? p.rmse_before_grey() : p.rmse_before_us(); }
   double After(const v1::DataProblem& p) const { return grey_ ? p.rmse_after_grey() : p.rmse_after_us(); }
 
-  std::string Text(double error) const;                    // "41.0 ms", "12.3 grey"
-  std::string Signed(double error) const;                  // "+9.10 ms", "-3.20 grey"
-  std::string Change(double from, double to) const;        // "41.0 -> 5.0 ms", "12.3 -> 2.1 grey"
+  std::string Text(double error) const;              // "41.0 ms", "12.3 grey"
+  std::string Signed(double error) const;            // "+9.10 ms", "-3.20 grey"
+  std::string Change(double from, double to) const;  // "41.0 -> 5.0 ms", "12.3 -> 2.1 grey"
 
  private:
   bool grey_;

@@ -113,9 +113,8 @@ std::string WrongValues(const v1::Report& report) {
   if (names.empty() && superfluous.empty()) what += ", but the noise is not what the model says";
   const ErrorScale scale(report);
   const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
-  return absl::StrCat(what,
-                      FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "",
-                      ".");
+  return absl::StrCat(
+      what, FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "", ".");
 }
 
 std::string MissingEffects(const v1::Report& report) {
@@ -127,9 +126,10 @@ std::string MissingEffects(const v1::Report& report) {
                                 [](const v1::Step& step) { return step.effect() == "surface_map"; });
   if (maps) {
     const double unseen = report.final().heldout_rmse_us();
-    return absl::StrCat(lacks, "on unseen touches the error ",
-                        FallsAtAll(scale, from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
-                        Time(unseen), ".");
+    return absl::StrCat(
+        lacks, "on unseen touches the error ",
+        FallsAtAll(scale, from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
+        Time(unseen), ".");
   }
   if (!FallsAtAll(scale, from, to)) return absl::StrCat(lacks, "the error stays ", scale.Text(to), ".");
   const Floor floor = NoiseFloorOf(report);
@@ -148,8 +148,9 @@ std::string Headline(const v1::Report& report) {
       if (report.has_finger_scatter())
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
-      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(ErrorScale(report).Readings(report)), " ",
-                          ErrorScale(report).readings(), " can tell.");
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ",
+                          Count(ErrorScale(report).Readings(report)), " ", ErrorScale(report).readings(),
+                          " can tell.");
     case v1::Report::WRONG_VALUES:
       return WrongValues(report);
     case v1::Report::MISSING_EFFECTS:

@@ -26,7 +26,8 @@ std::string Floors(const v1::Report& report) {
   const double upper = scale.grey() ? detail.upper_grey() : detail.upper_us();
   if (lower > 0 && lower < upper)
     absl::StrAppend(&text, ", 95 % interval ", scale.Text(lower), " to ", scale.Text(upper));
-  absl::StrAppend(&text, floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same ",
+  absl::StrAppend(&text,
+                  floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same ",
                   floor.bound ? "" : scale.one_reading());
   if (detail.degrees_of_freedom() > 0) {
     absl::StrAppend(&text, ", ", Count(detail.degrees_of_freedom()), " degrees of freedom");
@@ -44,12 +45,13 @@ std::string Summary(const v1::Report& report) {
   std::string terms;
   if (data.rows() > 0) {
     terms += Term("Rows in the file",
-                  absl::StrCat(Count(data.rows()), ", of which ", Count(report.touches() > 0 ? report.touches() : report.images()),
-                               " used"));
+                  absl::StrCat(Count(data.rows()), ", of which ",
+                               Count(report.touches() > 0 ? report.touches() : report.images()), " used"));
   }
   terms += Term("Objects", absl::StrJoin(objects, ", "));
   terms += Term("Speeds", speeds.empty() ? "" : absl::StrCat(absl::StrJoin(speeds, ", "), " mm/s"));
-  terms += Term(ErrorScale(report).grey() ? "Noise floor per pixel" : "Noise floor per finger", Floors(report));
+  terms +=
+      Term(ErrorScale(report).grey() ? "Noise floor per pixel" : "Noise floor per finger", Floors(report));
   terms += Term("Mean residual of each finger", absl::StrJoin(fingers, ", "));
   if (data.missed_contacts() > 0)
     terms += Term("Fingers that reported nothing", Count(data.missed_contacts()));

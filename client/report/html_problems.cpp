@@ -19,7 +19,8 @@ std::string ErrorBars(const ErrorScale& scale, const v1::DataProblem& problem) {
   const double largest = std::max(before, after);
   const auto row = [&](const char* name, double error, const char* css_class) {
     return absl::StrCat("<tr><td class=\"name\">", name, "</td>",
-                        Cell(Bar(error / largest, css_class), "barcell"), NumberCell(scale.Text(error)), "</tr>");
+                        Cell(Bar(error / largest, css_class), "barcell"), NumberCell(scale.Text(error)),
+                        "</tr>");
   };
   return absl::StrCat(
       "<table class=\"ladder\"><caption class=\"vh\">Error of the given model on the file as it is and ",
@@ -34,7 +35,8 @@ std::string HtmlDataProblems(const v1::Report& report) {
   int number = 0;
   for (const v1::DataProblem& problem : report.data_problems()) {
     const std::string id = absl::StrCat("fix", ++number);
-    std::string body = absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(ErrorScale(report), problem));
+    std::string body =
+        absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(ErrorScale(report), problem));
     if (!problem.fix().empty())
       absl::StrAppend(&body, "<div class=\"row\"><button type=\"button\" data-copy=\"", id,
                       "\">Copy</button><span>fixes the file</span></div>\n<pre id=\"", id, "\">",

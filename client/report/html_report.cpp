@@ -20,9 +20,10 @@ std::string HtmlReport(const v1::Report& report) {
       "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
   // Where nothing of the catalogue is the answer, what is known of the rest comes before what was tried.
   const bool no_name = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
-  for (const auto part : {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions,
-                          no_name ? HtmlUnexplained : HtmlWhy, no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere,
-                          HtmlObjects, HtmlFit, HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
+  for (const auto part :
+       {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions, no_name ? HtmlUnexplained : HtmlWhy,
+        no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere, HtmlObjects, HtmlFit,
+        HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
     page += part(report);
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",

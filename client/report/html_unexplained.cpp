@@ -61,10 +61,9 @@ std::string LookupCurve(const v1::Report& report) {
   };
   const ErrorScale scale(report);
   if (rest.formula().empty() && scale.Heldout(rest) > 0)
-    add("It would leave",
-        absl::StrCat(Typeset(scale.Text(scale.Heldout(rest))), " on ", scale.readings(),
-                     " left out of the fit; it removes ",
-                     Typeset(Share(rest.heldout_gain())), " of the excess error there"));
+    add("It would leave", absl::StrCat(Typeset(scale.Text(scale.Heldout(rest))), " on ", scale.readings(),
+                                       " left out of the fit; it removes ",
+                                       Typeset(Share(rest.heldout_gain())), " of the excess error there"));
   if (!rest.nearest_formula().empty())
     add("Nearest simple formula", absl::StrCat("<code>", Escape(rest.nearest_formula()), "</code>, with ",
                                                Typeset(Share(rest.nearest_formula_share())),
@@ -117,8 +116,8 @@ std::string HtmlUnexplained(const v1::Report& report) {
     const ErrorScale scale(report);
     if (scale.Heldout(rest) > 0) {
       absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(scale.Text(scale.Heldout(rest))), " on ",
-                      scale.readings(), " left out of the fit; it removes ", Typeset(Share(rest.heldout_gain())),
-                      " of the excess error there</dd>");
+                      scale.readings(), " left out of the fit; it removes ",
+                      Typeset(Share(rest.heldout_gain())), " of the excess error there</dd>");
     }
     if (!rest.nearest_effect().empty()) {
       absl::StrAppend(&body, "<dt>Nearest effect</dt><dd>", Typeset(NearestEffectWords(rest)), "</dd>");

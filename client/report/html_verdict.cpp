@@ -64,7 +64,8 @@ std::string LadderTable(const v1::Report& report) {
   }
   std::string table = absl::StrCat(
       "<table class=\"ladder\"><caption class=\"vh\">Error of the model after each change</caption>",
-      HeaderRow({"Model", "", ">RMSE", absl::StrCat(">on unseen ", scale.readings()), ">lack-of-fit p"}), "<tbody>");
+      HeaderRow({"Model", "", ">RMSE", absl::StrCat(">on unseen ", scale.readings()), ">lack-of-fit p"}),
+      "<tbody>");
   for (size_t i = 0; i < rungs.size(); ++i) {
     const Rung& rung = rungs[i];
     const bool is_floor = rung.kind == Rung::kFloor;
@@ -79,13 +80,15 @@ std::string LadderTable(const v1::Report& report) {
   }
   return Figure(
       absl::StrCat(table, "</tbody></table>"),
-      scale.grey() ? "RMSE of the residuals (measured minus expected grey levels, of 255), per pixel. Unseen "
-                     "pictures: the same on pictures left out of the fit. Lack-of-fit p: how likely that much "
-                     "misfit beyond noise is if nothing were missing. Dashed: the noise floor."
-      : "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), per "
-      "finger. "
-      "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much misfit "
-      "beyond noise is if nothing were missing. Dashed: the noise floor.");
+      scale.grey()
+          ? "RMSE of the residuals (measured minus expected grey levels, of 255), per pixel. Unseen "
+            "pictures: the same on pictures left out of the fit. Lack-of-fit p: how likely that much "
+            "misfit beyond noise is if nothing were missing. Dashed: the noise floor."
+          : "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), per "
+            "finger. "
+            "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much "
+            "misfit "
+            "beyond noise is if nothing were missing. Dashed: the noise floor.");
 }
 
 }  // namespace

@@ -20,24 +20,24 @@ constexpr size_t kMinCurves = 4;  // shown even if the residual depends on none 
 std::string Slices(const v1::Report& report) {
   if (report.where().empty()) return "";
   const ErrorScale scale(report);
-  std::string table = absl::StrCat(
-      "<div class=\"scroll\"><table>",
-      HeaderRow({"Part of the data", scale.grey() ? ">Pictures" : ">Touches", ">Share of the excess", "", ">Mean residual", "In words"}),
-      "<tbody>");
+  std::string table = absl::StrCat("<div class=\"scroll\"><table>",
+                                   HeaderRow({"Part of the data", scale.grey() ? ">Pictures" : ">Touches",
+                                              ">Share of the excess", "", ">Mean residual", "In words"}),
+                                   "<tbody>");
   for (const v1::Slice& slice : report.where()) {
     if (scale.Readings(slice) == 0) continue;  // of a joint report's touches
-    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"), NumberCell(Count(scale.Readings(slice))),
+    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"),
+                    NumberCell(Count(scale.Readings(slice))),
                     NumberCell(Share(slice.share_of_excess_error())),
                     Cell(Bar(slice.share_of_excess_error(), "given"), "barcell narrow"),
-                    NumberCell(scale.Signed(scale.Mean(slice))), Cell(Typeset(slice.words())),
-                    "</tr>\n");
+                    NumberCell(scale.Signed(scale.Mean(slice))), Cell(Typeset(slice.words())), "</tr>\n");
   }
   return Figure(
       absl::StrCat(table, "</tbody></table></div>"),
-      absl::StrCat("Excess: the mean square error of the given model beyond the noise floor. Residuals are measured "
-                   "minus simulated: positive means that ",
-                   scale.grey() ? "the picture is brighter" : "the real contact came later",
-                   " than the model says."));
+      absl::StrCat(
+          "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured "
+          "minus simulated: positive means that ",
+          scale.grey() ? "the picture is brighter" : "the real contact came later", " than the model says."));
 }
 
 std::string Groups(const v1::Report& report) {
@@ -116,8 +116,7 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
     const double error = std::isfinite(scale.StdError(bin)) ? scale.StdError(bin) : 0;
     size = std::max({size, std::abs(scale.Mean(bin)), std::abs(scale.After(bin))});
     x.Add(bin.centre());
-    for (const double value :
-         {scale.Mean(bin) - error, scale.Mean(bin) + error, scale.After(bin)})
+    for (const double value : {scale.Mean(bin) - error, scale.Mean(bin) + error, scale.After(bin)})
       y.Add(value);
   }
   const TimeUnit unit = scale.grey() ? TimeUnit{1, "grey levels"} : UnitOfTime(size);
@@ -148,8 +147,8 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
       if (!after) chart.Whiskers(points, errors, css);
       chart.Line(points, css);
     }
-    pair += chart.Svg(absl::StrCat("Mean residual", scale.grey() ? "" : " of each finger", " against ", x_axis.title, ", ",
-                                   after ? "improved model" : "given model"));
+    pair += chart.Svg(absl::StrCat("Mean residual", scale.grey() ? "" : " of each finger", " against ",
+                                   x_axis.title, ", ", after ? "improved model" : "given model"));
   }
   const bool improved = !report.improved_model_yaml().empty();
   const bool still = improved && curve.p_after() < kDependenceP;
@@ -207,10 +206,10 @@ std::string Curves(const v1::Report& report) {
       "</div>\n", folded,
       "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
       "permutation, corrected for the number of covariates",
-      ErrorScale(report).grey()
-          ? "; pictures of one pose count as one.</p>\n"
-          : " (and of fingers, where each is tested alone). Only differences between fingers are measured, so what "
-            "one finger does shows in the others with the other sign.</p>\n");
+      ErrorScale(report).grey() ? "; pictures of one pose count as one.</p>\n"
+                                : " (and of fingers, where each is tested alone). Only differences between "
+                                  "fingers are measured, so what "
+                                  "one finger does shows in the others with the other sign.</p>\n");
 }
 
 }  // namespace

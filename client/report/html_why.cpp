@@ -64,8 +64,7 @@ std::string CandidateTable(const v1::Report& report) {
   const double initial = scale.Unseen(report.initial());
   const double floor = NoiseFloorOf(report).sigma;
   double largest = initial;
-  for (const v1::Candidate& c : report.candidates())
-    largest = std::max(largest, scale.Unseen(c));
+  for (const v1::Candidate& c : report.candidates()) largest = std::max(largest, scale.Unseen(c));
   std::string table = absl::StrCat("<div class=\"scroll\"><table class=\"why\">",
                                    HeaderRow({"Effect", ">Probability", ">It would leave", "",
                                               "Parameter \u00b1 standard error", "95 % interval"}),
@@ -104,12 +103,13 @@ std::string CandidateTable(const v1::Report& report) {
     }
     table += "</tr>\n";
   }
-  return Figure(
-             absl::StrCat(table, "</tbody></table></div>"),
-             absl::StrCat("Each effect alone, as the first to be added. It would leave: the RMSE on ", scale.readings(),
-                          " left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
-                          "zero, no effect.",
-                          Typeset(shared))) +
+  return Figure(absl::StrCat(table, "</tbody></table></div>"),
+                absl::StrCat(
+                    "Each effect alone, as the first to be added. It would leave: the RMSE on ",
+                    scale.readings(),
+                    " left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
+                    "zero, no effect.",
+                    Typeset(shared))) +
          NotFitted(report);
 }
 

@@ -138,8 +138,9 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
     std::string note =
         step.equivalent().empty() ? "" : absl::StrCat("one of ", 1 + step.equivalent_size(), ", see below");
     if (!step.shown_by().empty())
-      absl::StrAppend(&note, note.empty() ? "" : "; ", "shown by ",
-                      step.shown_by() == "both" ? "touches and pictures" : absl::StrCat(step.shown_by(), " alone"));
+      absl::StrAppend(
+          &note, note.empty() ? "" : "; ", "shown by ",
+          step.shown_by() == "both" ? "touches and pictures" : absl::StrCat(step.shown_by(), " alone"));
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(scale, before, after), note, TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
@@ -147,8 +148,7 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
       const v1::Candidate& candidate = report.candidates(c);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                Change(scale, before, scale.Unseen(candidate)),
-                candidate.note(), TextLayout::kDim, &rows);
+                Change(scale, before, scale.Unseen(candidate)), candidate.note(), TextLayout::kDim, &rows);
       ++shown;
     }
     before = after;

@@ -14,8 +14,9 @@ constexpr int kWorstPictures = 4;
 
 // "0.912", or "0.912 -> 0.985" with an improved model.
 std::string BeforeAfter(double before, double after, bool improved, int decimals) {
-  return improved && !std::isnan(after) ? absl::StrCat(Fixed(before, decimals), " -> ", Fixed(after, decimals))
-                                        : Fixed(before, decimals);
+  return improved && !std::isnan(after)
+             ? absl::StrCat(Fixed(before, decimals), " -> ", Fixed(after, decimals))
+             : Fixed(before, decimals);
 }
 
 std::string Place(const v1::Vector3& v) {
@@ -28,13 +29,14 @@ void AddSilhouettes(const v1::Report& report, TextLayout* out) {
   const v1::PhotographSummary& summary = report.photographs();
   if (!report.has_photographs() || std::isnan(summary.silhouette_iou())) return;
   const bool improved = !report.improved_model_yaml().empty();
-  std::string text = absl::StrCat(
-      "Outlines: overlap (IoU) ",
-      BeforeAfter(summary.silhouette_iou(), summary.silhouette_iou_after(), improved, 3));
+  std::string text =
+      absl::StrCat("Outlines: overlap (IoU) ",
+                   BeforeAfter(summary.silhouette_iou(), summary.silhouette_iou_after(), improved, 3));
   if (!std::isnan(summary.contour_distance_px()))
-    absl::StrAppend(&text, ", apart by ",
-                    BeforeAfter(summary.contour_distance_px(), summary.contour_distance_after_px(), improved, 2),
-                    " px (root mean square).");
+    absl::StrAppend(
+        &text, ", apart by ",
+        BeforeAfter(summary.contour_distance_px(), summary.contour_distance_after_px(), improved, 2),
+        " px (root mean square).");
   out->Paragraph(text);
 }
 
@@ -49,16 +51,14 @@ void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<TextLayout::Cell>> rows;
   for (size_t k = 0; k < std::min<size_t>(kWorstPictures, errors.size()); ++k) {
     const v1::PhotographError& error = *errors[k];
-    rows.push_back({{absl::StrCat("image ", error.image())},
-                    {error.object()},
-                    {improved ? scale.Change(error.rmse_grey(), error.rmse_after_grey())
-                              : scale.Text(error.rmse_grey()),
-                     true},
-                    {std::isnan(error.silhouette_iou())
-                         ? ""
-                         : absl::StrCat("outline IoU ", Fixed(error.silhouette_iou(), 3)),
-                     false,
-                     TextLayout::kDim}});
+    rows.push_back(
+        {{absl::StrCat("image ", error.image())},
+         {error.object()},
+         {improved ? scale.Change(error.rmse_grey(), error.rmse_after_grey()) : scale.Text(error.rmse_grey()),
+          true},
+         {std::isnan(error.silhouette_iou()) ? ""
+                                             : absl::StrCat("outline IoU ", Fixed(error.silhouette_iou(), 3)),
+          false, TextLayout::kDim}});
   }
   out->Label("Pictures");
   out->Rows(rows);
@@ -69,11 +69,11 @@ void AddNextPhotographs(const v1::Report& report, TextLayout* out) {
   out->Label("Next");
   std::vector<std::vector<TextLayout::Cell>> rows;
   for (const v1::ProposedPhotograph& next : report.next_photographs())
-    rows.push_back({{absl::StrCat("picture of ", next.object())},
-                    {absl::StrCat("from ", Place(next.camera().eye_m()), " mm at ",
-                                  Place(next.camera().at_m()), " mm")},
-                    {absl::StrCat(Number(next.separation(), 2), " sigmas"), true},
-                    {next.purpose(), false, TextLayout::kDim}});
+    rows.push_back(
+        {{absl::StrCat("picture of ", next.object())},
+         {absl::StrCat("from ", Place(next.camera().eye_m()), " mm at ", Place(next.camera().at_m()), " mm")},
+         {absl::StrCat(Number(next.separation(), 2), " sigmas"), true},
+         {next.purpose(), false, TextLayout::kDim}});
   out->Rows(rows);
 }
 

@@ -7,9 +7,9 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/report.h"
 #include "client/report/terminal_parts.h"
-#include "client/report/error_scale.h"
 
 namespace touchstone::client {
 namespace {
@@ -54,11 +54,11 @@ void AddHowWrong(const v1::Report& report, TextLayout* out) {
     out->Paragraph(absl::StrCat("Of the fingers, ", FingerScatterWords(report), "."));
   AddSilhouettes(report, out);
   if (scale.grey() && report.initial().rmse_us() > 0)
-    out->Paragraph(absl::StrCat(
-        "Of the touches: RMSE ",
-        report.final().rmse_us() > 0 ? TimeChange(report.initial().rmse_us(), report.final().rmse_us())
-                                     : Time(report.initial().rmse_us()),
-        ", noise floor ", Time(report.noise_floor_us()), "."));
+    out->Paragraph(absl::StrCat("Of the touches: RMSE ",
+                                report.final().rmse_us() > 0
+                                    ? TimeChange(report.initial().rmse_us(), report.final().rmse_us())
+                                    : Time(report.initial().rmse_us()),
+                                ", noise floor ", Time(report.noise_floor_us()), "."));
   if (report.finger_bias_us_size() > 0) {
     std::vector<std::string> fingers;
     for (int i = 0; i < report.finger_bias_us_size(); ++i) {
@@ -141,7 +141,7 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
     p |= !std::isnan(rung.lack_of_fit_p);
   }
   const bool wide = out->width() >= 96;
-  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11), 10, 40);
+  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11) - (scale.grey() ? 5 : 0), 10, 40);
   std::vector<std::vector<TextCell>> rows;
   if (wide && (heldout || p)) {
     rows.push_back({{""},

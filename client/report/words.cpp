@@ -245,8 +245,7 @@ std::vector<Rung> Ladder(const v1::Report& report) {
   }
   const Floor floor = NoiseFloorOf(report);
   if (floor.sigma > 0) {
-    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma, kUnknown,
-        kUnknown);
+    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma, kUnknown, kUnknown);
   }
   return rungs;
 }

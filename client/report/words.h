@@ -56,9 +56,9 @@ struct Rung {
   enum Kind { kGiven, kRefit, kStep, kSuggestion, kFloor };
   Kind kind;
   std::string name;
-  double rmse;          // us, or grey levels of photographs
-  double heldout_rmse;  // NaN: none
-  double lack_of_fit_p;    // NaN: none
+  double rmse;           // us, or grey levels of photographs
+  double heldout_rmse;   // NaN: none
+  double lack_of_fit_p;  // NaN: none
 };
 // The given model, what was changed, and the noise floor; empty for a set without poses.
 std::vector<Rung> Ladder(const v1::Report& report);

@@ -17,8 +17,8 @@ namespace touchstone::diagnosis {
 
 struct DiagnosisInput {
   std::shared_ptr<const model::Model> model;
-  std::shared_ptr<const session::MeasurementSet> set;    // null: photographs alone
-  std::shared_ptr<const session::ImageSet> images = {};  // null: touches alone
+  std::shared_ptr<const session::MeasurementSet> set;                        // null: photographs alone
+  std::shared_ptr<const session::ImageSet> images = {};                      // null: touches alone
   std::map<std::string, std::shared_ptr<const geometry::Surface>> surfaces;  // by the set's object names
   std::vector<std::shared_ptr<const model::Effect>>
       also;  // formulas of the user that compete with the catalogue

@@ -49,8 +49,8 @@ images::PhotographDataProblem WithErrors(const checks::PhotoMistake& mistake, co
   return problem;
 }
 
-void Describe(const DiagnosisInput& input, const DiagnosisContext& context, const images::Expectation& expectation,
-              images::PhotographDiagnosis* diagnosis) {
+void Describe(const DiagnosisInput& input, const DiagnosisContext& context,
+              const images::Expectation& expectation, images::PhotographDiagnosis* diagnosis) {
   if (context.progress) context.progress("describing what is left", 0.95);
   residuals::DescribePhotographs(expectation, input.seed, context.pool, diagnosis);
   for (std::string& warning : report::PhotographWarnings(*diagnosis, *input.images))
@@ -74,8 +74,8 @@ absl::StatusOr<v1::Report> TouchReport(const DiagnosisInput& input, const Diagno
   TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis given, diagnosis::Compare(touches, context));
   report = report::ToReport(given);
   if (improved_yaml.empty()) return report;
-  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model improved, model::ParseModel(improved_yaml, "the improved model",
-                                                                       effects::Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model improved,
+                              model::ParseModel(improved_yaml, "the improved model", effects::Catalogue()));
   touches.model = std::make_shared<const model::Model>(std::move(improved));
   TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis better, diagnosis::Compare(touches, context));
   *report.mutable_final() = report::ToReport(better).initial();
@@ -87,14 +87,14 @@ absl::StatusOr<v1::Report> Reported(const DiagnosisInput& input, const Diagnosis
   images::Expectation expectation;
   TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis, engine(&expectation));
   Describe(input, context, expectation, &diagnosis);
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report,
-                              TouchReport(input, context, diagnosis.improved_model_yaml));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, TouchReport(input, context, diagnosis.improved_model_yaml));
   report::WritePhotographs(diagnosis, *input.images, &report);
   return report;
 }
 
 // The report of blunders, if there are any: of the touches first.
-absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context) {
   if (context.progress && !context.progress("checking the data", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
   if (input.set != nullptr) {
@@ -112,8 +112,8 @@ absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input, 
                                 images::ComparePhotographs(input, context, expectation));
     diagnosis.verdict = selection::Verdict::kCheckData;
     for (const checks::PhotoMistake& mistake : mistakes)
-      diagnosis.data_problems.push_back(WithErrors(
-          mistake, input, diagnosis.initial ? diagnosis.initial->rmse_grey : NAN, context.pool));
+      diagnosis.data_problems.push_back(
+          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse_grey : NAN, context.pool));
     return diagnosis;
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, Reported(input, context, engine));
@@ -129,13 +129,15 @@ absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const Diag
 
 }  // namespace
 
-absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
+                                                const DiagnosisContext& context) {
   return Reported(input, context, [&](images::Expectation* expectation) {
     return images::ComparePhotographs(input, context, expectation);
   });
 }
 
-absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context) {
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return images::DiagnosePhotographs(input, context, expectation);
   });

@@ -16,7 +16,8 @@ absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input, con
 
 // Also why, what to add, and what the error becomes. Errors of the improved model are those that a comparison with it
 // finds.
-absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input, const DiagnosisContext& context);
+absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context);
 
 // Diagnose, with at most `max_photographs` further pictures that would tell the explanations that are left apart.
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,

@@ -20,8 +20,8 @@
 namespace touchstone::service {
 namespace {
 
-using Work =
-    std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisInput&, const diagnosis::DiagnosisContext&)>;
+using Work = std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisInput&,
+                                                      const diagnosis::DiagnosisContext&)>;
 absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diagnosis>& diagnosis) {
   if (!diagnosis.ok()) return diagnosis.status();
   return diagnosis::report::ToReport(*diagnosis);

@@ -24,8 +24,8 @@ bool IsTurned(int rotate_deg) {
 
 absl::Status CheckImageFix(const ImageSetFix& fix, const ImageSet& set) {
   if (fix.rotate_deg % 90 != 0 || fix.rotate_deg < 0 || fix.rotate_deg > 270)
-    return RefusedImages(
-        set, absl::StrCat("pictures turn by 90, 180 or 270 degrees, not by ", fix.rotate_deg));
+    return RefusedImages(set,
+                         absl::StrCat("pictures turn by 90, 180 or 270 degrees, not by ", fix.rotate_deg));
   for (const double factor : {fix.scale_camera, fix.scale_focal, fix.scale_lengths})
     if (!(factor > 0 && std::isfinite(factor)))
       return RefusedImages(set, absl::StrCat("a factor above 0 was expected, not ", ShortestNumber(factor)));
@@ -39,8 +39,8 @@ absl::Status CheckImageFix(const ImageSetFix& fix, const ImageSet& set) {
         set, absl::StrCat("has ", set.size(), " rows; they cannot be shifted by ", fix.shift_rows));
   if (!fix.images.empty()) {
     const bool whole = fix.shift_rows != 0 || !fix.rename_objects.empty() || fix.scale_camera != 1 ||
-                       fix.scale_focal != 1 || (IsTurned(fix.rotate_deg) &&
-                                                set.camera.width_px != set.camera.height_px);
+                       fix.scale_focal != 1 ||
+                       (IsTurned(fix.rotate_deg) && set.camera.width_px != set.camera.height_px);
     if (whole)
       return RefusedImages(set,
                            "rows, names and the camera (and with it a quarter turn of pictures that are not "
@@ -52,8 +52,8 @@ absl::Status CheckImageFix(const ImageSetFix& fix, const ImageSet& set) {
     });
     if (!any) return RefusedImages(set, "has none of these pictures");
   }
-  if (fix.swap_channels &&
-      std::none_of(set.photographs.begin(), set.photographs.end(), [](const auto& p) { return p.channels == 3; }))
+  if (fix.swap_channels && std::none_of(set.photographs.begin(), set.photographs.end(),
+                                        [](const auto& p) { return p.channels == 3; }))
     return RefusedImages(set, "its pictures are grey: they have no channels to exchange");
   return absl::OkStatus();
 }
@@ -162,17 +162,18 @@ absl::StatusOr<std::vector<int>> ApplyFix(const ImageSetFix& fix, ImageSet* set)
   if (fix.shift_rows != 0) left = ShiftPictures(fix.shift_rows, set);
   const int width = set->camera.width_px, height = set->camera.height_px;
   for (PhotographRow& row : set->photographs) {
-    const bool concerned = fix.images.empty() ||
-                           std::any_of(fix.images.begin(), fix.images.end(), [&](const auto& range) {
-                             return row.image >= range.first && row.image <= range.second;
-                           });
+    const bool concerned =
+        fix.images.empty() || std::any_of(fix.images.begin(), fix.images.end(), [&](const auto& range) {
+          return row.image >= range.first && row.image <= range.second;
+        });
     if (!concerned) continue;
     if (fix.changes_pixels()) FixPixels(fix, width, height, &row);
     FixPlacement(fix, &row.commanded);
     if (row.measured) FixPlacement(fix, &*row.measured);
   }
   TurnCamera(fix.rotate_deg, &set->camera);
-  for (double* length : {&set->camera.fx_px, &set->camera.fy_px}) *length *= fix.scale_camera * fix.scale_focal;
+  for (double* length : {&set->camera.fx_px, &set->camera.fy_px})
+    *length *= fix.scale_camera * fix.scale_focal;
   for (double* place : {&set->camera.cx_px, &set->camera.cy_px}) *place *= fix.scale_camera;
   RenameAndNumber(fix.rename_objects, set);
   return left;
@@ -189,7 +190,8 @@ std::string FixOptions(const ImageSetFix& fix) {
   if (fix.shift_rows != 0) options.push_back(absl::StrCat("--shift-rows=", fix.shift_rows));
   if (fix.rotate_deg != 0) options.push_back(absl::StrCat("--rotate ", fix.rotate_deg));
   if (fix.mirror != ImageSetFix::Mirror::kNone)
-    options.push_back(fix.mirror == ImageSetFix::Mirror::kLeftRight ? "--mirror left-right" : "--mirror up-down");
+    options.push_back(fix.mirror == ImageSetFix::Mirror::kLeftRight ? "--mirror left-right"
+                                                                    : "--mirror up-down");
   if (fix.swap_channels) options.push_back("--swap-channels");
   for (std::string& option : RenameOptions(fix.rename_objects)) options.push_back(std::move(option));
   const auto scale = [&](const char* option, double factor) {
@@ -201,8 +203,8 @@ std::string FixOptions(const ImageSetFix& fix) {
   if (fix.axes) options.push_back("--permute-axes=" + FormatAxes(*fix.axes));
   if (fix.swap_eye_at) options.push_back("--swap-eye-at");
   if (fix.up)
-    options.push_back(absl::StrCat("--up=", ShortestNumber(fix.up->x()), ",", ShortestNumber(fix.up->y()), ",",
-                                   ShortestNumber(fix.up->z())));
+    options.push_back(absl::StrCat("--up=", ShortestNumber(fix.up->x()), ",", ShortestNumber(fix.up->y()),
+                                   ",", ShortestNumber(fix.up->z())));
   return absl::StrJoin(options, " ");
 }
 

@@ -34,18 +34,22 @@ bool EntryOf(absl::string_view column, const CameraPlacement& placement, double*
   static constexpr absl::string_view kAxes = "xyz";
   for (size_t axis = 0; axis < kAxes.size(); ++axis) {
     const std::string letter(1, kAxes[axis]);
-    if (column == absl::StrCat("eye_", letter, "_mm")) *value = placement.eye_m[axis] * kMillimetresPerMetre;
-    else if (column == absl::StrCat("at_", letter, "_mm")) *value = placement.at_m[axis] * kMillimetresPerMetre;
-    else if (column == absl::StrCat("up_", letter)) *value = placement.up[axis];
-    else continue;
+    if (column == absl::StrCat("eye_", letter, "_mm"))
+      *value = placement.eye_m[axis] * kMillimetresPerMetre;
+    else if (column == absl::StrCat("at_", letter, "_mm"))
+      *value = placement.at_m[axis] * kMillimetresPerMetre;
+    else if (column == absl::StrCat("up_", letter))
+      *value = placement.up[axis];
+    else
+      continue;
     return true;
   }
   return false;
 }
 
 // One field of a row; unchanged where the numbers are. Twelve digits: what stands behind them is rounding.
-void FixField(const std::string& column, const ImageSet& before, const PhotographRow& was, const ImageSet& after,
-              const PhotographRow& is, std::string* field) {
+void FixField(const std::string& column, const ImageSet& before, const PhotographRow& was,
+              const ImageSet& after, const PhotographRow& is, std::string* field) {
   if (column == "file" && is.file != was.file) *field = AsField(is.file);
   if (column == "object" && after.objects[is.object] != before.objects[was.object])
     *field = AsField(after.objects[is.object]);
@@ -91,7 +95,8 @@ absl::StatusOr<FixedImageSet> FixImageSet(const ImageSet& set, absl::string_view
     const PhotographRow &was = set.photographs[left[row]], &is = fixed.set.photographs[row];
     std::vector<std::string> fields = RawFields(absl::StripTrailingAsciiWhitespace(lines[was.line - 1]));
     for (size_t i = 0; i < std::min(fields.size(), columns.all().size()); ++i)
-      FixField(std::string(absl::StripAsciiWhitespace(columns.all()[i])), set, was, fixed.set, is, &fields[i]);
+      FixField(std::string(absl::StripAsciiWhitespace(columns.all()[i])), set, was, fixed.set, is,
+               &fields[i]);
     for (size_t i = 0; i < fields.size(); ++i)
       absl::StrAppend(&fixed.images_csv, i > 0 ? "," : "", fields[i]);
     fixed.images_csv += '\n';

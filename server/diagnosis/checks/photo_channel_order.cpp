@@ -52,7 +52,8 @@ std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set) 
   }
   const double red = TintOf(tints, true), blue = TintOf(tints, false);
   // The same colour seen the other way round, not two colours.
-  if (std::isnan(red) || std::isnan(blue) || std::max(red, blue) > 1.5 * std::min(red, blue)) return std::nullopt;
+  if (std::isnan(red) || std::isnan(blue) || std::max(red, blue) > 1.5 * std::min(red, blue))
+    return std::nullopt;
   const bool red_is_wrong = reddish < bluish;
   CandidateMistake mistake;
   mistake.kind = kChannelOrder;
@@ -68,10 +69,11 @@ std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set) 
   }
   if (mistake.fix.images.size() > kMaxRanges) return std::nullopt;
   mistake.detail = absl::StrCat(std::min(reddish, bluish), " of ", set.size(), " pictures");
-  mistake.words = absl::StrCat(
-      std::min(reddish, bluish), " of the ", set.size(),
-      " pictures have red and blue the other way round than the others (RGB and BGR mixed). No error of this report "
-      "depends on it, since grey levels are the mean of the three channels; what is trained on the pictures does");
+  mistake.words = absl::StrCat(std::min(reddish, bluish), " of the ", set.size(),
+                               " pictures have red and blue the other way round than the others (RGB and BGR "
+                               "mixed). No error of this report "
+                               "depends on it, since grey levels are the mean of the three channels; what is "
+                               "trained on the pictures does");
   return mistake;
 }
 

@@ -63,10 +63,13 @@ void AddUnits(std::vector<CandidateMistake>* list) {
     double factor;
     const char *unit, *told;
   };
-  for (const Length& length : {Length{1000, "m", "x 1000"}, {25.4, "inch", "x 25.4"}, {10, "cm", "x 10"},
+  for (const Length& length : {Length{1000, "m", "x 1000"},
+                               {25.4, "inch", "x 25.4"},
+                               {10, "cm", "x 10"},
                                {0.001, "um", "x 1/1000"}}) {
-    CandidateMistake mistake = OfSet(
-        "units_length", length.told, absl::StrCat("eye and at are in ", length.unit, " where mm are expected"));
+    CandidateMistake mistake =
+        OfSet("units_length", length.told,
+              absl::StrCat("eye and at are in ", length.unit, " where mm are expected"));
     mistake.fix.scale_lengths = length.factor;
     list->push_back(mistake);
   }
@@ -87,8 +90,9 @@ void AddAxes(std::vector<CandidateMistake>* list) {
   // Of the frame: poses told in one whose up is another axis, and its kin.
   for (const char* axes : {"x,-z,y", "x,z,-y", "z,x,y", "y,z,x", "-z,y,x", "z,y,-x", "-y,x,z", "y,-x,z",
                            "-x,-y,z", "x,-y,-z", "-x,y,-z", "y,x,z", "x,y,-z", "x,z,y", "-x,y,z", "x,-y,z"}) {
-    CandidateMistake mistake = OfSet(
-        "up_axis", axes, absl::StrCat("the poses are in another frame: the object's x, y, z are their ", axes));
+    CandidateMistake mistake =
+        OfSet("up_axis", axes,
+              absl::StrCat("the poses are in another frame: the object's x, y, z are their ", axes));
     mistake.fix.axes = *session::ParseAxes(axes);
     list->push_back(mistake);
   }
@@ -102,16 +106,23 @@ void AddCamera(std::vector<CandidateMistake>* list) {
     double factor;
     const char* told;
   };
-  for (const Factor& f : {Factor{2, "2"}, {0.5, "1/2"}, {4, "4"}, {0.25, "1/4"}, {1.5, "3/2"}, {2.0 / 3, "2/3"},
-                          {3, "3"}, {1.0 / 3, "1/3"}}) {
+  for (const Factor& f : {Factor{2, "2"},
+                          {0.5, "1/2"},
+                          {4, "4"},
+                          {0.25, "1/4"},
+                          {1.5, "3/2"},
+                          {2.0 / 3, "2/3"},
+                          {3, "3"},
+                          {1.0 / 3, "1/3"}}) {
     CandidateMistake whole =
         OfSet("focal_factor", absl::StrCat("camera x ", f.told),
               absl::StrCat("camera.yaml is of pictures of another size: fx, fy, cx and cy are ", f.told,
                            " times as large"));
     whole.fix.scale_camera = f.factor;
     list->push_back(whole);
-    CandidateMistake focal = OfSet("focal_factor", absl::StrCat("focal length x ", f.told),
-                                   absl::StrCat("the focal length is ", f.told, " times that of camera.yaml"));
+    CandidateMistake focal =
+        OfSet("focal_factor", absl::StrCat("focal length x ", f.told),
+              absl::StrCat("the focal length is ", f.told, " times that of camera.yaml"));
     focal.fix.scale_focal = f.factor;
     list->push_back(focal);
   }

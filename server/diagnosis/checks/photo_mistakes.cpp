@@ -18,7 +18,7 @@ namespace {
 constexpr int kMinPictures = 6;
 constexpr int kMinOfObject = 3;         // pictures of an object that says something of its own
 constexpr double kMinLeft = 0.04;       // what must be unexplained for a mistake to be looked for
-constexpr double kMaxPhotoRatio = 0.4;       // of what is left after a fix, to what was before
+constexpr double kMaxPhotoRatio = 0.4;  // of what is left after a fix, to what was before
 constexpr double kMaxLeft = 0.3;        // what a fix leaves at most
 constexpr double kMinAgreement = 0.75;  // share of the pictures that a fix helps
 constexpr double kAlike = 1.6;          // another kind leaves this much more, or it is named beside
@@ -81,7 +81,8 @@ class MistakeSearch {
     const std::vector<TrialPicture> after = trial_.Run(mistake.fix, mistake.model.get(), -1);
     if (after.size() < kMinPictures) return;
     TriedMistake tried{mistake};
-    if (Convinces(Same(before_, after), after, mistake.max_ratio > 0 ? mistake.max_ratio : kMaxPhotoRatio, &tried))
+    if (Convinces(Same(before_, after), after, mistake.max_ratio > 0 ? mistake.max_ratio : kMaxPhotoRatio,
+                  &tried))
       convincing_.push_back(tried);
   }
 
@@ -114,9 +115,8 @@ class MistakeSearch {
       TriedMistake tried = how[name];
       tried.mistake.kind = swapped ? "object_names" : "wrong_object";
       tried.mistake.detail = absl::StrCat(name, swapped ? " <-> " : " -> ", other);
-      tried.mistake.words =
-          swapped ? absl::StrCat("the names of ", name, " and ", other, " are exchanged")
-                  : absl::StrCat("what the set calls ", name, " is ", other);
+      tried.mistake.words = swapped ? absl::StrCat("the names of ", name, " and ", other, " are exchanged")
+                                    : absl::StrCat("what the set calls ", name, " is ", other);
       if (swapped) tried.mistake.fix.rename_objects.emplace_back(other, name);
       convincing_.push_back(tried);
     }
@@ -151,13 +151,14 @@ class MistakeSearch {
     told.left_before = tried.before, told.left_after = tried.after;
     told.problem.kind = tried.mistake.kind;
     told.problem.detail = tried.mistake.detail;
-    told.problem.words = absl::StrCat(
-        first ? "It looks as if " : "These pictures cannot tell it from another mistake: ", tried.mistake.words,
-        ".");
+    told.problem.words =
+        absl::StrCat(first ? "It looks as if " : "These pictures cannot tell it from another mistake: ",
+                     tried.mistake.words, ".");
     if (tried.mistake.kind != kChannelOrder)
-      absl::StrAppend(&told.problem.words,
-                      absl::StrFormat(" Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",
-                                      100 * tried.after, 100 * tried.before));
+      absl::StrAppend(
+          &told.problem.words,
+          absl::StrFormat(" Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",
+                          100 * tried.after, 100 * tried.before));
     told.problem.fix =
         tried.mistake.fix.empty() ? tried.mistake.command : FixCommand(tried.mistake.fix, *input_.images);
     return told;

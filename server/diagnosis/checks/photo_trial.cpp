@@ -9,10 +9,10 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
-constexpr int kSide = 64;             // px that the longer side shrinks to, about
-constexpr size_t kMaxSmall = 600;     // pictures that are made smaller
-constexpr int kMaxCompared = 30;      // pictures of a trial
-constexpr double kCounts = 0.7;       // share of the pictures that counts
+constexpr int kSide = 64;          // px that the longer side shrinks to, about
+constexpr size_t kMaxSmall = 600;  // pictures that are made smaller
+constexpr int kMaxCompared = 30;   // pictures of a trial
+constexpr double kCounts = 0.7;    // share of the pictures that counts
 
 // Means of squares of shrink x shrink pixels; what does not fill one is cut off.
 session::PhotographRow Small(const session::PhotographRow& row, int width, int height, int shrink) {
@@ -97,7 +97,12 @@ image::PhotoRequest RequestOf(const session::ImageSet& set, const session::Photo
   request.camera.at_m = row.commanded.at_m;
   request.camera.up = row.commanded.up;
   const session::CameraIntrinsics& camera = set.camera;
-  request.lens = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
+  request.lens = {camera.width_px,
+                  camera.height_px,
+                  camera.fx_px,
+                  camera.fy_px,
+                  camera.cx_px,
+                  camera.cy_px,
                   {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3}};
   request.session_time_s = row.session_time_s;
   return request;
@@ -129,7 +134,8 @@ PhotoTrial::PhotoTrial(const DiagnosisInput& input, ThreadPool* pool) : input_(i
   small_.camera = set.camera;
   shrink_ = std::max(1, std::max(set.camera.width_px, set.camera.height_px) / kSide);
   small_.camera.width_px /= shrink_, small_.camera.height_px /= shrink_;
-  for (double* length : {&small_.camera.fx_px, &small_.camera.fy_px, &small_.camera.cx_px, &small_.camera.cy_px})
+  for (double* length :
+       {&small_.camera.fx_px, &small_.camera.fy_px, &small_.camera.cx_px, &small_.camera.cy_px})
     *length /= shrink_;
   for (size_t row = 0; row < std::min(set.size(), kMaxSmall); ++row)
     small_.photographs.push_back(

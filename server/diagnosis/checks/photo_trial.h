@@ -25,7 +25,8 @@ class PhotoTrial {
 
   // Of the chosen pictures, those that the fix leaves; `model` null: the given one. `only_object` >= 0: of that object
   // alone. Empty where the fixed set cannot be simulated: that mistake is out then.
-  std::vector<TrialPicture> Run(const session::ImageSetFix& fix, const model::Model* model, int only_object) const;
+  std::vector<TrialPicture> Run(const session::ImageSetFix& fix, const model::Model* model,
+                                int only_object) const;
 
   // Rows of small_set() that are compared.
   const std::vector<int>& rows() const { return rows_; }

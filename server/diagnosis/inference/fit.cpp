@@ -28,7 +28,7 @@ absl::Status DifferentiateShape(const Experiment& experiment, const Parameteriza
     moved[i] += step;
     steps.push_back(step);
   }
-  const absl::StatusOr<std::vector<double>> prediction = 
+  const absl::StatusOr<std::vector<double>> prediction =
       observations.PredictNear(model.At(moved), model.At(point), predicted);
   if (!prediction.ok()) return prediction.status();
   const Eigen::VectorXd column = observations.Change(predicted, *prediction);

@@ -208,7 +208,8 @@ Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
 double Likelihood::LogLikelihood(double q, int s) const {
   const double n = rows();
   const double found = std::max(q, 0.0) / n + floor_ * floor_, least = least_sigma_ * least_sigma_;
-  const double by_noise = found < least ? -0.5 * n * (std::log(least) + found / least - 1) : -0.5 * n * std::log(found);
+  const double by_noise =
+      found < least ? -0.5 * n * (std::log(least) + found / least - 1) : -0.5 * n * std::log(found);
   return by_noise - 0.5 * hypotheses_[s].log_determinant;
 }
 

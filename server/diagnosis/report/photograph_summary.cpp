@@ -21,9 +21,10 @@ std::string Grey(double grey) {
 std::string HowWrongInGrey(const images::PhotographDiagnosis& diagnosis) {
   const double rmse = diagnosis.initial ? diagnosis.initial->rmse_grey : 0;
   if (!(diagnosis.noise_floor.sigma_grey > 0)) return absl::StrCat("The model is off by ", Grey(rmse), ".");
-  return absl::StrFormat("The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
-                         Grey(rmse), Grey(diagnosis.noise_floor.sigma_grey),
-                         diagnosis.noise_floor.from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
+  return absl::StrFormat(
+      "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
+      Grey(rmse), Grey(diagnosis.noise_floor.sigma_grey),
+      diagnosis.noise_floor.from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
 }
 
 std::string RestInWords(const images::UnexplainedPhotographs& rest) {
@@ -38,8 +39,8 @@ std::string RestInWords(const images::UnexplainedPhotographs& rest) {
 
 void AddSteps(const images::PhotographDiagnosis& diagnosis, std::vector<std::string>* sentences) {
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
-    sentences->push_back(absl::StrCat("In the model ", refit.effect, " has another value: ",
-                                      ValuesInWords(refit.parameters), "."));
+    sentences->push_back(absl::StrCat("In the model ", refit.effect,
+                                      " has another value: ", ValuesInWords(refit.parameters), "."));
   for (const std::string& effect : diagnosis.superfluous)
     sentences->push_back(absl::StrCat("The data do without ", effect, " (`touchstone model remove MODEL ",
                                       effect, " -o NEW`)."));
@@ -50,7 +51,8 @@ void AddSteps(const images::PhotographDiagnosis& diagnosis, std::vector<std::str
     if (step.shown_by == "touches" || step.shown_by == "photographs")
       sentences->push_back(absl::StrCat("Only the ", step.shown_by, " show it."));
     if (!step.equivalent.empty())
-      sentences->push_back(absl::StrCat("These pictures cannot tell them apart. ", step.discriminating_measurement));
+      sentences->push_back(
+          absl::StrCat("These pictures cannot tell them apart. ", step.discriminating_measurement));
     if (!step.words.empty()) sentences->push_back(step.words);
   }
 }
@@ -66,8 +68,9 @@ std::string Summarize(const images::PhotographDiagnosis& diagnosis) {
       sentences.push_back("Nothing is missing that these pictures could show.");
       break;
     case selection::Verdict::kUnexplained:
-      sentences.push_back(diagnosis.unexplained ? RestInWords(*diagnosis.unexplained)
-                                                : "A structure remains that no effect of the catalogue explains.");
+      sentences.push_back(diagnosis.unexplained
+                              ? RestInWords(*diagnosis.unexplained)
+                              : "A structure remains that no effect of the catalogue explains.");
       break;
     case selection::Verdict::kMissingEffects:
     case selection::Verdict::kWrongValues:
@@ -80,8 +83,8 @@ std::string Summarize(const images::PhotographDiagnosis& diagnosis) {
             absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
       break;
     case selection::Verdict::kTooLittleData:
-      sentences.push_back(absl::StrCat("That is too little for a verdict; ", diagnosis.images_needed,
-                                       " pictures would do."));
+      sentences.push_back(
+          absl::StrCat("That is too little for a verdict; ", diagnosis.images_needed, " pictures would do."));
       break;
     case selection::Verdict::kNone:
       break;
@@ -93,24 +96,24 @@ std::vector<std::string> PhotographWarnings(const images::PhotographDiagnosis& d
                                             const session::ImageSet& set) {
   std::vector<std::string> warnings;
   if (diagnosis.images < kFewPictures)
-    warnings.push_back(absl::StrCat("Only ", diagnosis.images, diagnosis.images == 1 ? " picture" : " pictures",
+    warnings.push_back(absl::StrCat("Only ", diagnosis.images,
+                                    diagnosis.images == 1 ? " picture" : " pictures",
                                     " took part: weak effects stay unseen, and errors are rough."));
   if (set.objects.size() == 1)
     warnings.push_back(
         "One object only: what belongs to the camera and what to this object cannot be told apart well.");
-  if (!diagnosis.noise_floor.from_repeats)
-    warnings.push_back(
-        "No picture was repeated: the noise floor is an upper bound, from what neighbouring pixels differ by.");
   const auto blind = std::count_if(diagnosis.photographs.begin(), diagnosis.photographs.end(),
                                    [](const auto& error) { return std::isnan(error.silhouette_iou); });
   if (blind > 0)
-    warnings.push_back(absl::StrCat(blind, " of ", diagnosis.photographs.size(),
-                                    " pictures show no background to tell the object's outline from: they take no "
-                                    "part in the silhouettes."));
+    warnings.push_back(
+        absl::StrCat(blind, " of ", diagnosis.photographs.size(),
+                     " pictures show no background to tell the object's outline from: they take no "
+                     "part in the silhouettes."));
   const auto coloured = std::any_of(set.photographs.begin(), set.photographs.end(),
                                     [](const auto& row) { return row.channels == 3; });
   if (coloured)
-    warnings.push_back("Colour pictures are compared as the mean of their three channels: a model knows no colour.");
+    warnings.push_back(
+        "Colour pictures are compared as the mean of their three channels: a model knows no colour.");
   return warnings;
 }
 

@@ -12,7 +12,7 @@ namespace touchstone::diagnosis::report {
 // One paragraph for people: what is wrong, and what to do.
 std::string Summarize(const images::PhotographDiagnosis& diagnosis);
 
-// What limits the report: few pictures, one object, no repeats, no outline to be seen.
+// What limits the report: few pictures, one object, no outline to be seen.
 std::vector<std::string> PhotographWarnings(const images::PhotographDiagnosis& diagnosis,
                                             const session::ImageSet& set);
 

@@ -79,8 +79,8 @@ std::string WhatRemains(const selection::UnexplainedRest& rest) {
     return "A structure remains that neither an effect of the catalogue nor a simple formula explains.";
   return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
                       rest.covariates.empty() ? "something" : rest.covariates[0].name,
-                      ". A suggestion: ", rest.formula, " (", ValuesInWords(rest.parameters), ") would leave ",
-                      TimeInWords(rest.rmse_s), ".");
+                      ". A suggestion: ", rest.formula, " (", ValuesInWords(rest.parameters),
+                      ") would leave ", TimeInWords(rest.rmse_s), ".");
 }
 
 constexpr char kNoTouch[] = "No touch could be used: nothing can be said of the model.";
@@ -126,8 +126,8 @@ std::string Summarize(const Diagnosis& diagnosis) {
     if (std::string words = FloorAgainstModel(*diagnosis.noise_floor); !words.empty())
       sentences.push_back(std::move(words));
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
-    sentences.push_back(
-        absl::StrCat("In the model ", refit.effect, " has another value: ", ValuesInWords(refit.parameters), "."));
+    sentences.push_back(absl::StrCat("In the model ", refit.effect,
+                                     " has another value: ", ValuesInWords(refit.parameters), "."));
   for (const std::string& effect : diagnosis.superfluous) sentences.push_back(SuperfluousInWords(effect));
   for (const selection::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;

@@ -86,9 +86,8 @@ void MeanSilhouettes(const std::vector<DescribedPicture>& pictures, images::Phot
 std::vector<int> PicturesToShow(const std::vector<DescribedPicture>& pictures) {
   std::vector<int> order(pictures.size());
   for (size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return pictures[a].error.rmse_grey > pictures[b].error.rmse_grey;
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return pictures[a].error.rmse_grey > pictures[b].error.rmse_grey; });
   std::vector<int> shown;
   for (const bool other_object : {true, false})
     for (const int k : order) {
@@ -97,9 +96,8 @@ std::vector<int> PicturesToShow(const std::vector<DescribedPicture>& pictures) {
       });
       if (shown.size() < kWorstMaps && !known) shown.push_back(k);
     }
-  std::stable_sort(shown.begin(), shown.end(), [&](int a, int b) {
-    return pictures[a].error.rmse_grey > pictures[b].error.rmse_grey;
-  });
+  std::stable_sort(shown.begin(), shown.end(),
+                   [&](int a, int b) { return pictures[a].error.rmse_grey > pictures[b].error.rmse_grey; });
   if (order.size() > kWorstMaps) {
     const int middle = order[order.size() / 2];
     if (std::find(shown.begin(), shown.end(), middle) == shown.end()) shown.push_back(middle);

@@ -27,8 +27,7 @@ PartsOfPicture PartsOf(const image::Photo& photo) {
     object[at] = photo.mask[at] != 0;
     if (object[at]) x_sum += at % width, y_sum += at / width, ++count;
   }
-  const std::vector<float> from_outline =
-      SquaredDistances(OutlineOf(object, width, height), width, height);
+  const std::vector<float> from_outline = SquaredDistances(OutlineOf(object, width, height), width, height);
   // Where the key light stands, seen in the picture: rows run downwards.
   const double right = image::kLights[0].right, down = -image::kLights[0].up;
   PartsOfPicture parts;
@@ -64,7 +63,8 @@ std::vector<float> PixelResiduals(const images::Photographs& photographs,
 }
 
 std::vector<ResidualCovariate> ListPixelCovariates(const images::Photographs& photographs,
-                                                   const std::vector<image::Photo>& expected, ThreadPool* pool) {
+                                                   const std::vector<image::Photo>& expected,
+                                                   ThreadPool* pool) {
   auto parts = std::make_shared<std::vector<PartsOfPicture>>(photographs.size());
   ParallelFor(pool, photographs.size(), 1, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) (*parts)[k] = PartsOf(expected[k]);
@@ -74,24 +74,39 @@ std::vector<ResidualCovariate> ListPixelCovariates(const images::Photographs& ph
   const double half_diagonal = 0.5 * std::hypot(camera.width_px, camera.height_px);
   const auto on_object = [&expected](int k, int at) { return expected[k].mask[at] != 0; };
   std::vector<ResidualCovariate> all = {
-      {"radius", "radius", "", {},
+      {"radius",
+       "radius",
+       "",
+       {},
        [=](int, int at) {
          return std::hypot(at % width + 0.5 - camera.cx_px, at / width + 0.5 - camera.cy_px) / half_diagonal;
        }},
       {"column", "column", "px", {}, [=](int, int at) { return at % width + 0.5; }},
       {"row", "row", "px", {}, [=](int, int at) { return at / width + 0.5; }},
       {"grey", "expected grey", "", {}, [&expected](int k, int at) { return expected[k].grey[at]; }},
-      {"incidence_deg", "incidence", "deg", {},
+      {"incidence_deg",
+       "incidence",
+       "deg",
+       {},
        [&expected, on_object](int k, int at) {
          return on_object(k, at) ? expected[k].incidence_rad[at] / kRadiansPerDegree : NAN;
        }},
-      {"depth_mm", "depth", "mm", {},
+      {"depth_mm",
+       "depth",
+       "mm",
+       {},
        [&expected, on_object](int k, int at) {
          return on_object(k, at) ? expected[k].depth_m[at] * kMillimetresPerMetre : NAN;
        }},
-      {"part", "part", "", {"outline", "object", "ground"},
+      {"part",
+       "part",
+       "",
+       {"outline", "object", "ground"},
        [parts](int k, int at) { return (*parts)[k].part[at]; }},
-      {"light_side", "side", "", {"towards the light", "away from the light"},
+      {"light_side",
+       "side",
+       "",
+       {"towards the light", "away from the light"},
        [parts](int k, int at) {
          const int side = (*parts)[k].side[at];
          return side == 2 ? NAN : side;
@@ -99,8 +114,9 @@ std::vector<ResidualCovariate> ListPixelCovariates(const images::Photographs& ph
       {"object", "object", "", photographs.objects,
        [&photographs](int k, int) { return photographs.object[k]; }}};
   if (photographs.set->has_session_time)
-    all.push_back({"session_time_s", "session time", "s", {},
-                   [&photographs](int k, int) { return photographs.TimeOf(k); }});
+    all.push_back({"session_time_s", "session time", "s", {}, [&photographs](int k, int) {
+                     return photographs.TimeOf(k);
+                   }});
   all.erase(std::remove_if(all.begin(), all.end(),
                            [&](const auto& covariate) { return !Varies(covariate, photographs); }),
             all.end());

@@ -75,8 +75,8 @@ double SignP(const PoseBins& poses, uint64_t seed, uint64_t number) {
 }
 
 // Of any dependence on the place in the session: the pictures of one pose might as well stand in another order.
-double OrderP(const std::vector<double>& mean, const std::vector<int>& bin, const std::vector<int>& pose, int bins,
-              uint64_t seed, uint64_t number) {
+double OrderP(const std::vector<double>& mean, const std::vector<int>& bin, const std::vector<int>& pose,
+              int bins, uint64_t seed, uint64_t number) {
   // Poses of one picture have no order of their own; then pictures are exchanged at will.
   const int poses = pose.empty() ? 0 : 1 + *std::max_element(pose.begin(), pose.end());
   const bool within = static_cast<int>(mean.size()) >= 2 * poses;
@@ -112,7 +112,8 @@ double OrderP(const std::vector<double>& mean, const std::vector<int>& bin, cons
   return PermutationP(observed, permuted);
 }
 
-std::vector<PictureBins> Binned(const images::Photographs& photographs, const std::vector<image::Photo>& before,
+std::vector<PictureBins> Binned(const images::Photographs& photographs,
+                                const std::vector<image::Photo>& before,
                                 const std::vector<image::Photo>& after, const ResidualCovariate& covariate,
                                 const std::vector<double>& ends, ThreadPool* pool) {
   std::vector<PictureBins> pictures(photographs.size());
@@ -120,7 +121,8 @@ std::vector<PictureBins> Binned(const images::Photographs& photographs, const st
   ParallelFor(pool, photographs.size(), 1, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       PictureBins& bins = pictures[k];
-      for (auto* column : {&bins.count, &bins.value, &bins.before, &bins.after}) column->assign(ends.size(), 0);
+      for (auto* column : {&bins.count, &bins.value, &bins.before, &bins.after})
+        column->assign(ends.size(), 0);
       for (int at = 0; at < pixels; ++at) {
         const double value = covariate.value(k, at);
         if (std::isnan(value)) continue;
@@ -137,7 +139,8 @@ std::vector<PictureBins> Binned(const images::Photographs& photographs, const st
 
 class CurveOfPictures {
  public:
-  CurveOfPictures(const images::Photographs& photographs, const std::vector<PictureBins>& pictures, size_t bins)
+  CurveOfPictures(const images::Photographs& photographs, const std::vector<PictureBins>& pictures,
+                  size_t bins)
       : photographs_(photographs), pictures_(pictures), bins_(bins) {}
 
   void FillBins(images::PhotographCurve* curve) const {
@@ -154,7 +157,8 @@ class CurveOfPictures {
       // Scatter of the poses' sums around the mean: neighbouring pixels share what is wrong.
       std::vector<double> apart(photographs_.poses, 0);
       for (size_t k = 0; k < pictures_.size(); ++k)
-        apart[photographs_.pose[k]] += pictures_[k].before[b] - pictures_[k].count[b] * bin.mean_residual_grey;
+        apart[photographs_.pose[k]] +=
+            pictures_[k].before[b] - pictures_[k].count[b] * bin.mean_residual_grey;
       const double scatter = std::inner_product(apart.begin(), apart.end(), apart.begin(), 0.0);
       const double poses = std::max(2, photographs_.poses);
       bin.std_error_grey = std::sqrt(scatter * poses / (poses - 1)) / count;

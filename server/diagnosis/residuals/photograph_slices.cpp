@@ -43,9 +43,10 @@ class PhotographSliceFinder {
     while (slices.size() < kMaxPhotographSlices) {
       const std::vector<SliceCandidate> candidates =
           SearchSlices(bins_, cells_, search_.live, min_cells, kTriesOfSlice);
-      const auto good = std::find_if(candidates.begin(), candidates.end(), [&](const SliceCandidate& candidate) {
-        return candidate.score < kMinShareOfExcess * search_.excess || AgreesOnOtherHalf(candidate);
-      });
+      const auto good =
+          std::find_if(candidates.begin(), candidates.end(), [&](const SliceCandidate& candidate) {
+            return candidate.score < kMinShareOfExcess * search_.excess || AgreesOnOtherHalf(candidate);
+          });
       if (good == candidates.end() || good->score < kMinShareOfExcess * search_.excess) break;
       std::vector<int> live = search_.live;
       live.insert(live.end(), check_.live.begin(), check_.live.end());
@@ -98,9 +99,10 @@ class PhotographSliceFinder {
   }
 
   bool HoldsCell(const SliceCandidate& slice, int cell) const {
-    return std::all_of(slice.conditions.begin(), slice.conditions.end(), [&](const SliceCondition& condition) {
-      return condition.Holds(cells_.bin[condition.covariate][cell]);
-    });
+    return std::all_of(slice.conditions.begin(), slice.conditions.end(),
+                       [&](const SliceCondition& condition) {
+                         return condition.Holds(cells_.bin[condition.covariate][cell]);
+                       });
   }
 
   bool AgreesOnOtherHalf(const SliceCandidate& slice) const {
