@@ -13,6 +13,7 @@ PhotographDiagnosis Diagnosed(const DiagnosisInput& input) {
   ThreadPool pool(2);
   DiagnosisContext context;
   context.pool = &pool;
+  if (getenv("D_COUNT")) context.progress = [](const std::string& s, double d) { fprintf(stderr, "%s %g cpu %ld\n", s.c_str(), d, (long)(clock() / 1000)); return true; };
   const absl::StatusOr<PhotographDiagnosis> diagnosis = DiagnosePhotographs(input, context);
   EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
   if (!diagnosis.ok()) return {};

@@ -9,6 +9,8 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr double kMinStepGrey = 4;    // between neighbouring pixels, from which it is a contour
+// The mean of a clipped pixel is as good as what is known of its noise there: it counts as if it scattered so much.
+constexpr double kClippedSigmas = 15;
 constexpr double kWithinPixel = 1.0 / 12;  // variance of a place within a pixel, px^2
 
 // The largest over each pixel and its neighbours.
@@ -51,14 +53,17 @@ CellGrid GridOfPicture(int width, int height, int cells) {
   return grid;
 }
 
-Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey, const PixelNoise& noise) {
+Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey,
+                            const RecordTable& record) {
   const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height);
   Eigen::VectorXf variance = Eigen::VectorXf::Zero(grid.size());
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {
       const size_t pixel = static_cast<size_t>(y) * grid.width + x;
+      const double variance_here = record.Variance(grey[pixel]);
+      const double clipped = kClippedSigmas * kClippedSigmas * variance_here * record.Clipped(grey[pixel]);
       variance[y / grid.cell * grid.columns() + x / grid.cell] +=
-          contour[pixel] + static_cast<float>(Record(grey[pixel], noise).variance);
+          contour[pixel] + static_cast<float>(variance_here + clipped);
     }
   return variance.cwiseSqrt().cwiseInverse();
 }

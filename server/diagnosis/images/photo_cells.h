@@ -23,9 +23,9 @@ struct CellGrid {
 CellGrid GridOfPicture(int width, int height, int cells);
 
 // 1 over the standard deviation of each cell's sum: noise of the pixels, and, near contours of the expected picture,
-// what the place of a contour within a pixel is worth. [cell]
+// what the place of a contour within a pixel is worth. `expected_grey`: recorded on average. [cell]
 Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& expected_grey,
-                            const PixelNoise& noise);
+                            const RecordTable& record);
 
 // Sums over cells, times their weights. [cell]
 Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights);

@@ -13,6 +13,7 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr int kBinsOfCurve = 10, kCurveFolds = 5;
+constexpr double kMaxClipped = 0.001;  // of a pixel's records
 constexpr double kMinShare = 1e-3;  // of the pixels, that a bin holds
 constexpr const char* kNames[] = {"radius", "row", "column", "grey", "incidence_deg", "depth_mm", "session_time_s"};
 constexpr int kNamed = 7;
@@ -114,6 +115,7 @@ std::vector<PhotoCovariate> TestCovariates(const Photographs& p, const std::vect
           if (std::isnan(value)) continue;
           const int b = std::clamp(static_cast<int>((value - low) / (high - low) * kBinsOfCurve), 0, kBinsOfCurve - 1);
           const size_t at = static_cast<size_t>(y) * p.width() + x;
+          if (p.record->Clipped(expected[k].grey[at]) > kMaxClipped) continue;
           bins.sum[p.pose[k]][b] += static_cast<double>(p.measured_grey[k][at]) - expected[k].grey[at];
           bins.count[p.pose[k]][b] += 1;
         }

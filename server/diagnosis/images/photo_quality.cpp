@@ -54,10 +54,10 @@ GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<i
   if (floor.from_repeats) {
     floor.sigma_grey = std::sqrt(squares / floor.degrees_of_freedom);
   } else {
-    const PixelNoise noise = NoiseOfResiduals(p, expected, pool);
+    const RecordTable record(NoiseOfResiduals(p, expected, pool));
     double variance = 0;
     for (int k = 0; k < p.size(); ++k)
-      for (const float grey : expected[k].grey) variance += Record(grey, noise).variance;
+      for (const float grey : expected[k].grey) variance += record.Variance(grey);
     floor.degrees_of_freedom = kEfficiency * pixels * p.size();
     floor.sigma_grey = std::sqrt(variance / (pixels * std::max(p.size(), 1)));
   }
@@ -76,7 +76,7 @@ double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expec
       std::vector<float> residual = p.measured_grey[k];
       for (size_t i = 0; i < residual.size(); ++i) residual[i] -= expected[k].grey[i];
       squares[k] =
-          CellSums(grid, residual.data(), CellWeights(grid, expected[k].grey, p.noise)).cast<double>().squaredNorm();
+          CellSums(grid, residual.data(), CellWeights(grid, expected[k].grey, *p.record)).cast<double>().squaredNorm();
     }
   });
   double sum = 0;

@@ -161,7 +161,7 @@ Eigen::VectorXd PhotoRows::Expect(const image::PhotoSimulator& simulator, const 
   const absl::StatusOr<image::Photo> photo =
       simulator.Run(photographs_.requests[view.k], image::PhotoOutputs(), &view.workspace);
   if (!photo.ok()) return view.measured.array() + kFarRows;
-  return view.Project(grid_, RecordedGrey(*photo, photographs_.noise));
+  return view.Project(grid_, RecordedGrey(*photo, *photographs_.record));
 }
 
 absl::StatusOr<std::vector<double>> PhotoRows::Predict(const model::Model& model) const {

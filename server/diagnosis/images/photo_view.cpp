@@ -59,9 +59,9 @@ double SquaresOfAPixel(const std::vector<float>& grey, int width, int height) {
 
 }  // namespace
 
-std::vector<float> RecordedGrey(const image::Photo& photo, const PixelNoise& noise) {
+std::vector<float> RecordedGrey(const image::Photo& photo, const RecordTable& record) {
   std::vector<float> grey = photo.grey;
-  for (float& value : grey) value = static_cast<float>(Record(value, noise).mean_grey);
+  for (float& value : grey) value = record.Mean(value);
   return grey;
 }
 
@@ -235,8 +235,8 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
     return image::PhotoSimulator(std::make_shared<const model::Model>(model)).Run(request, outputs, &workspace);
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
-  photo.grey = RecordedGrey(photo, photographs_.noise);
-  view->weights = CellWeights(grid_, photo.grey, photographs_.noise);
+  photo.grey = RecordedGrey(photo, *photographs_.record);
+  view->weights = CellWeights(grid_, photo.grey, *photographs_.record);
   const double pixel_squares = SquaresOfAPixel(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
   std::vector<Eigen::VectorXf> slopes;
@@ -255,7 +255,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         }
         const absl::StatusOr<image::Photo> there = simulate(moved, false);
         if (!there.ok()) break;
-        const std::vector<float> grey = RecordedGrey(*there, photographs_.noise);
+        const std::vector<float> grey = RecordedGrey(*there, *photographs_.record);
         for (size_t i = 0; i < grey.size(); ++i) change.difference[i] = grey[i] - photo.grey[i];
         const double move_px = change.MovePx(pixel_squares);
         if (!rays || tries > 0 || (move_px > kLeastMovePx && move_px < kMostMovePx) || move_px == 0) break;

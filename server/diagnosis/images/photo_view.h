@@ -36,6 +36,6 @@ struct PhotoRows::Direction {
 };
 
 // What is recorded on average where this photo is expected.
-std::vector<float> RecordedGrey(const image::Photo& photo, const PixelNoise& noise);
+std::vector<float> RecordedGrey(const image::Photo& photo, const RecordTable& record);
 
 }  // namespace touchstone::diagnosis::images

@@ -126,6 +126,7 @@ absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadP
   }
   FindPosesOfPhotographs(&photographs);
   photographs.noise = NoiseOf(photographs, pool);
+  photographs.record = std::make_shared<const RecordTable>(photographs.noise);
   return photographs;
 }
 
@@ -143,7 +144,7 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
       absl::StatusOr<image::Photo> photo = simulator.Run(photographs.requests[k], outputs, &workspace);
       statuses[k] = photo.status();
       if (!photo.ok()) continue;
-      for (float& grey : photo->grey) grey = static_cast<float>(Record(grey, photographs.noise).mean_grey);
+      for (float& grey : photo->grey) grey = photographs.record->Mean(grey);
       photos[k] = *std::move(photo);
     }
   });

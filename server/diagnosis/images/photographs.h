@@ -26,6 +26,7 @@ struct Photographs {
   std::vector<std::vector<float>> measured_grey;  // [k][row * width + column]
   std::vector<image::PhotoRequest> requests;      // commanded pose, nominal lens
   PixelNoise noise;  // judged from the pictures alone: repeats of a pose, else neighbouring pixels
+  std::shared_ptr<const RecordTable> record;  // of that noise
 
   int size() const { return static_cast<int>(row.size()); }
   int width() const { return set->camera.width_px; }

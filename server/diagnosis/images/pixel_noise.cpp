@@ -8,6 +8,8 @@ namespace {
 
 constexpr double kStepGrey = 0.125;
 constexpr double kWhite = 255, kGreyLevels = 256;
+constexpr int kPerGrey = 8;  // entries of a table
+constexpr int kEntries = 255 * kPerGrey + 1;
 constexpr double kRoundingVariance = 1.0 / 12;
 constexpr double kKept = 0.8;           // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
@@ -43,7 +45,7 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
   const double variance = std::max(noise.Variance(grey), kRoundingVariance);
   const double sigma = std::sqrt(variance);
   const double low = -grey / sigma, high = (kWhite - grey) / sigma;
-  if (low < -kClipped && high > kClipped) return {grey, variance};
+  if (low < -kClipped && high > kClipped) return {grey, variance, 0};
   // x = min(max(grey + sigma z, 0), white): moments of the part between the ends, and what lies at them.
   const double inside = Tail(low) - Tail(high);
   const double first = Density(low) - Density(high);
@@ -52,7 +54,32 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
   const double mean = grey * inside + sigma * first + kWhite * at_white;
   const double square = grey * grey * inside + 2 * grey * sigma * first + variance * second +
                         kWhite * kWhite * at_white;
-  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance};
+  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance, 1 - inside};
+}
+
+RecordTable::RecordTable(const PixelNoise& noise) : noise_(noise), variance_(kEntries), clipped_(kEntries) {
+  std::vector<RecordedPixel> by_grey;
+  for (int i = 0; i < kEntries; ++i) {
+    by_grey.push_back(Record(static_cast<double>(i) / kPerGrey, noise));
+    mean_.push_back(static_cast<float>(by_grey.back().mean_grey));
+  }
+  int from = 0;
+  for (int i = 0; i < kEntries; ++i) {
+    while (from + 1 < kEntries && by_grey[from + 1].mean_grey <= static_cast<double>(i) / kPerGrey) ++from;
+    variance_[i] = static_cast<float>(by_grey[from].variance);
+    clipped_[i] = static_cast<float>(by_grey[from].clipped);
+  }
+}
+
+float RecordTable::Mean(float grey) const {
+  const float place = std::clamp(grey, 0.0f, static_cast<float>(kWhite)) * kPerGrey;
+  const int below = std::min(static_cast<int>(place), kEntries - 2);
+  return mean_[below] + (place - static_cast<float>(below)) * (mean_[below + 1] - mean_[below]);
+}
+
+double RecordTable::At(const std::vector<float>& values, double mean) const {
+  const int entry = static_cast<int>(mean * kPerGrey + 0.5);
+  return values[std::clamp(entry, 0, kEntries - 1)];
 }
 
 void NoiseGatherer::Add(const std::vector<float>& image, const std::vector<float>& grey, int width,

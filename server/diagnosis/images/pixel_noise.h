@@ -16,8 +16,25 @@ struct PixelNoise {
 // What a clipped 8-bit pixel of this grey level records: its mean and variance.
 struct RecordedPixel {
   double mean_grey = 0, variance = 0;
+  double clipped = 0;  // share of its records
 };
 RecordedPixel Record(double grey, const PixelNoise& noise);
+
+// The same from a table, for many pixels.
+class RecordTable {
+ public:
+  explicit RecordTable(const PixelNoise& noise);
+  float Mean(float grey) const;
+  // Of a pixel that records `mean` on average.
+  double Variance(double mean) const { return At(variance_, mean); }
+  double Clipped(double mean) const { return At(clipped_, mean); }
+
+ private:
+  double At(const std::vector<float>& values, double mean) const;
+  PixelNoise noise_;
+  std::vector<float> mean_;                // by grey level
+  std::vector<float> variance_, clipped_;  // by what is recorded on average
+};
 
 // Gathers second differences of images along their rows, by grey level.
 class NoiseGatherer {
