@@ -23,6 +23,8 @@ struct CaptureOptions {
   std::string plan;
   std::string eye_mm, at_mm, up = "0,0,1";
   std::string output;
+  std::string model;
+  uint64_t seed = 0;
 };
 
 absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std::string& text) {
@@ -119,6 +121,9 @@ absl::Status RunCapture(const Cli& cli, const CaptureOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string encoding, EncodingOf(options.output));
   TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_image(), MakeImageSpec(cli, options.image, encoding));
   TOUCHSTONE_RETURN_IF_ERROR(AddViews(options, &request));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
+  if (!options.model.empty()) *request.mutable_model() = model;
+  request.set_seed(options.seed);
   const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
   if (IsStandardOutput(options.output)) {
     if (views.size() != 1 || request.image().depth() || request.image().mask())
@@ -143,6 +148,7 @@ absl::Status RunCapture(const Cli& cli, const CaptureOptions& options) {
   for (int i = 0; i < views.size(); ++i) {
     request.clear_views();
     *request.add_views() = views[i];
+    request.set_first_index(i);
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CaptureResponse response, source->Capture(request));
     for (const v1::Column& column : response.columns()) {
       TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(column, response.rows()));
@@ -169,6 +175,7 @@ void AddCapture(Cli* cli) {
       "touchstone capture lat20 --eye-mm 300,200,150 --image 640x480 --format rgb -o view.jpg\n"
       "touchstone capture lat20 --eye-mm 300,0,80 --depth --mask -o side.png    also side.depth_mm.npy, "
       "side.mask.png\n"
+      "touchstone capture lat20 --eye-mm 300,0,80 --model lens.yaml --seed 7 -o seen.png\n"
       "touchstone capture lat20 --plan plan.csv -o views/touch.png              views/touch-0000.png, ...",
       [cli, options] { return RunCapture(*cli, *options); });
   command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
@@ -187,6 +194,13 @@ void AddCapture(Cli* cli) {
                 command->add_option("--plan", options->plan, "The cameras of the touches of a CSV file")
                     ->type_name("FILE")
                     ->group("Camera"));
+  cli->AddInput(command,
+                command
+                    ->add_option("--model", options->model,
+                                 "Model file, name or hash, whose effects of photographs act (shaded "
+                                 "style, virtual sources). Default: the source's own")
+                    ->type_name("MODEL"));
+  command->add_option("--seed", options->seed, "Seed of the pixels' noise. Default: 0")->type_name("N");
   AddTouchOptions(command, &options->touch);
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);

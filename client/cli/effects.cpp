@@ -3,6 +3,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/formula.h"
+#include "server/effects/pixel_variables.h"
 
 namespace touchstone::cli {
 namespace {
@@ -92,24 +93,32 @@ std::string FormulaHelp() {
     variables.Add({variable.name, variable.unit[0] == '\0' ? "-" : variable.unit,
                    model::StageName(variable.since), variable.meaning});
   variables.Add({"cov_NAME", "-", "pose", "the column cov_NAME of the measurements"});
+  Table pixel_variables({"VARIABLE", "UNIT", "MEANING"});
+  for (const effects::PixelVariable& variable : effects::PixelVariables())
+    pixel_variables.Add({variable.name, variable.unit[0] == '\0' ? "-" : variable.unit, variable.meaning});
   Table functions({"FUNCTION", "MEANING"});
   for (const effects::FormulaWord& word : effects::FormulaFunctions())
     functions.Add({word.usage, word.meaning});
   for (const effects::FormulaWord& word : effects::FormulaConstants())
     functions.Add({word.usage, word.meaning});
   return absl::StrCat(
-      "\nIn an expression:\n\n", variables.Text(), "\n", functions.Text(),
+      "\nIn an expression:\n\n", variables.Text(),
+      "\nIn one that adds grey to each pixel of a photograph:\n\n", pixel_variables.Text(), "\n",
+      functions.Text(),
       "\nAn expression for travel_mm may use what its stage and earlier ones know.\n"
       "For instance:\n"
       "  touchstone model add nominal formula name=lead_screw adds=travel_mm \\\n"
-      "    'expression=k * sin(2*pi*travel_mm/lead)' k=0.1 k_unit=mm lead=4 lead_unit=mm -o screw.yaml\n");
+      "    'expression=k * sin(2*pi*travel_mm/lead)' k=0.1 k_unit=mm lead=4 lead_unit=mm -o screw.yaml\n"
+      "  touchstone model add nominal formula name=glare adds=grey 'expression=k*radius^2' k=4 k_unit=grey "
+      "\\\n"
+      "    k_min=-20 k_max=20 -o glare.yaml\n");
 }
 
 constexpr char kLookupHelp[] =
     "\nA model file has it as\n\n"
     "  - lookup:\n"
     "      name: warm_up\n"
-    "      adds: time_us                  # or travel_mm\n"
+    "      adds: time_us                  # or travel_mm; grey for photographs\n"
     "      covariate: session_time_s      # any variable of `touchstone effects formula`, or a cov_* column\n"
     "      knots: [0, 300, 900]           # rising, in the covariate's unit\n"
     "      values: {l: [0, 2100, 4000], m: [0, 0, 0], r: [0, -2100, -4000]}   # or one list for every "
@@ -140,13 +149,20 @@ Json FormulaJson() {
                          {"unit", variable.unit},
                          {"since_stage", model::StageName(variable.since)},
                          {"meaning", variable.meaning}});
+  Json pixel_variables = Json::array();
+  for (const effects::PixelVariable& variable : effects::PixelVariables())
+    pixel_variables.push_back(
+        {{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}});
   Json functions = Json::array();
   for (const effects::FormulaWord& word : effects::FormulaFunctions())
     functions.push_back({{"name", word.name}, {"usage", word.usage}, {"meaning", word.meaning}});
   Json constants = Json::array();
   for (const effects::FormulaWord& word : effects::FormulaConstants())
     constants.push_back({{"name", word.name}, {"meaning", word.meaning}});
-  return {{"variables", variables}, {"functions", functions}, {"constants", constants}};
+  return {{"variables", variables},
+          {"pixel_variables", pixel_variables},
+          {"functions", functions},
+          {"constants", constants}};
 }
 
 absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
@@ -168,10 +184,12 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
                  WithUnit(p.default_value(), p.unit()), WithUnit(p.typical(), p.unit()), p.meaning()});
     absl::StrAppend(&text, "\n", table.Text());
     const v1::Parameter& first = effect.parameters(0);
-    const std::string value = first.arity() == v1::PARAMETER_ARITY_SCALAR ? ShortestNumber(first.typical())
-                              : first.sum_zero() ? absl::StrCat(ShortestNumber(first.typical()), ",0,",
-                                                                ShortestNumber(-first.typical()))
-                                                 : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
+    const std::string value =
+        first.arity() == v1::PARAMETER_ARITY_SCALAR    ? ShortestNumber(first.typical())
+        : first.arity() == v1::PARAMETER_ARITY_VECTOR2 ? absl::StrCat(ShortestNumber(first.typical()), ",0")
+        : first.sum_zero()
+            ? absl::StrCat(ShortestNumber(first.typical()), ",0,", ShortestNumber(-first.typical()))
+            : absl::StrCat(ShortestNumber(first.typical()), ",0,0");
     absl::StrAppend(&text, "\nAdd it:  touchstone model add nominal ", effect.name(), " ", first.name(), "=",
                     value, " -o better.yaml\n");
   }

@@ -5,12 +5,13 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/journal_session.h"
+#include "client/cli/output_file.h"
 #include "client/cli/session_fix.h"
+#include "client/cli/session_images.h"
 #include "client/cli/session_trash.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
@@ -19,8 +20,6 @@
 
 namespace touchstone::cli {
 namespace {
-
-constexpr size_t kPiece = 1 << 20;
 
 struct SessionOptions {
   std::string name, file, output;
@@ -44,13 +43,20 @@ Json SessionJson(const v1::Session& session) {
           {"touches", session.touches()},
           {"fingers", session.fingers()},
           {"objects", std::vector<std::string>(session.objects().begin(), session.objects().end())},
-          {"has_poses", session.has_poses()}};
+          {"has_poses", session.has_poses()},
+          {"images", session.images()}};
 }
 
 std::string InWords(const v1::Session& session) {
-  return absl::StrCat(Counted(session.touches(), "touch", "touches"), ", ",
-                      Counted(session.fingers(), "finger", "fingers"), ", ",
-                      session.has_poses() ? "" : "no poses, ", "hash ", session.hash().substr(0, 12));
+  std::vector<std::string> parts;
+  if (session.touches() > 0 || session.images() == 0) {
+    parts.push_back(Counted(session.touches(), "touch", "touches"));
+    parts.push_back(Counted(session.fingers(), "finger", "fingers"));
+    if (!session.has_poses()) parts.push_back("no poses");
+  }
+  if (session.images() > 0) parts.push_back(Counted(session.images(), "photograph", "photographs"));
+  parts.push_back(absl::StrCat("hash ", session.hash().substr(0, 12)));
+  return absl::StrJoin(parts, ", ");
 }
 
 // --- Sessions of a journal file
@@ -128,7 +134,45 @@ absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
       "\n  Source    ", session.provenance, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
 }
 
+// --- Sessions of a server
+
+absl::Status RunCreate(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Session session,
+                              SendSession(connection.get(), options.file, options.name, options.check));
+  if (cli.output().json)
+    PrintJson(SessionJson(session));
+  else
+    cli.Log(absl::StrCat(options.check ? "can be stored as " : "stored as ", options.name, ": ",
+                         InWords(session)));
+  return absl::OkStatus();
+}
+
+// A journal keeps what a rig saw, in the rig's frame and as its camera gave it; photographs with poses in an object's
+// frame are kept by a server.
+absl::Status ImportToServer(const Cli& cli, const SessionOptions& options) {
+  SessionOptions create = options;
+  if (create.name.empty())
+    create.name = client::SessionNameOf(std::filesystem::path(options.file + "/").parent_path().string());
+  TOUCHSTONE_RETURN_IF_ERROR(client::CheckSessionName(create.name, "--session"));
+  return RunCreate(cli, create);
+}
+
 absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
+  std::error_code error;
+  const bool folder = std::filesystem::is_directory(options.file, error);
+  if (options.output.empty() && (folder || !cli.source().servers.empty()))
+    return ImportToServer(cli, options);
+  if (folder)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "-o: ", options.file,
+        " is a folder of photographs, whose poses are in the object's frame; a journal keeps them "
+        "in a rig's. A server keeps it: touchstone session import ",
+        options.file, " --server 127.0.0.1:50051"));
+  if (options.output.empty())
+    return absl::InvalidArgumentError(
+        "say where to: -o SESSION.db puts the touches into a journal, --server ADDRESS has a server keep "
+        "them");
   if (!IsJournalPath(options.output))
     return absl::InvalidArgumentError(
         absl::StrCat("-o: '", options.output, "' is no journal; its name ends in .db"));
@@ -137,39 +181,6 @@ absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const size_t touches, ImportIntoJournal(options.file, options.output, name));
   if (cli.output().json) PrintJson({{"session", name}, {"journal", options.output}, {"touches", touches}});
   cli.Log(absl::StrCat(options.output, ": session '", name, "', ", Counted(touches, "touch", "touches")));
-  return absl::OkStatus();
-}
-
-// --- Sessions of a server
-
-absl::Status RunCreate(const Cli& cli, const SessionOptions& options) {
-  std::ifstream file(options.file, std::ios::binary);
-  std::error_code error;
-  if (!file || !std::filesystem::is_regular_file(options.file, error))
-    return absl::NotFoundError(
-        absl::StrCat(options.file, ": cannot be read; a measurement file was expected"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
-  grpc::ClientContext context;
-  const Interrupt::Handler handler([&context] { context.TryCancel(); });
-  v1::Session session;
-  const auto writer = connection->sessions().CreateSession(&context, &session);
-  v1::CreateSessionRequest request;
-  request.set_name(options.name);
-  request.set_validate_only(options.check);
-  std::string piece(kPiece, '\0');
-  do {
-    file.read(piece.data(), kPiece);
-    request.set_csv(piece.substr(0, file.gcount()));
-    if (!writer->Write(request)) break;
-    request.clear_name();
-  } while (file);
-  writer->WritesDone();
-  TOUCHSTONE_RETURN_IF_ERROR(client::FromGrpc(writer->Finish()));
-  if (cli.output().json)
-    PrintJson(SessionJson(session));
-  else
-    cli.Log(absl::StrCat(options.check ? "can be stored as " : "stored as ", options.name, ": ",
-                         InWords(session)));
   return absl::OkStatus();
 }
 
@@ -203,10 +214,10 @@ absl::Status RunList(const Cli& cli, const SessionOptions& options) {
     cli.Log("The server keeps no session; touchstone session create NAME FILE stores one.");
     return absl::OkStatus();
   }
-  Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "HASH", "OBJECTS"});
+  Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "PICTURES", "HASH", "OBJECTS"});
   for (const v1::Session& session : response.sessions())
     table.Add({session.name(), std::to_string(session.touches()), std::to_string(session.fingers()),
-               session.has_poses() ? "yes" : "no",
+               session.has_poses() ? "yes" : "no", std::to_string(session.images()),
                session.hash().empty() ? "-" : session.hash().substr(0, 12),
                absl::StrJoin(session.objects(), ", ")});
   return cli.Print(table.Text());
@@ -256,16 +267,17 @@ absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
         "--skip-damaged is for a journal (.db): copy the rig's with sqlite3 rig.db '.backup copy.db', and "
         "export that");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
-  grpc::ClientContext context;
-  const Interrupt::Handler handler([&context] { context.TryCancel(); });
-  v1::ExportSessionRequest request;
-  request.set_name(options.name);
-  const auto reader = connection->sessions().ExportSession(&context, request);
-  v1::ExportSessionResponse response;
-  std::string csv;
-  while (reader->Read(&response)) csv += response.csv();
-  TOUCHSTONE_RETURN_IF_ERROR(client::FromGrpc(reader->Finish()));
-  return cli.Write(options.output, csv);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session,
+                              FetchSession(connection.get(), options.name));
+  if (!session.images) return cli.Write(options.output, session.csv);
+  if (options.output.empty() || IsStandardOutput(options.output))
+    return absl::InvalidArgumentError(absl::StrCat(
+        "-o is missing: session '", options.name, "' holds photographs, and a folder for them was expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteSessionFolder(session, options.output));
+  cli.Log(absl::StrCat(options.output, ": ",
+                       Counted(session.images->files_size(), "photograph", "photographs"),
+                       session.csv.empty() ? "" : ", and touches.csv"));
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -300,13 +312,19 @@ void AddSession(Cli* cli) {
   };
   const std::string server = " --server 127.0.0.1:50051";
 
-  CLI::App* create =
-      cli->AddCommand(group, "create", "Checks a measurement file and stores it. A session never changes.",
-                      "touchstone session create monday set.csv" + server + "\n" +
-                          "touchstone session create monday set.csv --check" + server,
-                      [cli, options] { return RunCreate(*cli, *options); });
+  CLI::App* create = cli->AddCommand(
+      group, "create",
+      "Checks a measurement file, or a folder of photographs (images.csv, "
+      "camera.yaml, pictures, and touches.csv if there is one), and stores it. A session never "
+      "changes.",
+      "touchstone session create monday set.csv" + server + "\n" +
+          "touchstone session create pictures photos" + server + "\n" +
+          "touchstone session create monday set.csv --check" + server,
+      [cli, options] { return RunCreate(*cli, *options); });
   add_name(create);
-  create->add_option("FILE", options->file, "The measurement file (CSV)")->type_name("")->required();
+  create->add_option("FILE", options->file, "The measurement file (CSV), or the folder")
+      ->type_name("")
+      ->required();
   create->add_flag("--check", options->check, "Only check it");
   cli->AddSourceOptions(create);
 
@@ -326,32 +344,42 @@ void AddSession(Cli* cli) {
   add_place(show);
   cli->AddSourceOptions(show);
 
-  CLI::App* out = cli->AddCommand(group, "export", "Writes a session's measurement file, as it was stored.",
+  CLI::App* out = cli->AddCommand(group, "export",
+                                  "Writes a session's measurement file, or the folder of its photographs, as "
+                                  "it was stored.",
                                   "touchstone session export monday -o set.csv" + server + "\n" +
+                                      "touchstone session export pictures -o photos" + server + "\n" +
                                       "touchstone session export session.db -o set.csv\n"
                                       "touchstone session export session.db monday -o set.h5",
                                   [cli, options] { return RunExport(*cli, *options); });
   add_place(out);
-  cli->AddOutput(out, "-o,--output", &options->output,
-                 "The file to write; from a journal also .h5, with poses and pictures. Default: stdout");
+  cli->AddOutput(
+      out, "-o,--output", &options->output,
+      "The file to write, or the folder; from a journal also .h5, with poses and pictures. Default: stdout");
   out->add_flag(
       "--skip-damaged", options->skip_damaged,
       "Leave out touches and pictures of a journal that differ from their checksums, naming each; else one "
       "of them is an error");
   cli->AddSourceOptions(out);
 
-  CLI::App* in = cli->AddCommand(group, "import", "Puts a measurement file into a journal.",
-                                 "touchstone session import set.csv -o session.db\n"
-                                 "touchstone session import set.csv -o session.db --session monday",
-                                 [cli, options] { return RunImport(*cli, *options); });
-  cli->AddInput(in, in->add_option("FILE", options->file,
-                                   "The measurement file (.csv), or what session export wrote (.h5)")
-                        ->type_name("")
-                        ->required());
+  CLI::App* in =
+      cli->AddCommand(group, "import",
+                      "Puts a measurement file into a journal, or has a server keep it or a folder "
+                      "of photographs (with its touches.csv, if there is one).",
+                      "touchstone session import set.csv -o session.db\n"
+                      "touchstone session import photos" +
+                          server + "\n" + "touchstone session import set.csv -o session.db --session monday",
+                      [cli, options] { return RunImport(*cli, *options); });
+  cli->AddInput(in,
+                in->add_option("FILE", options->file,
+                               "The measurement file (.csv), what session export wrote (.h5), or the folder "
+                               "of an image set")
+                    ->type_name("")
+                    ->required());
   cli->AddOutput(in, "-o,--output", &options->output,
                  "The journal (.db); made if it is not there, else the session is added to what it has",
-                 OutputKind::kJournal)
-      ->required();
+                 OutputKind::kJournal);
+  cli->AddSourceOptions(in);
   in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
       ->type_name("NAME");
 

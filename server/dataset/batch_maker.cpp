@@ -1,5 +1,6 @@
 #include "server/base/status.h"
 #include "server/dataset/stream.h"
+#include "server/image/photo_image.h"
 
 namespace touchstone::dataset {
 
@@ -33,6 +34,8 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
                                     absl::Span<const touch::TouchPose> poses,
                                     const std::atomic<bool>& cancelled) const {
   const DatasetImage& image = specification_->image;
+  const bool photographs = image::ChangesPhotographs(*specification_->model);
+  image::PhotoWorkspace workspace;
   size_t slot = 0;
   for (DatasetBatch& batch : batches) {
     for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
@@ -43,8 +46,11 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
       camera.vertical_fov_rad = image.vertical_fov_rad;
       const auto& object =
           specification_->objects[(batch.start_index + row) % specification_->objects.size()];
+      const image::PhotoNumber number{specification_->seed, batch.start_index + row};
       TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
-                                  image.renderer->Render(object, camera, image.options));
+                                  photographs ? image::TakePhotograph(specification_->model, object, camera,
+                                                                      image.options, number, &workspace)
+                                              : image.renderer->Render(object, camera, image.options));
       TOUCHSTONE_RETURN_IF_ERROR(columns.AppendPicture(picture, image, &batch));
     }
   }

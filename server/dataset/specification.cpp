@@ -5,6 +5,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/image/photo_image.h"
 
 namespace touchstone::dataset {
 namespace {
@@ -68,6 +69,9 @@ absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin im
         absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
   TOUCHSTONE_RETURN_IF_ERROR(touch::ValidatePlan(&specification->plan));
   if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image, images));
+  if (specification->columns.image && images == ImageOrigin::kRendered && specification->model != nullptr)
+    TOUCHSTONE_RETURN_IF_ERROR(
+        image::CheckPhotographStyle(*specification->model, specification->image.options));
   if (specification->max_draws < 1 || specification->max_draws > 1'000'000)
     return absl::InvalidArgumentError(
         absl::StrCat("max_draws = ", specification->max_draws, ": must be from 1 to 1000000"));

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "server/dataset/test_support.h"
+#include "server/effects/all_effects.h"
 #include "server/image/encode.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
@@ -240,6 +241,40 @@ TEST(DatasetStream, ImagesShareThePoseOfTheirTouchAndDoNotHangOnTheCut) {
     different +=
         std::abs(image->pixels[p] - static_cast<uint8_t>(columns[5][k * image->pixels.size() + p])) > 1;
   EXPECT_LT(different, 10);  // the pose in the column is rounded to single precision
+}
+
+TEST(DatasetStream, ImagesShowTheModelsEffectsOfPhotographsHoweverItIsCut) {
+  DatasetSpecification specification = SmallDataset(20);
+  specification.columns = *ColumnChoice::FromNames({"image"});
+  specification.image.options.width = 64;
+  specification.image.options.height = 48;
+  specification.image.renderer = *image::CreateCpuRenderer();
+  specification.image.vertical_fov_rad = 2.0;  // so that the ground shows
+  const std::string nominal = Columns(specification, {}, 1)[0];
+  model::Model model = *specification.model;
+  for (const auto& [effect, value] :
+       {std::pair("background_level", "grey=40"), std::pair("image_noise", "sigma_grey=2")})
+    model = *model::AddEffect(model, effect, {value}, effects::Catalogue());
+  specification.model = std::make_shared<const model::Model>(model);
+  DatasetPart part;
+  part.batch_size = 7;
+  const std::string noisy = Columns(specification, part, 2)[0];
+  EXPECT_EQ(noisy, Columns(specification, {}, 1)[0]);
+  ASSERT_EQ(noisy.size(), nominal.size());
+  double sum = 0, squares = 0;
+  int ground = 0;
+  for (size_t p = 0; p < nominal.size(); ++p) {
+    if (nominal[p] != 0) continue;
+    const double error = static_cast<uint8_t>(noisy[p]) - 40.0;
+    sum += error, squares += error * error, ++ground;
+  }
+  ASSERT_GT(ground, 20000);
+  EXPECT_NEAR(sum / ground, 0, 0.1);
+  EXPECT_NEAR(squares / ground, 4, 0.3);
+  // No two samples share their noise.
+  EXPECT_NE(noisy.substr(0, 64 * 6), noisy.substr(64 * 48, 64 * 6));
+  specification.image.options.shading_style = image::ShadingStyle::kDarkOnWhite;
+  EXPECT_THAT(std::string(ValidateDataset(&specification).message()), testing::HasSubstr("shading_style"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Formula: an effect that the user writes in the model file, without building anything.
 //   adds: travel_mm   pose, contact, motion: the finger travels that much more; sensor: the same, as time
 //   adds: time_us     sensor: the finger reports that much later
+//   adds: grey        image sensor: the pixel of a photograph is recorded that much brighter
 // A finger without contact gets nothing. A value that is not finite is an error of the whole batch
 // (TouchBatch::formula_error), not a silent hole in the data.
 #include "server/effects/formula.h"
@@ -16,7 +17,9 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/formula_program.h"
+#include "server/effects/pixel_variables.h"
 #include "server/effects/user_term.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::effects {
 
@@ -26,8 +29,8 @@ model::Effect Formula() {
   effect.name = "formula";
   effect.stage = model::Stage::kMotion;
   effect.meaning =
-      "An effect of your own: an expression over the touch that adds travel_mm or time_us to each finger. It "
-      "needs a name, an expression and its parameters.";
+      "An effect of your own: an expression over the touch that adds travel_mm or time_us to each finger, or "
+      "grey to each pixel of a photograph. It needs a name, an expression and its parameters.";
   effect.signature =
       "What the expression says. The diagnosis suggests one where no built-in effect explains the error.";
   effect.check_on_rig = "Change the one quantity that the expression depends on and hold the rest.";
@@ -42,7 +45,8 @@ namespace {
 struct Input {
   int parameter = -1;                                     // index of a parameter, else
   double (*read)(const TouchBatch&, int, int) = nullptr;  // a variable, else
-  std::string covariate;                                  // a cov_* column
+  std::string covariate;                                  // a cov_* column, else
+  double (*read_pixel)(const PhotoPixel&) = nullptr;      // a variable of photographs
 };
 
 struct CompiledFormula {
@@ -95,6 +99,24 @@ void ApplyFormula(const CompiledFormula& formula, absl::Span<const double> value
   });
 }
 
+// A formula that one thread evaluates pixel by pixel.
+std::function<double(const PhotoPixel&)> PixelFormula(std::shared_ptr<const CompiledFormula> formula,
+                                                      absl::Span<const double> values) {
+  const auto evaluator = std::make_shared<FormulaProgram::Loan>(*formula->program);
+  for (size_t i = 0; i < formula->inputs.size(); ++i) {
+    const int parameter = formula->inputs[i].parameter;
+    if (parameter >= 0)
+      (*evaluator)->inputs()[i] = FromSi(formula->spec->parameters[parameter].unit, values[parameter]);
+  }
+  // The program is lent for as long as the function lives.
+  return [formula = std::move(formula), evaluator](const PhotoPixel& pixel) {
+    double* inputs = (*evaluator)->inputs();
+    for (size_t i = 0; i < formula->inputs.size(); ++i)
+      if (formula->inputs[i].read_pixel != nullptr) inputs[i] = formula->inputs[i].read_pixel(pixel);
+    return (*evaluator)->Value();
+  };
+}
+
 bool IsPlainName(const std::string& name) {
   if (name.empty() || name.size() > 64 || !(absl::ascii_isalpha(name[0]) || name[0] == '_')) return false;
   return std::all_of(name.begin(), name.end(),
@@ -102,8 +124,9 @@ bool IsPlainName(const std::string& name) {
 }
 
 // Whether expressions know the name already.
-bool IsTaken(const std::string& name) {
+bool IsTaken(const std::string& name, bool of_photos) {
   const auto same = [&](const auto& word) { return name == word.name; };
+  if (of_photos && FindPixelVariable(name) != nullptr) return true;
   const auto variables = FormulaVariables();
   const auto functions = FormulaFunctions();
   const auto constants = FormulaConstants();
@@ -125,7 +148,7 @@ absl::Status CheckParameters(const model::FormulaSpec& spec) {
     if (!IsPlainName(name))
       return absl::InvalidArgumentError(absl::StrCat(
           "parameter '", name, "': a name has letters, digits and '_', and starts with a letter"));
-    if (IsTaken(name))
+    if (IsTaken(name, spec.adds_grey))
       return absl::InvalidArgumentError(absl::StrCat(
           "parameter '", name, "': the name belongs to a variable, function or constant; take another"));
     for (size_t j = 0; j < i; ++j)
@@ -156,6 +179,12 @@ absl::Status Resolve(const model::FormulaSpec& spec, CompiledFormula* formula, m
       if (spec.parameters[p].name == name.name) input.parameter = static_cast<int>(p);
     if (input.parameter >= 0) {
       used[input.parameter] = true;
+    } else if (spec.adds_grey) {
+      const auto variable = FindPixelInput("formula", name.name, parameters);
+      if (!variable.ok())
+        return absl::InvalidArgumentError(
+            absl::StrCat("character ", name.character, ": ", variable.status().message()));
+      input.read_pixel = (*variable)->read;
     } else {
       const auto variable = FindInput("formula", spec, name.name, parameters);
       if (!variable.ok())
@@ -194,14 +223,21 @@ absl::StatusOr<std::shared_ptr<const model::Effect>> Make(const model::FormulaSp
         absl::StrCat("expression \"", spec.expression, "\", ", resolved.message()));
 
   effect->stage = spec.stage;
-  effect->meaning =
-      absl::StrCat("Adds ", spec.adds_time ? "time_us" : "travel_mm", " = ", spec.expression, ".");
+  effect->meaning = absl::StrCat("Adds ", model::AddsName(spec), " = ", spec.expression, ".");
   effect->formula = formula->spec;
   for (size_t i = 0; i < spec.parameters.size(); ++i) {
     model::ParameterInfo parameter = spec.parameters[i];
     parameter.neutral = spec.values[i];
     parameter.typical = (parameter.upper - parameter.lower) / 4;
     effect->parameters.push_back(std::move(parameter));
+  }
+  if (spec.adds_grey) {
+    effect->apply = nullptr;
+    effect->apply_to_photo = [formula = std::shared_ptr<const CompiledFormula>(std::move(formula))](
+                                 absl::Span<const double> values, PhotoSettings& photo) {
+      photo.added_grey.push_back(PixelFormula(formula, values));
+    };
+    return std::shared_ptr<const model::Effect>(std::move(effect));
   }
   effect->apply = [formula = std::shared_ptr<const CompiledFormula>(std::move(formula))](
                       absl::Span<const double> values, TouchBatch& touches) {

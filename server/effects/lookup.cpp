@@ -12,7 +12,9 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/effects/pixel_variables.h"
 #include "server/effects/user_term.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::effects {
 
@@ -22,8 +24,9 @@ model::Effect Lookup() {
   effect.name = "lookup";
   effect.stage = model::Stage::kMotion;
   effect.meaning =
-      "A curve of your own, or one that a diagnosis found: it adds travel_mm or time_us to each finger, by "
-      "the value of one covariate. It needs a name, a covariate, knots and values.";
+      "A curve of your own, or one that a diagnosis found: it adds travel_mm or time_us to each finger, or "
+      "grey to each pixel of a photograph, by the value of one covariate. It needs a name, a covariate, "
+      "knots and values.";
   effect.signature =
       "What the curve shows. The diagnosis gives one where no built-in effect explains what depends on a "
       "covariate.";
@@ -48,7 +51,8 @@ namespace {
 // Where the covariate of a lookup comes from.
 struct LookupInput {
   model::LookupSpec spec;
-  double (*read)(const TouchBatch&, int, int) = nullptr;  // null: a cov_* column
+  double (*read)(const TouchBatch&, int, int) = nullptr;  // null: a cov_* column, or
+  double (*read_pixel)(const PhotoPixel&) = nullptr;      // of a photograph
 };
 
 void ApplyLookup(const LookupInput& input, TouchBatch& touches) {
@@ -87,6 +91,8 @@ absl::Status CheckCurve(const model::LookupSpec& spec) {
     if (!std::isfinite(spec.knots[n]) || (n > 0 && !(spec.knots[n] > spec.knots[n - 1])))
       return wrong("knots must rise; knot ", n + 1, " is ", ShortestNumber(spec.knots[n]));
   if (spec.values.empty()) return wrong("it has no values");
+  if (spec.adds_grey && spec.values.size() > 1)
+    return wrong("it has values for ", spec.values.size(), " fingers; what adds grey needs one list");
   for (const std::vector<double>& values : spec.values) {
     if (values.size() != spec.knots.size())
       return wrong("it has ", spec.knots.size(), " knots and ", values.size(),
@@ -99,6 +105,11 @@ absl::Status CheckCurve(const model::LookupSpec& spec) {
 
 absl::Status FindCovariate(LookupInput* input, model::EffectNeeds* needs) {
   const std::string& name = input->spec.covariate;
+  if (input->spec.adds_grey) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PixelVariable* pixel_variable, FindPixelInput("lookup", name, {}));
+    input->read_pixel = pixel_variable->read;
+    return absl::OkStatus();
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const FormulaVariable* variable, FindInput("lookup", input->spec, name, {}));
   if (variable != nullptr) input->read = variable->read;
   AddNeedsOf(name, needs);
@@ -117,8 +128,16 @@ absl::StatusOr<std::shared_ptr<const model::Effect>> MakeLookupEffect(const mode
     return absl::InvalidArgumentError(absl::StrCat("lookup '", spec.name, "': ", status.message()));
   effect->stage = spec.stage;
   effect->lookup = std::make_shared<const model::LookupSpec>(spec);
-  effect->meaning =
-      absl::StrCat("Adds ", spec.adds_time ? "time_us" : "travel_mm", " by a curve of ", spec.covariate, ".");
+  effect->meaning = absl::StrCat("Adds ", model::AddsName(spec), " by a curve of ", spec.covariate, ".");
+  if (spec.adds_grey) {
+    effect->apply = nullptr;
+    effect->apply_to_photo = [input = std::shared_ptr<const LookupInput>(std::move(input))](
+                                 absl::Span<const double>, PhotoSettings& photo) {
+      photo.added_grey.push_back(
+          [input](const PhotoPixel& pixel) { return LookupValue(input->spec, 0, input->read_pixel(pixel)); });
+    };
+    return std::shared_ptr<const model::Effect>(std::move(effect));
+  }
   effect->apply = [input = std::shared_ptr<const LookupInput>(std::move(input))](
                       absl::Span<const double>, TouchBatch& touches) { ApplyLookup(*input, touches); };
   return std::shared_ptr<const model::Effect>(std::move(effect));

@@ -128,5 +128,91 @@ TEST(ImageNoise, AddsVariances) {
   EXPECT_DOUBLE_EQ(settings.noise_gain, 0.1 + 0.2);
 }
 
+model::Model MustAdd(const std::string& effect, const std::vector<std::string>& assignments) {
+  const auto model = model::AddEffect(model::NominalModel(), effect, assignments, Catalogue());
+  if (model.ok()) return *model;
+  ADD_FAILURE() << model.status();
+  return {};
+}
+std::string ErrorOf(const std::string& effect, const std::vector<std::string>& assignments) {
+  return std::string(
+      model::AddEffect(model::NominalModel(), effect, assignments, Catalogue()).status().message());
+}
+
+TEST(GreyFormula, ReadsEveryVariableOfAPixelInTheUnitsOfFiles) {
+  PhotoPixel pixel;
+  pixel.radius = 0.5, pixel.row = 3, pixel.column = 7, pixel.grey = 100, pixel.incidence_deg = 40;
+  pixel.depth_mm = 300, pixel.session_time_s = 60;
+  const PhotoSettings settings = SettingsOf(
+      {{"formula",
+        {"name=mine", "adds=grey",
+         "expression=k*radius + 10*row + 100*column + grey/1000 + incidence_deg*a/1e6 + depth_mm*1e-9 + "
+         "session_time_s*1e-12",
+         "k=2", "k_unit=grey", "k_min=0", "k_max=9", "a=3", "a_unit=deg", "a_min=0", "a_max=9"}}});
+  ASSERT_EQ(settings.added_grey.size(), 1u);
+  EXPECT_DOUBLE_EQ(settings.added_grey[0](pixel), 1 + 30 + 700 + 0.1 + 120e-6 + 300e-9 + 60e-12);
+}
+
+TEST(GreyLookup, IsLinearBetweenKnotsAndConstantBeyond) {
+  const PhotoSettings settings = SettingsOf(
+      {{"lookup", {"name=dirt", "adds=grey", "covariate=radius", "knots=0.2,0.6", "values=-4,8"}}});
+  ASSERT_EQ(settings.added_grey.size(), 1u);
+  for (const auto& [radius, expected] :
+       {std::pair(0.0, -4.0), std::pair(0.3, -1.0), std::pair(0.5, 5.0), std::pair(0.9, 8.0)}) {
+    PhotoPixel pixel;
+    pixel.radius = radius;
+    EXPECT_NEAR(settings.added_grey[0](pixel), expected, 1e-12);
+  }
+}
+
+TEST(GreyTerms, ComeBackFromTheirFilesAndSayWhatChanged) {
+  const model::Model formula = MustAdd("formula", {"name=glare", "adds=grey", "expression=k*radius^2", "k=4",
+                                                   "k_unit=grey", "k_min=0", "k_max=9"});
+  const model::Model lookup =
+      MustAdd("lookup", {"name=dirt", "adds=grey", "covariate=row", "knots=0,100", "values=0,5"});
+  for (const model::Model& model : {formula, lookup}) {
+    EXPECT_EQ(model.effects[0].effect->stage, model::Stage::kImageSensor);
+    EXPECT_TRUE(model.effects[0].effect->of_photos());
+    EXPECT_FALSE(static_cast<bool>(model.effects[0].effect->apply));
+    const std::string text = model::FormatModel(model);
+    EXPECT_THAT(text, testing::HasSubstr("adds: grey"));
+    EXPECT_THAT(text, testing::Not(testing::HasSubstr("stage")));
+    const auto again = model::ParseModel(text, "again", Catalogue());
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->Hash(), model.Hash());
+  }
+  EXPECT_THAT(model::DiffModels(model::NominalModel(), formula),
+              testing::ElementsAre(testing::HasSubstr("grey += k*radius^2")));
+  EXPECT_THAT(model::DiffModels(model::NominalModel(), lookup),
+              testing::ElementsAre(testing::HasSubstr("grey += curve of row")));
+  // What is added is physics: the same expression as a travel is another model.
+  const auto travel = model::AddEffect(
+      model::NominalModel(), "lookup",
+      {"name=dirt", "adds=travel_mm", "covariate=session_time_s", "knots=0,100", "values=0,5"}, Catalogue());
+  const model::Model grey =
+      MustAdd("lookup", {"name=dirt", "adds=grey", "covariate=session_time_s", "knots=0,100", "values=0,5"});
+  EXPECT_NE(travel->Hash(), grey.Hash());
+}
+
+TEST(GreyTerms, RefuseWhatPhotographsDoNotHave) {
+  EXPECT_THAT(
+      ErrorOf("formula", {"name=a", "adds=grey", "expression=travel_mm"}),
+      testing::AllOf(testing::HasSubstr("unknown variable 'travel_mm'"), testing::HasSubstr("radius, row")));
+  EXPECT_THAT(ErrorOf("lookup", {"name=a", "adds=grey", "covariate=cov_heat", "knots=0,1", "values=0,1"}),
+              testing::HasSubstr("unknown covariate 'cov_heat'"));
+  EXPECT_THAT(ErrorOf("formula", {"name=a", "adds=travel_mm", "expression=radius"}),
+              testing::HasSubstr("unknown variable 'radius'"));
+  EXPECT_THAT(ErrorOf("formula", {"name=a", "adds=grey", "stage=sensor", "expression=radius"}),
+              testing::HasSubstr("leave the stage out"));
+  EXPECT_THAT(
+      ErrorOf("lookup", {"name=a", "adds=grey", "covariate=row", "knots=0,1", "l=0,1", "m=0,1", "r=0,1"}),
+      testing::HasSubstr("needs one list"));
+  EXPECT_THAT(ErrorOf("formula", {"name=a", "adds=gray", "expression=radius"}),
+              testing::HasSubstr("travel_mm, time_us or grey"));
+  EXPECT_THAT(ErrorOf("formula", {"name=a", "adds=grey", "expression=row*2", "row=1", "row_unit=1",
+                                  "row_min=0", "row_max=2"}),
+              testing::HasSubstr("belongs to a variable"));
+}
+
 }  // namespace
 }  // namespace touchstone::effects

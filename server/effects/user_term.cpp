@@ -8,6 +8,11 @@
 namespace touchstone::effects {
 
 absl::Status CheckAdds(const model::UserTerm& term) {
+  if (term.adds_grey != model::IsPhotoStage(term.stage) ||
+      (term.adds_grey && (term.adds_time || term.stage != model::Stage::kImageSensor)))
+    return absl::InvalidArgumentError(
+        absl::StrCat("grey is added in the image sensor, travel_mm and time_us in the ",
+                     "stages of a touch; this acts in the stage ", model::StageName(term.stage)));
   if (!term.adds_time || term.stage == model::Stage::kSensor) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("time_us can be added in the sensor stage only, not in the ",
                                                  model::StageName(term.stage),

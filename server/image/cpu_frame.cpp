@@ -20,6 +20,8 @@ CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh,
   frame.view = view;
   frame.box = ProjectBounds(view, surface.bounds());
   frame.lighting = MakeLighting(view, surface.bounds(), options.shading_style);
+  frame.middle_x = 0.5 * view.width, frame.middle_y = 0.5 * view.height;
+  frame.step_x = frame.step_y = view.step;
   frame.outside_only = mesh.outward && SeesOnlyOutside(view, surface.bounds());
 
   frame.sx.resize(view.width);

@@ -27,6 +27,10 @@ struct CpuFrame {
   Lighting lighting;
   bool outside_only;  // back faces cannot be seen and need not be looked at
 
+  // Pixel of a point of the camera: middle + (right, down) / (depth * step).
+  double middle_x, middle_y;
+  double step_x, step_y;
+
   // The ray of a pixel with slopes sx, sy: origin = start + sx * start_right + sy * start_up,
   // direction = forward + sx * right + sy * up.
   std::vector<float> sx, sy;  // by column and by row
@@ -62,6 +66,8 @@ void CastPixels(const CpuFrame& frame, Visibility* visibility);  // visibility_r
 void DrawTriangles(const CpuFrame& frame, const CpuKernels& kernels,
                    Visibility* visibility);  // visibility_triangles.cpp
 
+// Whether drawing is the faster way.
+bool IsCoarse(const CpuFrame& frame);
 // Whether triangles can be drawn as they are, without clipping, in single precision.
 bool CanDrawTriangles(const CpuFrame& frame);
 

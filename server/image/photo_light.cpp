@@ -6,6 +6,7 @@
 
 #include <embree3/rtcore.h>
 
+#include "server/image/photo_power.h"
 #include "server/image/photo_rays.h"
 #include "server/image/shading.h"
 
@@ -118,13 +119,16 @@ void FillLight(const PhotoPoints& points, const PhotoLamps& lamps, const effects
   const float lost = static_cast<float>(settings.shadow_strength);
   const float strength = static_cast<float>(settings.specular_strength);
   const float exponent = static_cast<float>(settings.specular_exponent);
+  const float* const half_cosine = lamps.half_cosine.data();
   for (int i = 0; i < points.count; ++i) {
-    float key = kLights[0].strength * key_cosine[i];
-    if (shines && lamps.half_cosine[i] > 0.0f)
-      key += strength * std::exp(exponent * std::log(lamps.half_cosine[i]));
-    if (shadows && lamps.in_shadow[i] != 0) key *= 1.0f - lost;
-    result[i] = ambient + key + kLights[1].strength * fill_cosine[i];
+    const float highlight = shines ? strength * PowerOf(half_cosine[i], exponent) : 0.0f;
+    result[i] = kLights[0].strength * key_cosine[i] + highlight;
   }
+  if (shadows) {
+    const uint8_t* const in_shadow = lamps.in_shadow.data();
+    for (int i = 0; i < points.count; ++i) result[i] *= 1.0f - lost * in_shadow[i];
+  }
+  for (int i = 0; i < points.count; ++i) result[i] += ambient + kLights[1].strength * fill_cosine[i];
 }
 
 }  // namespace touchstone::image

@@ -15,18 +15,9 @@ namespace {
 
 constexpr int kPhotoTileSide = 4;
 
-Vec3f Single(const Eigen::Vector3d& v) {
+Vec3f SingleOf(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
-
-// One photograph in single precision.
-struct PhotoFrame {
-  Vec3f forward, right, up;
-  Vec3f start, start_right, start_up;  // origin of a ray = start + slopes along the two others
-  float start_depth_m, near_m, far_m;  // depths; the last two from the start
-  PixelBox box;                        // outside it there is no object
-  bool outside_only;
-};
 
 View ViewOf(const PhotoCamera& camera, int width, int height) {
   View view;
@@ -81,45 +72,46 @@ PixelBox BoxOfSlopes(const View& view, const geometry::Bounds& bounds, const Pho
           std::min(lens.width, box.last_column + 1), std::min(lens.height, box.last_row + 1)};
 }
 
-PhotoFrame MakePhotoFrame(const geometry::Surface& surface, const ShadingMesh& mesh,
-                          const PhotoCamera& camera, const PhotoLens& lens, const PixelSlopes& slopes) {
-  const View view = ViewOf(camera, lens.width, lens.height);
-  PhotoFrame frame;
-  frame.box = BoxOfSlopes(view, surface.bounds(), lens, slopes);
-  frame.outside_only = mesh.outward && SeesOnlyOutside(view, surface.bounds());
+// As MakeCpuFrame's, for a camera and a lens of their own. Its slopes by column and row are left empty: those of a lens
+// that distorts differ from pixel to pixel.
+CpuFrame MakePhotoFrame(const geometry::Surface& surface, const ShadingMesh& mesh, const PhotoCamera& camera,
+                        const PhotoLens& lens, const PixelSlopes& slopes) {
+  CpuFrame frame;
+  frame.surface = &surface;
+  frame.mesh = &mesh;
+  frame.view = ViewOf(camera, lens.width, lens.height);
+  frame.box = BoxOfSlopes(frame.view, surface.bounds(), lens, slopes);
+  frame.middle_x = lens.cx, frame.middle_y = lens.cy;
+  frame.step_x = 1 / lens.fx, frame.step_y = 1 / lens.fy;
+  frame.outside_only = mesh.outward && SeesOnlyOutside(frame.view, surface.bounds());
+  frame.forward = SingleOf(camera.forward);
+  frame.right = SingleOf(camera.right);
+  frame.up = SingleOf(camera.up);
   const double eye_distance_m = (camera.eye_m - surface.bounds().Centre()).norm();
   const bool far_eye = eye_distance_m > kFarEyeRadii * 0.5 * surface.bounds().DiagonalM();
-  const double start_depth_m = far_eye ? camera.near_m : 0.0;
-  frame.start_depth_m = static_cast<float>(start_depth_m);
-  frame.near_m = static_cast<float>(camera.near_m - start_depth_m);
-  frame.far_m = static_cast<float>(camera.far_m - start_depth_m);
-  frame.forward = Single(camera.forward);
-  frame.right = Single(camera.right);
-  frame.up = Single(camera.up);
-  frame.start = Single(camera.eye_m + start_depth_m * camera.forward);
-  frame.start_right = Single(start_depth_m * camera.right);
-  frame.start_up = Single(start_depth_m * camera.up);
+  frame.start_depth_m = far_eye ? camera.near_m : 0.0;
+  frame.start = SingleOf(camera.eye_m + frame.start_depth_m * camera.forward);
+  frame.start_right = SingleOf(frame.start_depth_m * camera.right);
+  frame.start_up = SingleOf(frame.start_depth_m * camera.up);
   return frame;
 }
 
-// The triangle that each pixel of the box sees, appended row by row.
-void CastPhotoPixels(const geometry::Surface& surface, const PhotoFrame& frame, const PhotoLens& lens,
-                     const PixelSlopes& slopes, PhotoPoints* points) {
+// The triangle that each pixel of the box sees, by rays.
+void CastPhotoPixels(const CpuFrame& frame, const PhotoLens& lens, const PixelSlopes& slopes,
+                     Visibility* visibility) {
   const PixelBox& box = frame.box;
-  const RTCScene scene = static_cast<RTCScene>(surface.embree_scene());
+  const RTCScene scene = static_cast<RTCScene>(frame.surface->embree_scene());
   const RayPackets packets(scene);
-  const int columns = box.last_column - box.first_column;
-  std::vector<uint32_t> seen(static_cast<size_t>(kPhotoTileSide) * (columns + kPhotoTileSide));
+  const float tfar = static_cast<float>(frame.view.far_m - frame.start_depth_m);
   alignas(64) int valid[16];
   alignas(64) RTCRayHit16 rays;
   std::memset(&rays, 0, sizeof rays);
   for (int i = 0; i < 16; ++i) {
-    rays.ray.tnear[i] = frame.near_m;
+    rays.ray.tnear[i] = static_cast<float>(frame.view.near_m - frame.start_depth_m);
     rays.ray.mask[i] = 0xFFFFFFFFu;
     rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
   for (int row = box.first_row; row < box.last_row; row += kPhotoTileSide) {
-    std::fill(seen.begin(), seen.end(), geometry::kNoTriangle);
     for (int column = box.first_column; column < box.last_column; column += kPhotoTileSide) {
       alignas(64) float sx[16], sy[16];
       for (int i = 0; i < 16; ++i) {
@@ -138,26 +130,39 @@ void CastPhotoPixels(const geometry::Surface& surface, const PhotoFrame& frame, 
         rays.ray.dir_x[i] = frame.forward.x + sx[i] * frame.right.x + sy[i] * frame.up.x;
         rays.ray.dir_y[i] = frame.forward.y + sx[i] * frame.right.y + sy[i] * frame.up.y;
         rays.ray.dir_z[i] = frame.forward.z + sx[i] * frame.right.z + sy[i] * frame.up.z;
-        rays.ray.tfar[i] = frame.far_m;
+        rays.ray.tfar[i] = tfar;
         rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       }
       packets.Intersect(valid, &rays);
       for (int i = 0; i < 16; ++i) {
-        const size_t place = static_cast<size_t>(i / kPhotoTileSide) * (columns + kPhotoTileSide) +
-                             (column - box.first_column) + i % kPhotoTileSide;
-        seen[place] = valid[i] != 0 && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID ? rays.hit.primID[i]
-                                                                                     : geometry::kNoTriangle;
-      }
-    }
-    for (int y = row; y < std::min(row + kPhotoTileSide, box.last_row); ++y) {
-      const uint32_t* const line = &seen[static_cast<size_t>(y - row) * (columns + kPhotoTileSide)];
-      for (int i = 0; i < columns; ++i) {
-        if (line[i] == geometry::kNoTriangle) continue;
-        points->pixel.push_back(y * lens.width + box.first_column + i);
-        points->triangle.push_back(line[i]);
+        if (valid[i] == 0 || rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        visibility->Row(row + i / kPhotoTileSide)[column + i % kPhotoTileSide - box.first_column] =
+            rays.hit.primID[i];
       }
     }
   }
+}
+
+// The pixels of the box that see a triangle, row by row.
+void CollectPixels(Visibility* visibility, int width, PhotoPoints* points) {
+  const PixelBox& box = visibility->box;
+  const int columns = box.last_column - box.first_column;
+  const size_t most = static_cast<size_t>(box.last_row - box.first_row) * columns + 1;
+  points->pixel.resize(most);
+  points->triangle.resize(most);
+  size_t count = 0;
+  for (int row = box.first_row; row < box.last_row; ++row) {
+    const uint32_t* const seen = visibility->Row(row);
+    const int first_pixel = row * width + box.first_column;
+    for (int i = 0; i < columns; ++i) {
+      // Always written, counted only if there is a triangle.
+      points->pixel[count] = first_pixel + i;
+      points->triangle[count] = seen[i];
+      count += seen[i] != geometry::kNoTriangle;
+    }
+  }
+  points->pixel.resize(count);
+  points->triangle.resize(count);
 }
 
 // Corners of a block of triangles, a lane each.
@@ -168,11 +173,12 @@ struct CornerBlock {
 };
 
 // As in cpu_shading.cpp: where the ray meets the triangle's plane (Moeller and Trumbore 1997), kept inside the triangle.
-void MeetTriangles(const PhotoFrame& frame, float scale, const CornerBlock& block, int first,
+void MeetTriangles(const CpuFrame& frame, float scale, const CornerBlock& block, int first,
                    PhotoPoints* points) {
   const auto& a = block.corner[0];
   const auto& b = block.corner[1];
   const auto& c = block.corner[2];
+  const float start_depth_m = static_cast<float>(frame.start_depth_m);
   const float side_of_back = frame.outside_only ? 1.0f : -1.0f;
   float* const point[3] = {&points->point_m[0][first], &points->point_m[1][first],
                            &points->point_m[2][first]};
@@ -222,7 +228,7 @@ void MeetTriangles(const PhotoFrame& frame, float scale, const CornerBlock& bloc
     normal[0][i] = nx * n, normal[1][i] = ny * n, normal[2][i] = nz * n;
     face[0][i] = gx * g, face[1][i] = gy * g, face[2][i] = gz * g;
     eye[0][i] = dx * d, eye[1][i] = dy * d, eye[2][i] = dz * d;
-    depth[i] = scale * (frame.start_depth_m + ((x - ox) * dx + (y - oy) * dy + (z - oz) * dz) / dd);
+    depth[i] = scale * (start_depth_m + ((x - ox) * dx + (y - oy) * dy + (z - oz) * dz) / dd);
     const float facing = (nx * dx + ny * dy + nz * dz) * n * d;
     const float low = facing > 0.0f ? facing : 0.0f;
     cosine[i] = low < 1.0f ? low : 1.0f;
@@ -265,10 +271,19 @@ void PhotoPoints::Resize(int new_count) {
 
 void FindPoints(const geometry::Surface& surface, const ShadingMesh& mesh, const PhotoCamera& camera,
                 const PhotoLens& lens, const PixelSlopes& slopes, PhotoPoints* points) {
-  const PhotoFrame frame = MakePhotoFrame(surface, mesh, camera, lens, slopes);
+  const CpuFrame frame = MakePhotoFrame(surface, mesh, camera, lens, slopes);
   points->pixel.clear();
   points->triangle.clear();
-  if (frame.box.first_row < frame.box.last_row) CastPhotoPixels(surface, frame, lens, slopes, points);
+  if (frame.box.first_row < frame.box.last_row) {
+    Visibility visibility(frame.box);
+    // Straight edges stay straight without distortion: then triangles can be drawn.
+    if (!lens.Distorts() && IsCoarse(frame) && CanDrawTriangles(frame)) {
+      DrawTriangles(frame, BestKernels(), &visibility);
+    } else {
+      CastPhotoPixels(frame, lens, slopes, &visibility);
+    }
+    CollectPixels(&visibility, lens.width, points);
+  }
   points->Resize(static_cast<int>(points->pixel.size()));
 
   const auto block = std::make_unique<CornerBlock>();

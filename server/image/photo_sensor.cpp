@@ -7,6 +7,7 @@
 
 #include "server/base/random.h"
 #include "server/base/units.h"
+#include "server/image/photo_power.h"
 
 namespace touchstone::image {
 namespace {
@@ -115,7 +116,7 @@ void ExposeAndRespond(double exposure_factor, double gamma, std::vector<float>* 
   const float exponent = static_cast<float>(gamma);
   for (size_t i = 0; i < count; ++i) {
     const float exposed = values[i] * factor;
-    values[i] = exposed <= 0.0f ? 0.0f : exposed >= 1.0f ? white : white * std::pow(exposed, exponent);
+    values[i] = white * PowerOf(exposed < 1.0f ? exposed : 1.0f, exponent);
   }
 }
 

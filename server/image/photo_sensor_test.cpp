@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/image/photo_power.h"
 #include "server/image/photo_test_scene.h"
 
 namespace touchstone::image {
@@ -53,6 +54,21 @@ TEST_F(PhotoSensor, GammaIsAPowerOfExposedLight) {
     for (size_t i = 0; i < photo.grey.size(); ++i)
       EXPECT_NEAR(photo.grey[i], 255 * std::pow(linear.grey[i] / 255, exponent), 2e-3);
   }
+}
+
+TEST(PhotoPower, IsThePowerToAMillionth) {
+  double worst = 0;
+  for (double x = 1e-12; x <= 1.0; x *= 1.0137)
+    for (const double exponent : {0.1, 0.45, 1.0, 2.2, 9.0}) {
+      const double exact = std::pow(static_cast<double>(static_cast<float>(x)), exponent);
+      if (exact > 1e-30)
+        worst = std::max(worst,
+                         std::abs(PowerOf(static_cast<float>(x), static_cast<float>(exponent)) / exact - 1) /
+                             std::max(1.0, std::abs(exponent * std::log(x))));
+    }
+  EXPECT_LT(worst, 1e-6);
+  EXPECT_EQ(PowerOf(0, 0.45f), 0);
+  EXPECT_EQ(PowerOf(1, 2.2f), 1);
 }
 
 // A picture through a kernel of any shape, its border repeated, in double precision and without tricks.

@@ -1,6 +1,7 @@
 // Photographs: what they share with the renderer, camera poses, surfaces that effects move, workspaces, noise, errors.
 #include "server/image/simulate_photo.h"
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 
@@ -142,6 +143,32 @@ TEST(PhotoSimulator, IsTheSameWhateverTheThreads) {
     EXPECT_EQ(photo.pixels, alone.pixels);
     EXPECT_EQ(photo.grey, alone.grey);
   }
+}
+
+TEST(PhotoSimulator, AddsWhatFormulasAndLookupsSayToRecordedPixels) {
+  PhotoRequest request = RequestOf(MakeSurface("letter", LetterMesh()), CameraAt({0.12, -0.26, 0.09}));
+  request.session_time_s = 50;
+  const EffectLines gamma = {{"gamma", {"exponent=0.8"}}};
+  EffectLines lines = gamma;
+  lines.push_back({"formula",
+                   {"name=odd", "adds=grey",
+                    "expression=k*incidence_deg + depth_mm/100 - column/9 + row/7 + "
+                    "session_time_s/50 - grey/8",
+                    "k=0.1", "k_unit=1", "k_min=0", "k_max=1"}});
+  lines.push_back({"lookup", {"name=dirt", "adds=grey", "covariate=radius", "knots=0,1", "values=0,-20"}});
+  const Photo plain = MustPhotograph(gamma, request), photo = MustPhotograph(lines, request);
+  for (int i = 0; i < 120 * 90; ++i) {
+    const double column = i % 120 + 0.5, row = i / 120 + 0.5;
+    const double incidence_deg = plain.mask[i] != 0 ? plain.incidence_rad[i] / kRadiansPerDegree : 90;
+    double grey = plain.grey[i] + 0.1 * incidence_deg + 10 * plain.depth_m[i] - column / 9 + row / 7 + 1 -
+                  plain.grey[i] / 8;
+    grey = std::clamp(grey, 0.0, 255.0) - 20 * std::hypot(column - 60, row - 45) / 75;
+    EXPECT_NEAR(photo.grey[i], std::clamp(grey, 0.0, 255.0), 1e-3);
+  }
+  const auto broken =
+      PhotoSimulator(PhotoModel({{"formula", {"name=bad", "adds=grey", "expression=log(column-9)"}}}))
+          .Run(request, {}, nullptr);
+  EXPECT_THAT(std::string(broken.status().message()), HasSubstr("row 0, column 0"));
 }
 
 TEST(PhotoSimulator, RefusesWhatNoCameraSees) {

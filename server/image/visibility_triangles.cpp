@@ -1,11 +1,16 @@
 // Triangles drawn into a depth buffer. All arithmetic is plain single precision in a fixed order (cpu_kernels.h): the
 // result does not depend on the machine.
 #include <array>
+#include <cmath>
 
 #include "server/image/cpu_frame.h"
 
 namespace touchstone::image {
 namespace {
+
+// Up to this many triangles for a pixel of the object's box, drawing is faster than casting: measured, 2.7
+// times as fast at one or two, 1.4 times at 27; open meshes, which show both sides, gain less.
+constexpr double kTrianglesAPixel = 20.0;
 
 // One row of the matrix that projects: the vector, and what it makes of the eye.
 void SetRow(const Eigen::Vector3d& axis, const Eigen::Vector3d& eye_m, float* row) {
@@ -15,6 +20,12 @@ void SetRow(const Eigen::Vector3d& axis, const Eigen::Vector3d& eye_m, float* ro
 }
 
 }  // namespace
+
+bool IsCoarse(const CpuFrame& frame) {
+  const double pixels = static_cast<double>(frame.box.last_column - frame.box.first_column) *
+                        (frame.box.last_row - frame.box.first_row);
+  return static_cast<double>(frame.mesh->corners.size() / 3) <= kTrianglesAPixel * pixels;
+}
 
 bool CanDrawTriangles(const CpuFrame& frame) {
   // Nothing to be clipped, no corner so far beside the image that its pixel is blurred, and depths that
@@ -28,7 +39,11 @@ bool CanDrawTriangles(const CpuFrame& frame) {
                                    (i & 4) ? bounds.max_m.z() : bounds.min_m.z());
     const double depth_m = frame.view.DepthM(corner_m);
     if (depth_m < frame.view.near_m || depth_m > frame.view.far_m) return false;
-    if (frame.view.Project(corner_m).cwiseAbs().maxCoeff() > kFarthestPixel) return false;
+    const Eigen::Vector3d from_eye = corner_m - frame.view.eye_m;
+    if (std::abs(frame.middle_x + from_eye.dot(frame.view.right) / (depth_m * frame.step_x)) >
+            kFarthestPixel ||
+        std::abs(frame.middle_y - from_eye.dot(frame.view.up) / (depth_m * frame.step_y)) > kFarthestPixel)
+      return false;
   }
   return true;
 }
@@ -43,11 +58,11 @@ DrawnMesh DrawnMeshOf(const CpuFrame& frame) {
 void DrawTriangles(const CpuFrame& frame, const CpuKernels& kernels, Visibility* visibility) {
   const View& view = frame.view;
   ProjectionRows rows;
-  SetRow(view.right / view.step, view.eye_m, rows.right);
-  SetRow(-view.up / view.step, view.eye_m, rows.down);
+  SetRow(view.right / frame.step_x, view.eye_m, rows.right);
+  SetRow(-view.up / frame.step_y, view.eye_m, rows.down);
   SetRow(view.forward, view.eye_m, rows.forward);
-  rows.middle_x = 0.5f * view.width;
-  rows.middle_y = 0.5f * view.height;
+  rows.middle_x = static_cast<float>(frame.middle_x);
+  rows.middle_y = static_cast<float>(frame.middle_y);
 
   const DrawnMesh mesh = DrawnMeshOf(frame);
   // Kept from picture to picture: fresh memory would cost more than the arithmetic.

@@ -28,7 +28,7 @@ absl::StatusOr<Unit> UnitField(const FormulaFields::Parameter& parameter) {
   if (text->second == "1" || UnitFromSymbol(text->second, &unit)) return unit;
   return absl::InvalidArgumentError(
       absl::StrCat("formula parameter ", parameter.name, ": unknown unit '", text->second,
-                   "'; known: mm, deg, us, s, mm/s, mm/s^2, mm/h, 1/m, and 1 for anything else"));
+                   "'; known: mm, deg, us, s, mm/s, mm/s^2, mm/h, 1/m, px, grey, and 1 for anything else"));
 }
 
 }  // namespace

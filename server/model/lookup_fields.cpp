@@ -48,16 +48,15 @@ absl::StatusOr<LookupSpec> LookupFields::ToSpec(int fingers) const {
 }
 
 std::string LookupDefinition(const LookupSpec& spec) {
-  std::string text =
-      absl::StrCat("covariate ", spec.covariate, "\nadds ", spec.adds_time ? "time_us" : "travel_mm",
-                   "\nstage ", StageName(spec.stage), "\nknots ", Join(spec.knots), "\n");
+  std::string text = absl::StrCat("covariate ", spec.covariate, "\nadds ", AddsName(spec), "\nstage ",
+                                  StageName(spec.stage), "\nknots ", Join(spec.knots), "\n");
   for (const std::vector<double>& values : spec.values) absl::StrAppend(&text, "values ", Join(values), "\n");
   return text;
 }
 
 std::string LookupInWords(const LookupSpec& spec) {
-  return absl::StrCat(spec.adds_time ? "time_us" : "travel_mm", " += curve of ", spec.covariate, " with ",
-                      spec.knots.size(), " knots", spec.values.size() > 1 ? ", per finger" : "");
+  return absl::StrCat(AddsName(spec), " += curve of ", spec.covariate, " with ", spec.knots.size(), " knots",
+                      spec.values.size() > 1 ? ", per finger" : "");
 }
 
 }  // namespace touchstone::model

@@ -6,6 +6,7 @@
 #include "server/model/lookup_fields.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 namespace {
@@ -42,8 +43,7 @@ std::string Model::Hash() const {
     if (effect.formula) {
       AppendText("name", effect.formula->name, &text);
       AppendText("expression", effect.formula->expression, &text);
-      absl::StrAppend(&text, "adds ", effect.formula->adds_time ? "time_us" : "travel_mm", "\nstage ",
-                      StageName(effect.stage), "\n");
+      absl::StrAppend(&text, "adds ", AddsName(*effect.formula), "\nstage ", StageName(effect.stage), "\n");
       for (const ParameterInfo& parameter : effect.parameters)
         absl::StrAppend(&text, "bounds ", parameter.name, " ", UnitSymbol(parameter.unit), " ",
                         ShortestNumber(parameter.lower), " ", ShortestNumber(parameter.upper), "\n");

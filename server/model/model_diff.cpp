@@ -9,6 +9,7 @@
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 namespace {
@@ -29,8 +30,7 @@ std::string AllValues(const EffectInstance& instance, int fingers) {
   std::vector<std::string> parts;
   const Effect& effect = *instance.effect;
   if (effect.formula)
-    parts.push_back(absl::StrCat(effect.formula->adds_time ? "time_us" : "travel_mm",
-                                 " += ", effect.formula->expression));
+    parts.push_back(absl::StrCat(AddsName(*effect.formula), " += ", effect.formula->expression));
   if (effect.lookup) parts.push_back(LookupInWords(*effect.lookup));
   if (effect.surface_map) parts.push_back(SurfaceMapInWords(*effect.surface_map));
   for (size_t i = 0; i < effect.parameters.size(); ++i)
@@ -64,9 +64,8 @@ void CompareValues(const std::string& title, const std::string& object, const Ef
 
 // The definition of a formula, without its values.
 std::string Definition(const Effect& effect) {
-  std::string text =
-      absl::StrCat(effect.formula->adds_time ? "time_us" : "travel_mm", " += ", effect.formula->expression,
-                   " in the ", StageName(effect.stage), " stage");
+  std::string text = absl::StrCat(AddsName(*effect.formula), " += ", effect.formula->expression, " in the ",
+                                  StageName(effect.stage), " stage");
   for (const ParameterInfo& p : effect.parameters)
     absl::StrAppend(&text, ", ", p.name, " in ", WithUnit(p, absl::StrCat(p.lower, " to ", p.upper)));
   return text;

@@ -12,6 +12,7 @@
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
+#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 namespace {
@@ -67,9 +68,8 @@ void AppendFormula(const EffectInstance& instance, int fingers, std::string* tex
   const FormulaSpec& spec = *effect.formula;
   absl::StrAppend(text, "  - formula:\n      name: ", Scalar(spec.name), "\n");
   if (instance.per_object) absl::StrAppend(text, "      scope: object\n");
-  absl::StrAppend(text, "      adds: ", spec.adds_time ? "time_us" : "travel_mm", "\n");
-  if (spec.stage != (spec.adds_time ? Stage::kSensor : Stage::kMotion))
-    absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
+  absl::StrAppend(text, "      adds: ", AddsName(spec), "\n");
+  if (spec.stage != DefaultStage(spec)) absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
   absl::StrAppend(text, "      expression: ", Quoted(spec.expression), "\n");
   if (!effect.parameters.empty()) absl::StrAppend(text, "      parameters:\n");
   for (size_t i = 0; i < effect.parameters.size(); ++i) {
@@ -89,10 +89,9 @@ std::string NumberList(const std::vector<double>& numbers) {
 }
 
 void AppendLookup(const LookupSpec& spec, std::string* text) {
-  absl::StrAppend(text, "  - lookup:\n      name: ", Scalar(spec.name),
-                  "\n      adds: ", spec.adds_time ? "time_us" : "travel_mm", "\n");
-  if (spec.stage != (spec.adds_time ? Stage::kSensor : Stage::kMotion))
-    absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
+  absl::StrAppend(text, "  - lookup:\n      name: ", Scalar(spec.name), "\n      adds: ", AddsName(spec),
+                  "\n");
+  if (spec.stage != DefaultStage(spec)) absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
   absl::StrAppend(text, "      covariate: ", Scalar(spec.covariate),
                   "\n      knots: ", NumberList(spec.knots), "\n");
   if (spec.values.size() == 1) {

@@ -13,11 +13,16 @@ namespace touchstone::model {
 struct UserTermFields {
   std::string name;
   std::string adds;
-  std::string stage;  // empty: motion for travel_mm, sensor for time_us
+  std::string stage;  // empty: DefaultStage of what it adds
 
   // Checks the three and writes them to `term`. `kind`: "formula" or "lookup", for errors, which name the field.
   absl::Status FillTerm(absl::string_view kind, absl::string_view example_name, UserTerm* term) const;
 };
+
+// What a term adds, as files write it: "travel_mm", "time_us" or "grey".
+const char* AddsName(const UserTerm& term);
+// Where it acts if the file does not say: motion, sensor, image sensor.
+Stage DefaultStage(const UserTerm& term);
 
 // "KIND: 'FIELD' is missing; write for example EXAMPLE".
 absl::Status MissingField(absl::string_view kind, absl::string_view field, absl::string_view example);

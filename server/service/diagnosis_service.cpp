@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -85,13 +86,18 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   provenance->set_seed(input.seed);
   if (evidence.measurements_case() == v1::Evidence::kCsv)
     provenance->set_set_sha256(Sha256Hex(evidence.csv()));
-  if (evidence.measurements_case() == v1::Evidence::kSession)
-    if (const auto csv = resources.sessions->Bytes(evidence.session()); csv.ok())
-      provenance->set_set_sha256(Sha256Hex(**csv));
-  // A folder without touches is known by the hash of its files.
-  if (input.images != nullptr && provenance->set_sha256().empty())
+  if (evidence.measurements_case() == v1::Evidence::kSession) {
+    if (const auto session = resources.sessions->Find(evidence.session()); session.ok())
+      provenance->set_set_sha256(session->hash());
+  } else if (input.images != nullptr && input.set == nullptr) {
     provenance->set_set_sha256(input.images->sha256);
-  for (const std::string& object : ObjectsOf(input)) {
+  }
+  std::vector<std::string> objects;
+  if (input.set != nullptr) objects = input.set->objects;
+  if (input.images != nullptr)
+    for (const std::string& object : input.images->objects)
+      if (std::find(objects.begin(), objects.end(), object) == objects.end()) objects.push_back(object);
+  for (const std::string& object : objects) {
     const auto surface = input.surfaces.find(object);
     if (surface == input.surfaces.end()) continue;
     v1::MeshProvenance* mesh = provenance->add_meshes();

@@ -14,6 +14,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/service/convert.h"
 #include "server/service/measured_set_message.h"
+#include "server/service/stored_session.h"
 #include "server/session/image_set_file.h"
 
 namespace touchstone::service {
@@ -23,22 +24,78 @@ constexpr int kMaxAlso = 64;     // model files
 constexpr size_t kMaxNamed = 5;  // objects in a message
 constexpr size_t kMaxAlsoBytes = 1 << 20;
 
-absl::StatusOr<session::MeasurementSet> ReadSet(const v1::Evidence& message, const Resources& resources) {
+absl::Status SetTouches(absl::StatusOr<session::MeasurementSet> set, diagnosis::DiagnosisInput* input) {
+  TOUCHSTONE_RETURN_IF_ERROR(set.status());
+  if (set->fingers == 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat(set->origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
+  input->set = std::make_shared<const session::MeasurementSet>(*std::move(set));
+  return absl::OkStatus();
+}
+
+absl::Status SetImages(const v1::ImageSetFiles& files, diagnosis::DiagnosisInput* input) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(session::ImageSet images, session::ParseImageSet(files));
+  input->images = std::make_shared<const session::ImageSet>(std::move(images));
+  return absl::OkStatus();
+}
+
+// A stored session holds touches, photographs or both.
+absl::Status ReadSession(const v1::Evidence& message, const Resources& resources,
+                         diagnosis::DiagnosisInput* input) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> bytes,
+                              resources.sessions->Bytes(message.session()));
+  const std::string origin = message.origin().empty() ? message.session() : message.origin();
+  if (!HoldsImages(*bytes)) return SetTouches(session::ParseMeasurementSet(*bytes, origin), input);
+  if (message.has_images())
+    return absl::InvalidArgumentError(
+        absl::StrCat("evidence.images stands beside session '", message.session(),
+                     "', which holds photographs already; one of the two was expected"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(StoredSession stored, UnpackSession(*bytes));
+  stored.images->set_origin(origin);
+  TOUCHSTONE_RETURN_IF_ERROR(SetImages(*stored.images, input));
+  if (stored.csv.empty()) return absl::OkStatus();
+  return SetTouches(session::ParseMeasurementSet(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv)),
+                    input);
+}
+
+absl::Status ReadMeasurements(const v1::Evidence& message, const Resources& resources,
+                              diagnosis::DiagnosisInput* input) {
   const std::string origin = message.origin().empty() ? "measurements" : message.origin();
   switch (message.measurements_case()) {
-    case v1::Evidence::kSession: {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> csv,
-                                  resources.sessions->Bytes(message.session()));
-      return session::ParseMeasurementSet(*csv, message.origin().empty() ? message.session() : origin);
-    }
-    case v1::Evidence::kCsv:
-      return session::ParseMeasurementSet(message.csv(), origin);
-    case v1::Evidence::kSet:
-      return FromProto(message.set(), origin);
-    case v1::Evidence::MEASUREMENTS_NOT_SET:
+    case v1::Evidence::kSession:
+      TOUCHSTONE_RETURN_IF_ERROR(ReadSession(message, resources, input));
       break;
+    case v1::Evidence::kCsv:
+      TOUCHSTONE_RETURN_IF_ERROR(SetTouches(session::ParseMeasurementSet(message.csv(), origin), input));
+      break;
+    case v1::Evidence::kSet:
+      TOUCHSTONE_RETURN_IF_ERROR(SetTouches(FromProto(message.set(), origin), input));
+      break;
+    case v1::Evidence::MEASUREMENTS_NOT_SET:
+      if (message.has_images()) break;
+      return absl::InvalidArgumentError("evidence.measurements is empty: set session, csv or set, or images");
   }
-  return absl::InvalidArgumentError("evidence is empty: set session, csv, set or images");
+  return message.has_images() ? SetImages(message.images(), input) : absl::OkStatus();
+}
+
+// Every object of the evidence, and where its name first stands: "set.csv:17".
+std::vector<std::pair<std::string, std::string>> ObjectsOf(const diagnosis::DiagnosisInput& input) {
+  std::vector<std::pair<std::string, std::string>> objects;
+  if (const session::MeasurementSet* set = input.set.get(); set != nullptr)
+    for (size_t object = 0; object < set->objects.size(); ++object) {
+      const auto row =
+          std::find(set->object.begin(), set->object.end(), static_cast<int>(object)) - set->object.begin();
+      objects.emplace_back(set->objects[object], absl::StrCat(set->origin, ":", set->line[row]));
+    }
+  if (const session::ImageSet* images = input.images.get(); images != nullptr)
+    for (size_t object = 0; object < images->objects.size(); ++object) {
+      const auto row = std::find_if(
+          images->photographs.begin(), images->photographs.end(),
+          [&](const session::PhotographRow& one) { return one.object == static_cast<int>(object); });
+      objects.emplace_back(images->objects[object],
+                           absl::StrCat(images->origin, "/", session::kImagesCsv, ":", row->line));
+    }
+  return objects;
 }
 
 absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::MeshFile& file) {
@@ -59,23 +116,6 @@ absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::M
   return surface;
 }
 
-// Where a file has an object first: "set.csv:2".
-std::string PlaceOfObject(const diagnosis::DiagnosisInput& input, const std::string& name) {
-  const auto place = [&name](const std::vector<std::string>& objects) {
-    return static_cast<int>(std::find(objects.begin(), objects.end(), name) - objects.begin());
-  };
-  if (input.set != nullptr && place(input.set->objects) < static_cast<int>(input.set->objects.size())) {
-    const session::MeasurementSet& set = *input.set;
-    const auto row = std::find(set.object.begin(), set.object.end(), place(set.objects)) - set.object.begin();
-    return absl::StrCat(set.origin, ":", set.line[row]);
-  }
-  const int object = place(input.images->objects);
-  for (const session::PhotographRow& row : input.images->photographs)
-    if (row.object == object)
-      return absl::StrCat(input.images->origin, "/", session::kImagesCsv, ":", row.line);
-  return input.images->origin;
-}
-
 // With the objects of a set at most so many others are looked at.
 constexpr size_t kMaxKnownSurfaces = 24;
 
@@ -88,14 +128,17 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
       return absl::InvalidArgumentError(
           absl::StrCat("meshes: two are named '", file.name(), "'; one per object was expected"));
   std::vector<std::string> missing;
-  for (const std::string& name : ObjectsOf(*input)) {
+  std::string first_place;
+  for (const auto& [name, place] : ObjectsOf(*input)) {
+    if (input->surfaces.count(name) > 0) continue;  // touched and photographed
     const auto file = files.find(name);
     const auto served = resources.objects.all().find(name);
     if (file != files.end()) {
       TOUCHSTONE_ASSIGN_OR_RETURN(input->surfaces[name], ReadSurface(*file->second));
     } else if (served != resources.objects.all().end()) {
       input->surfaces[name] = served->second.surface;
-    } else {
+    } else if (std::find(missing.begin(), missing.end(), name) == missing.end()) {
+      if (missing.empty()) first_place = place;
       missing.push_back(name);
     }
   }
@@ -121,8 +164,8 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
                          absl::StrJoin(missing.begin() + 1,
                                        missing.begin() + std::min(missing.size(), kMaxNamed), ", "),
                          missing.size() > kMaxNamed ? ", ..." : "", ")");
-  return absl::NotFoundError(absl::StrCat(PlaceOfObject(*input, missing[0]), ": column object: '", missing[0],
-                                          "' has no mesh", others, "; give it with --mesh ", missing[0],
+  return absl::NotFoundError(absl::StrCat(first_place, ": column object: '", missing[0], "' has no mesh",
+                                          others, "; give it with --mesh ", missing[0],
                                           "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
 }
 
@@ -146,15 +189,6 @@ absl::Status ReadAlso(const v1::Evidence& message, diagnosis::DiagnosisInput* in
 }
 
 }  // namespace
-
-std::vector<std::string> ObjectsOf(const diagnosis::DiagnosisInput& input) {
-  std::vector<std::string> objects;
-  if (input.set != nullptr) objects = input.set->objects;
-  if (input.images != nullptr)
-    for (const std::string& name : input.images->objects)
-      if (std::find(objects.begin(), objects.end(), name) == objects.end()) objects.push_back(name);
-  return objects;
-}
 
 std::string AsModelFile(const std::string& yaml) {
   const std::vector<std::string> lines = absl::StrSplit(yaml, '\n');
@@ -181,17 +215,7 @@ absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& messa
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
   TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, &input));
-  if (message.has_images()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(session::ImageSet images, session::ParseImageSet(message.images()));
-    input.images = std::make_shared<const session::ImageSet>(std::move(images));
-  }
-  if (!message.has_images() || message.measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(session::MeasurementSet set, ReadSet(message, resources));
-    if (set.fingers == 0)
-      return absl::InvalidArgumentError(
-          absl::StrCat(set.origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
-    input.set = std::make_shared<const session::MeasurementSet>(std::move(set));
-  }
+  TOUCHSTONE_RETURN_IF_ERROR(ReadMeasurements(message, resources, &input));
   TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
   return input;
 }

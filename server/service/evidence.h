@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include <absl/status/statusor.h>
 
@@ -12,13 +11,10 @@
 
 namespace touchstone::service {
 
-// Objects of the set are looked up among the evidence's own meshes first, then among the server's. Errors
+// The input has a set, images or both. Their objects are looked up among the evidence's own meshes first, then among the server's. Errors
 // name the field, or file and line of what was sent.
 absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
                                                        const Resources& resources);
-
-// Of touches and photographs, each once, in order of appearance.
-std::vector<std::string> ObjectsOf(const diagnosis::DiagnosisInput& input);
 
 // The user's own effects as a model file: `yaml` itself if it is one, else a model file round an effect that
 // stands alone as it would under `effects:` ("formula:" and what belongs to it).

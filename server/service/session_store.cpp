@@ -13,13 +13,13 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/session/measurement_set.h"
 #include "server/source/request_checks.h"
 
 namespace touchstone::service {
 namespace {
 
-constexpr char kExtension[] = ".csv";
+// A measurement file under one, an image set under the other.
+constexpr char kCsvExtension[] = ".csv", kImagesExtension[] = ".images";
 constexpr size_t kPiece = 1 << 20;
 constexpr size_t kMaxSessions = 10000;
 
@@ -43,14 +43,14 @@ absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOpt
   return store;
 }
 
-absl::Status SessionStore::Upload::Append(absl::string_view piece) {
-  if (csv_.size() + piece.size() > store_->max_bytes_)
+absl::Status SessionStore::Upload::Append(const std::string& file, absl::string_view piece) {
+  if (pieces_.bytes() + piece.size() > store_->max_bytes_)
     return absl::InvalidArgumentError(absl::StrCat("csv: a session may have at most ",
                                                    store_->max_bytes_ >> 20,
                                                    " MiB (max_session_mib); divide it by object"));
   counted_ += piece.size();
   const uint64_t uploading = store_->uploading_ += piece.size();
-  csv_.append(piece.data(), piece.size());
+  TOUCHSTONE_RETURN_IF_ERROR(pieces_.Append(file, piece));
   if (uploading > store_->max_bytes_together_)
     return absl::ResourceExhaustedError(
         absl::StrCat("more than ", store_->max_bytes_together_ >> 20,
@@ -62,35 +62,23 @@ absl::Status SessionStore::CheckName(const std::string& name) {
   return source::CheckResourceName(name, "name");
 }
 
-absl::StatusOr<v1::Session> SessionStore::Describe(const std::string& name, absl::string_view csv,
-                                                   const std::string& origin) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet set, session::ParseMeasurementSet(csv, origin));
-  if (set.fingers == 0)
-    return absl::InvalidArgumentError(
-        absl::StrCat(origin, ":1: has no column t_*_us: it is a plan; a session holds what was measured"));
-  v1::Session session;
-  session.set_name(name);
-  session.set_hash(Sha256Hex(csv));
-  session.set_bytes(csv.size());
-  session.set_touches(set.size());
-  session.set_fingers(set.fingers);
-  for (const std::string& object : set.objects) session.add_objects(object);
-  session.set_has_poses(set.has_poses);
-  return session;
+std::string SessionStore::PathOf(const std::string& name, bool images) const {
+  return absl::StrCat(folder_, "/", name, images ? kImagesExtension : kCsvExtension);
 }
 
-std::string SessionStore::PathOf(const std::string& name) const {
-  return absl::StrCat(folder_, "/", name, kExtension);
-}
-
-bool SessionStore::Stat(const std::string& name, Version* version) const {
-  struct stat info;
-  if (::stat(PathOf(name).c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return false;
-  constexpr int64_t kNanosecondsPerSecond = 1'000'000'000;
-  version->modified_ns = info.st_mtim.tv_sec * kNanosecondsPerSecond + info.st_mtim.tv_nsec;
-  version->bytes = info.st_size;
-  version->inode = info.st_ino;
-  return true;
+bool SessionStore::Stat(const std::string& name, Version* version, std::string* path) const {
+  for (const bool images : {false, true}) {
+    const std::string file = PathOf(name, images);
+    struct stat info;
+    if (::stat(file.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) continue;
+    constexpr int64_t kNanosecondsPerSecond = 1'000'000'000;
+    version->modified_ns = info.st_mtim.tv_sec * kNanosecondsPerSecond + info.st_mtim.tv_nsec;
+    version->bytes = info.st_size;
+    version->inode = info.st_ino;
+    if (path != nullptr) *path = file;
+    return true;
+  }
+  return false;
 }
 
 std::vector<std::string> SessionStore::Names() const {
@@ -103,11 +91,14 @@ std::vector<std::string> SessionStore::Names() const {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder_, error)) {
     const std::string file = entry.path().filename().string();
-    if (!absl::EndsWith(file, kExtension)) continue;
-    std::string name = file.substr(0, file.size() - std::strlen(kExtension));
-    if (CheckName(name).ok()) names.push_back(std::move(name));
+    for (const char* extension : {kCsvExtension, kImagesExtension}) {
+      if (!absl::EndsWith(file, extension)) continue;
+      std::string name = file.substr(0, file.size() - std::strlen(extension));
+      if (CheckName(name).ok()) names.push_back(std::move(name));
+    }
   }
   std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
   return names;
 }
 
@@ -115,7 +106,7 @@ SessionStore::Usage SessionStore::Stored() const {
   Usage usage;
   if (folder_.empty()) {
     usage.sessions = known_.size();
-    for (const auto& [name, known] : known_) usage.bytes += known.csv->size();
+    for (const auto& [name, known] : known_) usage.bytes += known.bytes->size();
     return usage;
   }
   Version version;
@@ -134,7 +125,8 @@ absl::Status SessionStore::NoSession(const std::string& name) const {
 absl::StatusOr<v1::Session> SessionStore::Find(const std::string& name) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
   Version version;
-  const bool stored = folder_.empty() || Stat(name, &version);
+  std::string path;
+  const bool stored = folder_.empty() || Stat(name, &version, &path);
   {
     std::lock_guard<std::mutex> lock(mutex_);
     const auto found = known_.find(name);
@@ -142,8 +134,8 @@ absl::StatusOr<v1::Session> SessionStore::Find(const std::string& name) {
   }
   if (folder_.empty() || !stored) return NoSession(name);
   // Another replica wrote it, or this one before it was started anew.
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, ReadFile(PathOf(name)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, Describe(name, csv, name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, DescribeSession(name, bytes, name));
   std::lock_guard<std::mutex> lock(mutex_);
   Known& known = known_[name];
   known.session = session;
@@ -159,23 +151,29 @@ std::vector<v1::Session> SessionStore::All() {
 }
 
 // Whole or not at all, and never over another one: two replicas may be given the same name at once.
-absl::Status SessionStore::WriteNew(const std::string& name, const std::string& csv) const {
+absl::Status SessionStore::WriteNew(const std::string& name, const std::string& bytes) const {
   static std::atomic<uint64_t> counter{0};
-  const std::string path = PathOf(name);
+  const bool images = HoldsImages(bytes);
+  const std::string path = PathOf(name, images), other = PathOf(name, !images);
   const std::string draft = absl::StrCat(folder_, "/.", name, ".", ::getpid(), ".", counter++);
-  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(draft, csv));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(draft, bytes));
   const int failed = ::link(draft.c_str(), path.c_str()) == 0 ? 0 : errno;
   ::unlink(draft.c_str());
-  if (failed == 0) return absl::OkStatus();
+  if (failed == 0) {
+    // A session of the other kind came at the same moment: neither writes over the other, and this one steps back.
+    if (::access(other.c_str(), F_OK) != 0) return absl::OkStatus();
+    ::unlink(path.c_str());
+    return absl::AlreadyExistsError(other);
+  }
   if (failed == EEXIST) return absl::AlreadyExistsError(path);
   // A file system without links: the race is lost to the last writer there.
-  if (failed == EPERM || failed == EOPNOTSUPP || failed == ENOSYS) return WriteFileAtomically(path, csv);
+  if (failed == EPERM || failed == EOPNOTSUPP || failed == ENOSYS) return WriteFileAtomically(path, bytes);
   return absl::InternalError(absl::StrCat(path, ": ", std::strerror(failed)));
 }
 
-absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::string csv) {
+absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::string bytes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, Describe(name, csv, name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, DescribeSession(name, bytes, name));
   const auto same = [&](const absl::StatusOr<v1::Session>& other) -> absl::StatusOr<v1::Session> {
     if (other.ok() && other->hash() == session.hash()) return session;
     return absl::AlreadyExistsError(
@@ -197,15 +195,15 @@ absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::s
   if (stored.sessions >= kMaxSessions)
     return absl::ResourceExhaustedError(
         absl::StrCat("the store holds ", kMaxSessions, " sessions; delete some"));
-  if (stored.bytes + csv.size() > max_bytes_together_)
+  if (stored.bytes + bytes.size() > max_bytes_together_)
     return absl::ResourceExhaustedError(absl::StrCat("the store holds ", stored.bytes >> 20, " of ",
                                                      max_bytes_together_ >> 20,
                                                      " MiB (max_sessions_mib); delete some sessions"));
   if (folder_.empty()) {
-    known_[name] = {session, {}, std::make_shared<const std::string>(std::move(csv))};
+    known_[name] = {session, {}, std::make_shared<const std::string>(std::move(bytes))};
     return session;
   }
-  const absl::Status written = WriteNew(name, csv);
+  const absl::Status written = WriteNew(name, bytes);
   if (absl::IsAlreadyExists(written)) return same(Find(name));
   TOUCHSTONE_RETURN_IF_ERROR(written);
   Version version;
@@ -221,38 +219,37 @@ absl::StatusOr<std::shared_ptr<const std::string>> SessionStore::Bytes(const std
   if (folder_.empty()) {
     {
       std::lock_guard<std::mutex> lock(mutex_);
-      if (const auto found = known_.find(name); found != known_.end()) return found->second.csv;
+      if (const auto found = known_.find(name); found != known_.end()) return found->second.bytes;
     }
     return NoSession(name);
   }
   Version version;
-  if (!Stat(name, &version)) return NoSession(name);
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::string csv, ReadFile(PathOf(name)));
-  return std::make_shared<const std::string>(std::move(csv));
+  std::string path;
+  if (!Stat(name, &version, &path)) return NoSession(name);
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
+  return std::make_shared<const std::string>(std::move(bytes));
 }
 
-absl::Status SessionStore::Export(const std::string& name,
-                                  const std::function<bool(absl::string_view)>& take) {
-  if (folder_.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> csv, Bytes(name));
-    for (size_t begin = 0; begin < csv->size(); begin += kPiece)
-      if (!take(absl::string_view(*csv).substr(begin, kPiece))) break;
-    return absl::OkStatus();
-  }
+absl::Status SessionStore::Export(
+    const std::string& name, const std::function<bool(const std::string& file, absl::string_view)>& take) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
   Version version;
-  if (!Stat(name, &version)) return NoSession(name);
+  std::string path;
+  if (!folder_.empty() && !Stat(name, &version, &path)) return NoSession(name);
+  if (folder_.empty() || path == PathOf(name, true)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> bytes, Bytes(name));
+    return ForEachPiece(*bytes, kPiece, take);
+  }
   // Open, the file stays as it is although its name may be deleted.
-  std::ifstream file(PathOf(name), std::ios::binary);
+  std::ifstream file(path, std::ios::binary);
   std::string piece(kPiece, '\0');
   uint64_t taken = 0;
   while (taken < version.bytes && file.read(piece.data(), kPiece).gcount() > 0) {
     taken += file.gcount();
-    if (!take(absl::string_view(piece.data(), file.gcount()))) return absl::OkStatus();
+    if (!take("", absl::string_view(piece.data(), file.gcount()))) return absl::OkStatus();
   }
   if (taken != version.bytes)
-    return absl::DataLossError(
-        absl::StrCat(PathOf(name), ": ended after ", taken, " of ", version.bytes, " bytes"));
+    return absl::DataLossError(absl::StrCat(path, ": ended after ", taken, " of ", version.bytes, " bytes"));
   return absl::OkStatus();
 }
 
@@ -263,7 +260,9 @@ absl::Status SessionStore::Delete(const std::string& name) {
     std::lock_guard<std::mutex> lock(mutex_);
     deleted = known_.erase(name) > 0;
   }
-  if (!folder_.empty()) deleted = ::unlink(PathOf(name).c_str()) == 0;
+  Version version;
+  std::string path;
+  if (!folder_.empty()) deleted = Stat(name, &version, &path) && ::unlink(path.c_str()) == 0;
   return deleted ? absl::OkStatus() : NoSession(name);
 }
 

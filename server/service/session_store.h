@@ -1,4 +1,4 @@
-// Measurement files by name, as touchstone.v1.Sessions keeps them: in a folder, so that replicas
+// Measurement files and image sets by name, as touchstone.v1.Sessions keeps them: in a folder, so that replicas
 // that share it have the same ones, or in memory. A name never changes its meaning. Every function may be
 // called from several threads.
 #pragma once
@@ -17,6 +17,7 @@
 #include <absl/strings/string_view.h>
 
 #include "server/service/server_options.h"
+#include "server/service/stored_session.h"
 #include "touchstone/v1/sessions.pb.h"
 
 namespace touchstone::service {
@@ -33,29 +34,27 @@ class SessionStore {
     ~Upload() { store_->uploading_ -= counted_; }
     Upload(const Upload&) = delete;
     Upload& operator=(const Upload&) = delete;
-    absl::Status Append(absl::string_view piece);
-    std::string Take() { return std::move(csv_); }
+    // `file` as in CreateSessionRequest.
+    absl::Status Append(const std::string& file, absl::string_view piece);
+    absl::StatusOr<std::string> Take() { return pieces_.Take(); }
 
    private:
     SessionStore* store_;
     uint64_t counted_ = 0;
-    std::string csv_;
+    SessionPieces pieces_;
   };
 
   // [A-Za-z0-9_.-]{1,64}, no '.' first; the error names the field.
   static absl::Status CheckName(const std::string& name);
-  // Reads the file as a whole; errors name `origin` and the line.
-  static absl::StatusOr<v1::Session> Describe(const std::string& name, absl::string_view csv,
-                                              const std::string& origin);
-
-  // The same bytes again are taken and change nothing; other bytes are ALREADY_EXISTS.
-  absl::StatusOr<v1::Session> Create(const std::string& name, std::string csv);
+  // Bytes are as in stored_session.h. The same bytes again are taken and change nothing; other bytes are ALREADY_EXISTS.
+  absl::StatusOr<v1::Session> Create(const std::string& name, std::string bytes);
   absl::StatusOr<v1::Session> Find(const std::string& name);
-  // By name. A file in the folder that is no measurement file is left out.
+  // By name. A file in the folder that is neither is left out.
   std::vector<v1::Session> All();
   absl::StatusOr<std::shared_ptr<const std::string>> Bytes(const std::string& name);
-  // Hands the bytes over in pieces, until `take` returns false.
-  absl::Status Export(const std::string& name, const std::function<bool(absl::string_view)>& take);
+  // Hands the files over in pieces, until `take` returns false.
+  absl::Status Export(const std::string& name,
+                      const std::function<bool(const std::string& file, absl::string_view)>& take);
   absl::Status Delete(const std::string& name);
 
  private:
@@ -72,16 +71,17 @@ class SessionStore {
   };
   struct Known {
     v1::Session session;
-    Version version;                         // with a folder
-    std::shared_ptr<const std::string> csv;  // without one
+    Version version;                           // with a folder
+    std::shared_ptr<const std::string> bytes;  // without one
   };
 
-  std::string PathOf(const std::string& name) const;
-  bool Stat(const std::string& name, Version* version) const;
+  std::string PathOf(const std::string& name, bool images) const;
+  // The file of a name, and which version of it; false: there is none.
+  bool Stat(const std::string& name, Version* version, std::string* path = nullptr) const;
   std::vector<std::string> Names() const;  // in the folder, sorted
   Usage Stored() const;                    // without a folder: with mutex_ held
   absl::Status NoSession(const std::string& name) const;
-  absl::Status WriteNew(const std::string& name, const std::string& csv) const;
+  absl::Status WriteNew(const std::string& name, const std::string& bytes) const;
 
   std::string folder_;
   uint64_t max_bytes_ = 0, max_bytes_together_ = 0;

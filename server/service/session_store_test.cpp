@@ -52,7 +52,7 @@ TEST_P(SessionStoreTest, KeepsWhatItWasGiven) {
   std::string exported;
   EXPECT_TRUE(store
                   ->Export("monday",
-                           [&](absl::string_view piece) {
+                           [&](const std::string&, absl::string_view piece) {
                              exported.append(piece.data(), piece.size());
                              return true;
                            })
@@ -117,10 +117,10 @@ TEST_P(SessionStoreTest, KeepsItsLimits) {
   EXPECT_TRUE(store->Create("small", kSet).ok());
 
   SessionStore::Upload upload(store.get());
-  EXPECT_TRUE(upload.Append(large).ok());
-  EXPECT_THAT(std::string(upload.Append(large).message()), HasSubstr("max_session_mib"));
+  EXPECT_TRUE(upload.Append("", large).ok());
+  EXPECT_THAT(std::string(upload.Append("", large).message()), HasSubstr("max_session_mib"));
   SessionStore::Upload beside(store.get());
-  EXPECT_TRUE(absl::IsResourceExhausted(beside.Append(large)));
+  EXPECT_TRUE(absl::IsResourceExhausted(beside.Append("", large)));
 }
 
 TEST(SessionStoreFolder, IsSharedByReplicasAndLeavesStrangeFilesAlone) {

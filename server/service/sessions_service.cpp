@@ -31,18 +31,19 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
     if (!request.name().empty() && request.name() != name)
       return absl::InvalidArgumentError(
           absl::StrCat("name = '", request.name(), "': the first message said '", name, "'; say it once"));
-    TOUCHSTONE_RETURN_IF_ERROR(upload.Append(request.csv()));
+    TOUCHSTONE_RETURN_IF_ERROR(upload.Append(request.file(), request.csv()));
   } while (reader->Read(&request));
 
   // A stream that broke off looks like one that ended, and might even end with a whole row.
   if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
 
   const std::string origin = name.empty() ? "csv" : name;
-  TOUCHSTONE_ASSIGN_OR_RETURN(*response, validate_only ? SessionStore::Describe(name, upload.Take(), origin)
-                                                       : store.Create(name, upload.Take()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::string bytes, upload.Take());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      *response, validate_only ? DescribeSession(name, bytes, origin) : store.Create(name, std::move(bytes)));
   if (!validate_only)
-    spdlog::info("session '{}' stored, {} touches, hash {}", name, response->touches(),
-                 response->hash().substr(0, 8));
+    spdlog::info("session '{}' stored, {} touches, {} photographs, hash {}", name, response->touches(),
+                 response->images(), response->hash().substr(0, 8));
   return absl::OkStatus();
 }
 
@@ -64,11 +65,13 @@ grpc::Status SessionsService::ExportSession(grpc::ServerContext*, const v1::Expo
                                             grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
   bool gone = false;
   v1::ExportSessionResponse response;
-  const absl::Status status = resources_->sessions->Export(request->name(), [&](absl::string_view piece) {
-    response.set_csv(std::string(piece));
-    gone = !writer->Write(response);
-    return !gone;
-  });
+  const absl::Status status =
+      resources_->sessions->Export(request->name(), [&](const std::string& file, absl::string_view piece) {
+        response.set_file(file);
+        response.set_csv(std::string(piece));
+        gone = !writer->Write(response);
+        return !gone;
+      });
   return ToGrpc(gone ? absl::CancelledError("the client is gone") : status);
 }
 

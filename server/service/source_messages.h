@@ -17,7 +17,8 @@ absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message);  
 
 absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
 absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
-absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message);
+absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message,
+                                                 const Resources& resources);
 absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
                                                 const Resources& resources);
 

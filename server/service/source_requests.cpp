@@ -168,7 +168,8 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
   return request;
 }
 
-absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message) {
+absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message,
+                                                 const Resources& resources) {
   source::CaptureRequest request;
   request.object = message.object();
   TOUCHSTONE_ASSIGN_OR_RETURN(request.image, FromProto(message.image()));
@@ -178,6 +179,11 @@ absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& messa
     camera.vertical_fov_rad = request.image.vertical_fov_rad;
     request.cameras.push_back(camera);
   }
+  if (message.has_model() && Simulates(resources)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
+  }
+  request.seed = message.seed();
+  request.first_index = message.first_index();
   return request;
 }
 

@@ -67,7 +67,7 @@ absl::StatusOr<v1::CaptureResponse> SourceService::DoCapture(grpc::ServerContext
   const RunningGuard running(&resources_->running_requests);
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(message.lease_token()));
   const source::MotionGuard guard = StoppableGuardOf(context, resources_, leases_, message.lease_token());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const source::CaptureRequest request, FromProto(message));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const source::CaptureRequest request, FromProto(message, *resources_));
   TOUCHSTONE_ASSIGN_OR_RETURN(source::CaptureResults results, source_->Capture(request, guard));
   resources_->images += results.batch.rows;
   return ToProto(std::move(results));

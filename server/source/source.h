@@ -83,6 +83,10 @@ struct CaptureRequest {
   std::string object;
   std::vector<image::Camera> cameras;  // one per photograph; each with the image's field of view
   dataset::DatasetImage image;         // without its renderer
+  // Of a virtual source: its effects of photographs act (null: those of the source's own), and picture k draws the noise
+  // of (seed, first_index + k).
+  std::shared_ptr<const model::Model> model;
+  uint64_t seed = 0, first_index = 0;
 };
 
 // Where the camera of a physical source really was, object frame.

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/image/photo_image.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
@@ -119,6 +120,19 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
 
 absl::Status VirtualSource::MakePictures(const CaptureRequest& request, const ServedObject& object,
                                          const MotionGuard& guard, const TakePicture& take) {
+  const std::shared_ptr<const model::Model> model = request.model != nullptr ? request.model : default_model_;
+  if (image::ChangesPhotographs(*model)) {
+    image::PhotoWorkspace workspace;
+    for (size_t k = 0; k < request.cameras.size(); ++k) {
+      TOUCHSTONE_RETURN_IF_ERROR(guard());
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          const image::Image picture,
+          image::TakePhotograph(model, object.surface, request.cameras[k], request.image.options,
+                                {request.seed, request.first_index + k}, &workspace));
+      TOUCHSTONE_RETURN_IF_ERROR(take(picture, nullptr));
+    }
+    return absl::OkStatus();
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<image::Renderer> renderer,
                               RendererFor(request.image.renderer_kind));
   for (const image::Camera& camera : request.cameras) {

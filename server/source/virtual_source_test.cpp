@@ -108,6 +108,40 @@ TEST_F(VirtualSourceTest, TheGuardsErrorEndsTheWork) {
   EXPECT_EQ(source_.Capture(capture, stopped).status().code(), absl::StatusCode::kAborted);
 }
 
+TEST_F(VirtualSourceTest, ItsPicturesShowTheModelsEffectsOfPhotographs) {
+  CaptureRequest capture;
+  capture.object = "lat00";
+  capture.image.options.width = capture.image.options.height = 40;
+  image::Camera camera;
+  camera.eye_m = {0.3, 0, 0.1};
+  capture.cameras = {camera, camera};
+  const auto pictures = [&](const char* effects) {
+    capture.model = effects == nullptr ? nullptr : ModelWith(effects);
+    const auto results = source_.Capture(capture, NoObjection);
+    EXPECT_TRUE(results.ok()) << results.status();
+    return results.ok() ? results->batch.data[0] : std::string();
+  };
+  const std::string nominal = pictures(nullptr);
+  EXPECT_EQ(nominal.substr(0, 1600), nominal.substr(1600));
+  const std::string ground = pictures("  - background_level: {grey: 50}\n");
+  for (size_t i = 0; i < 3200; ++i)
+    if (nominal[i] == 0) {
+      EXPECT_EQ(ground[i], 50);
+    }
+  // Each picture has noise of its own, by seed and number.
+  const char* const noisy = "  - background_level: {grey: 50}\n  - image_noise: {sigma_grey: 3}\n";
+  const std::string noise = pictures(noisy);
+  EXPECT_NE(noise.substr(0, 1600), noise.substr(1600));
+  capture.first_index = 1;
+  EXPECT_EQ(pictures(noisy).substr(0, 1600), noise.substr(1600));
+  capture.seed = 1;
+  EXPECT_NE(pictures(noisy).substr(0, 1600), noise.substr(1600));
+  capture.image.options.shading_style = image::ShadingStyle::kDarkOnWhite;
+  capture.model = ModelWith("  - gamma: {exponent: 0.5}\n");
+  EXPECT_THAT(std::string(source_.Capture(capture, NoObjection).status().message()),
+              HasSubstr("shading_style"));
+}
+
 TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
   TouchRequest touches = Request(7);
   touches.seed = 3;

@@ -244,8 +244,14 @@ class Client:
         with self.lease() as lease:
             yield lease
 
-    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, lease_token: str = "") -> Batch:
+    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, model: ModelLike = None,
+                seed: int = 0, start: int = 0, lease_token: str = "") -> Batch:
         """Photographs: one for each touch (its camera) or each touchstone.Camera.
+
+        Args:
+          model: whose effects of photographs act on a virtual source's pictures (shaded style only); default: the
+            source's. A name, a hash, a path to a model file, its text, or a Model.
+          seed, start: view k draws the pixels' noise of index start + k.
 
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
@@ -253,7 +259,8 @@ class Client:
         with contextlib.ExitStack() as stack:
             token = lease_token or stack.enter_context(self.holding_lease())
             request = source_pb2.CaptureRequest(
-                object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=token
+                object=object, views=to_views(views), image=(image or default_image()).to_proto(), lease_token=token,
+                model=model_ref(model), seed=checks.uint64("seed", seed), first_index=checks.uint64("start", start),
             )
             reply = self._connection.call(_SOURCE, "Capture", request, repeat=not token)
         return Batch.from_columns(0, reply.rows, reply.columns)

@@ -1,0 +1,115 @@
+#include "client/cli/session_images.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "client/cli/interrupt.h"
+#include "client/source/errors.h"
+#include "client/source/image_set_files.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/session/image_set_file.h"
+
+namespace touchstone::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kSessionPiece = 1 << 20;
+
+using TakePiece = std::function<bool(const std::string& file, absl::string_view piece)>;
+
+// A measurement file goes out as it is read: it may be larger than the memory.
+absl::Status ReadFileInPieces(const std::string& path, const TakePiece& take) {
+  std::ifstream file(path, std::ios::binary);
+  std::error_code error;
+  if (!file || !fs::is_regular_file(path, error))
+    return absl::NotFoundError(absl::StrCat(
+        path, ": cannot be read; a measurement file or the folder of an image set was expected"));
+  std::string piece(kSessionPiece, '\0');
+  do {
+    file.read(piece.data(), kSessionPiece);
+    if (!take("", absl::string_view(piece).substr(0, file.gcount()))) break;
+  } while (file);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<service::StoredSession> ReadSessionFolder(const std::string& folder) {
+  service::StoredSession session;
+  TOUCHSTONE_ASSIGN_OR_RETURN(session.images, client::ReadImageSetFiles(folder));
+  if (client::HasTouches(folder)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(session.csv, ReadFile((fs::path(folder) / client::kTouchesCsv).string()));
+  }
+  return session;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const std::string& path,
+                                        const std::string& name, bool check) {
+  std::error_code error;
+  std::string folder_bytes;
+  const bool folder = fs::is_directory(path, error);
+  // What is wrong with a folder is said before anything is sent.
+  if (folder) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadSessionFolder(path));
+    folder_bytes = service::PackSession(session);
+  } else {
+    // ... and of a file that is not there.
+    TOUCHSTONE_RETURN_IF_ERROR(
+        ReadFileInPieces(path, [](const std::string&, absl::string_view) { return false; }));
+  }
+  grpc::ClientContext context;
+  const Interrupt::Handler handler([&context] { context.TryCancel(); });
+  v1::Session session;
+  const auto writer = connection->sessions().CreateSession(&context, &session);
+  v1::CreateSessionRequest request;
+  request.set_name(name);
+  request.set_validate_only(check);
+  const TakePiece send = [&](const std::string& file, absl::string_view piece) {
+    request.set_file(file);
+    request.set_csv(std::string(piece));
+    const bool sent = writer->Write(request);
+    request.clear_name();
+    return sent;
+  };
+  const absl::Status read =
+      folder ? service::ForEachPiece(folder_bytes, kSessionPiece, send) : ReadFileInPieces(path, send);
+  if (!read.ok()) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status finished = client::FromGrpc(writer->Finish());
+  TOUCHSTONE_RETURN_IF_ERROR(read);
+  TOUCHSTONE_RETURN_IF_ERROR(finished);
+  return session;
+}
+
+absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connection, const std::string& name) {
+  grpc::ClientContext context;
+  const Interrupt::Handler handler([&context] { context.TryCancel(); });
+  v1::ExportSessionRequest request;
+  request.set_name(name);
+  const auto reader = connection->sessions().ExportSession(&context, request);
+  v1::ExportSessionResponse response;
+  service::SessionPieces pieces;
+  absl::Status wrong;
+  while (wrong.ok() && reader->Read(&response)) wrong = pieces.Append(response.file(), response.csv());
+  if (!wrong.ok()) context.TryCancel();
+  const absl::Status finished = client::FromGrpc(reader->Finish());
+  TOUCHSTONE_RETURN_IF_ERROR(wrong);
+  TOUCHSTONE_RETURN_IF_ERROR(finished);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, pieces.Take());
+  return service::UnpackSession(bytes);
+}
+
+absl::Status WriteSessionFolder(const service::StoredSession& session, const std::string& folder) {
+  if (client::HasTouches(folder))
+    return absl::AlreadyExistsError(absl::StrCat((fs::path(folder) / client::kTouchesCsv).string(),
+                                                 " exists already; a new folder was expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(client::WriteImageSetFiles(*session.images, folder));
+  if (session.csv.empty()) return absl::OkStatus();
+  return WriteFileAtomically((fs::path(folder) / client::kTouchesCsv).string(), session.csv);
+}
+
+}  // namespace touchstone::cli
