@@ -112,6 +112,8 @@ void AddCamera(std::vector<CandidateMistake>* list) {
                           {0.25, "1/4"},
                           {1.5, "3/2"},
                           {2.0 / 3, "2/3"},
+                          {1.6, "1.6"},
+                          {0.625, "1/1.6"},
                           {3, "3"},
                           {1.0 / 3, "1/3"}}) {
     CandidateMistake whole =

@@ -19,7 +19,9 @@ constexpr size_t kMaxPhotographSlices = 5;
 constexpr int kMaxCells = 80000, kMinCellsOfPicture = 60;
 constexpr int kTriesOfSlice = 8;
 constexpr double kMinShareOfExcess = 0.03;
-constexpr double kMinZOfPoses = 3;  // on the half that the search did not see, poses as the independent units
+// On the half that the search did not see, poses as the independent units; the misfit of the set itself is certain.
+constexpr double kMinZOfPoses = 1.8;
+constexpr double kCertainShare = 0.03;  // of the excess to the noise, below which nothing is looked for
 constexpr int kMinPosesOfHalf = 3;
 constexpr double kOneSided = 0.2;  // share of a slice's excess in its mean, to call it brighter or darker
 
@@ -37,7 +39,8 @@ class PhotographSliceFinder {
 
   std::vector<images::PhotographSlice> Find() {
     Collect();
-    if (!(search_.excess > 0) || !(total_excess_ > 0)) return {};
+    const double noise = sigma_grey_ * sigma_grey_ * photographs_.width() * photographs_.height() * photographs_.size();
+    if (!(search_.excess > 0) || !(total_excess_ > kCertainShare * noise)) return {};
     const int min_cells = std::max(20, static_cast<int>(0.005 * cells_.size()));
     std::vector<images::PhotographSlice> slices;
     while (slices.size() < kMaxPhotographSlices) {
@@ -115,7 +118,7 @@ class PhotographSliceFinder {
     if (lifts.size() < kMinPosesOfHalf) return false;
     double sum = 0, squares = 0;
     for (const auto& [pose, lift] : lifts) sum += lift, squares += lift * lift;
-    return squares > 0 && sum > std::min(kMinZOfPoses, 0.75 * std::sqrt(lifts.size())) * std::sqrt(squares);
+    return squares > 0 && sum > kMinZOfPoses * std::sqrt(squares);
   }
 
   images::PhotographSlice Told(const SliceCandidate& slice) const {
