@@ -16,8 +16,8 @@
 namespace touchstone::cli {
 namespace {
 
-using ::testing::HasSubstr;
 using diagnosis::images::HiddenCamera;
+using ::testing::HasSubstr;
 
 class PhotographCommand : public RealBinaryTest {
  protected:
@@ -79,7 +79,8 @@ TEST_F(PhotographCommand, AServerFindsTheSame) {
   WriteSet("photos", rig);
   const TestServer server;
   nlohmann::json here = Report({"compare", "photos", "--model", "nominal.yaml"});
-  nlohmann::json there = Report({"compare", "photos", "--model", "nominal.yaml", "--server", server.address()});
+  nlohmann::json there =
+      Report({"compare", "photos", "--model", "nominal.yaml", "--server", server.address()});
   for (nlohmann::json* report : {&here, &there}) report->erase("duration_s"), report->erase("provenance");
   EXPECT_EQ(here, there);
 }
@@ -95,17 +96,17 @@ TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
 TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
   WriteSet("photos", Small());
   int number = 0;
-  for (const std::vector<std::string>& mistake : std::vector<std::vector<std::string>>{
-           {"--mirror", "left-right"},
-           {"--rotate", "90"},
-           {"--focal-factor", "0.5"},
-           {"--scale-camera", "2"},
-           {"--scale-lengths", "0.001"},
-           {"--swap-eye-at"},
-           {"--permute-axes=x,-z,y"},
-           {"--up=1,0,0"},
-           {"--swap-objects", "lat00,lat20"},
-           {"--shift-rows=1"}}) {
+  for (const std::vector<std::string>& mistake :
+       std::vector<std::vector<std::string>>{{"--mirror", "left-right"},
+                                             {"--rotate", "90"},
+                                             {"--focal-factor", "0.5"},
+                                             {"--scale-camera", "2"},
+                                             {"--scale-lengths", "0.001"},
+                                             {"--swap-eye-at"},
+                                             {"--permute-axes=x,-z,y"},
+                                             {"--up=1,0,0"},
+                                             {"--swap-objects", "lat00,lat20"},
+                                             {"--shift-rows=1"}}) {
     SCOPED_TRACE(mistake[0]);
     const std::string spoilt = absl::StrCat("spoilt", ++number);
     std::vector<std::string> spoil = {"session", "fix", "photos", "-o", spoilt};

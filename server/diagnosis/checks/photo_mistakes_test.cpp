@@ -42,9 +42,10 @@ void ExpectFound(const ImageSetFix& mistake, const std::string& kind) {
     auto set = std::make_shared<session::ImageSet>(*spoilt.images);
     ASSERT_TRUE(session::ApplyFix(claim.fix, set.get()).ok());
     EXPECT_LT(claim.left_after, 0.5 * claim.left_before);
-    restored |= set->photographs[0].pixels == input.images->photographs[0].pixels &&
-                (set->photographs[0].commanded.eye_m - input.images->photographs[0].commanded.eye_m).norm() < 1e-9 &&
-                std::abs(set->camera.fx_px - input.images->camera.fx_px) < 1e-9;
+    restored |=
+        set->photographs[0].pixels == input.images->photographs[0].pixels &&
+        (set->photographs[0].commanded.eye_m - input.images->photographs[0].commanded.eye_m).norm() < 1e-9 &&
+        std::abs(set->camera.fx_px - input.images->camera.fx_px) < 1e-9;
   }
   EXPECT_TRUE(restored);
 }
@@ -128,22 +129,22 @@ TEST(PhotoMistakes, RadiansInTheModelAreFound) {
 }
 
 TEST(PhotoMistakes, StrongPhysicsIsNoMistake) {
-  for (const images::NamedValues& hidden : std::vector<images::NamedValues>{
-           {},
-           {{"exposure", {"stops=1"}}},
-           {{"gamma", {"exponent=0.5"}}},
-           {{"focal_error", {"relative=0.06"}}},
-           {{"radial_distortion", {"k1=-0.3"}}},
-           {{"camera_rotation", {"rotation_deg=2,2,3"}}},
-           {{"camera_translation", {"offset_mm=5,-5,10"}}},
-           {{"object_pose", {"translation_mm=3,0,2", "rotation_deg=0,0,8"}}},
-           {{"light_position", {"offset_mm=60,-40,0"}}},
-           {{"ambient_light", {"level=0.2"}}},
-           {{"background_level", {"grey=60"}}},
-           {{"defocus_blur", {"sigma_px=3"}}},
-           {{"vignetting", {"strength=0.5"}}},
-           {{"specular", {"strength=0.5", "exponent=10"}}},
-           {{"principal_point", {"offset_px=6,-4"}}}}) {
+  for (const images::NamedValues& hidden :
+       std::vector<images::NamedValues>{{},
+                                        {{"exposure", {"stops=1"}}},
+                                        {{"gamma", {"exponent=0.5"}}},
+                                        {{"focal_error", {"relative=0.06"}}},
+                                        {{"radial_distortion", {"k1=-0.3"}}},
+                                        {{"camera_rotation", {"rotation_deg=2,2,3"}}},
+                                        {{"camera_translation", {"offset_mm=5,-5,10"}}},
+                                        {{"object_pose", {"translation_mm=3,0,2", "rotation_deg=0,0,8"}}},
+                                        {{"light_position", {"offset_mm=60,-40,0"}}},
+                                        {{"ambient_light", {"level=0.2"}}},
+                                        {{"background_level", {"grey=60"}}},
+                                        {{"defocus_blur", {"sigma_px=3"}}},
+                                        {{"vignetting", {"strength=0.5"}}},
+                                        {{"specular", {"strength=0.5", "exponent=10"}}},
+                                        {{"principal_point", {"offset_px=6,-4"}}}}) {
     SCOPED_TRACE(hidden.empty() ? "nothing" : hidden[0].first);
     images::HiddenCamera rig = SmallCamera();
     rig.hidden = hidden;
@@ -170,7 +171,8 @@ TEST(PhotoMistakes, ChannelsAreFoundOnlyWherePicturesDisagree) {
   for (session::PhotographRow& row : set->photographs) {
     std::vector<uint8_t> rgb;
     for (const uint8_t grey : row.pixels)
-      for (const double tint : {1.15, 1.0, 0.85}) rgb.push_back(static_cast<uint8_t>(std::min(255.0, tint * grey)));
+      for (const double tint : {1.15, 1.0, 0.85})
+        rgb.push_back(static_cast<uint8_t>(std::min(255.0, tint * grey)));
     row.channels = 3;
     row.pixels = rgb;
   }

@@ -39,7 +39,8 @@ class PhotographSliceFinder {
 
   std::vector<images::PhotographSlice> Find() {
     Collect();
-    const double noise = sigma_grey_ * sigma_grey_ * photographs_.width() * photographs_.height() * photographs_.size();
+    const double noise =
+        sigma_grey_ * sigma_grey_ * photographs_.width() * photographs_.height() * photographs_.size();
     if (!(search_.excess > 0) || !(total_excess_ > kCertainShare * noise)) return {};
     const int min_cells = std::max(20, static_cast<int>(0.005 * cells_.size()));
     std::vector<images::PhotographSlice> slices;
