@@ -106,7 +106,7 @@ void AddDiagnose(Cli* cli) {
   options->further_meshes = true;  // one of them may be what was touched
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
-      "Says how wrong a model is against measured touches, where, why, and what to add, until "
+      "Says how wrong a model is against measured touches or photographs, where, why, and what to add, until "
       "the rest is noise.",
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
@@ -117,6 +117,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
       "--with-surface-map\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
+      "touchstone diagnose photos --model nominal.yaml --mesh-dir meshes --html report.html\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
