@@ -22,10 +22,11 @@ absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
 void AddCompare(Cli* cli) {
   auto options = std::make_shared<ComparisonOptions>();
   CLI::App* command = cli->AddCommand(
-      nullptr, "compare", "Says how wrong a model is against measured touches, and where.",
+      nullptr, "compare", "Says how wrong a model is against measured touches or photographs, and where.",
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
-      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq .initial",
+      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq .initial\n"
+      "touchstone compare photos --model nominal.yaml --mesh-dir meshes --html report.html",
       [cli, options] { return RunCompare(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
 }

@@ -24,6 +24,7 @@
 #include "server/model/model.h"
 #include "server/service/evidence.h"
 #include "server/service/measured_set_message.h"
+#include "server/session/image_set_file.h"
 #include "server/session/measurement_set.h"
 
 namespace touchstone::cli {
@@ -40,18 +41,48 @@ constexpr uint64_t kMaxFurtherBytes = 32 << 20;
 constexpr int kWidthOfNoTerminal = 110;
 constexpr int kMinWidth = 60, kMaxWidth = 160;
 
-// A set as the user names it: its file's text, the name of a session that the server keeps, or what a rig's journal
-// holds.
+// A set as the user names it: its file's text, the name of a session that the server keeps, what a rig's journal
+// holds, or the files of a folder of photographs (with the text of its touches.csv, if it has one).
 struct NamedSet {
   std::string csv, session;
   std::optional<session::MeasurementSet> measured;
+  std::optional<v1::ImageSetFiles> images;
+  std::string images_sha256;
 };
+
+absl::StatusOr<NamedSet> ReadFolder(const std::string& folder) {
+  NamedSet set;
+  TOUCHSTONE_ASSIGN_OR_RETURN(set.images, session::ReadImageSetFiles(folder));
+  if (session::HasTouches(folder)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, ReadFile((fs::path(folder) / session::kTouchesCsv).string()));
+  }
+  return set;
+}
+
+// Its objects, those of the touches first. Reads all, so that errors name files here.
+absl::StatusOr<std::vector<std::string>> ObjectsOf(const std::string& origin, NamedSet* set) {
+  std::vector<std::string> objects;
+  if (set->measured.has_value()) objects = set->measured->objects;
+  if (!set->csv.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet read,
+                                session::ParseMeasurementSet(set->csv, origin));
+    objects = read.objects;
+  }
+  if (!set->images) return objects;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet read, session::ParseImageSet(*set->images));
+  set->images_sha256 = read.sha256;
+  for (const std::string& name : read.objects)
+    if (std::find(objects.begin(), objects.end(), name) == objects.end()) objects.push_back(name);
+  return objects;
+}
+
 absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
   NamedSet set;
   if (text == "-") {
     set.csv.assign(std::istreambuf_iterator<char>(std::cin), {});
     return set;
   }
+  if (std::error_code error; fs::is_directory(text, error)) return ReadFolder(text);
   // A rig's journal with one session is as good as its measurement file.
   if (IsJournalPath(text)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(set.measured, JournalSet(text));
@@ -177,8 +208,9 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
   };
   add_input(
       "SET", options->set, "",
-      "The measurement file (CSV), or the journal (.db) of a rig's session; -: stdin; with --server also "
-      "a stored session's name")
+      "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG files; with a "
+      "touches.csv in it both are taken), or the journal (.db) of a rig's session; -: stdin; with --server "
+      "also a stored session's name")
       ->required();
   add_input("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own");
   add_input("--also", options->also, "FILE",
@@ -231,16 +263,11 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   const bool served = !cli.source().servers.empty();
   std::vector<source::MeshSpec> meshes;
   if (set.session.empty()) {
-    evidence.set_origin(options.set == "-" ? "stdin" : options.set);
-    if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
-      std::vector<std::string> objects;
-      if (set.measured.has_value()) {
-        objects = set.measured->objects;
-      } else {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet read,
-                                    session::ParseMeasurementSet(set.csv, evidence.origin()));
-        objects = read.objects;
-      }
+    evidence.set_origin(options.set == "-" ? "stdin"
+                        : set.images       ? (fs::path(options.set) / session::kTouchesCsv).string()
+                                           : options.set);
+    if (set.images || !cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsOf(evidence.origin(), &set));
       TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
     }
   }
@@ -260,7 +287,16 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                                  options.further_meshes));
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
-  if (!set.csv.empty()) comparison->set_sha256_ = Sha256Hex(set.csv);
+  if (set.images) {
+    comparison->set_sha256_ = set.images_sha256;
+    TOUCHSTONE_RETURN_IF_ERROR(comparison->AddImages(*std::move(set.images)));
+    if (set.csv.empty()) {
+      comparison->meshes_ = std::move(meshes);
+      return comparison;
+    }
+  } else if (!set.csv.empty()) {
+    comparison->set_sha256_ = Sha256Hex(set.csv);
+  }
   comparison->meshes_ = std::move(meshes);
   if (!set.session.empty()) return comparison;
   if (set.measured.has_value()) {
@@ -317,6 +353,16 @@ absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes)
     return absl::InvalidArgumentError(absl::StrCat(
         "--mesh: the meshes have ", bytes >> 20,
         " MiB, too much for one request; give them to touchstone-server (the same option there)"));
+  return absl::OkStatus();
+}
+
+absl::Status Comparison::AddImages(v1::ImageSetFiles images) {
+  const size_t bytes = images.ByteSizeLong();
+  if (bytes + evidence_.ByteSizeLong() + kMaxInline > static_cast<size_t>(client::kMaxMessageBytes))
+    return absl::InvalidArgumentError(absl::StrCat(
+        "SET: the pictures of ", images.origin(), " have ", bytes >> 20, " MiB, too much for one request (",
+        client::kMaxMessageBytes >> 20, " MiB with everything); diagnose a part of them"));
+  *evidence_.mutable_images() = std::move(images);
   return absl::OkStatus();
 }
 

@@ -52,6 +52,7 @@ class Comparison {
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
   absl::Status SendMeshes(const std::vector<source::MeshSpec>& meshes);
+  absl::Status AddImages(v1::ImageSetFiles images);
   absl::Status SendAhead(const std::string& csv);
 
   const Cli& cli_;

@@ -113,7 +113,7 @@ void AddDiagnose(Cli* cli) {
   options->further_meshes = true;  // one of them may be what was touched
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
-      "Says how wrong a model is against measured touches, where, why, and what to add, until "
+      "Says how wrong a model is against measured touches or photographs, where, why, and what to add, until "
       "the rest is noise.",
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh cup=cup.off --save-model better.yaml\n"
@@ -124,6 +124,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
       "--with-surface-map\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
+      "touchstone diagnose photos --model nominal.yaml --mesh-dir meshes --html report.html\n"
       "touchstone diagnose photos --board 9x6 --square-mm 25 --save-model lens.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });

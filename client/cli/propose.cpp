@@ -1,11 +1,14 @@
 // touchstone propose: what to touch next, to tell the explanations apart that are left.
+#include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <map>
 
 #include "client/cli/comparison.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
+#include "server/session/images_csv.h"
 
 namespace touchstone::cli {
 namespace {
@@ -14,6 +17,42 @@ struct ProposeOptions : ComparisonOptions {
   uint32_t touches = 24;
   std::string output;
 };
+
+// Proposed pictures as the images.csv that they would have.
+std::string PlanOfPhotographs(const v1::Report& report) {
+  session::ImageSet plan;
+  for (const v1::ProposedPhotograph& next : report.next_photographs()) {
+    session::PhotographRow row;
+    row.image = plan.photographs.size();
+    row.file = absl::StrFormat("%04d.png", row.image);
+    const auto found = std::find(plan.objects.begin(), plan.objects.end(), next.object());
+    row.object = static_cast<int>(found - plan.objects.begin());
+    if (found == plan.objects.end()) plan.objects.push_back(next.object());
+    const auto vector = [](const v1::Vector3& v) { return Eigen::Vector3d(v.x(), v.y(), v.z()); };
+    row.commanded = {vector(next.camera().eye_m()), vector(next.camera().at_m()), vector(next.camera().up())};
+    plan.photographs.push_back(std::move(row));
+  }
+  return session::FormatImagesCsv(plan);
+}
+
+absl::Status WritePlanOfPhotographs(const Cli& cli, const ProposeOptions& options, const v1::Report& report) {
+  std::map<std::string, int> purposes;
+  for (const v1::ProposedPhotograph& next : report.next_photographs()) ++purposes[next.purpose()];
+  for (const auto& [purpose, pictures] : purposes)
+    cli.Log(absl::StrCat(Counted(pictures, "picture", "pictures"), ": ", purpose));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
+  if (report.next_photographs().empty()) {
+    cli.Log(report.data_problems().empty()
+                ? "no pictures to propose: no explanations are left that further pictures would tell apart"
+                : "no pictures to propose before the set is fixed: " + report.summary());
+    return absl::OkStatus();
+  }
+  if (options.ReportOnStdout() && options.output.empty()) return absl::OkStatus();
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, PlanOfPhotographs(report)));
+  cli.LogWritten(options.output,
+                 absl::StrCat(" (", Counted(report.next_photographs_size(), "picture", "pictures"), ")"));
+  return absl::OkStatus();
+}
 
 absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
   if (options.touches < 1)
@@ -28,6 +67,7 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
                                 return comparison->connection().diagnosis().Propose(context, request);
                               }));
 
+  if (report.images() > 0) return WritePlanOfPhotographs(cli, options, report);
   std::vector<client::MeasuredTouch> plan;
   std::map<std::string, int> purposes;
   for (const v1::ProposedTouch& proposed : report.next_touches()) {
@@ -62,12 +102,14 @@ void AddPropose(Cli* cli) {
   auto options = std::make_shared<ProposeOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "propose",
-      "Writes a plan of the touches that would best tell apart the explanations that are left.",
+      "Writes a plan of the touches (or, of a folder, of the photographs) that would best tell apart the explanations "
+      "that are left.",
       "touchstone propose set.csv --model nominal.yaml --mesh-dir meshes --touches 24 -o plan.csv\n"
-      "touchstone touch --plan plan.csv -o more.csv",
+      "touchstone touch --plan plan.csv -o more.csv\n"
+      "touchstone propose photos --model nominal.yaml --mesh-dir meshes --touches 12 -o images.csv",
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
-  command->add_option("--touches", options->touches, "How many to propose. Default: 24")->type_name("N");
+  command->add_option("--touches", options->touches, "How many (touches or photographs) to propose. Default: 24")->type_name("N");
   cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) to write. Default: stdout");
 }
 

@@ -6,7 +6,9 @@
 #include <absl/strings/str_split.h>
 
 #include <cmath>
+#include <filesystem>
 
+#include "client/cli/image_set_fix.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -23,6 +25,7 @@ struct FixOptions {
   double scale_times = 1, scale_lengths = 1, scale_targets = 1, scale_standoff = 1, scale_speed = 1;
   int shift_rows = 0;
   bool reverse_lateral = false, reverse_approach = false, drop_duplicates = false;
+  ImageSetFixOptions images;
 };
 
 absl::Status Expected(absl::string_view option, absl::string_view text, absl::string_view expected) {
@@ -109,6 +112,15 @@ absl::Status CheckFactors(const FixOptions& options) {
   return absl::OkStatus();
 }
 
+absl::Status ReadAxes(const FixOptions& options, std::optional<Eigen::Matrix3d>* fixed) {
+  if (options.axes.empty()) return absl::OkStatus();
+  absl::StatusOr<Eigen::Matrix3d> axes = session::ParseAxes(options.axes);
+  if (!axes.ok())
+    return absl::InvalidArgumentError(absl::StrCat("--permute-axes: ", axes.status().message()));
+  *fixed = *axes;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int fingers) {
   session::MeasurementFix fix;
   TOUCHSTONE_RETURN_IF_ERROR(ReadTouchRanges(options, &fix));
@@ -121,12 +133,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   fix.scale_targets = options.scale_lengths * options.scale_targets;
   fix.scale_standoff = options.scale_lengths * options.scale_standoff;
   fix.scale_speed = options.scale_speed;
-  if (!options.axes.empty()) {
-    absl::StatusOr<Eigen::Matrix3d> axes = session::ParseAxes(options.axes);
-    if (!axes.ok())
-      return absl::InvalidArgumentError(absl::StrCat("--permute-axes: ", axes.status().message()));
-    fix.axes = *axes;
-  }
+  TOUCHSTONE_RETURN_IF_ERROR(ReadAxes(options, &fix.axes));
   fix.reverse_lateral = options.reverse_lateral;
   fix.reverse_approach = options.reverse_approach;
   if (fix.empty())
@@ -135,7 +142,32 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   return fix;
 }
 
-absl::Status RunFix(const Cli& cli, const FixOptions& options) {
+// What a folder of photographs and a measurement file both may need, for a folder.
+absl::Status RunFolderFix(const Cli& cli, const CLI::App& command, const FixOptions& options) {
+  // In the order of the help.
+  for (const char* option : {"--touches", "--drop-duplicates", "--swap-fingers", "--finger-order",
+                             "--scale-times", "--scale-targets", "--scale-standoff", "--scale-speed",
+                             "--reverse-approach", "--reverse-lateral", "--move-object"})
+    if (command.count(option) > 0)
+      return absl::InvalidArgumentError(absl::StrCat(option, ": is for measurement files, and ", options.file,
+                                                     " is a folder of photographs"));
+  session::MeasurementFix shared;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &shared));
+  session::ImageSetFix fix;
+  fix.rename_objects = shared.rename_objects;
+  fix.shift_rows = options.shift_rows;
+  fix.scale_lengths = options.scale_lengths;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadAxes(options, &fix.axes));
+  return FixImageSetFolder(cli, options.file, options.output, options.images, fix);
+}
+
+absl::Status RunFix(const Cli& cli, const CLI::App& command, const FixOptions& options) {
+  if (std::error_code error; std::filesystem::is_directory(options.file, error))
+    return RunFolderFix(cli, command, options);
+  for (const char* option : ImageSetFixOptions::kNames)
+    if (command.count(option) > 0)
+      return absl::InvalidArgumentError(
+          absl::StrCat(option, ": is for folders of photographs, and ", options.file, " is none"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, ReadFile(options.file));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet before,
                               session::ParseMeasurementSet(csv, options.file));
@@ -160,23 +192,27 @@ absl::Status RunFix(const Cli& cli, const FixOptions& options) {
 
 void AddSessionFix(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<FixOptions>();
-  CLI::App* command =
-      cli->AddCommand(group, "fix",
-                      "Fixes a discrete mistake of a measurement file, as touchstone diagnose names it "
-                      "(verdict CHECK_DATA). Numbers "
-                      "that do not change keep their digits; several options are done in the order in which "
-                      "they stand below.",
-                      "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
-                      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
-                      "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
-                      "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
-                      "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
-                      "touchstone session fix set.csv --permute-axes=-y,x,z -o fixed.csv\n"
-                      "touchstone session fix set.csv --move-object cup=0,0,-20 -o fixed.csv",
-                      [cli, options] { return RunFix(*cli, *options); });
+  CLI::App* command = cli->AddCommand(
+      group, "fix",
+      "Fixes a discrete mistake of a measurement file or of a folder of photographs, as touchstone "
+      "diagnose names it (verdict CHECK_DATA). Numbers "
+      "that do not change keep their digits; several options are done in the order in which "
+      "they stand below.",
+      "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
+      "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
+      "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
+      "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
+      "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
+      "touchstone session fix set.csv --permute-axes=-y,x,z -o fixed.csv\n"
+      "touchstone session fix set.csv --move-object cup=0,0,-20 -o fixed.csv\n"
+      "touchstone session fix photos --mirror left-right -o fixed\n"
+      "touchstone session fix photos --focal-factor 2 -o fixed",
+      [cli, options, group] { return RunFix(*cli, *group->get_subcommand("fix"), *options); });
   cli->AddInput(
       command,
-      command->add_option("FILE", options->file, "The measurement file (CSV)")->type_name("")->required());
+      command->add_option("FILE", options->file, "The measurement file (CSV), or the folder of photographs")
+          ->type_name("")
+          ->required());
   command
       ->add_option("--touches", options->touches,
                    "Fix these touches alone, by their numbers. Default: all of the file")
@@ -184,9 +220,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command
-      ->add_option(
-          "--shift-rows", options->shift_rows,
-          "The times of each row belong N rows further down (up: N below 0); rows without times are dropped")
+      ->add_option("--shift-rows", options->shift_rows,
+                   "The times (the picture) of each row belong N rows further down (up: N below 0); rows "
+                   "that get none are "
+                   "dropped")
       ->type_name("N");
   CLI::Option* swap =
       command->add_option("--swap-fingers", options->swap_fingers, "Exchange the times of two fingers")
@@ -208,13 +245,15 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
     command->add_option(option, *value, text)->type_name("F");
   };
   scale("--scale-times", &options->scale_times, "Multiply all times");
-  scale("--scale-lengths", &options->scale_lengths, "Multiply targets and standoffs");
+  scale("--scale-lengths", &options->scale_lengths,
+        "Multiply targets and standoffs; of photographs eye and at");
   scale("--scale-targets", &options->scale_targets, "Multiply targets alone");
   scale("--scale-standoff", &options->scale_standoff, "Multiply standoffs alone");
   scale("--scale-speed", &options->scale_speed, "Multiply speeds");
   command
       ->add_option("--permute-axes", options->axes,
-                   "The file's axes that are the object's x, y and z, of targets and vectors")
+                   "The file's axes that are the object's x, y and z, of targets and vectors; of photographs "
+                   "of eye, at and up")
       ->type_name("-y,x,z");
   command->add_flag("--reverse-approach", options->reverse_approach, "Turn the approach vectors round");
   command->add_flag("--reverse-lateral", options->reverse_lateral, "Turn the lateral vectors round");
@@ -225,7 +264,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
       ->type_name("NAME=x,y,z")
       ->take_all()
       ->expected(1);
-  cli->AddOutput(command, "-o,--output", &options->output, "The file to write; -: to stdout")->required();
+  AddImageSetFixOptions(command, &options->images);
+  cli->AddOutput(command, "-o,--output", &options->output,
+                 "The file to write; -: to stdout. Of photographs a folder that is not there yet")
+      ->required();
 }
 
 }  // namespace touchstone::cli

@@ -5,7 +5,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "client/report/words.h"
+#include "client/report/error_scale.h"
 
 namespace touchstone::client {
 namespace {
@@ -21,13 +21,13 @@ std::string Steps(const v1::Report& report) {
   return Join(names, "and");
 }
 
-std::string Falls(double from_us, double to_us) {
-  return absl::StrCat("the error falls from ", Time(from_us), " to ", Time(to_us));
+std::string Falls(const ErrorScale& scale, double from, double to) {
+  return absl::StrCat("the error falls from ", scale.Text(from), " to ", scale.Text(to));
 }
 
 // A step that says nothing of single touches (a surface error) leaves the error where it was.
-bool FallsAtAll(double from_us, double to_us) {
-  return Time(from_us) != Time(to_us) && to_us < from_us;
+bool FallsAtAll(const ErrorScale& scale, double from, double to) {
+  return scale.Text(from) != scale.Text(to) && to < from;
 }
 
 // What repeats show comes before what distributions hide.
@@ -57,12 +57,13 @@ std::string Compared(const v1::Report& report) {
                         p < 0.01 ? "differ as distributions" : "cannot be told apart as distributions",
                         " (p ", p < 1e-15 ? "" : "= ", Probability(p), ").");
   }
-  if (!(report.initial().rmse_us() > 0)) return "Nothing could be compared.";
+  const ErrorScale scale(report);
+  const double rmse = scale.Rmse(report.initial());
+  if (!(rmse > 0)) return "Nothing could be compared.";
   const Floor floor = NoiseFloorOf(report);
-  if (!(floor.sigma_us > 0))
-    return absl::StrCat("The model is off by ", Time(report.initial().rmse_us()), ".");
-  return absl::StrCat("The model is off by ", Time(report.initial().rmse_us()), ", ",
-                      Number(report.initial().rmse_us() / floor.sigma_us, 2), " times the noise floor.");
+  if (!(floor.sigma > 0)) return absl::StrCat("The model is off by ", scale.Text(rmse), ".");
+  return absl::StrCat("The model is off by ", scale.Text(rmse), ", ", Number(rmse / floor.sigma, 2),
+                      " times the noise floor.");
 }
 
 std::string Unexplained(const v1::Report& report) {
@@ -81,16 +82,21 @@ std::string CheckData(const v1::Report& report) {
   if (report.data_problems().empty()) return "Check the data: the file has a mistake.";
   const v1::DataProblem& problem = report.data_problems(0);
   const std::string what = absl::StrCat("Check the data before the model: ", ProblemTitle(problem));
-  if (!(problem.rmse_after_us() > 0) || !(problem.rmse_after_us() < problem.rmse_before_us()))
-    return absl::StrCat(what, ".");
-  return absl::StrCat(what, "; fixed, ", Falls(problem.rmse_before_us(), problem.rmse_after_us()), ".");
+  const ErrorScale scale(report);
+  const double before = scale.Before(problem), after = scale.After(problem);
+  if (!(after > 0) || !(after < before)) return absl::StrCat(what, ".");
+  return absl::StrCat(what, "; fixed, ", Falls(scale, before, after), ".");
 }
 
 std::string TooLittle(const v1::Report& report) {
-  const std::string needed = absl::StrCat(Count(report.touches_needed()), " usable touches would do.");
-  if (report.touches() == 0) return absl::StrCat("No touch could be used, so nothing can be said; ", needed);
-  return absl::StrCat("Too little data for a verdict: ", Count(report.touches()),
-                      report.touches() == 1 ? " touch; " : " touches; ", needed);
+  const ErrorScale scale(report);
+  const uint32_t used = scale.Readings(report);
+  const std::string needed =
+      absl::StrCat(Count(report.touches_needed()), " usable ", scale.readings(), " would do.");
+  if (used == 0)
+    return absl::StrCat("No ", scale.one_reading(), " could be used, so nothing can be said; ", needed);
+  return absl::StrCat("Too little data for a verdict: ", Count(used), " ",
+                      used == 1 ? scale.one_reading() : scale.readings(), "; ", needed);
 }
 
 std::string WrongValues(const v1::Report& report) {
@@ -105,26 +111,30 @@ std::string WrongValues(const v1::Report& report) {
     absl::StrAppend(&what, names.empty() ? ", but " : ", and ", "the data do without ",
                     Join(superfluous, "and"));
   if (names.empty() && superfluous.empty()) what += ", but the noise is not what the model says";
-  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
-  return absl::StrCat(what, FallsAtAll(from, to) ? absl::StrCat(": put right, ", Falls(from, to)) : "", ".");
+  const ErrorScale scale(report);
+  const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
+  return absl::StrCat(
+      what, FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "", ".");
 }
 
 std::string MissingEffects(const v1::Report& report) {
-  const double from = report.initial().rmse_us(), to = report.final().rmse_us();
+  const ErrorScale scale(report);
+  const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
   const std::string lacks = absl::StrCat("The model lacks ", Steps(report), "; ");
   // A map of the surface is made from these very touches: what it does for others is what it is worth.
   const bool maps = std::any_of(report.steps().begin(), report.steps().end(),
                                 [](const v1::Step& step) { return step.effect() == "surface_map"; });
   if (maps) {
     const double unseen = report.final().heldout_rmse_us();
-    return absl::StrCat(lacks, "on unseen touches the error ",
-                        FallsAtAll(from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
-                        Time(unseen), ".");
+    return absl::StrCat(
+        lacks, "on unseen touches the error ",
+        FallsAtAll(scale, from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
+        Time(unseen), ".");
   }
-  if (!FallsAtAll(from, to)) return absl::StrCat(lacks, "the error stays ", Time(to), ".");
+  if (!FallsAtAll(scale, from, to)) return absl::StrCat(lacks, "the error stays ", scale.Text(to), ".");
   const Floor floor = NoiseFloorOf(report);
-  const bool reached = floor.sigma_us > 0 && to <= 1.05 * floor.sigma_us;
-  return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(from, to),
+  const bool reached = floor.sigma > 0 && to <= 1.05 * floor.sigma;
+  return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(scale, from, to),
                       reached ? ", the noise floor." : ".");
 }
 
@@ -138,8 +148,9 @@ std::string Headline(const v1::Report& report) {
       if (report.has_finger_scatter())
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
-      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(report.touches()),
-                          " touches can tell.");
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ",
+                          Count(ErrorScale(report).Readings(report)), " ", ErrorScale(report).readings(),
+                          " can tell.");
     case v1::Report::WRONG_VALUES:
       return WrongValues(report);
     case v1::Report::MISSING_EFFECTS:

@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/words.h"
 
@@ -17,14 +18,17 @@ std::string Term(const char* term, const std::string& text) {
 
 std::string Floors(const v1::Report& report) {
   const Floor floor = NoiseFloorOf(report);
-  if (!(floor.sigma_us > 0)) return "";
-  std::string text = absl::StrCat(floor.bound ? "at most " : "", Time(floor.sigma_us));
+  if (!(floor.sigma > 0)) return "";
+  const ErrorScale scale(report);
+  std::string text = absl::StrCat(floor.bound ? "at most " : "", scale.Text(floor.sigma));
   const v1::NoiseFloor& detail = report.noise_floor();
-  if (detail.lower_us() > 0 && detail.lower_us() < detail.upper_us()) {
-    absl::StrAppend(&text, ", 95 % interval ", Time(detail.lower_us()), " to ", Time(detail.upper_us()));
-  }
-  absl::StrAppend(
-      &text, floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same touch");
+  const double lower = scale.grey() ? detail.lower_grey() : detail.lower_us();
+  const double upper = scale.grey() ? detail.upper_grey() : detail.upper_us();
+  if (lower > 0 && lower < upper)
+    absl::StrAppend(&text, ", 95 % interval ", scale.Text(lower), " to ", scale.Text(upper));
+  absl::StrAppend(&text,
+                  floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same ",
+                  floor.bound ? "" : scale.one_reading());
   if (detail.degrees_of_freedom() > 0) {
     absl::StrAppend(&text, ", ", Count(detail.degrees_of_freedom()), " degrees of freedom");
   }
@@ -41,11 +45,13 @@ std::string Summary(const v1::Report& report) {
   std::string terms;
   if (data.rows() > 0) {
     terms += Term("Rows in the file",
-                  absl::StrCat(Count(data.rows()), ", of which ", Count(report.touches()), " used"));
+                  absl::StrCat(Count(data.rows()), ", of which ",
+                               Count(report.touches() > 0 ? report.touches() : report.images()), " used"));
   }
   terms += Term("Objects", absl::StrJoin(objects, ", "));
   terms += Term("Speeds", speeds.empty() ? "" : absl::StrCat(absl::StrJoin(speeds, ", "), " mm/s"));
-  terms += Term("Noise floor per finger", Floors(report));
+  terms +=
+      Term(ErrorScale(report).grey() ? "Noise floor per pixel" : "Noise floor per finger", Floors(report));
   terms += Term("Mean residual of each finger", absl::StrJoin(fingers, ", "));
   if (data.missed_contacts() > 0)
     terms += Term("Fingers that reported nothing", Count(data.missed_contacts()));
@@ -97,6 +103,7 @@ std::string HtmlData(const v1::Report& report) {
 }
 
 std::string HtmlMethods(const v1::Report& report) {
+  if (report.images() > 0) return HtmlPhotographMethods(report);
   if (!(report.initial().rmse_us() > 0)) return "";
   return Section(
       "methods", "How the numbers were computed", "",

@@ -51,6 +51,9 @@ std::string HtmlWhatToDo(const v1::Report& report);
 std::string HtmlWhy(const v1::Report& report);
 std::string HtmlUnexplained(const v1::Report& report);
 std::string HtmlWhere(const v1::Report& report);
+std::string HtmlPhotographs(const v1::Report& report);  // pictures side by side, outlines, picture by picture
+std::string HtmlNextPhotographs(const v1::Report& report);
+std::string HtmlPhotographMethods(const v1::Report& report);
 std::string HtmlObjects(const v1::Report& report);  // residuals on the surface
 std::string HtmlFit(const v1::Report& report);      // parity and histograms
 std::string HtmlDistributions(const v1::Report& report);

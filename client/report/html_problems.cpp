@@ -3,6 +3,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/words.h"
 
@@ -12,13 +13,14 @@ namespace {
 constexpr int kCommandColumns = 96;  // that a page has room for
 
 // Errors before and after, as bars of one scale; nothing where the file cannot be fixed.
-std::string ErrorBars(const v1::DataProblem& problem) {
-  const double before = problem.rmse_before_us(), after = problem.rmse_after_us();
+std::string ErrorBars(const ErrorScale& scale, const v1::DataProblem& problem) {
+  const double before = scale.Before(problem), after = scale.After(problem);
   if (!(before > 0) || !(after > 0)) return "";
   const double largest = std::max(before, after);
-  const auto row = [&](const char* name, double us, const char* css_class) {
+  const auto row = [&](const char* name, double error, const char* css_class) {
     return absl::StrCat("<tr><td class=\"name\">", name, "</td>",
-                        Cell(Bar(us / largest, css_class), "barcell"), NumberCell(Time(us)), "</tr>");
+                        Cell(Bar(error / largest, css_class), "barcell"), NumberCell(scale.Text(error)),
+                        "</tr>");
   };
   return absl::StrCat(
       "<table class=\"ladder\"><caption class=\"vh\">Error of the given model on the file as it is and ",
@@ -33,7 +35,8 @@ std::string HtmlDataProblems(const v1::Report& report) {
   int number = 0;
   for (const v1::DataProblem& problem : report.data_problems()) {
     const std::string id = absl::StrCat("fix", ++number);
-    std::string body = absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(problem));
+    std::string body =
+        absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(ErrorScale(report), problem));
     if (!problem.fix().empty())
       absl::StrAppend(&body, "<div class=\"row\"><button type=\"button\" data-copy=\"", id,
                       "\">Copy</button><span>fixes the file</span></div>\n<pre id=\"", id, "\">",

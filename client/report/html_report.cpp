@@ -13,15 +13,17 @@ std::string HtmlReport(const v1::Report& report) {
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
-      "script-src 'unsafe-inline'\">\n<title>",
+      "script-src 'unsafe-inline'",
+      report.photographs().maps().empty() ? "" : "; img-src data:", "\">\n<title>",
       Escape(report.model_name().empty() ? "Touchstone report"
                                          : absl::StrCat("Touchstone report: ", report.model_name())),
       "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
   // Where nothing of the catalogue is the answer, what is known of the rest comes before what was tried.
   const bool no_name = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
-  for (const auto part : {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions,
-                          no_name ? HtmlUnexplained : HtmlWhy, no_name ? HtmlWhy : HtmlUnexplained, HtmlWhere,
-                          HtmlObjects, HtmlFit, HtmlNextTouches, HtmlData, HtmlMethods, HtmlProvenance}) {
+  for (const auto part :
+       {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions, no_name ? HtmlUnexplained : HtmlWhy,
+        no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere, HtmlObjects, HtmlFit,
+        HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
     page += part(report);
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",

@@ -130,6 +130,10 @@ table.narrow{width:auto;min-width:min(34rem,100%)}
 rect.f0{fill:var(--f0)}rect.f1{fill:var(--f1)}rect.f2{fill:var(--f2)}rect.f3{fill:var(--f3)}
 rect.f4{fill:var(--f4)}rect.f5{fill:var(--f5)}
 .map{width:100%;height:auto}
+.photos{display:grid;grid-template-columns:repeat(5,1fr);gap:.35rem;margin:.4rem 0}
+.photos figure{margin:0}.photos img{width:100%;height:auto;display:block;image-rendering:pixelated;border-radius:.2rem;
+border:1px solid var(--line)}
+.photos figcaption{margin-top:.2rem;text-align:center}
 .maps{grid-template-columns:repeat(4,1fr);gap:.4rem 1rem}
 .maps figcaption{margin-top:0;text-align:center}
 .dot{fill:none;stroke-linecap:round}

@@ -4,6 +4,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/svg_chart.h"
 #include "client/report/words.h"
@@ -58,10 +59,11 @@ std::string LookupCurve(const v1::Report& report) {
   const auto add = [&terms](const char* term, const std::string& html) {
     absl::StrAppend(&terms, "<dt>", term, "</dt><dd>", html, "</dd>");
   };
-  if (rest.formula().empty() && rest.heldout_rmse_us() > 0)
-    add("It would leave",
-        absl::StrCat(Typeset(Time(rest.heldout_rmse_us())), " on touches left out of the fit; it removes ",
-                     Typeset(Share(rest.heldout_gain())), " of the excess error there"));
+  const ErrorScale scale(report);
+  if (rest.formula().empty() && scale.Heldout(rest) > 0)
+    add("It would leave", absl::StrCat(Typeset(scale.Text(scale.Heldout(rest))), " on ", scale.readings(),
+                                       " left out of the fit; it removes ",
+                                       Typeset(Share(rest.heldout_gain())), " of the excess error there"));
   if (!rest.nearest_formula().empty())
     add("Nearest simple formula", absl::StrCat("<code>", Escape(rest.nearest_formula()), "</code>, with ",
                                                Typeset(Share(rest.nearest_formula_share())),
@@ -111,10 +113,11 @@ std::string HtmlUnexplained(const v1::Report& report) {
       absl::StrAppend(&body, "<dt>", Escape(ParameterName(parameter)), "</dt><dd>",
                       Typeset(ValueWithError(parameter)), "</dd>");
     }
-    if (rest.heldout_rmse_us() > 0) {
-      absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(Time(rest.heldout_rmse_us())),
-                      " on touches left out of the fit; it removes ", Typeset(Share(rest.heldout_gain())),
-                      " of the excess error there</dd>");
+    const ErrorScale scale(report);
+    if (scale.Heldout(rest) > 0) {
+      absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(scale.Text(scale.Heldout(rest))), " on ",
+                      scale.readings(), " left out of the fit; it removes ",
+                      Typeset(Share(rest.heldout_gain())), " of the excess error there</dd>");
     }
     if (!rest.nearest_effect().empty()) {
       absl::StrAppend(&body, "<dt>Nearest effect</dt><dd>", Typeset(NearestEffectWords(rest)), "</dd>");

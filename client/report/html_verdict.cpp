@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/words.h"
 
@@ -34,9 +35,10 @@ std::string Facts(const v1::Report& report) {
   std::string text = DataInWords(report, "\u00d7");
   text += ".";
   const Floor floor = NoiseFloorOf(report);
-  if (floor.sigma_us > 0) {
-    const std::string length = LengthOf(floor.sigma_us, report);
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
+  const ErrorScale scale(report);
+  if (floor.sigma > 0) {
+    const std::string length = scale.grey() ? "levels of 255" : LengthOf(floor.sigma, report);
+    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", scale.Text(floor.sigma),
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
     if (floor.bound) absl::StrAppend(&text, ", an upper bound without repeats");
     if (!floor.bound && report.data().repeats() > 0)
@@ -53,33 +55,40 @@ std::string Facts(const v1::Report& report) {
 std::string LadderTable(const v1::Report& report) {
   const std::vector<Rung> rungs = Ladder(report);
   if (rungs.empty()) return "";
+  const ErrorScale scale(report);
   static const char* const kClasses[] = {"given", "better", "better", "suggested", "floor"};
   double largest = 0, floor = -1;
   for (const Rung& rung : rungs) {
-    largest = std::max(largest, rung.rmse_us);
-    if (rung.kind == Rung::kFloor) floor = rung.rmse_us;
+    largest = std::max(largest, rung.rmse);
+    if (rung.kind == Rung::kFloor) floor = rung.rmse;
   }
   std::string table = absl::StrCat(
       "<table class=\"ladder\"><caption class=\"vh\">Error of the model after each change</caption>",
-      HeaderRow({"Model", "", ">RMSE", ">on unseen touches", ">lack-of-fit p"}), "<tbody>");
+      HeaderRow({"Model", "", ">RMSE", absl::StrCat(">on unseen ", scale.readings()), ">lack-of-fit p"}),
+      "<tbody>");
   for (size_t i = 0; i < rungs.size(); ++i) {
     const Rung& rung = rungs[i];
     const bool is_floor = rung.kind == Rung::kFloor;
     absl::StrAppend(
         &table, is_floor ? "<tr class=\"dim last\">" : "<tr>", "<td class=\"name\">", Escape(rung.name),
         "</td>",
-        Cell(Bar(rung.rmse_us / largest, kClasses[rung.kind], is_floor ? -1 : floor / largest), "barcell"),
-        NumberCell(Time(rung.rmse_us)), "<td class=\"num more\" data-label=\"on unseen touches\">",
-        std::isnan(rung.heldout_rmse_us) ? "" : Typeset(Time(rung.heldout_rmse_us)),
+        Cell(Bar(rung.rmse / largest, kClasses[rung.kind], is_floor ? -1 : floor / largest), "barcell"),
+        NumberCell(scale.Text(rung.rmse)), "<td class=\"num more\" data-label=\"on unseen ", scale.readings(),
+        "\">", std::isnan(rung.heldout_rmse) ? "" : Typeset(scale.Text(rung.heldout_rmse)),
         "</td><td class=\"num more\" data-label=\"lack-of-fit p\">",
         std::isnan(rung.lack_of_fit_p) ? "" : Typeset(Probability(rung.lack_of_fit_p)), "</td></tr>\n");
   }
   return Figure(
       absl::StrCat(table, "</tbody></table>"),
-      "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), per "
-      "finger. "
-      "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much misfit "
-      "beyond noise is if nothing were missing. Dashed: the noise floor.");
+      scale.grey()
+          ? "RMSE of the residuals (measured minus expected grey levels, of 255), per pixel. Unseen "
+            "pictures: the same on pictures left out of the fit. Lack-of-fit p: how likely that much "
+            "misfit beyond noise is if nothing were missing. Dashed: the noise floor."
+          : "RMSE of the residuals (measured minus simulated, mean over a touch\u2019s fingers removed), per "
+            "finger. "
+            "Unseen touches: the same on touches left out of the fit. Lack-of-fit p: how likely that much "
+            "misfit "
+            "beyond noise is if nothing were missing. Dashed: the noise floor.");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/svg_chart.h"
 #include "client/report/words.h"
@@ -18,21 +19,25 @@ constexpr size_t kMinCurves = 4;  // shown even if the residual depends on none 
 
 std::string Slices(const v1::Report& report) {
   if (report.where().empty()) return "";
-  std::string table = absl::StrCat(
-      "<div class=\"scroll\"><table>",
-      HeaderRow({"Part of the data", ">Touches", ">Share of the excess", "", ">Mean residual", "In words"}),
-      "<tbody>");
+  const ErrorScale scale(report);
+  std::string table = absl::StrCat("<div class=\"scroll\"><table>",
+                                   HeaderRow({"Part of the data", scale.grey() ? ">Pictures" : ">Touches",
+                                              ">Share of the excess", "", ">Mean residual", "In words"}),
+                                   "<tbody>");
   for (const v1::Slice& slice : report.where()) {
-    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"), NumberCell(Count(slice.touches())),
+    if (scale.Readings(slice) == 0) continue;  // of a joint report's touches
+    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"),
+                    NumberCell(Count(scale.Readings(slice))),
                     NumberCell(Share(slice.share_of_excess_error())),
                     Cell(Bar(slice.share_of_excess_error(), "given"), "barcell narrow"),
-                    NumberCell(SignedTime(slice.mean_residual_us())), Cell(Typeset(slice.words())),
-                    "</tr>\n");
+                    NumberCell(scale.Signed(scale.Mean(slice))), Cell(Typeset(slice.words())), "</tr>\n");
   }
   return Figure(
       absl::StrCat(table, "</tbody></table></div>"),
-      "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured minus "
-      "simulated: positive means that the real contact came later than the model says.");
+      absl::StrCat(
+          "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured "
+          "minus simulated: positive means that ",
+          scale.grey() ? "the picture is brighter" : "the real contact came later", " than the model says."));
 }
 
 std::string Groups(const v1::Report& report) {
@@ -42,13 +47,15 @@ std::string Groups(const v1::Report& report) {
   std::vector<std::string> order;
   std::map<std::string, std::vector<const v1::GroupError*>> kinds;
   double largest = 0;
+  const ErrorScale scale(report);
   for (const v1::GroupError& group : report.groups()) {
+    if (scale.Readings(group) == 0) continue;  // of a joint report's touches
     if (kinds[group.kind()].empty()) order.push_back(group.kind());
     kinds[group.kind()].push_back(&group);
-    largest = std::max(largest, group.rmse_us());
+    largest = std::max(largest, scale.Rmse(group));
   }
   if (order.empty()) return "";
-  const double floor = NoiseFloorOf(report).sigma_us;
+  const double floor = NoiseFloorOf(report).sigma;
   std::string grid;
   for (const std::string& kind : order) {
     if (kinds[kind].size() < 2) continue;  // one group is the whole set
@@ -58,10 +65,10 @@ std::string Groups(const v1::Report& report) {
     for (const v1::GroupError* group : kinds[kind]) {
       absl::StrAppend(
           &table, "<tr title=\"",
-          Escape(absl::StrCat(Count(group->touches()), " touches, mean residual ",
-                              SignedTime(group->mean_residual_us()))),
-          "\">", Cell(Escape(group->name())), NumberCell(Time(group->rmse_us())),
-          Cell(Bar(group->rmse_us() / largest, "given", floor > 0 ? floor / largest : -1), "barcell"),
+          Escape(absl::StrCat(Count(scale.Readings(*group)), " ", scale.readings(), ", mean residual ",
+                              scale.Signed(scale.Mean(*group)))),
+          "\">", Cell(Escape(group->name())), NumberCell(scale.Text(scale.Rmse(*group))),
+          Cell(Bar(scale.Rmse(*group) / largest, "given", floor > 0 ? floor / largest : -1), "barcell"),
           NumberCell(Share(group->share_of_excess_error())), "</tr>");
     }
     absl::StrAppend(&grid, "<figure>", table, "</tbody></table></figure>\n");
@@ -94,20 +101,25 @@ std::string FingerDependences(const v1::CovariateCurve& curve, bool improved) {
   return items.empty() ? "" : absl::StrCat("<figcaption>", items, "</figcaption>");
 }
 
+// A joint report has curves of touches, finger by finger, and of photographs.
+bool OfTouches(const v1::CovariateCurve& curve) {
+  return !curve.bins().empty() && !curve.bins(0).finger().empty();
+}
+
 // Before and after share the vertical axis, in the unit that fits the larger.
 std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve) {
   RangeFinder x, y;
   y.Add(0);
   double size = 0;
+  const ErrorScale scale(OfTouches(curve) ? v1::Report() : report);
   for (const v1::CurveBin& bin : curve.bins()) {
-    const double error = std::isfinite(bin.std_error_us()) ? bin.std_error_us() : 0;
-    size = std::max({size, std::abs(bin.mean_residual_us()), std::abs(bin.after_us())});
+    const double error = std::isfinite(scale.StdError(bin)) ? scale.StdError(bin) : 0;
+    size = std::max({size, std::abs(scale.Mean(bin)), std::abs(scale.After(bin))});
     x.Add(bin.centre());
-    for (const double value :
-         {bin.mean_residual_us() - error, bin.mean_residual_us() + error, bin.after_us()})
+    for (const double value : {scale.Mean(bin) - error, scale.Mean(bin) + error, scale.After(bin)})
       y.Add(value);
   }
-  const TimeUnit unit = UnitOfTime(size);
+  const TimeUnit unit = scale.grey() ? TimeUnit{1, "grey levels"} : UnitOfTime(size);
   const Range us = y.Get();
   const Chart::Axis x_axis = {AxisTitle(curve), x.Get()};
   const Chart::Axis y_axis = {absl::StrCat("mean residual (", unit.symbol, ")"),
@@ -128,15 +140,15 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
       std::vector<double> errors;
       for (const v1::CurveBin& bin : curve.bins()) {
         if (bin.finger() != fingers[f]) continue;
-        points.push_back({bin.centre(), (after ? bin.after_us() : bin.mean_residual_us()) * unit.per_us});
-        errors.push_back(bin.std_error_us() * unit.per_us);
+        points.push_back({bin.centre(), (after ? scale.After(bin) : scale.Mean(bin)) * unit.per_us});
+        errors.push_back(scale.StdError(bin) * unit.per_us);
       }
       const std::string css = absl::StrCat("f", f % 6);
       if (!after) chart.Whiskers(points, errors, css);
       chart.Line(points, css);
     }
-    pair += chart.Svg(absl::StrCat("Mean residual of each finger against ", x_axis.title, ", ",
-                                   after ? "improved model" : "given model"));
+    pair += chart.Svg(absl::StrCat("Mean residual", scale.grey() ? "" : " of each finger", " against ",
+                                   x_axis.title, ", ", after ? "improved model" : "given model"));
   }
   const bool improved = !report.improved_model_yaml().empty();
   const bool still = improved && curve.p_after() < kDependenceP;
@@ -193,10 +205,11 @@ std::string Curves(const v1::Report& report) {
       "<h3>Residual against every covariate</h3>\n", Legend(keys), "<div class=\"grid wide\">", open,
       "</div>\n", folded,
       "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
-      "permutation, corrected for the number of covariates (and of fingers, where each is tested alone). "
-      "Only "
-      "differences between fingers are measured, so what one finger does shows in the others with the other "
-      "sign.</p>\n");
+      "permutation, corrected for the number of covariates",
+      ErrorScale(report).grey() ? "; pictures of one pose count as one.</p>\n"
+                                : " (and of fingers, where each is tested alone). Only differences between "
+                                  "fingers are measured, so what "
+                                  "one finger does shows in the others with the other sign.</p>\n");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/html_page.h"
 #include "client/report/svg_chart.h"
 #include "client/report/words.h"
@@ -25,7 +26,7 @@ std::string NotFitted(const v1::Report& report) {
   std::vector<std::string> notes;
   std::map<std::string, std::vector<std::string>> effects;
   for (const v1::Candidate& candidate : report.candidates()) {
-    if (candidate.rmse_us() > 0 || candidate.note().empty()) continue;
+    if (ErrorScale(report).Rmse(candidate) > 0 || candidate.note().empty()) continue;
     std::vector<std::string>& names = effects[candidate.note()];
     if (names.empty()) notes.push_back(candidate.note());
     names.push_back(absl::StrCat(candidate.effect(), candidate.scope() == "object" ? " (per object)" : ""));
@@ -59,11 +60,11 @@ std::string ParameterCells(const Parameters& parameters) {
 
 std::string CandidateTable(const v1::Report& report) {
   if (report.candidates().empty()) return "";
-  const double initial = UnseenError(report.initial().heldout_rmse_us(), report.initial().rmse_us());
-  const double floor = NoiseFloorOf(report).sigma_us;
+  const ErrorScale scale(report);
+  const double initial = scale.Unseen(report.initial());
+  const double floor = NoiseFloorOf(report).sigma;
   double largest = initial;
-  for (const v1::Candidate& c : report.candidates())
-    largest = std::max(largest, UnseenError(c.heldout_rmse_us(), c.rmse_us()));
+  for (const v1::Candidate& c : report.candidates()) largest = std::max(largest, scale.Unseen(c));
   std::string table = absl::StrCat("<div class=\"scroll\"><table class=\"why\">",
                                    HeaderRow({"Effect", ">Probability", ">It would leave", "",
                                               "Parameter \u00b1 standard error", "95 % interval"}),
@@ -81,8 +82,8 @@ std::string CandidateTable(const v1::Report& report) {
           : absl::StrCat(" Effects marked as one of these fit alike and share a probability of ",
                          EffectProbability(report.steps(0).probability()), ".");
   for (const v1::Candidate& candidate : report.candidates()) {
-    if (!(candidate.rmse_us() > 0) && !candidate.note().empty()) continue;
-    const double left = UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us());
+    if (!(scale.Rmse(candidate) > 0) && !candidate.note().empty()) continue;
+    const double left = scale.Unseen(candidate);
     const double p = candidate.probability();
     const bool shares = first_step.count(candidate.effect()) > 0;
     absl::StrAppend(
@@ -90,7 +91,7 @@ std::string CandidateTable(const v1::Report& report) {
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           candidate.scope() == "object" ? "<br><small>a value per object</small>" : "",
                           shares ? "<br><small>one of these</small>" : "")),
-        NumberCell(EffectProbability(p)), NumberCell(left > 0 ? Time(left) : ""),
+        NumberCell(EffectProbability(p)), NumberCell(left > 0 ? scale.Text(left) : ""),
         Cell(left > 0 ? Bar(left / largest, p < 0.05 || none ? "share" : "better",
                             floor > 0 ? floor / largest : -1)
                       : "",
@@ -102,12 +103,13 @@ std::string CandidateTable(const v1::Report& report) {
     }
     table += "</tr>\n";
   }
-  return Figure(
-             absl::StrCat(table, "</tbody></table></div>"),
-             absl::StrCat("Each effect alone, as the first to be added. It would leave: the RMSE on touches "
-                          "left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
-                          "zero, no effect.",
-                          Typeset(shared))) +
+  return Figure(absl::StrCat(table, "</tbody></table></div>"),
+                absl::StrCat(
+                    "Each effect alone, as the first to be added. It would leave: the RMSE on ",
+                    scale.readings(),
+                    " left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
+                    "zero, no effect.",
+                    Typeset(shared))) +
          NotFitted(report);
 }
 
@@ -129,9 +131,9 @@ std::string HtmlWhy(const v1::Report& report) {
   const bool none = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
   return Section(
       "why", none ? "What was tried" : "Why",
-      none ? "Every effect of the catalogue alone, judged on touches that the fit did not see: none "
-             "explains the error."
-           : "Every effect of the catalogue, fitted and judged on touches that the fit did not see.",
+      absl::StrCat("Every effect of the catalogue", none ? " alone, judged on " : ", fitted and judged on ",
+                   ErrorScale(report).readings(), " that the fit did not see",
+                   none ? ": none explains the error." : "."),
       absl::StrCat(CandidateTable(report), Ambiguities(report)));
 }
 

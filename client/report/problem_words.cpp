@@ -19,9 +19,18 @@ std::string ProblemTitle(const v1::DataProblem& problem) {
       {"units_time", "times in another unit"},
       {"units_length", "lengths in another unit"},
       {"speed_factor", "speeds off by a factor"},
-      {"row_shift", "times in the wrong rows"},
+      {"row_shift", "results in the wrong rows"},
       {"object_origin", "another origin of objects"},
-      {"duplicates", "rows copied under new numbers"}};
+      {"duplicates", "rows copied under new numbers"},
+      // Of photographs.
+      {"channel_order", "red and blue exchanged"},
+      {"mirrored", "mirrored pictures"},
+      {"rotated", "pictures turned"},
+      {"units_angle", "radians and degrees mixed up"},
+      {"up_axis", "another axis is up"},
+      {"eye_at", "eye and at exchanged"},
+      {"wrong_object", "another object"},
+      {"focal_factor", "another focal length"}};
   const auto title = kTitles.find(problem.kind());
   return absl::StrCat(title == kTitles.end() ? problem.kind() : title->second,
                       problem.detail().empty() ? "" : absl::StrCat(" (", problem.detail(), ")"));

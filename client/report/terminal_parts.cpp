@@ -10,7 +10,7 @@
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 
-#include "client/report/words.h"
+#include "client/report/error_scale.h"
 
 namespace touchstone::client {
 namespace {
@@ -73,8 +73,8 @@ void AddEffect(const Effect& effect, const std::string& name, double probability
 }
 
 // Without poses there is no RMSE.
-std::string Change(double before_us, double after_us) {
-  return before_us > 0 && after_us > 0 ? TimeChange(before_us, after_us) : "";
+std::string Change(const ErrorScale& scale, double before, double after) {
+  return before > 0 && after > 0 ? scale.Change(before, after) : "";
 }
 
 }  // namespace
@@ -115,9 +115,10 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
 
 void AddWhy(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<TextCell>> rows;
-  double before = UnseenError(report.initial().heldout_rmse_us(), report.initial().rmse_us());
+  const ErrorScale scale(report);
+  double before = scale.Unseen(report.initial());
   if (report.steps_size() > 0) {
-    const char* unseen = before > 0 ? "unseen touches" : "";
+    const std::string unseen = before > 0 ? absl::StrCat("unseen ", scale.readings()) : "";
     rows.push_back(
         {{""}, {""}, {"probability", true, TextLayout::kDim}, {unseen, true, TextLayout::kDim}, {""}});
   }
@@ -132,19 +133,22 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   }
   for (int i = 0; i < report.steps_size(); ++i) {
     const v1::Step& step = report.steps(i);
-    const double after = UnseenError(step.heldout_rmse_us(), step.rmse_us());
+    const double after = scale.Unseen(step);
     // The probability is that of the step with its equivalents.
-    const std::string note =
+    std::string note =
         step.equivalent().empty() ? "" : absl::StrCat("one of ", 1 + step.equivalent_size(), ", see below");
+    if (!step.shown_by().empty())
+      absl::StrAppend(
+          &note, note.empty() ? "" : "; ", "shown by ",
+          step.shown_by() == "both" ? "touches and pictures" : absl::StrCat(step.shown_by(), " alone"));
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
-              Change(before, after), note, TextLayout::kPlain, &rows);
+              Change(scale, before, after), note, TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
     for (int c = 0, shown = 0; i == 0 && c < report.candidates_size() && shown < kMaxCompetingEffects; ++c) {
       const v1::Candidate& candidate = report.candidates(c);
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                Change(before, UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us())),
-                candidate.note(), TextLayout::kDim, &rows);
+                Change(scale, before, scale.Unseen(candidate)), candidate.note(), TextLayout::kDim, &rows);
       ++shown;
     }
     before = after;
@@ -171,7 +175,7 @@ void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
   std::string text = "No name fits, but a curve does";
   if (rest.heldout_gain() > 0)
     absl::StrAppend(&text, ": it removes ", Share(rest.heldout_gain()),
-                    " of the excess error on unseen touches");
+                    " of the excess error on unseen data");
   if (!rest.nearest_formula().empty())
     absl::StrAppend(&text, "; the nearest simple formula is ", rest.nearest_formula(), " with ",
                     Share(rest.nearest_formula_share()), " of its gain in log evidence");

@@ -12,6 +12,10 @@ void AddWhy(const v1::Report& report, TextLayout* out);
 void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);
 void AddNextTouches(const v1::Report& report, TextLayout* out);
+// Of photographs.
+void AddSilhouettes(const v1::Report& report, TextLayout* out);       // lines of "How wrong"
+void AddWorstPhotographs(const v1::Report& report, TextLayout* out);  // the pictures that are off most
+void AddNextPhotographs(const v1::Report& report, TextLayout* out);
 void AddUnusedRows(const v1::Report& report, TextLayout* out);
 
 }  // namespace touchstone::client

@@ -1,19 +1,21 @@
 // Check the data, in the terminal.
 #include <absl/strings/str_cat.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/terminal_parts.h"
-#include "client/report/words.h"
 
 namespace touchstone::client {
 
 void AddDataProblems(const v1::Report& report, TextLayout* out) {
   if (report.data_problems().empty()) return;
   out->Label("Check");
+  const ErrorScale scale(report);
   for (const v1::DataProblem& problem : report.data_problems()) {
     std::string text = absl::StrCat(ProblemTitle(problem), ".");
-    if (problem.rmse_before_us() > 0 && problem.rmse_after_us() > 0)
+    if (scale.Before(problem) > 0 && scale.After(problem) > 0)
       absl::StrAppend(&text, " RMSE of the given model ",
-                      TimeChange(problem.rmse_before_us(), problem.rmse_after_us()), " with the file fixed.");
+                      scale.Change(scale.Before(problem), scale.After(problem)), " with the ",
+                      scale.grey() ? "set" : "file", " fixed.");
     out->Paragraph(text);
     out->Paragraph(problem.words());
     if (!problem.fix().empty()) {

@@ -7,9 +7,9 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "client/report/error_scale.h"
 #include "client/report/report.h"
 #include "client/report/terminal_parts.h"
-#include "client/report/words.h"
 
 namespace touchstone::client {
 namespace {
@@ -21,9 +21,10 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
   absl::StrAppend(&text, ".");
   const Floor floor = NoiseFloorOf(report);
-  if (floor.sigma_us > 0) {
-    const std::string length = LengthOf(floor.sigma_us, report);
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", Time(floor.sigma_us),
+  const ErrorScale scale(report);
+  if (floor.sigma > 0) {
+    const std::string length = scale.grey() ? "levels of 255" : LengthOf(floor.sigma, report);
+    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", scale.Text(floor.sigma),
                     length.empty() ? "" : absl::StrCat(" (", length, ")"));
     if (floor.bound) {
       absl::StrAppend(&text, ", an upper bound without repeats.");
@@ -43,13 +44,21 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
 }
 
 void AddHowWrong(const v1::Report& report, TextLayout* out) {
-  if (!(report.initial().rmse_us() > 0)) return;
+  const ErrorScale scale(report);
+  if (!(scale.Rmse(report.initial()) > 0)) return;
   const std::string times = TimesTheFloor(report);
   out->Label("How wrong");
   out->Paragraph(
-      absl::StrCat("RMSE ", Time(report.initial().rmse_us()), times.empty() ? "" : ", ", times, "."));
+      absl::StrCat("RMSE ", scale.Text(scale.Rmse(report.initial())), times.empty() ? "" : ", ", times, "."));
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
     out->Paragraph(absl::StrCat("Of the fingers, ", FingerScatterWords(report), "."));
+  AddSilhouettes(report, out);
+  if (scale.grey() && report.initial().rmse_us() > 0)
+    out->Paragraph(absl::StrCat("Of the touches: RMSE ",
+                                report.final().rmse_us() > 0
+                                    ? TimeChange(report.initial().rmse_us(), report.final().rmse_us())
+                                    : Time(report.initial().rmse_us()),
+                                ", noise floor ", Time(report.noise_floor_us()), "."));
   if (report.finger_bias_us_size() > 0) {
     std::vector<std::string> fingers;
     for (int i = 0; i < report.finger_bias_us_size(); ++i) {
@@ -66,12 +75,14 @@ void AddWhere(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<TextCell>> rows;
   for (int i = 0; i < std::min(report.where_size(), 6); ++i) {
     const v1::Slice& slice = report.where(i);
+    const bool of_touches = slice.touches() > 0;  // a joint report has both
+    const ErrorScale scale(of_touches ? v1::Report() : report);
     const std::string words = slice.words().empty()
-                                  ? absl::StrCat("mean residual ", SignedTime(slice.mean_residual_us()))
+                                  ? absl::StrCat("mean residual ", scale.Signed(scale.Mean(slice)))
                                   : slice.words();
     rows.push_back(
         {{slice.slice()},
-         {absl::StrCat(Count(slice.touches()), " touches"), true},
+         {absl::StrCat(Count(scale.Readings(slice)), " ", scale.readings()), true},
          {absl::StrCat(Share(slice.share_of_excess_error()), i == 0 ? " of the excess" : ""), false},
          {words}});
   }
@@ -119,17 +130,18 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
   const std::vector<Rung> rungs = Ladder(report);
   if (rungs.empty()) return;
   out->Label("Ladder");
+  const ErrorScale scale(report);
   double largest = 0;
   int names = 0;
   bool heldout = false, p = false;
   for (const Rung& rung : rungs) {
-    largest = std::max(largest, rung.rmse_us);
+    largest = std::max(largest, rung.rmse);
     names = std::max(names, Columns(rung.name));
-    heldout |= !std::isnan(rung.heldout_rmse_us);
+    heldout |= !std::isnan(rung.heldout_rmse);
     p |= !std::isnan(rung.lack_of_fit_p);
   }
   const bool wide = out->width() >= 96;
-  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11), 10, 40);
+  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11) - (scale.grey() ? 5 : 0), 10, 40);
   std::vector<std::vector<TextCell>> rows;
   if (wide && (heldout || p)) {
     rows.push_back({{""},
@@ -140,11 +152,11 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
   }
   for (const Rung& rung : rungs) {
     std::vector<TextCell> row = {{rung.name},
-                                 {std::string(BarLength(rung.rmse_us, largest, bar), '#'), false,
+                                 {std::string(BarLength(rung.rmse, largest, bar), '#'), false,
                                   rung.kind == Rung::kFloor ? TextLayout::kDim : TextLayout::kBar}};
-    row.push_back({Time(rung.rmse_us), true});
+    row.push_back({scale.Text(rung.rmse), true});
     if (wide && (heldout || p)) {
-      row.push_back({std::isnan(rung.heldout_rmse_us) ? "" : Time(rung.heldout_rmse_us), true});
+      row.push_back({std::isnan(rung.heldout_rmse) ? "" : scale.Text(rung.heldout_rmse), true});
       row.push_back({std::isnan(rung.lack_of_fit_p) ? "" : Probability(rung.lack_of_fit_p), true});
     }
     rows.push_back(row);
@@ -161,12 +173,14 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddDataProblems(report, &out);
   AddDistributions(report, &out);
   AddWhere(report, &out);
+  AddWorstPhotographs(report, &out);
   AddSession(report, &out);
   AddWhy(report, &out);
   AddUnexplained(report, &out);
   AddLadder(report, &out);
   AddWhatToDo(report, &out);
   AddNextTouches(report, &out);
+  AddNextPhotographs(report, &out);
   AddUnusedRows(report, &out);
   return out.Take();
 }

@@ -8,7 +8,7 @@
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
-#include "client/report/words.h"
+#include "client/report/error_scale.h"
 
 namespace touchstone::client {
 
@@ -25,18 +25,19 @@ std::string CovariateName(const std::string& name) {
 
 std::string TimesTheFloor(const v1::Report& report) {
   const Floor floor = NoiseFloorOf(report);
-  const double ratio = floor.sigma_us > 0 ? report.initial().rmse_us() / floor.sigma_us : 0;
+  const ErrorScale scale(report);
+  const double ratio = floor.sigma > 0 ? scale.Rmse(report.initial()) / floor.sigma : 0;
   if (!(ratio > 0)) return "";
   if (ratio <= 1.02) return "no more than the floor";
   const std::string times = absl::StrCat(Number(ratio, 2), " times the floor");
   const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(report.reducible_share()));
   if (report.verdict() == v1::Report::CHECK_DATA) {
-    const double after = report.data_problems().empty() ? 0 : report.data_problems(0).rmse_after_us();
+    const double after = report.data_problems().empty() ? 0 : scale.After(report.data_problems(0));
     return absl::StrCat(times, ", which says nothing of the model yet: the error is the file's",
-                        after > 0 ? absl::StrCat(" but for ", Time(after)) : "");
+                        after > 0 ? absl::StrCat(" but for ", scale.Text(after)) : "");
   }
   if (report.verdict() == v1::Report::TOO_LITTLE_DATA)
-    return absl::StrCat(times, ", from so few touches a rough figure");
+    return absl::StrCat(times, ", from so few ", scale.readings(), " a rough figure");
   return absl::StrCat(times, ": ", share, " of the error is the model's, not noise");
 }
 

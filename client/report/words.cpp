@@ -15,6 +15,7 @@
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
+#include "client/report/error_scale.h"
 #include "server/base/units.h"
 
 namespace touchstone::client {
@@ -197,7 +198,11 @@ std::string StepName(const v1::Step& step) {
 
 Floor NoiseFloorOf(const v1::Report& report) {
   Floor floor;
-  floor.sigma_us = report.noise_floor_us() > 0 ? report.noise_floor_us() : report.noise_floor().sigma_us();
+  if (report.images() > 0)
+    floor.sigma =
+        report.noise_floor_grey() > 0 ? report.noise_floor_grey() : report.noise_floor().sigma_grey();
+  else
+    floor.sigma = report.noise_floor_us() > 0 ? report.noise_floor_us() : report.noise_floor().sigma_us();
   floor.bound = report.has_noise_floor() && !report.noise_floor().from_repeats();
   return floor;
 }
@@ -214,33 +219,33 @@ std::string LengthOf(double us, const v1::Report& report) {
 
 std::vector<Rung> Ladder(const v1::Report& report) {
   std::vector<Rung> rungs;
-  if (!(report.initial().rmse_us() > 0)) return rungs;
+  const ErrorScale scale(report);
+  if (!(scale.Rmse(report.initial()) > 0)) return rungs;
   const auto add = [&](Rung::Kind kind, std::string name, double rmse, double heldout, double p) {
     rungs.push_back({kind, std::move(name), rmse, heldout > 0 ? heldout : kUnknown, p});
   };
   const v1::Quality& initial = report.initial();
-  add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), initial.rmse_us(),
-      initial.heldout_rmse_us(), initial.lack_of_fit_p());
+  add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), scale.Rmse(initial),
+      scale.Heldout(initial), initial.lack_of_fit_p());
   if (report.steps().empty() && !report.refitted().empty()) {
-    add(Rung::kRefit, "refitted values", report.final().rmse_us(), report.final().heldout_rmse_us(),
+    add(Rung::kRefit, "refitted values", scale.Rmse(report.final()), scale.Heldout(report.final()),
         report.final().lack_of_fit_p());
   }
   for (const v1::Step& step : report.steps()) {
-    add(Rung::kStep, absl::StrCat("+ ", RungName(step)), step.rmse_us(), step.heldout_rmse_us(),
+    add(Rung::kStep, absl::StrCat("+ ", RungName(step)), scale.Rmse(step), scale.Heldout(step),
         step.lack_of_fit_p());
   }
-  if (!report.data_problems().empty() && report.data_problems(0).rmse_after_us() > 0)
-    add(Rung::kSuggestion, "with the file fixed", report.data_problems(0).rmse_after_us(), kUnknown,
-        kUnknown);
+  if (!report.data_problems().empty() && scale.After(report.data_problems(0)) > 0)
+    add(Rung::kSuggestion, absl::StrCat("with the ", scale.grey() ? "set" : "file", " fixed"),
+        scale.After(report.data_problems(0)), kUnknown, kUnknown);
   const v1::Unexplained& rest = report.unexplained();
-  if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && rest.rmse_us() > 0) {
-    add(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula",
-        report.unexplained().rmse_us(), report.unexplained().heldout_rmse_us(), kUnknown);
+  if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && scale.Rmse(rest) > 0) {
+    add(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula", scale.Rmse(rest),
+        scale.Heldout(rest), kUnknown);
   }
   const Floor floor = NoiseFloorOf(report);
-  if (floor.sigma_us > 0) {
-    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma_us, kUnknown,
-        kUnknown);
+  if (floor.sigma > 0) {
+    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma, kUnknown, kUnknown);
   }
   return rungs;
 }
@@ -269,12 +274,17 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 std::string SummaryToShow(const v1::Report& report) {
   // Their own part says it at more length.
   if (!report.data_problems().empty()) return "";
-  return report.initial().rmse_us() > 0 ? "" : report.summary();
+  return ErrorScale(report).Rmse(report.initial()) > 0 ? "" : report.summary();
 }
 
 std::string DataInWords(const v1::Report& report, const std::string& times) {
   const v1::DataSummary& data = report.data();
-  std::string text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
+  std::string text;
+  if (report.images() == 0 || report.touches() > 0)
+    text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
+  if (report.images() > 0)
+    absl::StrAppend(&text, text.empty() ? "" : " and ", Count(report.images()),
+                    report.images() == 1 ? " picture" : " pictures");
   if (data.objects_size() > 0) {
     absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
   }

@@ -44,7 +44,7 @@ std::string StepName(const v1::Step& step);
 
 // The noise floor, from wherever the report has it, and whether it is only an upper bound; 0: unknown.
 struct Floor {
-  double sigma_us = 0;
+  double sigma = 0;  // us, or grey levels of photographs (error_scale.h)
   bool bound = false;
 };
 Floor NoiseFloorOf(const v1::Report& report);
@@ -56,9 +56,9 @@ struct Rung {
   enum Kind { kGiven, kRefit, kStep, kSuggestion, kFloor };
   Kind kind;
   std::string name;
-  double rmse_us;
-  double heldout_rmse_us;  // NaN: none
-  double lack_of_fit_p;    // NaN: none
+  double rmse;           // us, or grey levels of photographs
+  double heldout_rmse;   // NaN: none
+  double lack_of_fit_p;  // NaN: none
 };
 // The given model, what was changed, and the noise floor; empty for a set without poses.
 std::vector<Rung> Ladder(const v1::Report& report);

@@ -12,6 +12,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/photograph_reports.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
@@ -20,8 +21,13 @@
 namespace touchstone::service {
 namespace {
 
-using Work = std::function<absl::StatusOr<diagnosis::report::Diagnosis>(const diagnosis::DiagnosisInput&,
-                                                                        const diagnosis::DiagnosisContext&)>;
+using Work = std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisInput&,
+                                                      const diagnosis::DiagnosisContext&)>;
+absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diagnosis>& diagnosis) {
+  if (!diagnosis.ok()) return diagnosis.status();
+  return diagnosis::report::ToReport(*diagnosis);
+}
+
 constexpr std::chrono::milliseconds kProgressInterval{250};
 constexpr int kDefaultProposedTouches = 24;
 
@@ -116,11 +122,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
         if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources));
-        if (input.set == nullptr)
-          return absl::UnimplementedError(
-              "photographs alone are not diagnosed here yet; send touches with them");
-        TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis, work(input, how));
-        v1::Report report = diagnosis::report::ToReport(diagnosis);
+        TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work(input, how));
         AddProvenance(evidence, input, *resources, &report);
         return report;
       },
@@ -174,8 +176,12 @@ absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& requ
 grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                        grpc::ServerWriter<v1::CompareResponse>* writer) {
   v1::Report report;
-  return ToGrpc(
-      RunAndSend(context, request->evidence(), touchstone::diagnosis::Compare, resources_, writer, &report));
+  const Work work = [](const diagnosis::DiagnosisInput& input,
+                       const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+    if (input.images != nullptr) return touchstone::diagnosis::ComparePhotographSet(input, how);
+    return AsReport(touchstone::diagnosis::Compare(input, how));
+  };
+  return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }
 
 grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::DiagnoseRequest* request,
@@ -186,11 +192,13 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
     if (const absl::Status status = ModelStore::CheckName(name); !status.ok())
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   v1::Report report;
-  const Work work = [with_surface_map = request->with_surface_map()](const diagnosis::DiagnosisInput& input,
-                                                                     const diagnosis::DiagnosisContext& how) {
+  const Work work = [with_surface_map = request->with_surface_map()](
+                        const diagnosis::DiagnosisInput& input,
+                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     diagnosis::DiagnosisInput asked = input;
     asked.with_surface_map = with_surface_map;
-    return touchstone::diagnosis::Diagnose(asked, how);
+    if (input.images != nullptr) return touchstone::diagnosis::DiagnosePhotographSet(asked, how);
+    return AsReport(touchstone::diagnosis::Diagnose(asked, how));
   };
   absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
@@ -207,8 +215,9 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
   const int touches =
       request->touches() == 0 ? kDefaultProposedTouches : static_cast<int>(request->touches());
   const Work work = [touches](const diagnosis::DiagnosisInput& input,
-                              const diagnosis::DiagnosisContext& how) {
-    return touchstone::diagnosis::Propose(input, touches, how);
+                              const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+    if (input.images != nullptr) return touchstone::diagnosis::ProposePhotographSet(input, touches, how);
+    return AsReport(touchstone::diagnosis::Propose(input, touches, how));
   };
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));

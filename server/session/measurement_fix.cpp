@@ -17,20 +17,10 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/model/finger_name.h"
+#include "server/session/fix_text.h"
 
 namespace touchstone::session {
 namespace {
-
-// A word for the shell: in quotes where it needs them.
-std::string ShellWord(const std::string& word) {
-  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](char c) {
-    return absl::ascii_isalnum(c) || absl::StrContains("_-./=,", absl::string_view(&c, 1));
-  });
-  if (plain) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
 
 absl::Status Refused(const MeasurementSet& set, absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat(set.origin, ": ", what));
@@ -267,13 +257,7 @@ std::string FixOptions(const MeasurementFix& fix, int fingers) {
     options.push_back(moved.size() == 2 ? absl::StrCat("--swap-fingers ", absl::StrJoin(moved, ","))
                                         : absl::StrCat("--finger-order ", absl::StrJoin(all, ",")));
   }
-  const auto& renames = fix.rename_objects;
-  if (renames.size() == 2 && renames[0].first == renames[1].second && renames[0].second == renames[1].first) {
-    options.push_back("--swap-objects " + ShellWord(absl::StrCat(renames[0].first, ",", renames[1].first)));
-  } else {
-    for (const auto& [from, to] : renames)
-      options.push_back("--rename-object " + ShellWord(absl::StrCat(from, "=", to)));
-  }
+  for (std::string& option : RenameOptions(fix.rename_objects)) options.push_back(std::move(option));
   const auto scale = [&](const char* option, double factor) {
     if (factor != 1) options.push_back(absl::StrCat(option, " ", ShortestNumber(factor)));
   };

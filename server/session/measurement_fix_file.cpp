@@ -12,26 +12,12 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/session/csv_fields.h"
+#include "server/session/fix_text.h"
 #include "server/session/measurement_columns.h"
 #include "server/session/measurement_fix.h"
 
 namespace touchstone::session {
 namespace {
-
-// A line's fields with all their bytes. The line was read before, so its quotes are in order.
-std::vector<std::string> RawFields(absl::string_view line) {
-  std::vector<std::string> fields(1);
-  bool quoted = false;
-  for (const char c : line) {
-    if (c == '"') quoted = !quoted;
-    if (c == ',' && !quoted) {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
 
 // The number of a field that a fix may change, in SI.
 double ValueOf(const MeasurementSet& set, const Column& column, int row) {

@@ -24,14 +24,6 @@ std::string Value(const inference::ParameterEstimate& value) {
                          value.unit.empty() ? "" : " ", value.unit);
 }
 
-std::string Values(const std::vector<inference::ParameterEstimate>& parameters) {
-  constexpr int kMaxShown = 4;
-  if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
-  std::vector<std::string> texts;
-  for (const inference::ParameterEstimate& value : parameters) texts.push_back(Value(value));
-  return absl::StrJoin(texts, ", ");
-}
-
 std::string HowWrong(const Diagnosis& diagnosis) {
   const double rmse_s = diagnosis.initial ? diagnosis.initial->rmse_s : 0;
   if (!diagnosis.noise_floor || !(diagnosis.noise_floor->sigma_s > 0))
@@ -87,13 +79,21 @@ std::string WhatRemains(const selection::UnexplainedRest& rest) {
     return "A structure remains that neither an effect of the catalogue nor a simple formula explains.";
   return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
                       rest.covariates.empty() ? "something" : rest.covariates[0].name,
-                      ". A suggestion: ", rest.formula, " (", Values(rest.parameters), ") would leave ",
-                      TimeInWords(rest.rmse_s), ".");
+                      ". A suggestion: ", rest.formula, " (", ValuesInWords(rest.parameters),
+                      ") would leave ", TimeInWords(rest.rmse_s), ".");
 }
 
 constexpr char kNoTouch[] = "No touch could be used: nothing can be said of the model.";
 
 }  // namespace
+
+std::string ValuesInWords(const std::vector<inference::ParameterEstimate>& parameters) {
+  constexpr int kMaxShown = 4;
+  if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
+  std::vector<std::string> texts;
+  for (const inference::ParameterEstimate& value : parameters) texts.push_back(Value(value));
+  return absl::StrJoin(texts, ", ");
+}
 
 std::vector<std::string> DataWarnings(const touches::DataSummary& data) {
   if (data.touches == 0) return {kNoTouch};
@@ -126,13 +126,13 @@ std::string Summarize(const Diagnosis& diagnosis) {
     if (std::string words = FloorAgainstModel(*diagnosis.noise_floor); !words.empty())
       sentences.push_back(std::move(words));
   for (const selection::RefittedEffect& refit : diagnosis.refitted)
-    sentences.push_back(
-        absl::StrCat("In the model ", refit.effect, " has another value: ", Values(refit.parameters), "."));
+    sentences.push_back(absl::StrCat("In the model ", refit.effect,
+                                     " has another value: ", ValuesInWords(refit.parameters), "."));
   for (const std::string& effect : diagnosis.superfluous) sentences.push_back(SuperfluousInWords(effect));
   for (const selection::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
-    sentences.push_back(absl::StrCat("Missing: ", name, " (", Values(step.parameters), ")."));
+    sentences.push_back(absl::StrCat("Missing: ", name, " (", ValuesInWords(step.parameters), ")."));
     if (!step.equivalent.empty())
       sentences.push_back(
           absl::StrCat("These data cannot tell them apart. ", step.discriminating_measurement));

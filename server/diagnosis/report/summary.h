@@ -9,6 +9,9 @@
 namespace touchstone::diagnosis::report {
 
 // What limits the diagnosis: few objects, no repeats, few touches.
+// "radius_mm 1.5 +- 0.005 mm, ..."; only how many where they are many.
+std::string ValuesInWords(const std::vector<inference::ParameterEstimate>& parameters);
+
 std::vector<std::string> DataWarnings(const touches::DataSummary& data);
 
 // One paragraph: how wrong, why, what to do.

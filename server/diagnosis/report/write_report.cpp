@@ -3,66 +3,13 @@
 #include "server/base/units.h"
 #include "server/diagnosis/report/design_messages.h"
 #include "server/diagnosis/report/distributions_messages.h"
+#include "server/diagnosis/report/message_parts.h"
 #include "server/diagnosis/report/residuals_messages.h"
 #include "server/effects/formula.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
-
-v1::Report::Verdict ToMessage(selection::Verdict verdict) {
-  switch (verdict) {
-    case selection::Verdict::kNone:
-      return v1::Report::VERDICT_UNSPECIFIED;
-    case selection::Verdict::kAdequate:
-      return v1::Report::ADEQUATE;
-    case selection::Verdict::kWrongValues:
-      return v1::Report::WRONG_VALUES;
-    case selection::Verdict::kMissingEffects:
-      return v1::Report::MISSING_EFFECTS;
-    case selection::Verdict::kUnexplained:
-      return v1::Report::UNEXPLAINED;
-    case selection::Verdict::kCheckData:
-      return v1::Report::CHECK_DATA;
-    case selection::Verdict::kTooLittleData:
-      return v1::Report::TOO_LITTLE_DATA;
-  }
-  return v1::Report::VERDICT_UNSPECIFIED;
-}
-
-const char* ToMessage(selection::EffectScope scope) {
-  return scope == selection::EffectScope::kObject ? "object" : "rig";
-}
-
-const char* ToMessage(selection::CandidateNote note) {
-  switch (note) {
-    case selection::CandidateNote::kNone:
-      return "";
-    case selection::CandidateNote::kInvisible:
-      return "this experiment cannot see it";
-    case selection::CandidateNote::kNeutral:
-      return "fits best where it changes nothing";
-    case selection::CandidateNote::kLinearised:
-      return "not among the eight most probable; its gain is a linearised prediction";
-  }
-  return "";
-}
-
-template <typename Message>
-void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters, Message* message) {
-  for (const inference::ParameterEstimate& estimate : parameters) {
-    v1::ParameterValue* value = message->add_parameters();
-    value->set_name(estimate.name);
-    value->set_value(estimate.value);
-    value->set_std_error(estimate.std_error);
-    value->set_unit(estimate.unit);
-    value->set_finger(estimate.entry);
-    value->set_object(estimate.object);
-    value->set_lower(estimate.lower);
-    value->set_upper(estimate.upper);
-    if (estimate.before) value->set_before(*estimate.before);
-  }
-}
 
 void WriteQuality(const selection::Quality& quality, v1::Quality* message) {
   message->set_rmse_us(Microseconds(quality.rmse_s));

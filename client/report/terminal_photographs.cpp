@@ -1,0 +1,80 @@
+// What the terminal report says of photographs alone.
+#include <algorithm>
+#include <cmath>
+
+#include <absl/strings/str_cat.h>
+
+#include "client/report/error_scale.h"
+#include "client/report/terminal_parts.h"
+
+namespace touchstone::client {
+namespace {
+
+constexpr int kWorstPictures = 4;
+
+// "0.912", or "0.912 -> 0.985" with an improved model.
+std::string BeforeAfter(double before, double after, bool improved, int decimals) {
+  return improved && !std::isnan(after)
+             ? absl::StrCat(Fixed(before, decimals), " -> ", Fixed(after, decimals))
+             : Fixed(before, decimals);
+}
+
+std::string Place(const v1::Vector3& v) {
+  return absl::StrCat(Fixed(1000 * v.x(), 0), " ", Fixed(1000 * v.y(), 0), " ", Fixed(1000 * v.z(), 0));
+}
+
+}  // namespace
+
+void AddSilhouettes(const v1::Report& report, TextLayout* out) {
+  const v1::PhotographSummary& summary = report.photographs();
+  if (!report.has_photographs() || std::isnan(summary.silhouette_iou())) return;
+  const bool improved = !report.improved_model_yaml().empty();
+  std::string text =
+      absl::StrCat("Outlines: overlap (IoU) ",
+                   BeforeAfter(summary.silhouette_iou(), summary.silhouette_iou_after(), improved, 3));
+  if (!std::isnan(summary.contour_distance_px()))
+    absl::StrAppend(
+        &text, ", apart by ",
+        BeforeAfter(summary.contour_distance_px(), summary.contour_distance_after_px(), improved, 2),
+        " px (root mean square).");
+  out->Paragraph(text);
+}
+
+void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
+  if (!report.has_photographs() || report.photographs().photographs_size() < 2) return;
+  std::vector<const v1::PhotographError*> errors;
+  for (const v1::PhotographError& error : report.photographs().photographs()) errors.push_back(&error);
+  std::stable_sort(errors.begin(), errors.end(),
+                   [](const auto* a, const auto* b) { return a->rmse_grey() > b->rmse_grey(); });
+  const ErrorScale scale(report);
+  const bool improved = !report.improved_model_yaml().empty();
+  std::vector<std::vector<TextLayout::Cell>> rows;
+  for (size_t k = 0; k < std::min<size_t>(kWorstPictures, errors.size()); ++k) {
+    const v1::PhotographError& error = *errors[k];
+    rows.push_back(
+        {{absl::StrCat("image ", error.image())},
+         {error.object()},
+         {improved ? scale.Change(error.rmse_grey(), error.rmse_after_grey()) : scale.Text(error.rmse_grey()),
+          true},
+         {std::isnan(error.silhouette_iou()) ? ""
+                                             : absl::StrCat("outline IoU ", Fixed(error.silhouette_iou(), 3)),
+          false, TextLayout::kDim}});
+  }
+  out->Label("Pictures");
+  out->Rows(rows);
+}
+
+void AddNextPhotographs(const v1::Report& report, TextLayout* out) {
+  if (report.next_photographs().empty()) return;
+  out->Label("Next");
+  std::vector<std::vector<TextLayout::Cell>> rows;
+  for (const v1::ProposedPhotograph& next : report.next_photographs())
+    rows.push_back(
+        {{absl::StrCat("picture of ", next.object())},
+         {absl::StrCat("from ", Place(next.camera().eye_m()), " mm at ", Place(next.camera().at_m()), " mm")},
+         {absl::StrCat(Number(next.separation(), 2), " sigmas"), true},
+         {next.purpose(), false, TextLayout::kDim}});
+  out->Rows(rows);
+}
+
+}  // namespace touchstone::client

@@ -1,0 +1,28 @@
+// The discrete mistakes that an image set, or the model that it is compared with, may have.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/model/model.h"
+#include "server/session/image_set_fix.h"
+
+namespace touchstone::diagnosis::checks {
+
+struct CandidateMistake {
+  std::string kind, detail;
+  std::string words;  // to follow "It looks as if"
+  session::ImageSetFix fix;
+  std::shared_ptr<const model::Model> model;  // of a mistake in the model's values; else null
+  std::string command;                        // that fixes the model
+  double max_ratio = 0;                       // stricter than for others; 0: as for others
+};
+
+// What concerns a whole set, likelier mistakes first.
+std::vector<CandidateMistake> MistakesOfSets(const session::ImageSet& set);
+
+// Angles of the model's effects that may be radians where degrees belong, or the reverse.
+std::vector<CandidateMistake> MistakesOfModels(const model::Model& model);
+
+}  // namespace touchstone::diagnosis::checks

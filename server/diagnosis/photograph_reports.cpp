@@ -1,0 +1,153 @@
+#include "server/diagnosis/photograph_reports.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/checks/data_problems.h"
+#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/images/diagnose_photographs.h"
+#include "server/diagnosis/report/photograph_summary.h"
+#include "server/diagnosis/report/write_photograph_report.h"
+#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis {
+namespace {
+
+using Engine = std::function<absl::StatusOr<images::PhotographDiagnosis>(images::Expectation*)>;
+
+// What a comparison finds for this model on this set.
+double GreyErrorOf(const DiagnosisInput& input, ThreadPool* pool) {
+  const absl::StatusOr<images::Photographs> photographs = images::MakePhotographs(input, pool);
+  if (!photographs.ok()) return NAN;
+  const absl::StatusOr<std::vector<image::Photo>> expected =
+      images::ExpectPhotographs(*photographs, *input.model, false, pool);
+  return expected.ok() ? images::RmseGrey(*photographs, *expected) : NAN;
+}
+
+// The problem with its errors: the model as it was given, on the set as it is and as it would be.
+images::PhotographDataProblem WithErrors(const checks::PhotoMistake& mistake, const DiagnosisInput& input,
+                                         double before_grey, ThreadPool* pool) {
+  images::PhotographDataProblem problem = mistake.problem;
+  problem.rmse_before_grey = before_grey;
+  DiagnosisInput fixed = input;
+  if (mistake.model != nullptr) {
+    fixed.model = mistake.model;
+  } else {
+    auto set = std::make_shared<session::ImageSet>(*input.images);
+    if (!session::ApplyFix(mistake.fix, set.get()).ok()) return problem;
+    fixed.images = set;
+  }
+  problem.rmse_after_grey = GreyErrorOf(fixed, pool);
+  if (std::abs(problem.rmse_after_grey - before_grey) > 1e-9)
+    problem.words += absl::StrFormat(" The model as it is would be off by %.3g grey levels instead of %.3g.",
+                                     problem.rmse_after_grey, before_grey);
+  return problem;
+}
+
+void Describe(const DiagnosisInput& input, const DiagnosisContext& context,
+              const images::Expectation& expectation, images::PhotographDiagnosis* diagnosis) {
+  if (context.progress) context.progress("describing what is left", 0.95);
+  residuals::DescribePhotographs(expectation, input.seed, context.pool, diagnosis);
+  for (std::string& warning : report::PhotographWarnings(*diagnosis, *input.images))
+    diagnosis->warnings.push_back(std::move(warning));
+  diagnosis->summary = report::Summarize(*diagnosis);
+}
+
+// Touches alone of a joint input.
+DiagnosisInput TouchesOf(const DiagnosisInput& input) {
+  DiagnosisInput touches = input;
+  touches.images = nullptr;
+  return touches;
+}
+
+// The comparison of the touches, given and improved; empty without touches.
+absl::StatusOr<v1::Report> TouchReport(const DiagnosisInput& input, const DiagnosisContext& context,
+                                       const std::string& improved_yaml) {
+  v1::Report report;
+  if (input.set == nullptr) return report;
+  DiagnosisInput touches = TouchesOf(input);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis given, diagnosis::Compare(touches, context));
+  report = report::ToReport(given);
+  if (improved_yaml.empty()) return report;
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model improved,
+                              model::ParseModel(improved_yaml, "the improved model", effects::Catalogue()));
+  touches.model = std::make_shared<const model::Model>(std::move(improved));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis better, diagnosis::Compare(touches, context));
+  *report.mutable_final() = report::ToReport(better).initial();
+  return report;
+}
+
+absl::StatusOr<v1::Report> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
+                                    const Engine& engine) {
+  images::Expectation expectation;
+  TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis, engine(&expectation));
+  Describe(input, context, expectation, &diagnosis);
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, TouchReport(input, context, diagnosis.improved_model_yaml));
+  report::WritePhotographs(diagnosis, *input.images, &report);
+  return report;
+}
+
+// The report of blunders, if there are any: of the touches first.
+absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context) {
+  if (context.progress && !context.progress("checking the data", 0.02))
+    return absl::CancelledError("the diagnosis was cancelled");
+  if (input.set != nullptr) {
+    const DiagnosisInput touches = TouchesOf(input);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto problems, checks::FindDataProblems(touches, context));
+    if (!problems.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis diagnosis, diagnosis::Diagnose(touches, context));
+      return std::optional<v1::Report>(report::ToReport(diagnosis));
+    }
+  }
+  const std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
+  if (mistakes.empty()) return std::optional<v1::Report>();
+  const auto engine = [&](images::Expectation* expectation) -> absl::StatusOr<images::PhotographDiagnosis> {
+    TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
+                                images::ComparePhotographs(input, context, expectation));
+    diagnosis.verdict = selection::Verdict::kCheckData;
+    for (const checks::PhotoMistake& mistake : mistakes)
+      diagnosis.data_problems.push_back(
+          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse_grey : NAN, context.pool));
+    return diagnosis;
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, Reported(input, context, engine));
+  return std::optional<v1::Report>(std::move(report));
+}
+
+absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
+                                         const Engine& engine) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
+  if (blunders) return *std::move(blunders);
+  return Reported(input, context, engine);
+}
+
+}  // namespace
+
+absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
+                                                const DiagnosisContext& context) {
+  return Reported(input, context, [&](images::Expectation* expectation) {
+    return images::ComparePhotographs(input, context, expectation);
+  });
+}
+
+absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context) {
+  return BlundersFirst(input, context, [&](images::Expectation* expectation) {
+    return images::DiagnosePhotographs(input, context, expectation);
+  });
+}
+
+absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
+                                                const DiagnosisContext& context) {
+  return BlundersFirst(input, context, [&](images::Expectation* expectation) {
+    return images::ProposePhotographs(input, max_photographs, context, expectation);
+  });
+}
+
+}  // namespace touchstone::diagnosis
