@@ -159,8 +159,10 @@ void AddImageOptions(CLI::App* command, ImageFlags* options) {
       ->add_flag("--depth", options->depth, "Also depth along the viewing axis, in mm, 0 where no object is")
       ->group(kImageGroup);
   command
-      ->add_flag("--normalize", options->normalize,
-                 "A dark object on white, without ground and shadows; --mask is then the one that this finds")
+      ->add_flag(
+          "--normalize", options->normalize,
+          "A dark object on white, without ground and shadows; --mask is then the one that this finds. A "
+          "picture without ground around the object becomes white, and its mask empty")
       ->group(kImageGroup);
   command->add_flag("--mask", options->mask, "Also the object's mask, 255 on the object, 0 beside it")
       ->group(kImageGroup);

@@ -80,7 +80,7 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
       shading_style: "shaded" (white lights, black background) or "dark_on_white".
       renderer: "egl", "cpu", or "auto": the source's choice. Two renderers may differ by 1/255.
       normalize: a dark object on white, without ground and shadows, whatever was photographed, in grey; "mask" is
-        then the one that this found.
+        then the one that this found. A picture without ground around the object becomes white, and its mask empty.
     """
     return ImageOptions(
         width, height, format, encoding, depth, mask, shading_style, renderer, jpeg_quality, vertical_fov_deg, normalize
