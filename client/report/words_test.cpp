@@ -145,7 +145,7 @@ TEST(Ladder, RunsFromTheGivenModelToTheFloor) {
   ASSERT_EQ(rungs.size(), 4u);
   EXPECT_EQ(rungs[0].name, "nominal");
   EXPECT_EQ(rungs[1].name, "+ tip_radius or surface_offset");
-  EXPECT_EQ(rungs[2].rmse_us, 5010);
+  EXPECT_EQ(rungs[2].rmse, 5010);
   EXPECT_EQ(rungs[3].kind, Rung::kFloor);
   EXPECT_EQ(Ladder(WrongValuesReport())[1].kind, Rung::kRefit);
   EXPECT_EQ(Ladder(UnexplainedReport())[1].kind, Rung::kSuggestion);
