@@ -102,14 +102,17 @@ void AddPropose(Cli* cli) {
   auto options = std::make_shared<ProposeOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "propose",
-      "Writes a plan of the touches (or, of a folder, of the photographs) that would best tell apart the explanations "
+      "Writes a plan of the touches (or, of a folder, of the photographs) that would best tell apart the "
+      "explanations "
       "that are left.",
       "touchstone propose set.csv --model nominal.yaml --mesh-dir meshes --touches 24 -o plan.csv\n"
       "touchstone touch --plan plan.csv -o more.csv\n"
       "touchstone propose photos --model nominal.yaml --mesh-dir meshes --touches 12 -o images.csv",
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
-  command->add_option("--touches", options->touches, "How many (touches or photographs) to propose. Default: 24")->type_name("N");
+  command
+      ->add_option("--touches", options->touches, "How many (touches or photographs) to propose. Default: 24")
+      ->type_name("N");
   cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) to write. Default: stdout");
 }
 
