@@ -221,10 +221,10 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command
       ->add_option("--shift-rows", options->shift_rows,
-                   "The times (the picture) of each row belong N rows further down (up: N below 0); rows "
+                   "The times (the picture) of each row belong so many rows further down (up: below 0); rows "
                    "that get none are "
                    "dropped")
-      ->type_name("N");
+      ->type_name("ROWS");
   CLI::Option* swap =
       command->add_option("--swap-fingers", options->swap_fingers, "Exchange the times of two fingers")
           ->type_name("A,B");
