@@ -1,0 +1,58 @@
+"""The benchmark in small: `touchstone diagnose` on six sets of the tuning seeds. The whole is run by hand (run)."""
+import os
+import pathlib
+
+import pytest
+
+cv2 = pytest.importorskip("cv2", reason="opencv-python-headless is not installed (deploy/python-packages.txt)")
+
+import blunders  # noqa: E402
+import judge  # noqa: E402
+import score  # noqa: E402
+import sets  # noqa: E402
+import strengths  # noqa: E402
+
+PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
+    "touchstone"
+SEED = 1_900_000  # beyond those of the arms
+PICTURES = 6  # of each object: a third of the time that a whole set takes
+
+pytestmark = pytest.mark.skipif(not PROGRAM.exists(), reason=f"{PROGRAM} is not built")
+
+
+def marked(folder, effects=None, blunder="", seed=SEED):
+    """The report on a set and its mark."""
+    scene = sets.make_scene(seed, pictures=PICTURES, repeats=1)
+    effects = {name: strengths.realistic(name, scene) for name in effects or ()}
+    truth = sets.Truth("test", seed, "realistic", effects)
+    files = sets.make_files(scene, truth, lambda number: sets.make_physics(effects))
+    if blunder:
+        blunders.make(blunder, files, sets.stream(seed, "blunder"))
+    sets.write_set(files, folder / "set")
+    sets.write_meshes(folder / "meshes")
+    sets.write_model(folder / "nominal.yaml")
+    report, seconds, _, said = score.diagnose(PROGRAM, folder / "set", folder / "nominal.yaml", folder / "meshes",
+                                              folder / "report.json")
+    assert report is not None, said
+    return report, judge.judge(report, vars(files.truth), seconds), files.truth
+
+
+def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path):
+    report, mark, _ = marked(tmp_path)
+    assert not mark.false_claim, (mark.verdict, mark.claims)
+    assert report["final"]["rmse_grey"] == pytest.approx(report["initial"]["rmse_grey"], rel=0.01)
+
+
+@pytest.mark.parametrize("effect", ["focal_error", "exposure", "vignetting"])
+def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect, tmp_path):
+    report, mark, truth = marked(tmp_path, [effect])
+    assert mark.right_first and not mark.confidently_wrong, (mark.verdict, mark.claims)
+    assert mark.over_floor < judge.OVER_FLOOR < report["initial"]["rmse_grey"] / report["noise_floor_grey"]
+    assert all(abs(error) < 4 for error in mark.errors) and mark.errors
+
+
+@pytest.mark.parametrize("blunder", ["mirrored", "focal_factor"])
+def test_a_mistake_in_the_files_is_found_before_any_physics(blunder, tmp_path):
+    report, mark, _ = marked(tmp_path, blunder=blunder)
+    assert mark.right, (mark.verdict, report["data_problems"])
+    assert not report["steps"]
