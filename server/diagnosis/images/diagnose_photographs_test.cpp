@@ -102,6 +102,10 @@ TEST(DiagnosePhotographs, NamesBothOfAPair) {
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
   ASSERT_EQ(d.steps.size(), 2u);
+  // Half of the explanation fits nothing, even where what is left shows at contours alone.
+  EXPECT_GT(d.steps[0].quality.rmse_grey, 1.2 * d.noise_floor.sigma_grey);
+  EXPECT_LT(d.steps[0].quality.lack_of_fit_p, 1e-6);
+  EXPECT_GT(d.final->lack_of_fit_p, 1e-3);
 }
 
 TEST(DiagnosePhotographs, NamesAPoseThatDiffersFromObjectToObject) {

@@ -15,6 +15,8 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr double kMisfitRows = 1.1;  // root mean square of rows, in noise, from which a rest counts
+// Rows hardly count contours, which are point-sampled: an error so many times the floor is none of theirs.
+constexpr double kMisfitPixels = 1.2;
 constexpr double kRestP = 1e-4;
 constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures that a curve did not see
 constexpr double kAlbedoNats = 5;
@@ -50,7 +52,12 @@ class PhotoLadder {
     d_.noise_floor = NoiseFloorOfPhotographs(photographs_, best, pool_);
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
     SetHeldOut(fit_, &*d_.final);
-    for (PhotographStep& step : d_.steps) SetHeldOut(fit_, &step.quality);
+    for (PhotographStep& step : d_.steps) {
+      SetHeldOut(fit_, &step.quality);
+      JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
+    }
+    for (GreyQuality* quality : {&*d_.initial, &*d_.final})
+      JudgeByPixels(photographs_, d_.noise_floor, quality);
     const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2),
                  initial2 = std::pow(d_.initial->rmse_grey, 2);
     d_.reducible_share = initial2 > floor2 ? 1 - floor2 / initial2 : 0;
@@ -184,7 +191,8 @@ class PhotoLadder {
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
     const double p = boost::math::gamma_q(0.5 * freedom, 0.5 * q);
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
-    const bool misfit = p < kRestP && std::sqrt(q / freedom) > kMisfitRows;
+    const bool misfit = (p < kRestP && std::sqrt(q / freedom) > kMisfitRows) ||
+                        d_.final->rmse_grey > kMisfitPixels * d_.noise_floor.sigma_grey;
     const bool albedo = fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats;
     const std::vector<PhotoCovariate> curves = CovariatesOf(improved_);
     const bool curve = std::any_of(curves.begin(), curves.end(), [](const PhotoCovariate& c) {

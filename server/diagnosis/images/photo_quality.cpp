@@ -16,6 +16,7 @@ namespace {
 constexpr int kPatches = 1600;           // of a picture
 constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
 constexpr double kMinRepeatPixels = 1000;
+constexpr double kContours = 1.1;    // an error so many times the floor may come from contours alone
 constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
 
 }  // namespace
@@ -94,6 +95,14 @@ GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vect
   quality.rmse_grey = quality.heldout_rmse_grey = RmseGrey(photographs, expected);
   quality.lack_of_fit_p = PatchMisfitP(photographs, expected, parameters, pool);
   return quality;
+}
+
+void JudgeByPixels(const Photographs& p, const GreyNoiseFloor& floor, GreyQuality* quality) {
+  const double freedom = kEfficiency * p.width() * p.height() * p.size();
+  const double ratio = quality->rmse_grey / (kContours * floor.sigma_grey);
+  if (!(floor.sigma_grey > 0) || ratio <= 1) return;
+  quality->lack_of_fit_p =
+      std::min(quality->lack_of_fit_p, boost::math::gamma_q(0.5 * freedom, 0.5 * freedom * ratio * ratio));
 }
 
 double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,

@@ -25,6 +25,10 @@ double PatchMisfitP(const Photographs& photographs, const std::vector<image::Pho
 GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
                                  int parameters, ThreadPool* pool);
 
+// The same of single pixels, whose error at contours patches hardly count: lowers quality->lack_of_fit_p where the error
+// lies farther above the floor than contours that were sampled at pixel centres explain (a tenth).
+void JudgeByPixels(const Photographs& photographs, const GreyNoiseFloor& floor, GreyQuality* quality);
+
 // What pictures that a fit did not see have beyond those that it saw, as mean square grey levels.
 double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
                      double floor_grey);
