@@ -9,6 +9,7 @@
 
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
+#include "server/base/sanitizers.h"
 #include "server/diagnosis/images/photo_test_set.h"
 #include "server/geometry/mesh_file.h"
 #include "server/session/image_set_file.h"
@@ -74,6 +75,7 @@ TEST_F(PhotographCommand, EveryErrorOfADiagnosisIsFoundAgainByComparisons) {
 }
 
 TEST_F(PhotographCommand, AServerFindsTheSame) {
+  if (kUnderSanitizers) GTEST_SKIP() << "another whole diagnosis";
   HiddenCamera rig = Small();
   rig.hidden = {{"exposure", {"stops=0.3"}}};
   WriteSet("photos", rig);
@@ -86,6 +88,7 @@ TEST_F(PhotographCommand, AServerFindsTheSame) {
 }
 
 TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
+  if (kUnderSanitizers) GTEST_SKIP() << "another whole diagnosis";
   WriteSet("photos", Small());
   const nlohmann::json report = Report({"diagnose", "photos", "--model", "nominal.yaml"});
   EXPECT_EQ(report["verdict"], "ADEQUATE") << report["summary"];
@@ -94,6 +97,7 @@ TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
 }
 
 TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
+  if (kUnderSanitizers) GTEST_SKIP() << "dozens of starts of a program";
   WriteSet("photos", Small());
   int number = 0;
   for (const std::vector<std::string>& mistake :

@@ -89,6 +89,7 @@ void Step(const std::vector<PictureEquations>& equations, const std::vector<doub
     Matrix6 damped = equations[i].pose;
     damped.diagonal() *= 1 + damping;
     solvers[i].compute(damped);
+    if (count == 0) continue;  // poses alone
     left += weights[i] * (equations[i].lens -
                           equations[i].lens_pose * solvers[i].solve(equations[i].lens_pose.transpose()));
     right += weights[i] *

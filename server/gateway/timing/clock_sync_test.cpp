@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/random.h"
+#include "server/base/sanitizers.h"
 
 namespace touchstone::gateway::timing {
 namespace {
@@ -58,14 +59,6 @@ struct Line {
     return (estimate.RemoteOf(host_s) - Remote(host_s)) / nominal_rate;
   }
 };
-
-// Statistics over hours of queries: sanitizers would make minutes of it and find nothing that the
-// rest does not.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kUnderSanitizers = true;
-#else
-constexpr bool kUnderSanitizers = false;
-#endif
 
 TEST(ClockSync, KnowsNothingBeforeTheFirstMessage) {
   ClockSync sync;
