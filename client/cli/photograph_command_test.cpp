@@ -135,6 +135,21 @@ TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
   }
 }
 
+TEST_F(PhotographCommand, TouchesBesideArePartOfAComparisonAndOfNoVerdict) {
+  WriteSet("photos", Small());
+  ASSERT_EQ(
+      Run({"plan", "lat00", "--plan", "faces", "--samples-per-face", "1", "--rounds", "2", "-o", "plan.csv"})
+          .exit_code,
+      0);
+  ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "photos/touches.csv"}).exit_code, 0);
+  const nlohmann::json compared = Report({"compare", "photos", "--model", "nominal.yaml"});
+  EXPECT_GT(compared["initial"]["rmse_grey"].get<double>(), 0);
+  EXPECT_GE(compared["touches"].get<int>(), 8);
+  const Outcome outcome = Run({"diagnose", "photos", "--model", "nominal.yaml", "--mesh-dir", "meshes"});
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("not yet diagnosed together"));
+}
+
 TEST_F(PhotographCommand, MessagesNameWhatIsWrong) {
   WriteSet("photos", Small());
   struct Case {

@@ -14,7 +14,7 @@ namespace touchstone::diagnosis {
 // How wrong and where. `input.images` is set; `input.set` too for a joint report.
 absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input, const DiagnosisContext& context);
 
-// Also why, what to add, and what the error becomes. Errors of the improved model are those that a comparison with it
+// Also why, what to add, and what the error becomes. UNIMPLEMENTED with touches beside the photographs. Errors of the improved model are those that a comparison with it
 // finds.
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context);
