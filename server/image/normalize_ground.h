@@ -1,6 +1,7 @@
 // The light of the ground behind an object, as Normalize sees it.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace touchstone::image {

@@ -1,6 +1,7 @@
 // Regions of a picture: which one is the object.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
