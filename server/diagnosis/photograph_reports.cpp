@@ -13,7 +13,6 @@
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/residuals/describe_photographs.h"
-#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -58,28 +57,13 @@ void Describe(const DiagnosisInput& input, const DiagnosisContext& context,
   diagnosis->summary = report::Summarize(*diagnosis);
 }
 
-// Touches alone of a joint input.
-DiagnosisInput TouchesOf(const DiagnosisInput& input) {
+// The comparison of touches beside the photographs; empty without them.
+absl::StatusOr<v1::Report> TouchReport(const DiagnosisInput& input, const DiagnosisContext& context) {
+  if (input.set == nullptr) return v1::Report();
   DiagnosisInput touches = input;
   touches.images = nullptr;
-  return touches;
-}
-
-// The comparison of the touches, given and improved; empty without touches.
-absl::StatusOr<v1::Report> TouchReport(const DiagnosisInput& input, const DiagnosisContext& context,
-                                       const std::string& improved_yaml) {
-  v1::Report report;
-  if (input.set == nullptr) return report;
-  DiagnosisInput touches = TouchesOf(input);
   TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis given, diagnosis::Compare(touches, context));
-  report = report::ToReport(given);
-  if (improved_yaml.empty()) return report;
-  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model improved,
-                              model::ParseModel(improved_yaml, "the improved model", effects::Catalogue()));
-  touches.model = std::make_shared<const model::Model>(std::move(improved));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis better, diagnosis::Compare(touches, context));
-  *report.mutable_final() = report::ToReport(better).initial();
-  return report;
+  return report::ToReport(given);
 }
 
 absl::StatusOr<v1::Report> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
@@ -87,7 +71,7 @@ absl::StatusOr<v1::Report> Reported(const DiagnosisInput& input, const Diagnosis
   images::Expectation expectation;
   TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis, engine(&expectation));
   Describe(input, context, expectation, &diagnosis);
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, TouchReport(input, context, diagnosis.improved_model_yaml));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, TouchReport(input, context));
   report::WritePhotographs(diagnosis, *input.images, &report);
   return report;
 }

@@ -12,7 +12,7 @@ namespace touchstone::image {
 namespace {
 
 constexpr int kLensBlock = 64;
-constexpr int kMostNewtonSteps = 12;
+constexpr int kMaxNewtonSteps = 12;
 constexpr double kUndistortTolerance = 1e-12;  // of normalised coordinates: far below a thousandth of a pixel
 
 // Normalised coordinates of a row's pixels, taken through the lens backwards by Newton's method, a block at a time.
@@ -44,7 +44,7 @@ void NewtonStep(const PhotoLens& lens, UndistortBlock* block) {
 void Undistort(const PhotoLens& lens, UndistortBlock* block) {
   std::copy_n(block->xd, kLensBlock, block->x);
   std::copy_n(block->yd, kLensBlock, block->y);
-  for (int step = 0; step < kMostNewtonSteps; ++step) {
+  for (int step = 0; step < kMaxNewtonSteps; ++step) {
     NewtonStep(lens, block);
     // Newton's method squares the distance: what was within the root of the tolerance is now within it.
     double worst = 0;

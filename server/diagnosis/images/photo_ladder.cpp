@@ -20,7 +20,7 @@ constexpr double kMisfitPixels = 1.2;
 constexpr double kRestP = 1e-4;
 constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures that a curve did not see
 constexpr double kAlbedoNats = 5;
-constexpr double kDoubted = 0.5, kMostBesideRest = 0.9;
+constexpr double kDoubted = 0.5, kMaxBesideRest = 0.9;
 constexpr double kZeroWithinErrors = 2;
 
 class PhotoLadder {
@@ -232,7 +232,7 @@ class PhotoLadder {
                  after2 = std::pow(d_.final->rmse_grey, 2) - floor2;
     const double explained = before2 > 0 ? std::clamp(1 - after2 / before2, 0.0, 1.0) : 0;
     for (PhotographStep& step : d_.steps) {
-      step.probability = std::min(step.probability, kDoubted + (kMostBesideRest - kDoubted) * explained);
+      step.probability = std::min(step.probability, kDoubted + (kMaxBesideRest - kDoubted) * explained);
       absl::StrAppend(&step.words, step.words.empty() ? "" : " ",
                       "Beside it a rest remains unexplained: it may stand in for something else.");
     }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr PhotoRowsOptions kPolish = {12544, 1, 100, true, 0.01};
 constexpr int kValleys = 2, kValleyPasses = 3;
-constexpr double kMostWider = 100;     // of a variance
+constexpr double kMaxWider = 100;      // of a variance
 constexpr double kFarEnough = 4;       // standard errors to the end of a valley, that ask for another look
 constexpr double kRoughSquares = 0.5;  // of the squares, that contours move by chance
 
@@ -55,7 +55,7 @@ absl::StatusOr<bool> SearchValleys(const inference::Experiment& experiment, infe
     const Eigen::Vector3d curve = normal.ldlt().solve(right);
     if (!(curve[2] > 0)) continue;
     // Derivatives are rough too, which makes them long: the curve's width is the honest one.
-    wider += std::max(std::min(1 / curve[2], kMostWider) - 1, 0.0) * fit->sigma * fit->sigma * way *
+    wider += std::max(std::min(1 / curve[2], kMaxWider) - 1, 0.0) * fit->sigma * fit->sigma * way *
              way.transpose();
     farthest = std::max(farthest, std::abs(0.5 * curve[1] / curve[2]));
     const Eigen::VectorXd lowest = from + std::clamp(-0.5 * curve[1] / curve[2], -12.0, 12.0) * way;

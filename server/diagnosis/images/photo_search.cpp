@@ -212,7 +212,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
   }
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
-  // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is hangs on the noise.
+  // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is depends on the noise.
   selection.photographs = std::make_unique<Photographs>(photographs);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const std::vector<image::Photo> expected,

@@ -11,8 +11,8 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kRayStep = 0.3, kSensorStep = 0.5;                 // over a parameter's typical size
-constexpr double kLeastMovePx = 0.5, kMostMovePx = 2, kMovePx = 1;  // of contours, by a step
+constexpr double kRayStep = 0.3, kSensorStep = 0.5;              // over a parameter's typical size
+constexpr double kMinMovePx = 0.5, kMaxMovePx = 2, kMovePx = 1;  // of contours, by a step
 constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
 constexpr int kObjectWaves = 2, kPatchPx = 12;
 constexpr double kMinPatch = 0.25;  // of a patch's pixels that see the object
@@ -259,7 +259,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         const std::vector<float> grey = RecordedGrey(*there, *photographs_.record);
         for (size_t i = 0; i < grey.size(); ++i) change.difference[i] = grey[i] - photo.grey[i];
         const double move_px = change.MovePx(pixel_squares);
-        if (!rays || tries > 0 || (move_px > kLeastMovePx && move_px < kMostMovePx) || move_px == 0) break;
+        if (!rays || tries > 0 || (move_px > kMinMovePx && move_px < kMaxMovePx) || move_px == 0) break;
         step *= std::clamp(kMovePx / move_px, 0.1, 5.0);
       }
       if (rays && options.central) {
