@@ -1,4 +1,5 @@
 // What holds for every effect of a photograph, as contract_test.cpp has it for touches.
+#include <Eigen/Geometry>
 #include <absl/strings/match.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
