@@ -7,7 +7,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
-#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/inference/laplace_evidence.h"
 
 namespace touchstone::diagnosis::images {
@@ -100,9 +100,20 @@ class PhotoCandidateRanking {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                                 ExpectPhotographs(photographs_, fit.model.base(), false, pool_));
     candidate->rmse_grey = RmseGrey(photographs_, expected);
-    candidate->heldout_rmse_grey = std::sqrt(candidate->rmse_grey * candidate->rmse_grey +
-                                             HeldOutExcess(selection_.fine, fit, photographs_, floor_grey_));
+    candidate->heldout_rmse_grey = std::sqrt(candidate->rmse_grey * candidate->rmse_grey + UnseenExcess(fit));
     return absl::OkStatus();
+  }
+
+  // What pictures that a fit did not see have beyond those that it saw, as mean square grey levels; the fits to others
+  // are linear steps, since these are many.
+  double UnseenExcess(const inference::Fit& fit) const {
+    const PhotoRows& rows = *selection_.fine.rows;
+    const double seen = fit.columns.values.col(0).squaredNorm();
+    const double unseen = std::max(inference::HeldOutRmse(*selection_.fine.experiment, fit),
+                                   inference::HeldOutRmseByBlock(*selection_.fine.experiment, fit));
+    const double pixels =
+        static_cast<double>(photographs_.width()) * photographs_.height() * rows.photographs();
+    return std::max(rows.rows() * unseen * unseen - seen, 0.0) * floor_grey_ * floor_grey_ / pixels;
   }
 
   const Photographs& photographs_;

@@ -66,9 +66,10 @@ class PhotoLadder {
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
-    JudgeRest();
     TOUCHSTONE_ASSIGN_OR_RETURN(
         d_.candidates, RankPhotoCandidates(photographs_, selection_, d_.noise_floor.sigma_grey, pool_));
+    JudgeRest();
+    DoubtCandidates();
     d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
                  : !d_.steps.empty() ? selection::Verdict::kMissingEffects
                  : values_wrong_     ? selection::Verdict::kWrongValues
@@ -188,6 +189,23 @@ class PhotoLadder {
     return expected.ok() ? TestCovariates(*selection_.photographs, *expected) : std::vector<PhotoCovariate>();
   }
 
+  // The most that a step can be sure of beside a rest that remains.
+  double MostBesideRest() const {
+    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
+    const double before2 = std::pow(d_.initial->rmse_grey, 2) - floor2,
+                 after2 = std::pow(d_.final->rmse_grey, 2) - floor2;
+    const double explained = before2 > 0 ? std::clamp(1 - after2 / before2, 0.0, 1.0) : 0;
+    return kDoubted + (kMaxBesideRest - kDoubted) * explained;
+  }
+
+  // What was not found good enough for a step, or leaves a rest, is not probable, whatever it is compared with.
+  void DoubtCandidates() {
+    double most = selection_.steps.empty() ? kDoubted : selection::kMaxProbability;
+    if (d_.unexplained && !selection_.steps.empty()) most = MostBesideRest();
+    for (RankedPhotographCandidate& candidate : d_.candidates)
+      candidate.probability = std::min(candidate.probability, most);
+  }
+
   // A formula or a curve that says what is left.
   void AddSuggestion(UnexplainedPhotographs* rest) const {
     const std::optional<RestSuggestion> found =
@@ -241,12 +259,8 @@ class PhotoLadder {
           "catalogue "
           "explains it.";
     d_.unexplained = std::move(rest);
-    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
-    const double before2 = std::pow(d_.initial->rmse_grey, 2) - floor2,
-                 after2 = std::pow(d_.final->rmse_grey, 2) - floor2;
-    const double explained = before2 > 0 ? std::clamp(1 - after2 / before2, 0.0, 1.0) : 0;
     for (PhotographStep& step : d_.steps) {
-      step.probability = std::min(step.probability, kDoubted + (kMaxBesideRest - kDoubted) * explained);
+      step.probability = std::min(step.probability, MostBesideRest());
       absl::StrAppend(&step.words, step.words.empty() ? "" : " ",
                       "Beside it a rest remains unexplained: it may stand in for something else.");
     }
