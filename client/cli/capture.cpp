@@ -42,9 +42,9 @@ absl::Status AddViews(const CaptureOptions& options, v1::CaptureRequest* request
         "where from? Give exactly one of --approach (the camera of that touch), --eye-mm (a camera of your "
         "own) and --plan FILE (the cameras of its touches or photographs)");
   if (!options.plan.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const auto views, ReadViews(options.plan, options.object));
-    if (views.has_value()) {
-      for (const v1::View& view : *views) *request->add_views() = view;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto pictures, ReadPictures(options.plan, options.object));
+    if (pictures.has_value()) {
+      for (const PlannedPicture& picture : *pictures) *request->add_views() = picture.view;
       return absl::OkStatus();
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<client::MeasuredTouch> touches, ReadTouches(options.plan));

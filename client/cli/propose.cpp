@@ -8,6 +8,7 @@
 #include "client/cli/comparison.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/session/images_csv.h"
 
 namespace touchstone::cli {
@@ -18,13 +19,22 @@ struct ProposeOptions : ComparisonOptions {
   std::string output;
 };
 
+// A name that says from where: the same view has the same name in every plan, so that a folder keeps those of several.
+std::string PictureName(const v1::ProposedPhotograph& next) {
+  const v1::Vector3& eye = next.camera().eye_m();
+  return absl::StrFormat("%s_from_%.0f_%.0f_%.0f.png", next.object(), FromSi(Unit::kMillimetre, eye.x()),
+                         FromSi(Unit::kMillimetre, eye.y()), FromSi(Unit::kMillimetre, eye.z()));
+}
+
 // Proposed pictures as the images.csv that they would have.
 std::string PlanOfPhotographs(const v1::Report& report) {
   session::ImageSet plan;
   for (const v1::ProposedPhotograph& next : report.next_photographs()) {
     session::PhotographRow row;
     row.image = plan.photographs.size();
-    row.file = absl::StrFormat("%04d.png", row.image);
+    row.file = PictureName(next);
+    for (const session::PhotographRow& other : plan.photographs)
+      if (other.file == row.file) row.file = absl::StrFormat("%d_%s", row.image, PictureName(next));
     const auto found = std::find(plan.objects.begin(), plan.objects.end(), next.object());
     row.object = static_cast<int>(found - plan.objects.begin());
     if (found == plan.objects.end()) plan.objects.push_back(next.object());
@@ -117,7 +127,8 @@ void AddPropose(Cli* cli) {
       "touchstone propose set.csv --model nominal.yaml --mesh-dir meshes --touches 24 -o plan.csv\n"
       "touchstone touch --plan plan.csv -o more.csv\n"
       "touchstone propose photos --model nominal.yaml --mesh-dir meshes --photographs 12 -o next.csv\n"
-      "touchstone capture lat20 --plan next.csv -o more/picture.png             its pictures of lat20",
+      "touchstone capture lat20 --plan next.csv -o more/picture.png             its pictures of lat20\n"
+      "touchstone rig photos lat20 --plan next.csv -o photos --server 127.0.0.1:50052",
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
   command->add_option("--touches", options->touches, "How many touches to propose. Default: 24")

@@ -1,4 +1,5 @@
 // touchstone rig photos: the fixed sequence of camera poses, once for every way in which the object lies.
+#include <algorithm>
 #include <cmath>
 
 #include <absl/strings/str_format.h>
@@ -22,7 +23,7 @@ constexpr double kMargin = 1.05;  // the object's sphere fills the picture but f
 struct PhotosOptions {
   MotionFlags motion;
   ImageFlags image;
-  std::string object, folder, sequence = "ring";
+  std::string object, folder, plan, sequence = "ring";
   int turns = 4;
 };
 
@@ -109,6 +110,7 @@ class Photos {
     TOUCHSTONE_RETURN_IF_ERROR(OneOf("OBJECT", options_.object, names).status());
     const Eigen::Vector3d low = service::FromProto(object->bounds_min_m()),
                           high = service::FromProto(object->bounds_max_m());
+    if (!options_.plan.empty()) return PlanFromFile((low + high) / 2);
     const double distance_m =
         kMargin * (high - low).norm() / 2 / std::sin(request_.image().vertical_fov_rad() / 2);
     for (int turn = 0; turn < options_.turns; ++turn) {
@@ -120,6 +122,29 @@ class Photos {
                             ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
                                    2 * kPi * k / ring.views)});
     }
+    return absl::OkStatus();
+  }
+
+  // The rows of a plan that are of the object, each while that face is up which the camera sees most of.
+  absl::Status PlanFromFile(const Eigen::Vector3d& centre) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto pictures, ReadPictures(options_.plan, options_.object));
+    if (!pictures.has_value())
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--plan: ", options_.plan,
+          " is no plan of photographs; the columns of images.csv were expected (touchstone propose FOLDER)"));
+    for (const auto& [face, top] : Turns())
+      for (const PlannedPicture& picture : *pictures) {
+        const Eigen::Vector3d from = service::FromProto(picture.view.camera().eye_m()) - centre;
+        const auto most = std::max_element(
+            Turns().begin(), Turns().end(),
+            [&from](const auto& a, const auto& b) { return a.second.dot(from) < b.second.dot(from); });
+        if (most->first != face) continue;
+        SequenceView view;
+        view.up_face = face;
+        view.file = picture.file;
+        view.view = picture.view;
+        views_.push_back(std::move(view));
+      }
     return absl::OkStatus();
   }
 
@@ -250,6 +275,12 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
       ->add_option("--turns", options->turns,
                    "On how many of its faces the object is laid, 1 to 6. Default: 4")
       ->type_name("N");
+  cli->AddInput(command,
+                command
+                    ->add_option("--plan", options->plan,
+                                 "In place of the sequence the rows of a plan of photographs that are of "
+                                 "OBJECT (touchstone propose FOLDER -o FILE)")
+                    ->type_name("FILE"));
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);
   cli->AddRigOptions(command);

@@ -59,6 +59,15 @@ double RadicalInverse(int number, int base) {
   return value;
 }
 
+// Numbers that a person can read off a plan: 0.01 mm, and 1e-4 of a direction.
+session::CameraPlacement Rounded(session::CameraPlacement camera) {
+  const auto round = [](Eigen::Vector3d* v, double unit) {
+    for (int axis = 0; axis < 3; ++axis) (*v)[axis] = std::round((*v)[axis] / unit) * unit + 0.0;
+  };
+  round(&camera.eye_m, 1e-5), round(&camera.at_m, 1e-5), round(&camera.up, 1e-4);
+  return camera;
+}
+
 // View `n` of a row that fills directions, distances, turns and places in the picture evenly.
 ViewCandidate DrawView(const images::Photographs& photographs, int object, int n, double distance_m,
                        double lowest, double first_turn) {
@@ -139,8 +148,8 @@ std::vector<ViewCandidate> ListViews(const images::Photographs& photographs, int
     const double first_turn = random.Uniform(0, 1);
     int found = 0;
     for (int n = 0; n < kMaxTries * per_object && found < per_object; ++n) {
-      const ViewCandidate view =
-          DrawView(photographs, object, n, distance_m, table ? 0 : kLowest, first_turn);
+      ViewCandidate view = DrawView(photographs, object, n, distance_m, table ? 0 : kLowest, first_turn);
+      view.camera = Rounded(view.camera);
       if (!IsAllowed(photographs, view, table)) continue;
       views.push_back(view);
       ++found;

@@ -243,17 +243,19 @@ class PhotoLadder {
     for (const PhotoCovariate& c : curves)
       if (c.p < kRestP && c.unseen_gain > 0) rest.covariates.push_back({c.name, c.p, c.gain_nats});
     AddSuggestion(&rest);
-    if (selection_.field >= 0)
+    // What a formula or a curve says as well is not said again.
+    const bool said = !rest.formula.empty() || !rest.lookup_yaml.empty();
+    if (selection_.field >= 0 && !said)
       absl::StrAppend(
           &rest.words,
           "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
           "reflection, stray light. Photograph a plain white sheet.");
-    if (albedo)
+    if (albedo && !said)
       absl::StrAppend(
           &rest.words, rest.words.empty() ? "" : " ",
           "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
           "dirt, or a shape that departs from its mesh.");
-    if (misfit && rest.words.empty())
+    if (misfit && rest.words.empty() && !said)
       rest.words =
           "Pictures differ from what is expected by more than their pixels scatter, and nothing in the "
           "catalogue "
