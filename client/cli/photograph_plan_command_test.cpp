@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include <nlohmann/json.hpp>
+
 #include "client/cli/real_binary_test.h"
 #include "server/base/sanitizers.h"
 #include "server/diagnosis/images/photo_test_set.h"
@@ -48,13 +50,22 @@ class PhotographPlanCommand : public RealBinaryTest {
 TEST_F(PhotographPlanCommand, AProposedPlanCanBePhotographed) {
   if (kUnderSanitizers) GTEST_SKIP() << "a whole diagnosis";
   WriteSet(4);
-  const Outcome outcome = Propose({"--photographs", "4", "-o", "next.csv"});
+  const Outcome outcome = Propose({"--photographs", "4", "-o", "next.csv", "--json", "next.json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("4 pictures"));
   EXPECT_THAT(outcome.err, HasSubstr("tells focal_error from"));
+  const nlohmann::json report = nlohmann::json::parse(Read("next.json"));
+  ASSERT_EQ(report["next_photographs"].size(), 4u);
+  EXPECT_GE(report["next_photographs"][0]["photographs_to_verdict"].get<int>(), 1);
+  EXPECT_GT(report["next_photographs"][0]["separation"].get<double>(), 0);
+  // Every effect as the first step, the best one first, with what it alone leaves.
+  ASSERT_GE(report["candidates"].size(), 10u);
+  EXPECT_EQ(report["candidates"][0]["effect"], "focal_error");
+  EXPECT_LT(report["candidates"][0]["rmse_grey"].get<double>(), report["initial"]["rmse_grey"].get<double>());
   const auto plan = session::ParseImagesCsv(Read("next.csv"), "next.csv");
   ASSERT_TRUE(plan.ok()) << plan.status();
   ASSERT_EQ(plan->size(), 4u);
+  EXPECT_THAT(plan->photographs[0].file, HasSubstr(plan->objects[plan->photographs[0].object] + "_from_"));
   const std::string object = plan->objects[0];
   const auto rows = std::count_if(plan->photographs.begin(), plan->photographs.end(),
                                   [](const auto& row) { return row.object == 0; });

@@ -21,9 +21,10 @@ namespace {
 constexpr double kMargin = 1.05;  // the object's sphere fills the picture but for this
 
 struct PhotosOptions {
+  std::string plan;  // a file, in place of the sequence; empty: none
   MotionFlags motion;
   ImageFlags image;
-  std::string object, folder, plan, sequence = "ring";
+  std::string object, folder, sequence = "ring";
   int turns = 4;
 };
 
@@ -265,6 +266,12 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
   cli->AddOutput(command, "-o,--output", &options->folder,
                  "The folder for the pictures; those that are there are kept", OutputKind::kFolder)
       ->required();
+  cli->AddInput(command,
+                command
+                    ->add_option("--plan", options->plan,
+                                 "In place of the sequence the rows of a plan of photographs that are of "
+                                 "OBJECT (touchstone propose FOLDER -o FILE)")
+                    ->type_name("FILE"));
   command
       ->add_option(
           "--sequence", options->sequence,
@@ -275,12 +282,6 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
       ->add_option("--turns", options->turns,
                    "On how many of its faces the object is laid, 1 to 6. Default: 4")
       ->type_name("N");
-  cli->AddInput(command,
-                command
-                    ->add_option("--plan", options->plan,
-                                 "In place of the sequence the rows of a plan of photographs that are of "
-                                 "OBJECT (touchstone propose FOLDER -o FILE)")
-                    ->type_name("FILE"));
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);
   cli->AddRigOptions(command);

@@ -49,7 +49,7 @@ std::vector<images::ProposedPhotograph> PhotographsToBegin(const images::Photogr
   for (const ViewCandidate& view :
        MostDifferentViews(photographs, ListViews(photographs, kMaxViews, seed), count))
     proposed.push_back(
-        {photographs.objects[view.object], view.camera, "gives a verdict enough to go by", 0, 0});
+        {photographs.objects[view.object], view.camera, "makes the set large enough for a verdict", 0, 0});
   return proposed;
 }
 
