@@ -202,7 +202,7 @@ class PhotoLadder {
     rest.rmse_grey = d_.final->rmse_grey;
     rest.heldout_rmse_grey = d_.final->heldout_rmse_grey;
     for (const PhotoCovariate& c : curves)
-      if (c.p < kRestP && c.unseen_gain > 0) rest.covariates.push_back({c.name, c.p, c.gain_nats});
+      if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
     if (!curves.empty() && curves[0].p < kRestP && curves[0].unseen_gain > kCurveGain) {
       rest.lookup_yaml = LookupYaml(curves[0]);
       const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), all2 = std::pow(rest.rmse_grey, 2);

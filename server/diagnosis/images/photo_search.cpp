@@ -21,7 +21,8 @@ constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between
 constexpr double kSameLikelihoodNats = 1;
 constexpr double kFaint = 0.1;  // of the noise
 constexpr int kAnchorPasses = 5;
-constexpr double kAnchorStays = 1;  // standard errors by which a value moves from an anchor that is near enough
+constexpr double kAnchorStays =
+    1;  // standard errors by which a value moves from an anchor that is near enough
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -153,8 +154,8 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
     double farthest = 0;  // standard errors
     for (int i = 0; i < fit.model.size(); ++i)
       if (fit.covariance(i, i) > 0)
-        farthest = std::max(farthest, std::abs(fit.point[i] - explanation->fit.point[i]) /
-                                          std::sqrt(fit.covariance(i, i)));
+        farthest = std::max(
+            farthest, std::abs(fit.point[i] - explanation->fit.point[i]) / std::sqrt(fit.covariance(i, i)));
     explanation->fit = std::move(fit);
     if (farthest < kAnchorStays) break;
   }

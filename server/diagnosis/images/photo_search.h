@@ -43,7 +43,7 @@ struct PhotoSelection {
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
   // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
   double heldout_ratio = 1;
-  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
+  double albedo_nats = 0;  // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,

@@ -167,8 +167,7 @@ absl::StatusOr<std::vector<double>> SquaredErrors(const Photographs& photographs
       if (!photo.ok()) continue;
       const std::vector<float>& measured = photographs.measured_grey[which[i]];
       for (size_t at = 0; at < measured.size(); ++at) {
-        const double residual =
-            static_cast<double>(measured[at]) - photographs.record->Mean(photo->grey[at]);
+        const double residual = static_cast<double>(measured[at]) - photographs.record->Mean(photo->grey[at]);
         squares[i] += residual * residual;
       }
     }

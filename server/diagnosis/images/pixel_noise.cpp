@@ -54,8 +54,7 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
     mean += reaches;
     square += (2 * level - 1) * reaches;
   }
-  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance,
-          1 - (Tail(low) - Tail(high))};
+  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance, 1 - (Tail(low) - Tail(high))};
 }
 
 RecordTable::RecordTable(const PixelNoise& noise) : noise_(noise), variance_(kEntries), clipped_(kEntries) {
