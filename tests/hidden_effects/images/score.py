@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import pathlib
+import random
 import resource
 import shutil
 import subprocess
@@ -152,9 +153,18 @@ def table(results):
     return "\n".join(lines)
 
 
-def words_before(done, asked):
+def earlier(file):
+    """What an interrupted run has written to --results."""
+    lines = pathlib.Path(file).read_text().splitlines() if file and pathlib.Path(file).exists() else []
+    rows = [json.loads(line) for line in lines]
+    return [(r["arm"], r["group"], r["seed"], r["truth"], judge.Mark(**r["mark"]), r["said"]) for r in rows]
+
+
+def words_before(done, asked, resumed):
     whole = sum(arm.sets for arm in all_arms.ARMS)
     words = f"{done} sets of the {whole} of a whole run."
+    if resumed:
+        words += f" {resumed} of them are of the same run before it was interrupted."
     if done < asked:
         words += f" {asked} were asked for; the time was up."
     if done < whole:
@@ -173,6 +183,7 @@ def main():
     parser.add_argument("--threads", type=int, default=1, help="sets at once")
     parser.add_argument("--keep", help="folder for sets, truths and reports; default: they are removed")
     parser.add_argument("--results", help="append a line of JSON for each set to this file")
+    parser.add_argument("--resume", action="store_true", help="count what --results holds already; the program must be the same")
     parser.add_argument("--verbose", action="store_true", help="a line for each set (tuning seeds only)")
     options = parser.parse_args()
     if options.verbose and options.seeds != "tuning":
@@ -187,10 +198,14 @@ def main():
         count = max(1, round(arm.sets * options.share))
         jobs += [((k + 0.5) / count, (index, k, options.seeds, str(options.program), options.keep, common))
                  for k in range(count)]
-    if options.minutes is not None:  # so that each arm has its part where the time ends early
+    if options.minutes is not None:  # so that no kind of arm stands last where the time ends early
+        random.Random(0).shuffle(jobs)
         jobs.sort(key=lambda job: job[0])
     jobs = [job for _, job in jobs]
-    results, began = [], time.monotonic()
+    results, began = earlier(options.results) if options.resume else [], time.monotonic()
+    asked, done = len(jobs), {(r[0], r[2]) for r in results}
+    jobs = [job for job in jobs
+            if (all_arms.ARMS[job[0]].name, all_arms.seed_of(all_arms.ARMS[job[0]], *job[1:3])) not in done]
     with concurrent.futures.ProcessPoolExecutor(options.threads) as pool:
         for result in map(run_one, jobs) if options.threads == 1 else pool.map(run_one, jobs):
             results.append(result)
@@ -209,7 +224,7 @@ def main():
                 break
     if not options.keep:
         shutil.rmtree(common)
-    print(words_before(len(results), len(jobs)))
+    print(words_before(len(results), asked, len(done)))
     print(table(results))
     return 0
 
