@@ -53,11 +53,8 @@ class PhotoLadder {
     const std::vector<image::Photo>& best = changed_ ? *after_ : before_;
     d_.noise_floor = NoiseFloorOfPhotographs(photographs_, best, pool_);
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
-    SetHeldOut(fit_, &*d_.final);
-    for (PhotographStep& step : d_.steps) {
-      SetHeldOut(fit_, &step.quality);
-      JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
-    }
+    d_.final->heldout_rmse_grey *= selection_.heldout_ratio;
+    for (PhotographStep& step : d_.steps) JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
     for (GreyQuality* quality : {&*d_.initial, &*d_.final})
       JudgeByPixels(photographs_, d_.noise_floor, quality);
     const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2),
@@ -133,7 +130,12 @@ class PhotoLadder {
       kept.push_back(open[chosen]->effect);
       // The last step is the whole explanation.
       const bool last = open.size() == 1 && selection_.field < 0;
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next));
+      double heldout_ratio = selection_.heldout_ratio;
+      if (!last) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            heldout_ratio, HeldOutRatio(*selection_.photographs, *selection_.fine.rows, experiment, *next));
+      }
+      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next, heldout_ratio));
       open.erase(open.begin() + static_cast<long>(chosen));
     }
     return absl::OkStatus();
@@ -148,7 +150,8 @@ class PhotoLadder {
     return part;
   }
 
-  absl::Status DescribeStep(const selection::SelectedStep& from, const inference::Fit& with_it) {
+  absl::Status DescribeStep(const selection::SelectedStep& from, const inference::Fit& with_it,
+                            double heldout_ratio) {
     const model::EffectInstance& instance = fit_.model.base().effects[from.effect];
     PhotographStep step;
     step.effect = inference::NameOf(*instance.effect);
@@ -174,13 +177,9 @@ class PhotoLadder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                                 ExpectPhotographs(photographs_, step.model, false, pool_));
     step.quality = QualityOfPhotographs(photographs_, expected, with_it.model.size(), pool_);
+    step.quality.heldout_rmse_grey *= heldout_ratio;
     d_.steps.push_back(std::move(step));
     return absl::OkStatus();
-  }
-
-  void SetHeldOut(const inference::Fit& fit, GreyQuality* quality) const {
-    const double excess = HeldOutExcess(selection_.fine, fit, photographs_, d_.noise_floor.sigma_grey);
-    quality->heldout_rmse_grey = std::sqrt(quality->rmse_grey * quality->rmse_grey + excess);
   }
 
   // On what the improved model leaves, expected with the noise that it leaves.
@@ -241,7 +240,7 @@ class PhotoLadder {
     rest.rmse_grey = d_.final->rmse_grey;
     rest.heldout_rmse_grey = d_.final->heldout_rmse_grey;
     for (const PhotoCovariate& c : curves)
-      if (c.p < kRestP && c.unseen_gain > 0) rest.covariates.push_back({c.name, c.p, c.gain_nats});
+      if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
     AddSuggestion(&rest);
     // What a formula or a curve says as well is not said again.
     const bool said = !rest.formula.empty() || !rest.lookup_yaml.empty();

@@ -41,7 +41,9 @@ struct PhotoSelection {
   int field = -1;                              // index of the image field's effect; -1: none
   std::vector<selection::SelectedStep> steps;  // named effects
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
-  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
+  // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
+  double heldout_ratio = 1;
+  double albedo_nats = 0;  // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,

@@ -47,6 +47,10 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
 // Root mean square of measured minus expected over all pixels, grey levels.
 double RmseGrey(const Photographs& photographs, const std::vector<image::Photo>& expected);
 
+// Sum over the pixels of each of these photographs of (measured - expected)^2. Errors as ExpectPhotographs.
+absl::StatusOr<std::vector<double>> SquaredErrors(const Photographs& photographs, const model::Model& model,
+                                                  const std::vector<int>& which, ThreadPool* pool);
+
 // What a diagnosis expected, for those who describe what is left: no picture need be simulated again.
 struct Expectation {
   Photographs photographs;
