@@ -9,6 +9,7 @@ from test_rig_commands import ROOT, emulated_rig, touchstone
 
 SPEEDUP = 20
 HIDDEN_K1 = -0.2
+RIM = 0.3  # of the object in the pictures, over the focal length
 SIZE = (160, 120)
 MESH = f"lat20={ROOT / 'meshes/lat20.off'}"
 
@@ -58,8 +59,9 @@ def test_a_diagnosis_of_what_the_gateway_kept_names_the_hidden_lens(rig, photos,
     result = report("diagnose", tmp_path / "kept", model, tmp_path)
     steps = {step["effect"]: step for step in result["steps"]}
     assert "radial_distortion" in steps, result["summary"]
-    values = {each["name"]: each for each in steps["radial_distortion"]["parameters"]}
-    assert abs(values["k1"]["value"] - HIDDEN_K1) < 0.05
+    found = {each["name"]: each["value"] for each in steps["radial_distortion"]["parameters"]}
+    # k1 and k2 stand in for each other on so small an object: what counts is the shift that they make at its rim.
+    assert abs(found["k1"] + found["k2"] * RIM ** 2 - HIDDEN_K1) < 0.05
     assert result["final"]["rmse_grey"] < 0.3 * result["initial"]["rmse_grey"]
     # The same pictures at the same size are as wrong either way.
     straight = report("compare", photos, model, tmp_path)
