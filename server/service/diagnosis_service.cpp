@@ -17,6 +17,7 @@
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
+#include "server/session/emulated.h"
 
 namespace touchstone::service {
 namespace {
@@ -92,6 +93,10 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   } else if (input.images != nullptr && input.set == nullptr) {
     provenance->set_set_sha256(input.images->sha256);
   }
+  // Wherever a set was copied to, its report says that no camera saw it.
+  if (input.images != nullptr)
+    if (const std::string emulated = session::EmulatedPhotographs(*input.images); !emulated.empty())
+      report->add_warnings(emulated);
   std::vector<std::string> objects;
   if (input.set != nullptr) objects = input.set->objects;
   if (input.images != nullptr)

@@ -1,6 +1,6 @@
 // The emulated camera, carried by the flange: pictures of the mounted object from where the arm truly is, as
 // MJPEG over HTTP ("/video.mjpg") and one by one ("/frame.jpg"). A plain matt object on a dark ground with a
-// little noise, so that no two pictures are equal; not a likeness of any real camera.
+// little noise, so that no two pictures are equal, seen as hidden_camera.h says; not a likeness of any real camera.
 #pragma once
 
 #include <condition_variable>
@@ -18,6 +18,7 @@
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "tests/rig/world.h"
+#include "tests/rig/world/hidden_camera.h"
 #include "tests/rig/world/tcp_server.h"
 
 namespace touchstone::rig {
@@ -28,7 +29,9 @@ struct CameraOptions {
   int width = 640, height = 480;
   double vertical_fov_rad = 0.7853981633974483;
   double frames_per_host_s = 10;
+  int jpeg_quality = 90;
   uint64_t seed = 1;
+  HiddenCamera hidden;
 };
 
 // What is before the camera now.
@@ -50,6 +53,8 @@ class EmulatedCamera {
  private:
   void Run();
   std::string Picture();
+  Light PinholePicture(const CameraView& view, int width, int height, double vertical_fov_rad);
+  std::vector<char> MeetObject(const CameraView& view, const std::vector<Eigen::Vector2d>& rays) const;
   void Serve(LineConnection& connection);
   // The first picture after number *number, which is then its number; empty: it ends, or the
   // camera is unplugged.
