@@ -56,14 +56,22 @@ std::string VerdictWords(const v1::Report& report) {
 }
 
 std::string BoardReportInWords(const v1::Report& report) {
-  std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n");
+  std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n\n");
+  const auto add_error = [&](const std::string& name, double rmse_px, double heldout_rmse_px) {
+    absl::StrAppendFormat(&words, "%-20s %9.4f px %9.4f px\n", name, rmse_px, heldout_rmse_px);
+  };
+  if (report.has_initial()) {
+    absl::StrAppendFormat(&words, "%-20s %12s %12s\n", "Reprojection error", "pictures", "left out");
+    add_error("  as given", report.initial().rmse_px(), report.initial().heldout_rmse_px());
+    for (const v1::Step& step : report.steps())
+      add_error(absl::StrCat("  + ", step.effect()), step.rmse_px(), step.heldout_rmse_px());
+  }
   for (const v1::Step& step : report.steps()) {
     absl::StrAppend(&words, "\n", step.effect(), "  probability ",
                     absl::StrFormat("%.3f", step.probability()), "\n");
     for (const v1::ParameterValue& value : step.parameters())
       absl::StrAppendFormat(&words, "  %-10s %-2s %10.5g +- %.2g %s\n", value.name(), value.finger(),
                             value.value(), value.std_error(), value.unit());
-    absl::StrAppend(&words, "  ", step.words(), "\n");
     if (step.equivalent_size() > 0)
       absl::StrAppend(&words, "  these pictures cannot tell it from ", absl::StrJoin(step.equivalent(), ", "),
                       "\n");

@@ -1,5 +1,7 @@
 #include "server/diagnosis/report/board_messages.h"
 
+#include <cmath>
+
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -29,6 +31,11 @@ std::string ErrorWords(const boards::BoardQuality& quality) {
                          quality.heldout_rmse_px);
 }
 
+void WriteQuality(const boards::BoardQuality& from, v1::Quality* to) {
+  to->set_rmse_px(from.rmse_px);
+  to->set_heldout_rmse_px(from.heldout_rmse_px);
+}
+
 void WriteBoardStep(const boards::BoardStep& found, v1::Step* step) {
   step->set_effect(found.effect);
   for (const std::string& equivalent : found.equivalent) step->add_equivalent(equivalent);
@@ -39,6 +46,8 @@ void WriteBoardStep(const boards::BoardStep& found, v1::Step* step) {
   step->set_remedy(found.remedy);
   step->set_scope("rig");
   step->set_words(ErrorWords(found.quality));
+  step->set_rmse_px(found.quality.rmse_px);
+  step->set_heldout_rmse_px(found.quality.heldout_rmse_px);
   for (const inference::ParameterEstimate& estimate : found.parameters) {
     v1::ParameterValue* value = step->add_parameters();
     value->set_name(estimate.name);
@@ -61,6 +70,12 @@ v1::Report WriteBoardReport(const boards::BoardSet& set, const boards::BoardDiag
   report.set_model_hash(diagnosis.model_hash);
   report.set_summary(diagnosis.summary);
   for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
+  if (diagnosis.initial) WriteQuality(*diagnosis.initial, report.mutable_initial());
+  if (diagnosis.final) {
+    WriteQuality(*diagnosis.final, report.mutable_final());
+    // There are no repeats of a corner: what the best lens leaves is an upper bound. An error has two coordinates.
+    report.mutable_noise_floor()->set_sigma_px(diagnosis.final->rmse_px / std::sqrt(2.0));
+  }
   for (const boards::BoardStep& step : diagnosis.steps) WriteBoardStep(step, report.add_steps());
   if (!diagnosis.rest.empty()) {
     std::vector<std::string> words;
