@@ -9,6 +9,7 @@
 #include "server/diagnosis/checks/photo_mistakes.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
+#include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/report/photograph_summary.h"
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
@@ -98,12 +99,6 @@ absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
                                          const Engine& engine) {
-  // A verdict on the photographs alone would pass for one on both.
-  if (input.set != nullptr)
-    return absl::UnimplementedError(
-        absl::StrCat(input.images->origin,
-                     ": touches and photographs are compared together, but not yet diagnosed together: "
-                     "diagnose its touches.csv by itself, and the folder without it"));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
   if (blunders) return *std::move(blunders);
   return Reported(input, context, engine);
@@ -120,6 +115,11 @@ absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context) {
+  if (input.set != nullptr) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
+    if (blunders) return *std::move(blunders);
+    return DiagnoseJointSet(input, context);
+  }
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return images::DiagnosePhotographs(input, context, expectation);
   });
@@ -127,6 +127,12 @@ absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context) {
+  // A proposal for the photographs alone would pass for one for both.
+  if (input.set != nullptr)
+    return absl::UnimplementedError(
+        absl::StrCat(input.images->origin,
+                     ": touches and photographs are diagnosed together, but nothing is proposed for both: "
+                     "propose for its touches.csv by itself, and for the folder without it"));
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return images::ProposePhotographs(input, max_photographs, context, expectation);
   });
