@@ -57,7 +57,12 @@ std::string ErrorsInWords(const JointQuality& quality) {
                          Microseconds(quality.touches.rmse_s) / 1000, quality.photographs.rmse_grey);
 }
 
-// "x 2.1 and 3.4 times", of the value that gains most by the other kind.
+// Of a mean square error, what is not noise.
+double ShareBeyond(double rmse, double floor) {
+  return rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
+}
+
+// Of the value that gains most by the other kind.
 std::string TighterInWords(const joint::SharedStep& step) {
   double than_touches = 0, than_photographs = 0;
   for (const inference::ParameterEstimate& e : step.parameters) {
@@ -226,7 +231,6 @@ v1::Report ToJointReport(const JointDiagnosis& d, const session::ImageSet& set) 
   const v1::Unexplained rest_of_touches = report.unexplained();
   const bool rest = report.has_unexplained();
   const uint32_t touches_needed = report.touches_needed();
-  const double reducible_touches = report.reducible_share();
   report.clear_steps();
   report.clear_unexplained();
   WritePhotographs(d.photographs, set, &report);
@@ -251,7 +255,10 @@ v1::Report ToJointReport(const JointDiagnosis& d, const session::ImageSet& set) 
   report.set_improved_model_hash(d.improved_model_hash);
   report.set_verdict(ToMessage(WorseOf(VerdictOfTouches(d), VerdictOfPhotographs(d))));
   report.set_touches_needed(std::max(touches_needed, report.touches_needed()));
-  report.set_reducible_share(std::max(reducible_touches, report.reducible_share()));
+  report.set_reducible_share(
+      std::max(ShareBeyond(d.initial.photographs.rmse_grey, d.photographs.noise_floor.sigma_grey),
+               ShareBeyond(d.initial.touches.rmse_s,
+                           d.touches.noise_floor ? d.touches.noise_floor->sigma_s : 0)));
   report.set_summary(SummarizeJointly(d));
   report.set_duration_s(d.touches.duration_s + d.photographs.duration_s);
   return report;
