@@ -263,9 +263,8 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& given, const Dia
   const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
   AddHowWrong(*workspace, residuals, &diagnosis);
   if (diagnosis.data.touches > 0)
-    diagnosis.residuals =
-        DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal, residuals,
-                     diagnosis.noise_floor->sigma_s);
+    diagnosis.residuals = DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,
+                                       residuals, diagnosis.noise_floor->sigma_s);
   photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);
   diagnosis.duration_s = Now() - began;

@@ -48,10 +48,11 @@ class JointDiagnoser {
 
   absl::StatusOr<v1::Report> Run() {
     if (!input_.set->has_poses)
-      return absl::InvalidArgumentError(absl::StrCat(
-          input_.set->origin,
-          ": touches without poses cannot be diagnosed together with photographs; take touches.csv out of the folder and "
-          "diagnose it by itself"));
+      return absl::InvalidArgumentError(
+          absl::StrCat(input_.set->origin,
+                       ": touches without poses cannot be diagnosed together with photographs; take "
+                       "touches.csv out of the folder and "
+                       "diagnose it by itself"));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::DataProblem> problems,
                                 checks::FindDataProblems(touches_, Stretch(context_, 0, 0.05)));
     d_.model_name = input_.model->name;
@@ -99,7 +100,8 @@ class JointDiagnoser {
   }
 
   absl::StatusOr<bool> IsEnoughForBoth() const {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace, selection::MakeWorkspace(touches_, Stretch(context_, 0, 0)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace,
+                                selection::MakeWorkspace(touches_, Stretch(context_, 0, 0)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const images::Photographs photographs,
                                 images::MakePhotographs(photographs_, context_.pool));
     return TouchesNeeded(*workspace->observations) == 0 && photographs.poses >= images::kMinPoses;
@@ -115,8 +117,8 @@ class JointDiagnoser {
 
   absl::Status ComparePictures() {
     images::Expectation expectation;
-    TOUCHSTONE_ASSIGN_OR_RETURN(d_.photographs,
-                                images::ComparePhotographs(photographs_, Stretch(context_, 0.6, 0.9), &expectation));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        d_.photographs, images::ComparePhotographs(photographs_, Stretch(context_, 0.6, 0.9), &expectation));
     return DescribePictures(expectation);
   }
 
@@ -145,8 +147,7 @@ class JointDiagnoser {
     photographs.model = std::make_shared<const model::Model>(d_.shared.in_place);
     images::Expectation expectation;
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        d_.photographs,
-        images::DiagnosePhotographs(photographs, Stretch(context_, 0.7, 0.95), &expectation));
+        d_.photographs, images::DiagnosePhotographs(photographs, Stretch(context_, 0.7, 0.95), &expectation));
     if (!d_.shared.steps.empty()) {
       // Described is what the given model had left, before anything was put in place.
       if (expectation.after.empty()) expectation.after = std::move(expectation.before);

@@ -84,8 +84,8 @@ absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisCo
                                PhotoSelection* selection) {
   selection->polished = selection->fit;
   if (selection->fit.model.size() == 0) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const PhotoSearch all, MakePolishRows(photographs, selection->fit.model.base(), context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch all,
+                              MakePolishRows(photographs, selection->fit.model.base(), context));
   const inference::Likelihood plain(all.rows->GroupRows(), nullptr, 0, nullptr);
   inference::Experiment experiment = *all.experiment;
   if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;

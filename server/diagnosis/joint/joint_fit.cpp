@@ -39,7 +39,8 @@ class JointGaussNewton {
       }
       fit_.place[kPhotographs].push_back(place);
     }
-    rows_ = parts[kTouches].experiment->likelihood->rows() + parts[kPhotographs].experiment->likelihood->rows();
+    rows_ =
+        parts[kTouches].experiment->likelihood->rows() + parts[kPhotographs].experiment->likelihood->rows();
     // Noise of one: each kind's inner products come in units of its own.
     unit_ = std::make_unique<Likelihood>(std::vector<int>{0, rows_}, nullptr, 0, nullptr);
     unit_->SetLeastNoise(1);
@@ -180,13 +181,15 @@ class JointGaussNewton {
     fit_.point = point;
     const inference::LaplaceEvidence both = Step(point);
     fit_.covariance = both.covariance;
-    fit_.log_evidence = both.log_evidence - both.log_likelihood;  // the prior of the values, and Occam's factor
+    fit_.log_evidence =
+        both.log_evidence - both.log_likelihood;  // the prior of the values, and Occam's factor
     for (const Kind kind : kKinds) {
       const Likelihood& likelihood = *parts_[kind].experiment->likelihood;
       const Likelihood::Columns residual = Likelihood::Pick(states_[kind].columns, {0});
       std::vector<double> logs;
       for (int s = 0; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
-        logs.push_back(likelihood.LogPrior(s) + likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
+        logs.push_back(likelihood.LogPrior(s) +
+                       likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
       const double averaged = inference::LogSum(logs) / parts_[kind].variance_factor;
       fit_.log_likelihood += averaged;
       fit_.log_evidence += averaged;
@@ -229,7 +232,7 @@ Eigen::MatrixXd JointFit::CovarianceOf(Kind kind) const {
 
 bool IsSameValue(const inference::Parameterization& a, int i, const inference::Parameterization& b, int j) {
   const inference::FreeParameter &one = a.parameters()[i], &other = b.parameters()[j];
-  const model::Effect &effect = *a.base().effects[one.effect].effect;
+  const model::Effect& effect = *a.base().effects[one.effect].effect;
   return effect.moves_surface && effect.name == b.base().effects[other.effect].effect->name &&
          one.parameter == other.parameter && one.object == other.object && one.weights == other.weights;
 }

@@ -1,11 +1,12 @@
 #include "server/diagnosis/joint/shared_effects.h"
 
-#include <Eigen/Cholesky>
 #include <absl/strings/str_cat.h>
+#include <Eigen/Cholesky>
 #include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_quality.h"
@@ -19,10 +20,10 @@
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr double kConflictNats = 9;   // that values of their own need over one value
-constexpr double kConflictP = 1e-4;   // ... and of values so far apart by chance
-constexpr double kShownP = 1e-3;      // of a value that one kind alone has by chance
-constexpr double kUnknown = 10;       // usual sizes: a value that is known no better is not known
+constexpr double kConflictNats = 9;  // that values of their own need over one value
+constexpr double kConflictP = 1e-4;  // ... and of values so far apart by chance
+constexpr double kShownP = 1e-3;     // of a value that one kind alone has by chance
+constexpr double kUnknown = 10;      // usual sizes: a value that is known no better is not known
 
 // P of a value as far from `neutral` as this; 1 where nothing is known.
 double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance) {
@@ -55,8 +56,17 @@ struct Prepared {
 
 class SharedFinder {
  public:
-  SharedFinder(const DiagnosisInput& touches, const DiagnosisInput& photographs, const DiagnosisContext& context)
-      : touches_(touches), photographs_(photographs), context_(context) {}
+  SharedFinder(const DiagnosisInput& touches, const DiagnosisInput& photographs,
+               const DiagnosisContext& context)
+      : touches_(touches), photographs_(photographs), context_(context) {
+    // Fits ask from whatever thread works; the caller is told by one at a time.
+    if (context.progress)
+      context_.progress = [this, &context](const std::string& stage, double done) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (!cancelled_ && !context.progress(stage, done)) cancelled_ = true;
+        return !cancelled_;
+      };
+  }
 
   absl::StatusOr<SharedEffects> Run() {
     for (const auto& effect : effects::TouchEffects())
@@ -169,14 +179,14 @@ class SharedFinder {
       for (int a = 0; a < n; ++a) {
         difference[a] = one.fit.point[same[a].first] - other.fit.point[same[a].second];
         for (int b = 0; b < n; ++b)
-          covariance(a, b) = one.covariance(same[a].first, same[b].first) +
-                             other.covariance(same[a].second, same[b].second);
+          covariance(a, b) =
+              one.covariance(same[a].first, same[b].first) + other.covariance(same[a].second, same[b].second);
       }
       const double p = WaldP(difference, covariance);
       if (p > kConflictP) continue;
-      found_.conflicts.push_back({effect.name(),
-                                  one.fit.model.Describe(one.index, one.fit.point, one.covariance),
-                                  other.fit.model.Describe(other.index, other.fit.point, other.covariance), p, ahead});
+      found_.conflicts.push_back(
+          {effect.name(), one.fit.model.Describe(one.index, one.fit.point, one.covariance),
+           other.fit.model.Describe(other.index, other.fit.point, other.covariance), p, ahead});
     }
     return absl::OkStatus();
   }
@@ -237,8 +247,8 @@ class SharedFinder {
         images::ExpectPhotographs(p_.photographs, found_.in_place, false, context_.pool));
     const images::GreyNoiseFloor floor =
         images::NoiseFloorOfPhotographs(p_.photographs, expected, context_.pool);
-    found_.heldout_excess_grey2 = images::HeldOutExcess(p_.pictures.fine, found.fits[kPhotographs],
-                                                        p_.photographs, floor.sigma_grey);
+    found_.heldout_excess_grey2 =
+        images::HeldOutExcess(p_.pictures.fine, found.fits[kPhotographs], p_.photographs, floor.sigma_grey);
     return absl::OkStatus();
   }
 
@@ -324,12 +334,15 @@ class SharedFinder {
     consider(selection.none);
     for (const Explained& explained : selection.tried) consider(explained);
     std::sort(step->equivalent.begin(), step->equivalent.end());
-    step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()), step->equivalent.end());
+    step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()),
+                           step->equivalent.end());
     step->gain_nats = best - without;
     step->probability = selection::ProbabilityOfShare(inference::LogSum(same) - inference::LogSum(all));
     std::array<bool, 2> shows;
     for (const Kind kind : kKinds) shows[kind] = ShownBy(kind, shared.name(), selection.best.fit);
-    step->shown_by = shows[kTouches] == shows[kPhotographs] ? "both" : shows[kTouches] ? "touches" : "photographs";
+    step->shown_by = shows[kTouches] == shows[kPhotographs] ? "both"
+                     : shows[kTouches]                      ? "touches"
+                                                            : "photographs";
   }
 
   // Whether one kind, with everything else in place, has a value that chance would not give it.
@@ -351,14 +364,17 @@ class SharedFinder {
 
   const DiagnosisInput& touches_;
   const DiagnosisInput& photographs_;
-  const DiagnosisContext& context_;
+  DiagnosisContext context_;
+  std::mutex mutex_;
+  bool cancelled_ = false;
   Prepared p_;
   SharedEffects found_;
 };
 
 }  // namespace
 
-absl::StatusOr<SharedEffects> FindSharedEffects(const DiagnosisInput& touches, const DiagnosisInput& photographs,
+absl::StatusOr<SharedEffects> FindSharedEffects(const DiagnosisInput& touches,
+                                                const DiagnosisInput& photographs,
                                                 const DiagnosisContext& context) {
   return SharedFinder(touches, photographs, context).Run();
 }

@@ -24,7 +24,7 @@ struct SharedStep {
   std::string effect;
   bool given = false;  // of the given model: other values, no new effect
   selection::EffectScope scope = selection::EffectScope::kRig;
-  std::string words;  // "on lat10 only"
+  std::string words;                                     // "on lat10 only"
   std::vector<inference::ParameterEstimate> parameters;  // with what either kind alone would have left
   std::vector<std::string> equivalent;
   double probability = 0;
@@ -37,8 +37,8 @@ struct SharedStep {
 struct Conflict {
   std::string effect;
   std::vector<inference::ParameterEstimate> touches, photographs;
-  double p = 1;            // of values so far apart by chance
-  double ahead_nats = 0;   // of values of their own over one value
+  double p = 1;           // of values so far apart by chance
+  double ahead_nats = 0;  // of values of their own over one value
 };
 
 struct SharedEffects {
@@ -53,7 +53,8 @@ struct SharedEffects {
 
 // `touches`, `photographs`: the same question of the two kinds, each with a model without the other's effects (touches) or
 // with all of them (photographs). Both hold enough data for a verdict of their own.
-absl::StatusOr<SharedEffects> FindSharedEffects(const DiagnosisInput& touches, const DiagnosisInput& photographs,
+absl::StatusOr<SharedEffects> FindSharedEffects(const DiagnosisInput& touches,
+                                                const DiagnosisInput& photographs,
                                                 const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis::joint

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <iostream>
+#include <map>
 
 #include "server/diagnosis/joint/joint_test_set.h"
 
@@ -17,8 +18,7 @@ void Print(const char* what, const std::vector<inference::ParameterEstimate>& pa
               << e.std_error_photographs.value_or(-1) << ")\n";
 }
 
-SharedEffects Found(const HiddenSession& session) {
-  const JointInputs inputs = MakeInputs(session);
+SharedEffects Found(const JointInputs& inputs) {
   ThreadPool pool(2);
   DiagnosisContext context;
   context.pool = &pool;
@@ -26,16 +26,21 @@ SharedEffects Found(const HiddenSession& session) {
   EXPECT_TRUE(found.ok()) << found.status();
   if (!found.ok()) return {};
   for (const SharedStep& step : found->steps) {
-    std::cout << "  + " << step.effect << " " << step.probability << " gain " << step.gain_nats << " shown by "
-              << step.shown_by << " " << step.words << "\n";
+    std::cout << "  + " << step.effect << " " << step.probability << " gain " << step.gain_nats
+              << " shown by " << step.shown_by << " " << step.words << "\n";
     Print("values", step.parameters);
   }
   for (const Conflict& conflict : found->conflicts) {
-    std::cout << "  conflict " << conflict.effect << " p " << conflict.p << " ahead " << conflict.ahead_nats << "\n";
+    std::cout << "  conflict " << conflict.effect << " p " << conflict.p << " ahead " << conflict.ahead_nats
+              << "\n";
     Print("touches", conflict.touches);
     Print("photographs", conflict.photographs);
   }
   return *found;
+}
+
+SharedEffects Found(const HiddenSession& session) {
+  return Found(MakeInputs(session));
 }
 
 const images::NamedValues kAskew = {
@@ -81,6 +86,33 @@ TEST(SharedEffects, CameraIsNotToldAsThePoseOfObjects) {
   EXPECT_TRUE(found.conflicts.empty());
 }
 
+// A sag of the fingers is a shift of the objects to touches: only pictures can tell which.
+TEST(SharedEffects, PhotographsDecideBetweenASagOfTheToolAndAShiftOfTheObjects) {
+  HiddenSession sagging = WithHidden({});
+  sagging.rig.hidden = {{"gravity_sag", {"drop_mm=0.5"}}};
+  const SharedEffects of_tool = Found(sagging);
+  EXPECT_TRUE(of_tool.steps.empty());
+  EXPECT_TRUE(of_tool.conflicts.empty());
+  const SharedEffects of_objects = Found(WithHidden({{"object_pose", {"translation_mm=0,0,0.5"}}}));
+  ASSERT_EQ(of_objects.steps.size(), 1u);
+  EXPECT_EQ(of_objects.steps[0].effect, "object_pose");
+  EXPECT_TRUE(of_objects.steps[0].equivalent.empty());
+}
+
+TEST(SharedEffects, ScaleOfTheModelIsPutRightByBoth) {
+  HiddenSession session = WithHidden({});
+  JointInputs inputs = MakeInputs(session);
+  for (DiagnosisInput* input : {&inputs.touches, &inputs.photographs})
+    input->model = std::make_shared<const model::Model>(
+        images::WithPhotoEffects(*input->model, {{"object_scale", {"relative=0.01"}}}));
+  const SharedEffects found = Found(inputs);
+  ASSERT_EQ(found.steps.size(), 1u);
+  EXPECT_TRUE(found.steps[0].given);
+  ASSERT_EQ(found.steps[0].parameters.size(), 1u);
+  EXPECT_EQ(found.steps[0].parameters[0].before, 0.01);
+  EXPECT_NEAR(found.steps[0].parameters[0].value, 0, 4 * found.steps[0].parameters[0].std_error);
+}
+
 TEST(SharedEffects, ConflictIsSaidAndNotAveraged) {
   HiddenSession session = WithHidden({});
   session.rig.hidden = {{"object_pose", {"translation_mm=0.8,0,0"}}};
@@ -89,6 +121,46 @@ TEST(SharedEffects, ConflictIsSaidAndNotAveraged) {
   EXPECT_TRUE(found.steps.empty());
   ASSERT_EQ(found.conflicts.size(), 1u);
   EXPECT_EQ(found.conflicts[0].effect, "object_pose");
+}
+
+// Sixty sessions: minutes.
+TEST(SharedEffects, DISABLED_ManySessionsAreToldRightly) {
+  int askew = 0, one_askew = 0, tools = 0, cameras = 0, nothing = 0, conflicts = 0;
+  std::map<std::string, int> covered;
+  for (uint64_t seed = 500; seed < 512; ++seed) {
+    const auto seeded = [&](HiddenSession session) {
+      session.rig.seed = session.camera.seed = seed;
+      return Found(session);
+    };
+    SharedEffects found = seeded(WithHidden(kAskew));
+    askew += found.steps.size() == 1 && found.steps[0].effect == "object_pose" && found.steps[0].shown_by == "both";
+    conflicts += !found.conflicts.empty();
+    const double truth[] = {0.4, -0.3, 0.2, 0.3, 0.2, -0.4};
+    for (size_t i = 0; i < 6 && found.steps.size() == 1; ++i) {
+      const inference::ParameterEstimate& e = found.steps[0].parameters[i];
+      covered[e.name + e.entry] += e.lower <= truth[i] && truth[i] <= e.upper;
+    }
+    found = seeded(WithHidden({}));
+    nothing += found.steps.empty() && found.conflicts.empty();
+    HiddenSession session = WithHidden({});
+    session.rig.hidden = {{"tool_yaw", {"angle_deg=0.5"}}, {"tip_radius", {"radius_mm=0.5"}}};
+    found = seeded(session);
+    tools += found.steps.empty() && found.conflicts.empty();
+    session = WithHidden({});
+    session.camera.hidden = {{"camera_translation", {"offset_mm=0.5,-0.4,0.8"}},
+                             {"camera_rotation", {"rotation_deg=0.1,0.1,0"}}};
+    found = seeded(session);
+    cameras += found.steps.empty() && found.conflicts.empty();
+    session = WithHidden(kAskew);
+    session.rig.hidden.push_back({"finger_spacing", {"delta_mm=0.4"}});
+    session.camera.hidden.push_back({"focal_error", {"relative=0.01"}});
+    found = seeded(session);
+    one_askew += found.steps.size() == 1 && found.steps[0].effect == "object_pose";
+    conflicts += !found.conflicts.empty();
+  }
+  std::cout << "askew " << askew << ", askew with a tool and a lens " << one_askew << ", nothing " << nothing
+            << ", tools " << tools << ", cameras " << cameras << " of 12; conflicts " << conflicts << "\n";
+  for (const auto& [name, count] : covered) std::cout << "  " << name << " covered " << count << "\n";
 }
 
 }  // namespace

@@ -12,12 +12,14 @@
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr int kPasses = 2;           // of values and what stands beside them
-constexpr int kMaxTried = 3;         // forms per round, beside those that either kind names by itself
-constexpr double kWorthTrying = 3;   // nats that either kind, or both together, expect of a form
-constexpr int kMaxShared = 2;        // effects
+constexpr int kPasses = 2;          // of values and what stands beside them
+constexpr int kMaxTried = 3;        // forms per round, beside those that either kind names by itself
+constexpr double kWorthTrying = 3;  // nats that either kind, or both together, expect of a form
+constexpr int kMaxShared = 2;       // effects
 
-selection::SearchRules Rules() { return {}; }
+selection::SearchRules Rules() {
+  return {};
+}
 
 double ChiSquaredP(double x, int freedom) {
   return x > 0 && freedom > 0 ? boost::math::gamma_q(0.5 * freedom, 0.5 * x) : 1;
@@ -30,9 +32,7 @@ struct Form {
   bool named = false;  // by the explanation of one kind alone
 
   double Sum() const { return gain_nats[0] + gain_nats[1]; }
-  bool IsWorthTrying() const {
-    return named || std::max({gain_nats[0], gain_nats[1], Sum()}) > kWorthTrying;
-  }
+  bool IsWorthTrying() const { return named || std::max({gain_nats[0], gain_nats[1], Sum()}) > kWorthTrying; }
 };
 
 SharedEffect FormOf(const Side& side, const selection::Extension& extension) {
@@ -45,7 +45,8 @@ SharedEffect FormOf(const Side& side, const selection::Extension& extension) {
   const selection::Candidate& candidate = side.search->candidates()[extension.candidate];
   effect.instance.effect = candidate.effect;
   effect.instance.values = candidate.effect->NeutralValues(side.given->fingers);
-  effect.instance.per_object = candidate.per_object || candidate.effect->always_per_object || !candidate.object.empty();
+  effect.instance.per_object =
+      candidate.per_object || candidate.effect->always_per_object || !candidate.object.empty();
   effect.object = candidate.object;
   effect.rare = candidate.rare;
   return effect;
@@ -59,10 +60,9 @@ absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained&
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::Extension> extensions,
                                 side.search->Score(fit, static_cast<int>(side.given->effects.size())));
     for (const selection::Extension& extension : extensions) {
-      const bool shared =
-          extension.candidate >= 0
-              ? IsShared(*side.search->candidates()[extension.candidate].effect)
-              : IsShared(*side.given->effects[IndexOf(*side.given, extension.name)].effect);
+      const bool shared = extension.candidate >= 0
+                              ? IsShared(*side.search->candidates()[extension.candidate].effect)
+                              : IsShared(*side.given->effects[IndexOf(*side.given, extension.name)].effect);
       if (!shared || !extension.visible) continue;
       const SharedEffect effect = FormOf(side, extension);
       Form& form = forms.emplace(effect.Key(), Form{effect, {0, 0}, false}).first->second;

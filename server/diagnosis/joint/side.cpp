@@ -22,7 +22,8 @@ void StartAt(const model::EffectInstance& instance, int index, inference::Parame
   model->MoveTo(model->Clip(point));
 }
 
-void AddAt(const model::EffectInstance& instance, const std::string& object, inference::Parameterization* model) {
+void AddAt(const model::EffectInstance& instance, const std::string& object,
+           inference::Parameterization* model) {
   if (object.empty())
     model->Add(instance.effect, instance.per_object);
   else
@@ -58,8 +59,8 @@ std::string OwnEffects::Key() const {
   for (const auto& [name, instance] : freed) absl::StrAppend(&key, "given ", name, "\n");
   std::vector<std::string> names;
   for (const auto& [instance, object] : added)
-    names.push_back(absl::StrCat(inference::NameOf(*instance.effect), instance.per_object ? " by object " : " ",
-                                 object, "\n"));
+    names.push_back(absl::StrCat(inference::NameOf(*instance.effect),
+                                 instance.per_object ? " by object " : " ", object, "\n"));
   std::sort(names.begin(), names.end());
   for (const std::string& name : names) key += name;
   return key;
@@ -75,7 +76,8 @@ void Side::Prepare(const inference::Experiment& of, std::vector<selection::Candi
   const auto quiet = [](const std::string&) {};
   own_search = std::make_unique<selection::StepwiseSearch>(*settled, WithoutShared(candidates),
                                                            selection::SearchRules(), quiet);
-  search = std::make_unique<selection::StepwiseSearch>(of, std::move(candidates), selection::SearchRules(), quiet);
+  search =
+      std::make_unique<selection::StepwiseSearch>(of, std::move(candidates), selection::SearchRules(), quiet);
 }
 
 bool Side::HasObject(const std::string& object) const {
@@ -104,7 +106,8 @@ inference::Parameterization Side::Held(const std::vector<SharedEffect>& shared, 
 }
 
 int Side::InitialEffects(const std::vector<SharedEffect>& shared) const {
-  const auto added = std::count_if(shared.begin(), shared.end(), [](const SharedEffect& e) { return !e.given; });
+  const auto added =
+      std::count_if(shared.begin(), shared.end(), [](const SharedEffect& e) { return !e.given; });
   return static_cast<int>(given->effects.size() + added);
 }
 
@@ -128,7 +131,8 @@ std::vector<SharedEffect> Side::SharedOf(const inference::Fit& fit) const {
     if (!IsShared(*effects[index].effect) || !fit.model.IsFree(index)) continue;
     SharedEffect effect{effects[index], index < static_cast<int>(given->effects.size()),
                         fit.model.OnlyObject(index)};
-    effect.rare = !effect.object.empty() || (effect.instance.per_object && !effect.instance.effect->often_per_object);
+    effect.rare =
+        !effect.object.empty() || (effect.instance.per_object && !effect.instance.effect->often_per_object);
     shared.push_back(std::move(effect));
   }
   return shared;

@@ -15,7 +15,9 @@
 namespace touchstone::diagnosis::joint {
 
 // Effects that move the surface are seen by touch and by camera: object_pose, object_scale.
-inline bool IsShared(const model::Effect& effect) { return effect.moves_surface; }
+inline bool IsShared(const model::Effect& effect) {
+  return effect.moves_surface;
+}
 
 // A shared effect in some form: new, or of the given model with its values set free.
 struct SharedEffect {
@@ -42,10 +44,10 @@ struct Side {
   std::shared_ptr<const model::Model> given;
   std::vector<std::string> objects;
   const inference::Experiment* experiment = nullptr;
-  std::unique_ptr<inference::Experiment> settled;            // the same, shared values held
-  std::unique_ptr<selection::StepwiseSearch> search;         // over every effect
-  std::unique_ptr<selection::StepwiseSearch> own_search;     // over those that only this kind shows
-  inference::Fit alone;                                      // the explanation without the other kind
+  std::unique_ptr<inference::Experiment> settled;         // the same, shared values held
+  std::unique_ptr<selection::StepwiseSearch> search;      // over every effect
+  std::unique_ptr<selection::StepwiseSearch> own_search;  // over those that only this kind shows
+  inference::Fit alone;                                   // the explanation without the other kind
 
   // `candidates`: every effect that may be missing.
   void Prepare(const inference::Experiment& experiment, std::vector<selection::Candidate> candidates);

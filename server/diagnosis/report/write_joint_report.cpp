@@ -73,16 +73,20 @@ std::string TighterInWords(const joint::SharedStep& step) {
   }
   if (!(than_touches > 0) || !(than_photographs > 0)) return "";
   return absl::StrFormat(
-      " Fitted to both together its values are up to %.3g times as sure as from touches alone, and up to %.3g times as "
+      " Fitted to both together its values are up to %.3g times as sure as from touches alone, and up to "
+      "%.3g times as "
       "from photographs alone.",
       than_touches, than_photographs);
 }
 
 std::string ConflictInWords(const joint::Conflict& conflict) {
   return absl::StrFormat(
-      "Touches and photographs contradict each other about %s: touches alone ask for %s, photographs alone for %s (chance "
-      "would part them so far with p = %.1g). One value for both would explain neither: the object was moved between "
-      "touching and photographing, or each kind has something else that its own data take for %s. Nothing is claimed.",
+      "Touches and photographs contradict each other about %s: touches alone ask for %s, photographs alone "
+      "for %s (chance "
+      "would part them so far with p = %.1g). One value for both would explain neither: the object was moved "
+      "between "
+      "touching and photographing, or each kind has something else that its own data take for %s. Nothing is "
+      "claimed.",
       conflict.effect, ValuesInWords(conflict.touches), ValuesInWords(conflict.photographs),
       std::max(conflict.p, 1e-300), conflict.effect);
 }
@@ -112,7 +116,8 @@ void WriteSharedStep(const joint::SharedStep& step, const JointQuality& quality,
 }
 
 // What one kind says of a rest beside what the other says.
-void MergeUnexplained(const v1::Unexplained& touches, const v1::Unexplained& photographs, v1::Unexplained* both) {
+void MergeUnexplained(const v1::Unexplained& touches, const v1::Unexplained& photographs,
+                      v1::Unexplained* both) {
   *both = touches;
   for (const v1::CovariateTest& test : photographs.covariates()) *both->add_covariates() = test;
   both->set_rmse_grey(photographs.rmse_grey());
@@ -123,9 +128,9 @@ void MergeUnexplained(const v1::Unexplained& touches, const v1::Unexplained& pho
     both->set_lookup_yaml(photographs.lookup_yaml());
     both->set_heldout_gain(photographs.heldout_gain());
   }
-  both->set_words(absl::StrCat("Touches: ", touches.words().empty() ? "a rest remains." : touches.words(),
-                               " Photographs: ",
-                               photographs.words().empty() ? "a rest remains." : photographs.words()));
+  both->set_words(
+      absl::StrCat("Touches: ", touches.words().empty() ? "a rest remains." : touches.words(),
+                   " Photographs: ", photographs.words().empty() ? "a rest remains." : photographs.words()));
 }
 
 void WriteInitialAndFinal(const JointDiagnosis& d, v1::Report* report) {
@@ -134,8 +139,7 @@ void WriteInitialAndFinal(const JointDiagnosis& d, v1::Report* report) {
   initial->set_heldout_rmse_us(Microseconds(d.initial.touches.heldout_rmse_s));
   initial->set_rmse_grey(d.initial.photographs.rmse_grey);
   initial->set_heldout_rmse_grey(d.initial.photographs.heldout_rmse_grey);
-  initial->set_lack_of_fit_p(
-      std::min(d.initial.touches.lack_of_fit_p, d.initial.photographs.lack_of_fit_p));
+  initial->set_lack_of_fit_p(std::min(d.initial.touches.lack_of_fit_p, d.initial.photographs.lack_of_fit_p));
   v1::Quality* final = report->mutable_final();
   if (d.touches.final) {
     final->set_rmse_us(Microseconds(d.touches.final->rmse_s));
@@ -206,19 +210,19 @@ std::string SummarizeJointly(const JointDiagnosis& d) {
     in_place.push_back(step.effect);
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
-    sentences.push_back(absl::StrCat(step.given ? "In the model another value: " : "Missing: ", name, " (",
-                                     ValuesInWords(step.parameters), step.words.empty() ? "" : ", ", step.words,
-                                     "), ",
-                                     step.shown_by == "both" ? "which touches and photographs show alike."
-                                                             : absl::StrCat("which only the ", step.shown_by,
-                                                                            " show."),
-                                     TighterInWords(step)));
+    sentences.push_back(
+        absl::StrCat(step.given ? "In the model another value: " : "Missing: ", name, " (",
+                     ValuesInWords(step.parameters), step.words.empty() ? "" : ", ", step.words, "), ",
+                     step.shown_by == "both" ? "which touches and photographs show alike."
+                                             : absl::StrCat("which only the ", step.shown_by, " show."),
+                     TighterInWords(step)));
   }
   const std::string place =
       in_place.empty() ? "" : absl::StrCat(", with ", absl::StrJoin(in_place, " and "), " in place");
   // A conflict is the verdict of both: what each would say by itself would contradict it.
   if (d.shared.conflicts.empty()) {
-    sentences.push_back(absl::StrCat("Touches (", NameOf(VerdictOfTouches(d)), ")", place, ": ", d.touches.summary));
+    sentences.push_back(
+        absl::StrCat("Touches (", NameOf(VerdictOfTouches(d)), ")", place, ": ", d.touches.summary));
     sentences.push_back(absl::StrCat("Photographs (", NameOf(VerdictOfPhotographs(d)), ")", place, ": ",
                                      d.photographs.summary));
   }
@@ -255,10 +259,9 @@ v1::Report ToJointReport(const JointDiagnosis& d, const session::ImageSet& set) 
   report.set_improved_model_hash(d.improved_model_hash);
   report.set_verdict(ToMessage(WorseOf(VerdictOfTouches(d), VerdictOfPhotographs(d))));
   report.set_touches_needed(std::max(touches_needed, report.touches_needed()));
-  report.set_reducible_share(
-      std::max(ShareBeyond(d.initial.photographs.rmse_grey, d.photographs.noise_floor.sigma_grey),
-               ShareBeyond(d.initial.touches.rmse_s,
-                           d.touches.noise_floor ? d.touches.noise_floor->sigma_s : 0)));
+  report.set_reducible_share(std::max(
+      ShareBeyond(d.initial.photographs.rmse_grey, d.photographs.noise_floor.sigma_grey),
+      ShareBeyond(d.initial.touches.rmse_s, d.touches.noise_floor ? d.touches.noise_floor->sigma_s : 0)));
   report.set_summary(SummarizeJointly(d));
   report.set_duration_s(d.touches.duration_s + d.photographs.duration_s);
   return report;

@@ -19,11 +19,11 @@ struct JointQuality {
 
 struct JointDiagnosis {
   joint::SharedEffects shared;
-  std::vector<JointQuality> shared_quality;  // after each shared step
-  Diagnosis touches;                         // with the shared effects in place
-  images::PhotographDiagnosis photographs;   // the same
-  JointQuality initial;                      // of the given model
-  std::string model_name, model_hash;        // its
+  std::vector<JointQuality> shared_quality;              // after each shared step
+  Diagnosis touches;                                     // with the shared effects in place
+  images::PhotographDiagnosis photographs;               // the same
+  JointQuality initial;                                  // of the given model
+  std::string model_name, model_hash;                    // its
   std::string improved_model_yaml, improved_model_hash;  // both kinds' effects; empty if nothing changed
 };
 

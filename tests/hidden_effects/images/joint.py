@@ -91,10 +91,10 @@ HEADER = ("touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_
 
 
 def write_touches(path, seed, pose=None, yaw_deg=0.0, length_mm=(0, 0, 0), poses=16, rounds=3, objects=None):
-    """`pose`: of the objects, as keyword arguments of moved()."""
+    """`pose`: of the objects, as keyword arguments of moved(). `objects`: numbers of sets.objects(); all by default."""
     random, noise = sets.stream(seed, "touches"), sets.stream(seed, "noise of touches")
     lines, number = [HEADER], 0
-    for solid in objects or sets.objects():
+    for solid in [sets.objects()[k] for k in objects or range(len(sets.objects()))]:
         real = moved(solid, **(pose or {}))
         commands = [draw_touch(solid, random) for _ in range(poses)]
         for round_ in range(rounds):
@@ -110,9 +110,11 @@ def write_touches(path, seed, pose=None, yaw_deg=0.0, length_mm=(0, 0, 0), poses
     path.write_text("\n".join(lines) + "\n")
 
 
-def write_photographs(folder, seed, pose=None, pictures=6, repeats=1):
+def write_photographs(folder, seed, pose=None, pictures=6, repeats=1, objects=None, camera=None):
     """The folder of an image set of the same objects, lying like this."""
     scene = sets.make_scene(seed, pictures=pictures, repeats=repeats)
+    scene.camera = camera or scene.camera
+    scene.shots = [shot for shot in scene.shots if objects is None or shot.object in objects]
     nominal = sets.objects()
     physics = sets.make_physics({})
     random = sets.stream(seed, "noise")
