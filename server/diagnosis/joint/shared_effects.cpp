@@ -78,6 +78,7 @@ class SharedFinder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const SharedSelection selection, SearchShared(p_.sides));
     TOUCHSTONE_RETURN_IF_ERROR(Enter("fitting both together", 0.55));
     TOUCHSTONE_RETURN_IF_ERROR(FindConflicts(selection));
+    FindUndecided(selection);
     if (found_.conflicts.empty() && !selection.best.shared.empty())
       TOUCHSTONE_RETURN_IF_ERROR(Describe(selection));
     return std::move(found_);
@@ -190,6 +191,24 @@ class SharedFinder {
     }
     return absl::OkStatus();
   }
+
+  // What explains as much as the best, with a shared effect in the place of others.
+  void FindUndecided(const SharedSelection& selection) {
+    for (const Explained& tried : selection.tried) {
+      if (tried.fit.log_evidence < selection.best.fit.log_evidence - selection::SearchRules().equivalent_nats)
+        continue;
+      for (const SharedEffect& effect : tried.shared) {
+        const auto same = [&](const auto& other) { return NameOfShared(other) == effect.name(); };
+        if (std::any_of(selection.best.shared.begin(), selection.best.shared.end(), same) ||
+            std::any_of(found_.undecided.begin(), found_.undecided.end(), same))
+          continue;
+        std::vector<std::string> instead = OwnBeside(selection.best, tried);
+        if (!instead.empty()) found_.undecided.push_back({effect.name(), std::move(instead)});
+      }
+    }
+  }
+  static const std::string& NameOfShared(const SharedEffect& effect) { return effect.name(); }
+  static const std::string& NameOfShared(const Undecided& undecided) { return undecided.effect; }
 
   // The joint fit to every photograph, the photographs' noise judged by the scatter between them.
   absl::StatusOr<JointFit> Polish(const Explained& best) const {
@@ -330,6 +349,7 @@ class SharedFinder {
       same.push_back(evidence);
       for (const SharedEffect& other : explained.shared)
         if (!has(selection.best, other.name())) step->equivalent.push_back(other.name());
+      for (const std::string& own : OwnBeside(explained, selection.best)) step->equivalent.push_back(own);
     };
     consider(selection.none);
     for (const Explained& explained : selection.tried) consider(explained);

@@ -41,8 +41,15 @@ struct Conflict {
   double ahead_nats = 0;  // of values of their own over one value
 };
 
+// A shared effect that explains as much as effects that either kind names by itself, and is not claimed.
+struct Undecided {
+  std::string effect;
+  std::vector<std::string> in_place_of;  // at least one
+};
+
 struct SharedEffects {
   std::vector<SharedStep> steps;
+  std::vector<Undecided> undecided;
   std::vector<Conflict> conflicts;  // if there are any, there is no step
   model::Model in_place;            // the given model with the steps
   // What values fitted to a part of the data leave on the rest: held-out error over error of the touches, and what the mean

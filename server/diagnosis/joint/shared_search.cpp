@@ -15,6 +15,7 @@ namespace {
 constexpr int kPasses = 2;          // of values and what stands beside them
 constexpr int kMaxTried = 3;        // forms per round, beside those that either kind names by itself
 constexpr double kWorthTrying = 3;  // nats that either kind, or both together, expect of a form
+constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
 constexpr int kMaxShared = 2;       // effects
 
 selection::SearchRules Rules() {
@@ -102,6 +103,12 @@ bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained
 bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& after, size_t forms) {
   const bool rare = after.shared.back().rare;
   const double gain = after.fit.log_evidence - before.fit.log_evidence;
+  // Where it takes the place of what either kind named by itself, nothing is added but one cause put for others.
+  int replaced = 0;
+  for (const Kind kind : kKinds) replaced += before.own[kind].size() - after.own[kind].size();
+  if (replaced > 0)
+    return gain >
+           (after.fit.parameters.size() > before.fit.parameters.size() ? Rules().swap_nats : kSwapNats);
   if (gain < (rare ? Rules().enter_rare_nats : Rules().enter_nats)) return false;
   const int added = std::max(
       static_cast<int>(after.fit.parameters.size()) - static_cast<int>(before.fit.parameters.size()), 1);
@@ -111,6 +118,16 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
 }
 
 }  // namespace
+
+std::vector<std::string> OwnBeside(const Explained& one, const Explained& other) {
+  std::vector<std::string> beside;
+  for (const Kind kind : kKinds) {
+    const std::vector<std::string> others = other.own[kind].Names();
+    for (const std::string& name : one.own[kind].Names())
+      if (std::find(others.begin(), others.end(), name) == others.end()) beside.push_back(name);
+  }
+  return beside;
+}
 
 std::array<Part, 2> PartsOf(const Sides& sides, const Explained& explained) {
   std::array<Part, 2> parts;

@@ -21,6 +21,9 @@ struct SharedSelection {
   std::vector<Explained> tried;  // every other form
 };
 
+// Effects of either kind alone that the one has and the other does not.
+std::vector<std::string> OwnBeside(const Explained& one, const Explained& other);
+
 using Sides = std::array<Side, 2>;
 
 // The shared effects, fitted jointly, with whatever each kind shows beside them.

@@ -66,6 +66,13 @@ std::string OwnEffects::Key() const {
   return key;
 }
 
+std::vector<std::string> OwnEffects::Names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, instance] : freed) names.push_back(absl::StrCat(selection::kGivenPrefix, name));
+  for (const auto& [instance, object] : added) names.push_back(inference::NameOf(*instance.effect));
+  return names;
+}
+
 void Side::Prepare(const inference::Experiment& of, std::vector<selection::Candidate> candidates) {
   experiment = &of;
   settled = std::make_unique<inference::Experiment>(of);

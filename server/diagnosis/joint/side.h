@@ -37,6 +37,8 @@ struct OwnEffects {
   std::map<std::string, model::EffectInstance> freed;                // by name
 
   std::string Key() const;
+  int size() const { return static_cast<int>(added.size() + freed.size()); }
+  std::vector<std::string> Names() const;
 };
 
 struct Side {

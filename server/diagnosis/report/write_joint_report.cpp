@@ -12,6 +12,7 @@
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/selection/candidates.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
@@ -154,6 +155,18 @@ void WriteInitialAndFinal(const JointDiagnosis& d, v1::Report* report) {
     final->set_lack_of_fit_p(std::min(d.touches.final->lack_of_fit_p, d.photographs.final->lack_of_fit_p));
 }
 
+// Names what a shared effect would take the place of as its equivalent.
+void AddUndecided(const JointDiagnosis& d, v1::Step* step) {
+  for (const joint::Undecided& undecided : d.shared.undecided)
+    if (std::find(undecided.in_place_of.begin(), undecided.in_place_of.end(), step->effect()) !=
+        undecided.in_place_of.end()) {
+      step->add_equivalent(undecided.effect);
+      if (step->discriminating_measurement().empty())
+        step->set_discriminating_measurement(
+            selection::DiscriminatingMeasurement({step->effect(), undecided.effect}));
+    }
+}
+
 // Shared steps, then each kind's own with what the other kind has beside them.
 void WriteSteps(const JointDiagnosis& d, const std::vector<v1::Step>& touches,
                 const std::vector<v1::Step>& photographs, v1::Report* report) {
@@ -173,6 +186,7 @@ void WriteSteps(const JointDiagnosis& d, const std::vector<v1::Step>& touches,
     v1::Step* message = report->add_steps();
     *message = step;
     message->set_shown_by("touches");
+    AddUndecided(d, message);
     message->set_heldout_rmse_us(step.heldout_rmse_us() * d.shared.heldout_ratio);
     message->set_rmse_grey(so_far.photographs.rmse_grey);
     message->set_heldout_rmse_grey(so_far.photographs.heldout_rmse_grey);
@@ -181,6 +195,7 @@ void WriteSteps(const JointDiagnosis& d, const std::vector<v1::Step>& touches,
     v1::Step* message = report->add_steps();
     *message = step;
     message->set_shown_by("photographs");
+    AddUndecided(d, message);
     const double unseen = step.heldout_rmse_grey();
     message->set_heldout_rmse_grey(std::sqrt(unseen * unseen + d.shared.heldout_excess_grey2));
     message->set_rmse_us(report->final().rmse_us());
@@ -217,6 +232,9 @@ std::string SummarizeJointly(const JointDiagnosis& d) {
                                              : absl::StrCat("which only the ", step.shown_by, " show."),
                      TighterInWords(step)));
   }
+  for (const joint::Undecided& undecided : d.shared.undecided)
+    sentences.push_back(absl::StrCat("One cause, ", undecided.effect, ", explains both as well as ",
+                                     absl::StrJoin(undecided.in_place_of, " and "), "."));
   const std::string place =
       in_place.empty() ? "" : absl::StrCat(", with ", absl::StrJoin(in_place, " and "), " in place");
   // A conflict is the verdict of both: what each would say by itself would contradict it.
