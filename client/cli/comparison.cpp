@@ -217,7 +217,8 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
   add_input(
       "SET", options->set, "",
       "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG files; with a "
-      "touches.csv in it `compare` takes both), or the journal (.db) of a rig's session; -: stdin; with "
+      "touches.csv in it `compare` and `diagnose` take both), or the journal (.db) of a rig's session; -: "
+      "stdin; with "
       "--server "
       "also a stored session's name")
       ->required();

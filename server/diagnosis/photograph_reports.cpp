@@ -11,6 +11,7 @@
 #include "server/diagnosis/design/propose_photographs.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
+#include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/report/photograph_summary.h"
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
@@ -135,12 +136,6 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
 
 absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
                                          const Engine& engine) {
-  // A verdict on the photographs alone would pass for one on both.
-  if (input.set != nullptr)
-    return absl::UnimplementedError(
-        absl::StrCat(input.images->origin,
-                     ": touches and photographs are compared together, but not yet diagnosed together: "
-                     "diagnose its touches.csv by itself, and the folder without it"));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
   if (blunders) return *std::move(blunders);
   return Reported(input, context, engine);
@@ -157,6 +152,11 @@ absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context) {
+  if (input.set != nullptr) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
+    if (blunders) return *std::move(blunders);
+    return DiagnoseJointSet(input, context);
+  }
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, kDefaultPhotographs, false, context, expectation);
   });
@@ -164,6 +164,12 @@ absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context) {
+  // A proposal for the photographs alone would pass for one for both.
+  if (input.set != nullptr)
+    return absl::UnimplementedError(
+        absl::StrCat(input.images->origin,
+                     ": touches and photographs are diagnosed together, but nothing is proposed for both: "
+                     "propose for its touches.csv by itself, and for the folder without it"));
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, max_photographs, true, context, expectation);
   });

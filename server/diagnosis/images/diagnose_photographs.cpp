@@ -11,8 +11,6 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kMinPoses = 6;  // that a verdict needs
-
 double SecondsNow() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }

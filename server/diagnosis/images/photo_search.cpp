@@ -169,7 +169,7 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
   std::vector<selection::Candidate> candidates;
   std::vector<std::shared_ptr<const model::Effect>> effects;
   for (const auto& effect : effects::TouchEffects())
-    if (effect->moves_surface) effects.push_back(effect);
+    if (effect->moves_surface && !input.IsSettled(effect->name)) effects.push_back(effect);
   for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
   effects.push_back(ImageFieldEffect());
   for (const auto& effect : effects) {
@@ -238,6 +238,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   {
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch coarse,
                                 MakePhotoSearch(photographs, *input.model, candidates, kCoarse, context));
+    coarse.experiment->settled = input.settled;
     TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
   }
@@ -253,6 +254,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.fine,
       MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, kFine, context));
+  selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));

@@ -50,6 +50,10 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
 
+// Rows of every photograph at an anchor that is near, contours trusted to a tenth of a pixel: no candidates.
+absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
+                                           const DiagnosisContext& context);
+
 // Fits the explanation to every photograph: `polished` and `covariance`.
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection);
