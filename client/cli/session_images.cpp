@@ -40,6 +40,9 @@ absl::Status ReadFileInPieces(const std::string& path, const TakePiece& take) {
 }
 
 absl::StatusOr<service::StoredSession> ReadSessionHdf5(const std::string& path) {
+  if (std::error_code error; !fs::is_regular_file(path, error))
+    return absl::NotFoundError(
+        absl::StrCat(path, ": cannot be read; the HDF5 file of an image set was expected"));
   if (!session::IsImageSetHdf5(path))
     return absl::InvalidArgumentError(absl::StrCat(
         path, ": is not the HDF5 file of an image set; a session of a rig's journal goes into a journal: ",

@@ -148,7 +148,10 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   scenario.objects = ReadObjects(options_.meshes, options.supershape_triangles);
   CameraOptions camera;
   for (const std::string& each : options.hide)
-    if (!HideInCamera(each, &camera.hidden)) Hide(each, &scenario);
+    if (HideInCamera(each, &camera.hidden))
+      camera.anything_hidden = true;
+    else
+      Hide(each, &scenario);
   for (const std::string& each : options.unlisted) AddUnlisted(each, &scenario);
   std::map<std::string, Eigen::Isometry3d> base_from_object;
   for (const auto& object : scenario.objects) {

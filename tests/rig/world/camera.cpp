@@ -12,7 +12,7 @@ namespace touchstone::rig {
 namespace {
 
 constexpr int kGroundLevel = 14, kNoiseLevels = 5;
-constexpr double kLookAheadM = 0.2, kFarM = 10;
+constexpr double kLookAheadM = 0.2;
 constexpr char kBoundary[] = "touchstone-emulated-frame";
 
 }  // namespace
@@ -43,56 +43,39 @@ uint64_t EmulatedCamera::frames() const {
   return rendered_;
 }
 
-Light EmulatedCamera::PinholePicture(const CameraView& view, int width, int height, double vertical_fov_rad) {
+Light EmulatedCamera::SeenThroughLens(const CameraView& view) {
   const double ground = options_.hidden.ground_grey.value_or(0) / 255;
-  const size_t pixels = static_cast<size_t>(width) * height;
-  Light light{width, height, std::vector<double>(pixels, ground), std::vector<char>(pixels, 0)};
-  if (!view.surface) return light;
-  const Eigen::Affine3d mesh_from_camera = RealPose(options_.hidden, view.mesh_from_camera);
-  image::Camera camera;
-  camera.eye_m = mesh_from_camera.translation();
-  const Eigen::Vector3d ahead = mesh_from_camera.linear().col(2).normalized();
-  camera.at_m = camera.eye_m + ahead * kLookAheadM;
-  camera.up = -mesh_from_camera.linear().col(1);
-  camera.vertical_fov_rad = vertical_fov_rad;
-  image::ImageOptions image;
-  image.width = width, image.height = height;
-  // An object that is not before the camera at all gives no picture, but a dark one.
-  const auto rendered = renderer_->Render(view.surface, camera, image);
-  if (!rendered.ok()) return light;
-  // What is lit has ambient light at least: black is where no object is.
-  for (size_t k = 0; k < pixels; ++k)
-    if (rendered->pixels[k] > 0) light.level[k] = rendered->pixels[k] / 255.0, light.shows_object[k] = 1;
-  return light;
+  if (view.surface && (!light_ || light_->surface() != view.surface))
+    light_ = std::make_unique<CameraLight>(view.surface);
+  return ThroughLens(options_.hidden, options_.width, options_.height, options_.vertical_fov_rad,
+                     [&](const std::vector<Eigen::Vector2d>& rays) {
+                       if (!view.surface) return std::vector<double>(rays.size(), ground);
+                       return light_->Along(rays, RealPose(options_.hidden, view.mesh_from_camera),
+                                            view.mesh_from_camera, ground);
+                     });
 }
 
-std::vector<char> EmulatedCamera::MeetObject(const CameraView& view,
-                                             const std::vector<Eigen::Vector2d>& rays) const {
-  std::vector<char> meets(rays.size(), 0);
-  if (!view.surface) return meets;
-  const Eigen::Affine3d mesh_from_camera = RealPose(options_.hidden, view.mesh_from_camera);
-  const std::vector<Eigen::Vector3d> eyes(rays.size(), mesh_from_camera.translation());
-  std::vector<Eigen::Vector3d> directions;
-  for (const Eigen::Vector2d& ray : rays) {
-    const Eigen::Vector3d ahead =
-        ray.allFinite() ? Eigen::Vector3d(ray.x(), ray.y(), 1) : Eigen::Vector3d(0, 0, -1);
-    directions.push_back((mesh_from_camera.linear() * ahead).normalized());
-  }
-  geometry::Contacts contacts;
-  contacts.Resize(rays.size());
-  view.surface->CastLines(eyes, directions, kFarM, &contacts);
-  for (size_t k = 0; k < rays.size(); ++k) meets[k] = contacts.triangle[k] != geometry::kNoTriangle;
-  return meets;
+Light EmulatedCamera::SeenByPinhole(const CameraView& view) {
+  Light light{options_.width, options_.height,
+              std::vector<double>(static_cast<size_t>(options_.width) * options_.height, 0)};
+  if (!view.surface) return light;
+  image::Camera camera;
+  camera.eye_m = view.mesh_from_camera.translation();
+  const Eigen::Vector3d ahead = view.mesh_from_camera.linear().col(2).normalized();
+  camera.at_m = camera.eye_m + ahead * kLookAheadM;
+  camera.up = -view.mesh_from_camera.linear().col(1);
+  camera.vertical_fov_rad = options_.vertical_fov_rad;
+  image::ImageOptions image;
+  image.width = options_.width, image.height = options_.height;
+  // An object that is not before the camera at all gives no picture, but a dark one.
+  if (const auto rendered = renderer_->Render(view.surface, camera, image); rendered.ok())
+    for (size_t k = 0; k < light.level.size(); ++k) light.level[k] = rendered->pixels[k] / 255.0;
+  return light;
 }
 
 std::string EmulatedCamera::Picture() {
   const CameraView view = look_();
-  Light light = ThroughLens(
-      options_.hidden, options_.width, options_.height, options_.vertical_fov_rad,
-      [&](int width, int height, double vertical_fov_rad) {
-        return PinholePicture(view, width, height, vertical_fov_rad);
-      },
-      [&](const std::vector<Eigen::Vector2d>& rays) { return MeetObject(view, rays); });
+  Light light = options_.anything_hidden ? SeenThroughLens(view) : SeenByPinhole(view);
   Develop(options_.hidden, &light);
   std::vector<uint8_t> pixels;
   if (options_.hidden.sigma_grey) {

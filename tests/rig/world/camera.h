@@ -18,6 +18,7 @@
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "tests/rig/world.h"
+#include "tests/rig/world/camera_light.h"
 #include "tests/rig/world/hidden_camera.h"
 #include "tests/rig/world/tcp_server.h"
 
@@ -32,6 +33,7 @@ struct CameraOptions {
   int jpeg_quality = 90;
   uint64_t seed = 1;
   HiddenCamera hidden;
+  bool anything_hidden = false;  // among `hidden`
 };
 
 // What is before the camera now.
@@ -53,8 +55,9 @@ class EmulatedCamera {
  private:
   void Run();
   std::string Picture();
-  Light PinholePicture(const CameraView& view, int width, int height, double vertical_fov_rad);
-  std::vector<char> MeetObject(const CameraView& view, const std::vector<Eigen::Vector2d>& rays) const;
+  // As hidden_camera.h says, and as the plain pinhole that it is if nothing is hidden.
+  Light SeenThroughLens(const CameraView& view);
+  Light SeenByPinhole(const CameraView& view);
   void Serve(LineConnection& connection);
   // The first picture after number *number, which is then its number; empty: it ends, or the
   // camera is unplugged.
@@ -64,6 +67,7 @@ class EmulatedCamera {
   const std::function<CameraView()> look_;
   const Faults* const faults_;
   std::shared_ptr<image::Renderer> renderer_;
+  std::unique_ptr<CameraLight> light_;  // of the surface that was seen last
   std::mt19937_64 random_;
 
   mutable std::mutex mutex_;

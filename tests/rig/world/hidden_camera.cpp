@@ -7,9 +7,6 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr int kMaxFine = 4;         // samples of the finer picture along a pixel
-constexpr int kMaxFineSide = 2048;  // of a picture that the renderer makes
-constexpr double kMaxFineFovRad = 2.6;
 constexpr int kUndistortSteps = 100;
 constexpr double kWhite = 255;
 constexpr double kRadPerDeg = M_PI / 180;
@@ -90,27 +87,6 @@ Eigen::Vector2d Undistorted(const Eigen::Vector2d& x, double k1, double k2) {
   return ideal;
 }
 
-// Between pixel centres at half-integers, among the pixels that show the same (object or ground) as the ray; beside the
-// picture it is dark.
-double Between(const Light& light, double column, double row, bool object) {
-  const double x = column - 0.5, y = row - 0.5;
-  if (!(x > -1 && y > -1 && x < light.width && y < light.height)) return 0;
-  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
-  double sum = 0, weights = 0, nearest = 1e9, fallback = 0;
-  // A ring more than the four round it: of a thin rim perhaps none of them shows the same.
-  for (int j = y0 - 1; j <= y0 + 2; ++j)
-    for (int i = x0 - 1; i <= x0 + 2; ++i) {
-      const size_t at = static_cast<size_t>(std::clamp(j, 0, light.height - 1)) * light.width +
-                        std::clamp(i, 0, light.width - 1);
-      if (!light.shows_object.empty() && (light.shows_object[at] != 0) != object) continue;
-      const double weight = std::max(0.0, 1 - std::abs(x - i)) * std::max(0.0, 1 - std::abs(y - j));
-      sum += weight * light.level[at], weights += weight;
-      if (const double away = std::hypot(x - i, y - j); away < nearest)
-        nearest = away, fallback = light.level[at];
-    }
-  return weights > 1e-9 ? sum / weights : fallback;
-}
-
 void BlurAlong(int step_x, int step_y, double sigma, Light* light) {
   const int reach = std::max(1, static_cast<int>(std::ceil(4 * sigma)));
   std::vector<double> weight(2 * reach + 1);
@@ -162,39 +138,17 @@ Eigen::Affine3d RealPose(const HiddenCamera& hidden, const Eigen::Affine3d& from
 }
 
 Light ThroughLens(const HiddenCamera& hidden, int width, int height, double vertical_fov_rad,
-                  const Pinhole& pinhole, const MeetsObject& meets_object) {
-  if (!hidden.ChangesLens()) return pinhole(width, height, vertical_fov_rad);
+                  const LightAlong& light_along) {
   const double focal = 0.5 * height / std::tan(0.5 * vertical_fov_rad) * (1 + hidden.focal_relative);
   const Eigen::Vector2d principal(0.5 * width + hidden.principal_px.x(),
                                   0.5 * height + hidden.principal_px.y());
-  // Where every pixel looks, one step before the eye, and how far aside at most.
-  std::vector<Eigen::Vector2d> ways;
-  ways.reserve(static_cast<size_t>(width) * height);
-  Eigen::Vector2d widest(0, 0);
-  const double widest_y = std::tan(0.5 * kMaxFineFovRad);
+  std::vector<Eigen::Vector2d> rays;
+  rays.reserve(static_cast<size_t>(width) * height);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const Eigen::Vector2d seen((x + 0.5 - principal.x()) / focal, (y + 0.5 - principal.y()) / focal);
-      ways.push_back(Undistorted(seen, hidden.k1, hidden.k2));
-      if (ways.back().allFinite() && ways.back().cwiseAbs().maxCoeff() < widest_y)
-        widest = widest.cwiseMax(ways.back().cwiseAbs());
-    }
-  // A pinhole picture that holds all of them, as fine as may be.
-  const double half_height = widest.y() + 2 / focal, half_width = widest.x() + 2 / focal;
-  double fine = kMaxFine * focal;
-  fine = std::min(fine, 0.5 * kMaxFineSide / std::max(half_height, half_width));
-  const int fine_height = 2 * static_cast<int>(std::floor(half_height * fine)),
-            fine_width = 2 * static_cast<int>(std::floor(half_width * fine));
-  const Light wide = pinhole(fine_width, fine_height, 2 * std::atan(0.5 * fine_height / fine));
-  const std::vector<char> object = meets_object(ways);
-  Light light{width, height, {}, object};
-  light.level.reserve(ways.size());
-  for (size_t k = 0; k < ways.size(); ++k)
-    light.level.push_back(ways[k].allFinite()
-                              ? Between(wide, 0.5 * fine_width + fine * ways[k].x(),
-                                        0.5 * fine_height + fine * ways[k].y(), object[k] != 0)
-                              : 0);
-  return light;
+    for (int x = 0; x < width; ++x)
+      rays.push_back(Undistorted({(x + 0.5 - principal.x()) / focal, (y + 0.5 - principal.y()) / focal},
+                                 hidden.k1, hidden.k2));
+  return {width, height, light_along(rays)};
 }
 
 void Develop(const HiddenCamera& hidden, Light* light) {

@@ -24,9 +24,6 @@ struct HiddenCamera {
   // None: the camera's own dark ground and its even noise (camera.h).
   std::optional<double> ground_grey, sigma_grey;
   double noise_gain = 0;
-
-  bool ChangesLens() const { return focal_relative != 0 || !principal_px.isZero() || k1 != 0 || k2 != 0; }
-  bool ChangesLight() const { return vignetting != 0 || defocus_px != 0 || stops != 0 || gamma != 1; }
 };
 
 // "radial_distortion.k1=-0.2", "camera_rotation.rotation_deg=0,0,0.5": names and units of the catalogue's image effects,
@@ -44,19 +41,15 @@ Eigen::Affine3d RealPose(const HiddenCamera& hidden, const Eigen::Affine3d& from
 struct Light {
   int width = 0, height = 0;
   std::vector<double> level;
-  std::vector<char> shows_object;  // pixels that do not show the ground; none: that makes no difference
 };
 
-// A pinhole picture of this vertical field of view (rad), its axis through the middle.
-using Pinhole = std::function<Light(int width, int height, double vertical_fov_rad)>;
-// Which rays meet the object; a ray by where it passes one step before the eye: right, down.
-using MeetsObject = std::function<std::vector<char>(const std::vector<Eigen::Vector2d>& rays)>;
+// The light of rays, each by where it passes one step before the eye: right, down.
+using LightAlong = std::function<std::vector<double>(const std::vector<Eigen::Vector2d>& rays)>;
 
-// What falls on the sensor through the real lens of a camera that is nominally a pinhole of this size and field of view:
-// its pixels' centres are looked up in a finer and wider pinhole picture, and the outline is where the rays themselves
-// leave the object, so that it stays as sharp as the pinhole's. The nominal picture if the lens is ideal.
+// What falls on the pixels' centres through the real lens of a camera that is nominally a pinhole of this size and
+// vertical field of view (rad), its axis through the middle.
 Light ThroughLens(const HiddenCamera& hidden, int width, int height, double vertical_fov_rad,
-                  const Pinhole& pinhole, const MeetsObject& meets_object);
+                  const LightAlong& light_along);
 
 // Vignetting, defocus, exposure with its clipping at white, response. In place.
 void Develop(const HiddenCamera& hidden, Light* light);
