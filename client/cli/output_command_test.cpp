@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
+#include <map>
 #include <ostream>
 #include <set>
 #include <sstream>
@@ -127,19 +128,34 @@ std::vector<OutputCase> Cases() {
 class OutputCommandTest : public RealBinaryTest, public ::testing::WithParamInterface<OutputCase> {
  protected:
   void SetUp() override {
-    ASSERT_EQ(Run({"model", "new", "-o", "model.yaml"}).exit_code, 0);
-    ASSERT_EQ(Run({"model", "add", "model.yaml", "tip_radius", "radius_mm=3", "-o", "tips.yaml"}).exit_code,
-              0);
+    // Made once: six starts of the program before each test took longer than the tests.
+    static const auto* const files = new std::map<std::string, std::string>(MakeInputs());
+    for (const auto& [name, bytes] : *files) {
+      ASSERT_FALSE(bytes.empty()) << name << " was not made";
+      Write(name, bytes);
+    }
+  }
+
+  // What the commands read, by name. In this test's folder, which is empty again afterwards.
+  std::map<std::string, std::string> MakeInputs() {
     Write("map.csv",
           "object,x_mm,y_mm,z_mm,departure_mm,std_dev_mm,length_mm,rms_mm\nmine,50,0,0,0.1,0.02,22,0.3\n");
     Write("also.yaml", "not read before the outputs are checked");
-    ASSERT_EQ(Run({"mesh", "supershape", "lat20", "--triangles", "200", "-o", "mine.off"}).exit_code, 0);
-    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o",
-                   "plan.csv"})
-                  .exit_code,
-              0);
-    ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "set.csv"}).exit_code, 0);
-    ASSERT_EQ(Run({"session", "import", "set.csv", "-o", "session.db"}).exit_code, 0);
+    const std::vector<std::vector<std::string>> commands = {
+        {"model", "new", "-o", "model.yaml"},
+        {"model", "add", "model.yaml", "tip_radius", "radius_mm=3", "-o", "tips.yaml"},
+        {"mesh", "supershape", "lat20", "--triangles", "200", "-o", "mine.off"},
+        {"plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o", "plan.csv"},
+        {"touch", "--plan", "plan.csv", "-o", "set.csv"},
+        {"session", "import", "set.csv", "-o", "session.db"}};
+    for (const std::vector<std::string>& command : commands) EXPECT_EQ(Run(command).exit_code, 0);
+    std::map<std::string, std::string> files;
+    for (const char* name : {"map.csv", "also.yaml", "model.yaml", "tips.yaml", "mine.off", "plan.csv",
+                             "set.csv", "session.db"}) {
+      files[name] = Read(name);
+      fs::remove(Path(name));
+    }
+    return files;
   }
 
   std::string Out(const std::string& stem) const { return stem + GetParam().ending; }
@@ -304,7 +320,7 @@ TEST_F(OutputsTest, TheSetIsNotTakenForTheFileOfTheReport) {
 TEST_F(OutputsTest, PhotographsOfAPlanReplaceNothing) {
   ASSERT_EQ(Run({"plan", "lat20", "--count", "3", "-o", "plan.csv"}).exit_code, 0);
   fs::create_directory(Path("views"));
-  for (const std::string& standing : {"views/touch-0002.png", "views/touch-0001.mask.png"}) {
+  for (const std::string standing : {"views/touch-0002.png", "views/touch-0001.mask.png"}) {
     Write(standing, "precious");
     const std::vector<std::string> capture = {"capture", "lat20", "--plan",         "plan.csv",
                                               "--image", "16x16", "--renderer",     "cpu",

@@ -50,6 +50,11 @@ struct TouchFlags {
 void AddTouchOptions(CLI::App* command, TouchFlags* options);
 absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& options);
 
+// The cameras of a plan of photographs (a file with the columns of images.csv) that are of `object`, in the order of its
+// rows. None (no value) if the file is a plan of touches. NOT_FOUND, with the objects that it has, where no row is.
+absl::StatusOr<std::optional<std::vector<v1::View>>> ReadViews(const std::string& path,
+                                                               const std::string& object);
+
 // Reads a plan or measurement file.
 absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path);
 

@@ -1,8 +1,8 @@
 // What holds for every effect of a photograph, as contract_test.cpp has it for touches.
-#include <Eigen/Geometry>
 #include <absl/strings/match.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <set>
 

@@ -22,9 +22,4 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
                                                         const DiagnosisContext& context,
                                                         Expectation* expectation = nullptr);
 
-// Diagnose, with at most `max_photographs` further ones that would tell the explanations that are left apart.
-absl::StatusOr<PhotographDiagnosis> ProposePhotographs(const DiagnosisInput& input, int max_photographs,
-                                                       const DiagnosisContext& context,
-                                                       Expectation* expectation = nullptr);
-
 }  // namespace touchstone::diagnosis::images

@@ -8,7 +8,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/images/photo_candidates.h"
 #include "server/diagnosis/images/photo_covariates.h"
+#include "server/diagnosis/images/photo_formula.h"
 #include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone::diagnosis::images {
@@ -62,6 +64,8 @@ class PhotoLadder {
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
     JudgeRest();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        d_.candidates, RankPhotoCandidates(photographs_, selection_, d_.noise_floor.sigma_grey, pool_));
     d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
                  : !d_.steps.empty() ? selection::Verdict::kMissingEffects
                  : values_wrong_     ? selection::Verdict::kWrongValues
@@ -183,6 +187,22 @@ class PhotoLadder {
     return expected.ok() ? TestCovariates(*selection_.photographs, *expected) : std::vector<PhotoCovariate>();
   }
 
+  // A formula or a curve that says what is left.
+  void AddSuggestion(UnexplainedPhotographs* rest) const {
+    const std::optional<RestSuggestion> found =
+        SuggestForRest(photographs_, *selection_.photographs, improved_,
+                       {rest->rmse_grey, rest->heldout_rmse_grey, d_.noise_floor.sigma_grey}, pool_);
+    if (!found) return;
+    rest->formula = found->formula;
+    rest->formula_yaml = found->formula_yaml;
+    rest->lookup_yaml = found->lookup_yaml;
+    rest->rmse_grey = found->rmse_grey;
+    rest->heldout_rmse_grey = found->heldout_rmse_grey;
+    rest->heldout_gain = found->heldout_gain;
+    std::stable_partition(rest->covariates.begin(), rest->covariates.end(),
+                          [&](const auto& test) { return test.name == found->covariate; });
+  }
+
   // A structure that no named effect explains.
   void JudgeRest() {
     const inference::Likelihood& likelihood = *selection_.fine.likelihood;
@@ -203,13 +223,7 @@ class PhotoLadder {
     rest.heldout_rmse_grey = d_.final->heldout_rmse_grey;
     for (const PhotoCovariate& c : curves)
       if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
-    if (!curves.empty() && curves[0].p < kRestP && curves[0].unseen_gain > kCurveGain) {
-      rest.lookup_yaml = LookupYaml(curves[0]);
-      const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), all2 = std::pow(rest.rmse_grey, 2);
-      rest.heldout_gain =
-          all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
-      rest.heldout_rmse_grey = rest.heldout_rmse_grey * std::sqrt(std::max(1 - curves[0].unseen_gain, 0.0));
-    }
+    AddSuggestion(&rest);
     if (selection_.field >= 0)
       absl::StrAppend(
           &rest.words,

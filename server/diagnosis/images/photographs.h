@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/images/photo_explanations.h"
 #include "server/diagnosis/images/pixel_noise.h"
 #include "server/diagnosis/input.h"
 #include "server/image/simulate_photo.h"
@@ -55,6 +56,7 @@ struct Expectation {
   Photographs photographs;
   std::vector<image::Photo> before;  // of the given model, with details
   std::vector<image::Photo> after;   // of the improved model, with details; empty if nothing changed
+  ExplanationsLeft left;             // none unless a diagnosis was made
 };
 
 }  // namespace touchstone::diagnosis::images
