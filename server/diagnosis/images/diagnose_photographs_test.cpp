@@ -119,6 +119,8 @@ TEST(DiagnosePhotographs, NamesBothOfAPair) {
 // set of both was once called UNEXPLAINED.
 TEST(DiagnosePhotographs, NamesALensBesideAnExposureThatAlbedoCouldHold) {
   HiddenCamera rig;
+  rig.photographs = 6;
+  rig.side_px = 112;
   rig.hidden = {{"radial_distortion", {"k1=-0.18", "k2=0.035"}}, {"exposure", {"stops=0.4"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);

@@ -137,4 +137,16 @@ absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoR
   return seen > 0 ? std::sqrt(largest / seen) : 1;
 }
 
+double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+                     double floor_grey) {
+  if (fit.model.size() == 0) return 0;
+  const double rows = search.rows->rows();
+  const double seen = fit.columns.values.col(0).squaredNorm();
+  const double unseen = std::max(inference::HeldOutRmse(*search.experiment, fit),
+                                 inference::HeldOutRmseByBlock(*search.experiment, fit));
+  const double pixels =
+      static_cast<double>(photographs.width()) * photographs.height() * search.rows->photographs();
+  return std::max(rows * unseen * unseen - seen, 0.0) * floor_grey * floor_grey / pixels;
+}
+
 }  // namespace touchstone::diagnosis::images

@@ -36,4 +36,9 @@ void JudgeByPixels(const Photographs& photographs, const GreyNoiseFloor& floor, 
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
                                     const inference::Experiment& experiment, const inference::Fit& fit);
 
+// For a ranking of many fits, quickly: what pictures have as mean square grey levels beyond those that the fit saw, where
+// one linear step of it makes up for what is left out. Of a step that is claimed, see HeldOutRatio.
+double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+                     double floor_grey);
+
 }  // namespace touchstone::diagnosis::images
