@@ -1,0 +1,132 @@
+// touchstone diagnose --board on the command line: real pictures, and what is refused.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/real_binary_test.h"
+#include "server/base/sanitizers.h"
+#include "touchstone_test_paths.h"
+
+namespace touchstone::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// OpenCV's chessboard pictures; TOUCHSTONE_CHESSBOARD names another folder of them.
+std::string Chessboards() {
+  const char* other = std::getenv("TOUCHSTONE_CHESSBOARD");
+  return other != nullptr ? other : TOUCHSTONE_SHARED_DATA "/camera/opencv_chessboard";
+}
+// OpenCV's own calibration of the same corners, and its error on left-out pictures: board_pictures_test.cpp computes both.
+constexpr double kOpenCvK1 = -0.2843, kOpenCvHeldoutPx = 0.1943;
+
+class BoardCommand : public RealBinaryTest {
+ protected:
+  // The error of a command that must be refused.
+  std::string Refused(std::vector<std::string> more) {
+    std::vector<std::string> command = {"diagnose"};
+    command.insert(command.end(), more.begin(), more.end());
+    const Outcome outcome = Run(command);
+    EXPECT_NE(outcome.exit_code, 0) << outcome.out;
+    EXPECT_LT(outcome.exit_code, 128) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    return outcome.err;
+  }
+  // `count` of OpenCV's pictures.
+  void CopyBoards(const std::string& name, size_t count) {
+    fs::create_directories(Path(name));
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(Chessboards()))
+      if (entry.path().extension() == ".jpg") files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    ASSERT_GE(files.size(), count);
+    for (size_t i = 0; i < count; ++i) fs::copy_file(files[i], fs::path(Path(name)) / files[i].filename());
+  }
+};
+
+TEST_F(BoardCommand, RealPicturesNameRadialDistortionInPixels) {
+  if (!fs::exists(Chessboards())) GTEST_SKIP() << Chessboards() << " is not there";
+  if (kUnderSanitizers) GTEST_SKIP() << "diagnosis_boards_test runs the same search";
+  const Outcome outcome = Run({"diagnose", Chessboards(), "--board", "9x6", "--square-mm", "25", "--json",
+                               "report.json", "--save-model", "lens.yaml"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("Reprojection error"), HasSubstr("+ radial_distortion"),
+                                 HasSubstr("px a coordinate")));
+  const nlohmann::json report = nlohmann::json::parse(Read("report.json"), nullptr, false);
+  const nlohmann::json* radial = nullptr;
+  for (const nlohmann::json& step : report["steps"]) {
+    EXPECT_GT(step["heldout_rmse_px"].get<double>(), 0);
+    if (step["effect"] == "radial_distortion") radial = &step;
+  }
+  ASSERT_NE(radial, nullptr) << outcome.out;
+  EXPECT_NEAR((*radial)["parameters"][0]["value"].get<double>(), kOpenCvK1, 0.02);
+  const auto px = [&](const char* of, const char* what) { return report[of][what].get<double>(); };
+  EXPECT_LT(px("final", "heldout_rmse_px"), 1.05 * kOpenCvHeldoutPx);
+  EXPECT_GT(px("initial", "heldout_rmse_px"), 3 * kOpenCvHeldoutPx);
+  EXPECT_NEAR(report["steps"].back()["rmse_px"].get<double>(), px("final", "rmse_px"), 1e-9);
+  EXPECT_LT(px("initial", "lack_of_fit_p"), 1e-3);
+  // Two coordinates a corner; what the fits of poses and lens take away is less than a tenth.
+  EXPECT_NEAR(report["noise_floor"]["sigma_px"].get<double>(), px("final", "rmse_px") / std::sqrt(2.0),
+              0.1 * px("final", "rmse_px"));
+  EXPECT_THAT(Read("lens.yaml"), HasSubstr("radial_distortion"));
+}
+
+TEST_F(BoardCommand, TooFewBoardsGiveNoVerdictAndNoErrors) {
+  if (!fs::exists(Chessboards())) GTEST_SKIP() << Chessboards() << " is not there";
+  CopyBoards("two", 2);
+  const Outcome two = Run({"diagnose", "two", "--board", "9x6", "--square-mm", "25", "--json", "two.json"});
+  EXPECT_EQ(two.exit_code, 0) << two.err;
+  EXPECT_THAT(two.out, HasSubstr("found in 2 pictures; 5 are needed"));
+  const nlohmann::json report = nlohmann::json::parse(Read("two.json"), nullptr, false);
+  EXPECT_EQ(report["verdict"], "TOO_LITTLE_DATA");
+  EXPECT_TRUE(report["steps"].empty());
+  EXPECT_TRUE(report.value("initial", nlohmann::json()).is_null()) << report["initial"];
+  // Inner corners, not squares.
+  const Outcome none = Run({"diagnose", "two", "--board", "10x7", "--square-mm", "25"});
+  EXPECT_EQ(none.exit_code, 0) << none.err;
+  EXPECT_THAT(none.out,
+              AllOf(HasSubstr("found in 0 pictures"), HasSubstr("Is 10x7 the number of its inner corners")));
+}
+
+TEST_F(BoardCommand, WhatCannotBeIsRefusedByName) {
+  EXPECT_THAT(Refused({"absent", "--board", "9x6", "--square-mm", "25"}),
+              AllOf(HasSubstr("absent"), HasSubstr("a folder of pictures was expected")));
+  fs::create_directories(Path("empty"));
+  EXPECT_THAT(Refused({"empty", "--board", "9x6", "--square-mm", "25"}), HasSubstr("holds no picture"));
+  Write("empty/a.png", "no picture");
+  EXPECT_THAT(Refused({"empty", "--board", "9x6", "--square-mm", "25"}), HasSubstr("a.png: cannot be read"));
+  for (const char* size : {"9", "9x2", "9x6x3", "1000x6", "-9x6", "nine"})
+    EXPECT_THAT(Refused({"empty", "--board", size, "--square-mm", "25"}), HasSubstr("--board: ")) << size;
+  for (const char* side : {"-25", "nan", "1e9", "inf"})
+    EXPECT_THAT(Refused({"empty", "--board", "9x6", "--square-mm", side}), HasSubstr("--square-mm: "))
+        << side;
+  EXPECT_THAT(Refused({"empty", "--board", "9x6"}), HasSubstr("Give --square-mm"));
+  EXPECT_THAT(Refused({"empty", "--square-mm", "25"}), HasSubstr("Give --board"));
+}
+
+TEST_F(BoardCommand, OptionsThatABoardDoesNotHaveAreRefused) {
+  fs::create_directories(Path("empty"));
+  const std::vector<std::pair<std::string, std::string>> options = {
+      {"--html", "page.html"},   {"--server", "127.0.0.1:1"}, {"--also", "more.yaml"},
+      {"--mesh", "cup=cup.off"}, {"--mesh-dir", "empty"},     {"--keep-as", "lens"}};
+  for (const auto& [name, value] : options) {
+    if (name == "--also") Write(value, "effects: []\n");
+    if (name == "--mesh") Write("cup.off", "OFF\n");
+    EXPECT_THAT(Refused({"empty", "--board", "9x6", "--square-mm", "25", name, value}), HasSubstr(name))
+        << name;
+  }
+  EXPECT_THAT(Refused({"empty", "--board", "9x6", "--square-mm", "25", "--with-formula"}),
+              HasSubstr("--with-formula"));
+  EXPECT_FALSE(fs::exists(Path("page.html")));
+}
+
+}  // namespace
+}  // namespace touchstone::cli
