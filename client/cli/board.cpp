@@ -28,6 +28,8 @@ absl::Status CheckBoardOptions(const Cli& cli, const ComparisonOptions& options,
   if (!cli.source().servers.empty())
     return absl::InvalidArgumentError(
         "--server: pictures of a board are diagnosed by this program; leave --server out");
+  if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty())
+    return absl::InvalidArgumentError("--mesh, --mesh-dir: a board needs no mesh; leave them out");
   if (!options.also.empty())
     return absl::InvalidArgumentError(
         "--also: effects of your own take no part in the diagnosis of a board; leave it out");
@@ -55,17 +57,26 @@ std::string VerdictWords(const v1::Report& report) {
   }
 }
 
-std::string BoardReportInWords(const v1::Report& report) {
-  std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n\n");
-  const auto add_error = [&](const std::string& name, double rmse_px, double heldout_rmse_px) {
-    absl::StrAppendFormat(&words, "%-20s %9.4f px %9.4f px\n", name, rmse_px, heldout_rmse_px);
+// The reprojection error after each step.
+std::string LadderInWords(const v1::Report& report) {
+  if (!report.has_initial()) return "";
+  std::string words = absl::StrFormat("\n%-22s %12s %12s %12s\n", "Reprojection error", "fitted px",
+                                      "left-out px", "lack of fit");
+  const auto add = [&](const std::string& name, const auto& quality) {
+    absl::StrAppendFormat(&words, "%-22s %12.4f %12.4f   p = %.2g\n", name, quality.rmse_px(),
+                          quality.heldout_rmse_px(), quality.lack_of_fit_p());
   };
-  if (report.has_initial()) {
-    absl::StrAppendFormat(&words, "%-20s %12s %12s\n", "Reprojection error", "pictures", "left out");
-    add_error("  as given", report.initial().rmse_px(), report.initial().heldout_rmse_px());
-    for (const v1::Step& step : report.steps())
-      add_error(absl::StrCat("  + ", step.effect()), step.rmse_px(), step.heldout_rmse_px());
-  }
+  add("nominal lens", report.initial());
+  for (const v1::Step& step : report.steps()) add(absl::StrCat("+ ", step.effect()), step);
+  if (report.noise_floor().sigma_px() > 0)
+    absl::StrAppendFormat(&words,
+                          "Noise of a corner: %.4f px a coordinate, at most (from residuals, no repeats)\n",
+                          report.noise_floor().sigma_px());
+  return words;
+}
+
+std::string BoardReportInWords(const v1::Report& report) {
+  std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n");
   for (const v1::Step& step : report.steps()) {
     absl::StrAppend(&words, "\n", step.effect(), "  probability ",
                     absl::StrFormat("%.3f", step.probability()), "\n");
@@ -76,6 +87,7 @@ std::string BoardReportInWords(const v1::Report& report) {
       absl::StrAppend(&words, "  these pictures cannot tell it from ", absl::StrJoin(step.equivalent(), ", "),
                       "\n");
   }
+  absl::StrAppend(&words, LadderInWords(report));
   for (const std::string& warning : report.warnings()) absl::StrAppend(&words, "\nNote: ", warning, "\n");
   return words;
 }
@@ -87,7 +99,9 @@ void AddBoardOptions(CLI::App* command, BoardOptions* options) {
       ->add_option(
           "--board", options->corners,
           "SET is a folder of PNG and JPEG pictures of a chessboard with so many inner corners, for instance "
-          "9x6: what the lens differs from a pinhole by (camera.yaml in the folder, else a guess)")
+          "9x6: what the lens differs from a pinhole by (camera.yaml in the folder, else a guess), with "
+          "reprojection "
+          "errors in px. Runs in this program and makes no page: without --server and --html")
       ->type_name("NxM")
       ->group("Board");
   command->add_option("--square-mm", options->square_mm, "Side of one square of the board")

@@ -72,8 +72,15 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
 }
 
 absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
-  if (!options.board.corners.empty())
+  if (!options.board.corners.empty()) {
+    for (const auto& [given, name] : {std::pair{options.with_formula, "--with-formula"},
+                                      std::pair{options.with_surface_map, "--with-surface-map"},
+                                      std::pair{!options.keep_as.empty(), "--keep-as"}})
+      if (given)
+        return absl::InvalidArgumentError(
+            absl::StrCat(name, ": is not for pictures of a board (--board); leave it out"));
     return RunBoardDiagnosis(cli, options, options.board, options.save_model);
+  }
   if (options.board.square_mm != 0)
     return absl::InvalidArgumentError(
         "--square-mm: the side of a square of what board? Give --board, for instance 9x6");

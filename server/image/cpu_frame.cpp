@@ -11,6 +11,20 @@ Vec3f ToFloat(const Eigen::Vector3d& v) {
 
 }  // namespace
 
+void SetRays(CpuFrame* frame) {
+  const View& view = frame->view;
+  const geometry::Bounds& bounds = frame->surface->bounds();
+  frame->forward = ToFloat(view.forward);
+  frame->right = ToFloat(view.right);
+  frame->up = ToFloat(view.up);
+  const double eye_distance_m = (view.eye_m - bounds.Centre()).norm();
+  const bool far_eye = eye_distance_m > kFarEyeRadii * 0.5 * bounds.DiagonalM();
+  frame->start_depth_m = far_eye ? view.near_m : 0.0;
+  frame->start = ToFloat(view.eye_m + frame->start_depth_m * view.forward);
+  frame->start_right = ToFloat(frame->start_depth_m * view.right);
+  frame->start_up = ToFloat(frame->start_depth_m * view.up);
+}
+
 CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh, const Camera& camera,
                       const ImageOptions& options) {
   CpuFrame frame;
@@ -30,16 +44,7 @@ CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh,
     frame.sx[x] = static_cast<float>((x + 0.5 - 0.5 * view.width) * view.step);
   for (int y = 0; y < view.height; ++y)
     frame.sy[y] = static_cast<float>((0.5 * view.height - y - 0.5) * view.step);
-
-  frame.forward = ToFloat(view.forward);
-  frame.right = ToFloat(view.right);
-  frame.up = ToFloat(view.up);
-  const double eye_distance_m = (view.eye_m - surface.bounds().Centre()).norm();
-  const bool far_eye = eye_distance_m > kFarEyeRadii * 0.5 * surface.bounds().DiagonalM();
-  frame.start_depth_m = far_eye ? view.near_m : 0.0;
-  frame.start = ToFloat(view.eye_m + frame.start_depth_m * view.forward);
-  frame.start_right = ToFloat(frame.start_depth_m * view.right);
-  frame.start_up = ToFloat(frame.start_depth_m * view.up);
+  SetRays(&frame);
   return frame;
 }
 

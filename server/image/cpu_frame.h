@@ -47,6 +47,9 @@ inline constexpr double kFarEyeRadii = 100;
 CpuFrame MakeCpuFrame(const geometry::Surface& surface, const ShadingMesh& mesh, const Camera& camera,
                       const ImageOptions& options);
 
+// The rays of a frame whose view and surface are set: forward to start_depth_m.
+void SetRays(CpuFrame* frame);
+
 // The triangle seen through each pixel's centre, for the pixels of a frame's box.
 struct Visibility {
   static constexpr int kPadding =

@@ -8,6 +8,7 @@
 
 #include "server/image/cpu_kernels.h"
 #include "server/image/cpu_vectors.h"
+#include "server/image/ray_triangle.h"
 
 namespace touchstone::image {
 namespace {
@@ -127,12 +128,7 @@ void Draw(const DrawnMesh& mesh, const ProjectedVertices& projected, bool outsid
   for (uint32_t i = 0; i < count; ++i) DrawTriangle(mesh, projected, candidates[i], target);
 }
 
-struct Vectors {
-  Floats x, y, z;
-};
-inline Floats Dot(const Vectors& a, const Vectors& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+using Vectors = Triple<Floats>;
 // start + sx * right + sy * up.
 inline Vectors AlongRay(const float* start, const float* right, const float* up, Floats sx, float sy) {
   return {start[0] + sx * right[0] + sy * up[0], start[1] + sx * right[1] + sy * up[1],
@@ -162,29 +158,19 @@ inline void ShadePixels(const ShadeConstants& c, const DrawnMesh& mesh, const Sh
     position[k] = {fields[0], fields[1], fields[2]};
     normal[k] = {fields[3], fields[4], fields[5]};
   }
-  const Vectors& a = position[0];
-  const Vectors e1 = {position[1].x - a.x, position[1].y - a.y, position[1].z - a.z};
-  const Vectors e2 = {position[2].x - a.x, position[2].y - a.y, position[2].z - a.z};
   const Floats slope_x = LoadUpTo(row.slope_x + column, row.count - column, 0.0f);
   const Vectors d = AlongRay(c.forward, c.right, c.up, slope_x, row.slope_y);
   const Vectors o = AlongRay(c.start, c.start_right, c.start_up, slope_x, row.slope_y);
 
-  // Where the ray meets the triangle's plane (Moeller and Trumbore 1997), kept inside the triangle.
-  const Vectors p = {d.y * e2.z - d.z * e2.y, d.z * e2.x - d.x * e2.z, d.x * e2.y - d.y * e2.x};
-  const Floats determinant = Dot(e1, p);
-  const Floats inverse = 1.0f / (determinant == 0.0f ? Floats{} + 1e-30f : determinant);
-  const Vectors s = {o.x - a.x, o.y - a.y, o.z - a.z};
-  const Vectors q = {s.y * e1.z - s.z * e1.y, s.z * e1.x - s.x * e1.z, s.x * e1.y - s.y * e1.x};
-  const Floats u = Min(Max(Dot(s, p) * inverse, Floats{}), Floats{} + 1.0f);
-  const Floats v = Min(Max(Dot(d, q) * inverse, Floats{}), 1.0f - u);
-  const Floats w = 1.0f - u - v;
+  const TriangleHit<Floats> hit = MeetTriangle(o, d, position[0], position[1], position[2]);
+  const Floats u = hit.u, v = hit.v, w = hit.w;
+  const Vectors& point = hit.point;
 
-  // Interpolated point and normal, turned with the face towards the viewer.
-  const Floats side = determinant < 0.0f ? Floats{} + c.side_of_back : Floats{} + 1.0f;
+  // Interpolated normal, turned with the face towards the viewer.
+  const Floats side = hit.determinant < 0.0f ? Floats{} + c.side_of_back : Floats{} + 1.0f;
   const Vectors n = {side * (w * normal[0].x + u * normal[1].x + v * normal[2].x),
                      side * (w * normal[0].y + u * normal[1].y + v * normal[2].y),
                      side * (w * normal[0].z + u * normal[1].z + v * normal[2].z)};
-  const Vectors point = {a.x + u * e1.x + v * e2.x, a.y + u * e1.y + v * e2.y, a.z + u * e1.z + v * e2.z};
   const Floats nn = Dot(n, n);
   const Floats shade = c.ambient + c.key_strength * Cosine(c.key, point, n, nn) +
                        c.fill_strength * Cosine(c.fill, point, n, nn);

@@ -9,15 +9,12 @@
 #include <embree3/rtcore.h>
 
 #include "server/image/photo_rays.h"
+#include "server/image/ray_triangle.h"
 
 namespace touchstone::image {
 namespace {
 
 constexpr int kPhotoTileSide = 4;
-
-Vec3f SingleOf(const Eigen::Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
 
 View ViewOf(const PhotoCamera& camera, int width, int height) {
   View view;
@@ -84,15 +81,7 @@ CpuFrame MakePhotoFrame(const geometry::Surface& surface, const ShadingMesh& mes
   frame.middle_x = lens.cx, frame.middle_y = lens.cy;
   frame.step_x = 1 / lens.fx, frame.step_y = 1 / lens.fy;
   frame.outside_only = mesh.outward && SeesOnlyOutside(frame.view, surface.bounds());
-  frame.forward = SingleOf(camera.forward);
-  frame.right = SingleOf(camera.right);
-  frame.up = SingleOf(camera.up);
-  const double eye_distance_m = (camera.eye_m - surface.bounds().Centre()).norm();
-  const bool far_eye = eye_distance_m > kFarEyeRadii * 0.5 * surface.bounds().DiagonalM();
-  frame.start_depth_m = far_eye ? camera.near_m : 0.0;
-  frame.start = SingleOf(camera.eye_m + frame.start_depth_m * camera.forward);
-  frame.start_right = SingleOf(frame.start_depth_m * camera.right);
-  frame.start_up = SingleOf(frame.start_depth_m * camera.up);
+  SetRays(&frame);
   return frame;
 }
 
@@ -172,7 +161,7 @@ struct CornerBlock {
   alignas(64) float sx[kLanes] = {}, sy[kLanes] = {};
 };
 
-// As in cpu_shading.cpp: where the ray meets the triangle's plane (Moeller and Trumbore 1997), kept inside the triangle.
+// Where the ray of each lane meets its triangle, and what stands there.
 void MeetTriangles(const CpuFrame& frame, float scale, const CornerBlock& block, int first,
                    PhotoPoints* points) {
   const auto& a = block.corner[0];
@@ -189,9 +178,6 @@ void MeetTriangles(const CpuFrame& frame, float scale, const CornerBlock& block,
   float* const cosine = &points->cos_incidence[first];
 #pragma GCC ivdep
   for (int i = 0; i < CornerBlock::kLanes; ++i) {
-    const float ax = a[0][i], ay = a[1][i], az = a[2][i];
-    const float e1x = b[0][i] - ax, e1y = b[1][i] - ay, e1z = b[2][i] - az;
-    const float e2x = c[0][i] - ax, e2y = c[1][i] - ay, e2z = c[2][i] - az;
     const float slope_x = block.sx[i], slope_y = block.sy[i];
     const float dx = frame.forward.x + slope_x * frame.right.x + slope_y * frame.up.x;
     const float dy = frame.forward.y + slope_x * frame.right.y + slope_y * frame.up.y;
@@ -199,26 +185,20 @@ void MeetTriangles(const CpuFrame& frame, float scale, const CornerBlock& block,
     const float ox = frame.start.x + slope_x * frame.start_right.x + slope_y * frame.start_up.x;
     const float oy = frame.start.y + slope_x * frame.start_right.y + slope_y * frame.start_up.y;
     const float oz = frame.start.z + slope_x * frame.start_right.z + slope_y * frame.start_up.z;
-    const float px = dy * e2z - dz * e2y, py = dz * e2x - dx * e2z, pz = dx * e2y - dy * e2x;
-    const float determinant = e1x * px + e1y * py + e1z * pz;
-    const float inverse = 1.0f / (determinant == 0.0f ? 1e-30f : determinant);
-    const float sx = ox - ax, sy = oy - ay, sz = oz - az;
-    const float qx = sy * e1z - sz * e1y, qy = sz * e1x - sx * e1z, qz = sx * e1y - sy * e1x;
-    const float free_u = (sx * px + sy * py + sz * pz) * inverse;
-    const float free_v = (dx * qx + dy * qy + dz * qz) * inverse;
-    const float low_u = free_u > 0.0f ? free_u : 0.0f;
-    const float u = low_u < 1.0f ? low_u : 1.0f;
-    const float low_v = free_v > 0.0f ? free_v : 0.0f;
-    const float v = low_v < 1.0f - u ? low_v : 1.0f - u;
-    const float w = 1.0f - u - v;
-    const float x = ax + u * e1x + v * e2x, y = ay + u * e1y + v * e2y, z = az + u * e1z + v * e2z;
+    const TriangleHit<float> hit =
+        MeetTriangle<float>({ox, oy, oz}, {dx, dy, dz}, {a[0][i], a[1][i], a[2][i]},
+                            {b[0][i], b[1][i], b[2][i]}, {c[0][i], c[1][i], c[2][i]});
+    const float u = hit.u, v = hit.v, w = hit.w;
+    const float x = hit.point.x, y = hit.point.y, z = hit.point.z;
 
     // Interpolated normal, turned with the face towards the viewer.
-    const float side = determinant < 0.0f ? side_of_back : 1.0f;
+    const float side = hit.determinant < 0.0f ? side_of_back : 1.0f;
     const float nx = side * (w * a[3][i] + u * b[3][i] + v * c[3][i]);
     const float ny = side * (w * a[4][i] + u * b[4][i] + v * c[4][i]);
     const float nz = side * (w * a[5][i] + u * b[5][i] + v * c[5][i]);
     const float n = 1.0f / std::sqrt(nx * nx + ny * ny + nz * nz + 1e-30f);
+    const float e1x = hit.e1.x, e1y = hit.e1.y, e1z = hit.e1.z;
+    const float e2x = hit.e2.x, e2y = hit.e2.y, e2z = hit.e2.z;
     const float gx = e1y * e2z - e1z * e2y, gy = e1z * e2x - e1x * e2z, gz = e1x * e2y - e1y * e2x;
     const float towards = gx * dx + gy * dy + gz * dz > 0.0f ? -1.0f : 1.0f;
     const float g = towards / std::sqrt(gx * gx + gy * gy + gz * gz + 1e-30f);

@@ -43,6 +43,22 @@ size_t CsvLines::left() const {
   return std::count(rest_.begin(), rest_.end(), '\n') + 1;
 }
 
+absl::StatusOr<std::vector<std::string>> ReadCsvHeader(const std::string& origin, absl::string_view example,
+                                                       size_t max_columns, CsvLines* lines,
+                                                       CsvFields* fields) {
+  const auto wrong = [&](absl::string_view what) {
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":1: ", what));
+  };
+  absl::string_view header;
+  if (!lines->Next(&header) || absl::StripAsciiWhitespace(header).empty())
+    return wrong(absl::StrCat("a header line was expected (", example, ")"));
+  if (absl::Status status = fields->Cut(header); !status.ok()) return wrong(status.message());
+  const size_t columns = fields->all().size();
+  if (columns > max_columns)
+    return wrong(absl::StrCat("has ", columns, " columns; at most ", max_columns, " are read"));
+  return std::vector<std::string>(fields->all().begin(), fields->all().end());
+}
+
 absl::StatusOr<double> FieldNumber(absl::string_view field) {
   if (field.empty()) return absl::InvalidArgumentError("is empty; a number was expected");
   absl::string_view digits = field;

@@ -41,6 +41,12 @@ class CsvLines {
   int number_ = 0;
 };
 
+// The header's names, read into `fields` from the first line; INVALID_ARGUMENT with the line where there is none, or one of
+// more columns than `max_columns`. `example`: how a header begins.
+absl::StatusOr<std::vector<std::string>> ReadCsvHeader(const std::string& origin, absl::string_view example,
+                                                       size_t max_columns, CsvLines* lines,
+                                                       CsvFields* fields);
+
 // The number that a field holds, infinities and NaN among them: whether those are right depends on the column. The
 // error says what the field is and what was expected, not where.
 absl::StatusOr<double> FieldNumber(absl::string_view field);

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <set>
 
+#include <Eigen/Geometry>
+
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -237,15 +239,10 @@ absl::StatusOr<ImageSet> ParseImagesCsv(absl::string_view csv, const std::string
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(CsvLines lines, CsvLines::Open(csv, origin));
   CsvFields fields;
-  absl::string_view header;
-  if (!lines.Next(&header) || absl::StripAsciiWhitespace(header).empty())
-    return wrong(1, "a header line was expected (image,file,object,eye_x_mm,...)");
-  if (absl::Status status = fields.Cut(header); !status.ok()) return wrong(1, status.message());
-  if (fields.all().size() > kMaxImageColumns)
-    return wrong(
-        1, absl::StrCat("has ", fields.all().size(), " columns; at most ", kMaxImageColumns, " are read"));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<ImageColumn> columns,
-                              ReadImageColumns({fields.all().begin(), fields.all().end()}, origin));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const std::vector<std::string> names,
+      ReadCsvHeader(origin, "image,file,object,eye_x_mm,...", kMaxImageColumns, &lines, &fields));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<ImageColumn> columns, ReadImageColumns(names, origin));
   for (const ImageColumn& column : columns) {
     set.has_session_time = set.has_session_time || column.kind == ImageColumnKind::kSessionTime;
     set.has_round = set.has_round || column.kind == ImageColumnKind::kRound;

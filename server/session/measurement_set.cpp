@@ -236,14 +236,8 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(CsvLines lines, CsvLines::Open(csv, origin));
   CsvFields fields;
-  absl::string_view header;
-  if (!lines.Next(&header) || absl::StripAsciiWhitespace(header).empty())
-    return wrong(1, "a header line was expected (touch,object,...)");
-  if (absl::Status status = fields.Cut(header); !status.ok()) return wrong(1, status.message());
-  if (fields.all().size() > kMaxColumns)
-    return wrong(1,
-                 absl::StrCat("has ", fields.all().size(), " columns; at most ", kMaxColumns, " are read"));
-  const std::vector<std::string> names(fields.all().begin(), fields.all().end());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> names,
+                              ReadCsvHeader(origin, "touch,object,...", kMaxColumns, &lines, &fields));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Columns columns, ReadColumns(names, origin));
   set.fingers = columns.fingers;
   set.has_poses = columns.has_poses;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -49,9 +50,27 @@ EntryName NameOf(int entry) {
   }
 }
 
-BoardQuality QualityOf(const BoardSet& set, const LensChoice& choice) {
+// `fullest`: the choice of all terms.
+BoardQuality QualityOf(const BoardSet& set, const LensChoice& choice, const LensChoice& fullest) {
   const double corners = static_cast<double>(set.pictures.size()) * set.board.corners();
-  return {std::sqrt(choice.fit.sum_px2 / corners), std::sqrt(SumOf(choice.unseen_px2) / corners)};
+  return {std::sqrt(choice.fit.sum_px2 / corners), std::sqrt(SumOf(choice.unseen_px2) / corners),
+          LackOfFitP(choice, fullest)};
+}
+
+LensChoice FitAllTerms(const BoardSet& set, const BoardFit& start) {
+  std::vector<int> terms(LensTerms().size());
+  std::iota(terms.begin(), terms.end(), 0);
+  return FitChoice(set, start, terms);
+}
+
+// From the residuals of the lens with all terms: two readings a corner, less what was fitted.
+BoardNoise NoiseOf(const BoardSet& set, const LensChoice& fullest) {
+  BoardNoise noise;
+  noise.degrees_of_freedom =
+      static_cast<int>(set.pictures.size()) * (2 * set.board.corners() - 6) - kLensEntries;
+  if (noise.degrees_of_freedom > 0)
+    noise.sigma_px = std::sqrt(fullest.fit.sum_px2 / noise.degrees_of_freedom);
+  return noise;
 }
 
 // Standard deviations of the lens over sets of as many pictures, drawn from the set's with replacement.
@@ -108,7 +127,7 @@ void Weigh(const BoardSet& set, const LensChoice& last, int term, BoardStep* ste
 }
 
 // What no effect of the catalogue has and left-out pictures are predicted better with, one after the other.
-std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now) {
+std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now, const LensChoice& fullest) {
   std::vector<BoardRest> rest;
   for (;;) {
     std::optional<LensChoice> best;
@@ -127,7 +146,7 @@ std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now) {
     BoardRest found;
     found.name = term.name;
     found.gain_nats = gain;
-    found.quality = QualityOf(set, *best);
+    found.quality = QualityOf(set, *best, fullest);
     for (const int entry : term.entries)
       found.values.emplace_back(NameOf(entry).parameter, best->fit.lens[entry]);
     rest.push_back(std::move(found));
@@ -165,8 +184,14 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
                            quality.heldout_rmse_px);
   };
   if (diagnosis.verdict == selection::Verdict::kTooLittleData)
-    return absl::StrFormat("The board was found in %d pictures; %d are needed, from different sides.",
-                           diagnosis.pictures, diagnosis.pictures_needed);
+    return absl::StrFormat(
+        "The board was found in %d pictures; %d are needed, from different sides.%s", diagnosis.pictures,
+        diagnosis.pictures_needed,
+        diagnosis.pictures > 0
+            ? ""
+            : absl::StrFormat(" Is %dx%d the number of its inner corners, where four squares "
+                              "meet, and is the whole board in the pictures?",
+                              set.board.columns, set.board.rows));
   std::string words =
       absl::StrFormat("Reprojection error of %d corners in %d pictures: %s with the nominal lens%s.",
                       diagnosis.corners, diagnosis.pictures, error(*diagnosis.initial),
@@ -192,7 +217,8 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
   return words;
 }
 
-void AddSteps(const BoardSet& set, const LensSearch& search, uint64_t seed, BoardDiagnosis* diagnosis) {
+void AddSteps(const BoardSet& set, const LensSearch& search, const LensChoice& fullest, uint64_t seed,
+              BoardDiagnosis* diagnosis) {
   const LensChoice& last = search.ladder.back();
   const LensVector errors = ResampledErrors(set, last, seed);
   const double t =
@@ -203,7 +229,7 @@ void AddSteps(const BoardSet& set, const LensSearch& search, uint64_t seed, Boar
     step.effect = term.name;
     step.gain_nats = search.gain_nats[k];
     step.parameters = Estimates(term, last.fit.lens, errors, t);
-    step.quality = QualityOf(set, search.ladder[k + 1]);
+    step.quality = QualityOf(set, search.ladder[k + 1], fullest);
     Weigh(set, last, last.terms[k], &step);
     if (const auto effect = effects::Catalogue().Find(term.name)) {
       step.meaning = effect->meaning;
@@ -252,11 +278,13 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   through_model.camera = LensOfModel(set.camera, model);
   TOUCHSTONE_ASSIGN_OR_RETURN(const BoardFit start, StartFit(through_model));
   const LensSearch search = SearchNamed(through_model, start);
-  diagnosis.initial = QualityOf(through_model, search.ladder.front());
-  diagnosis.final = QualityOf(through_model, search.ladder.back());
+  const LensChoice fullest = FitAllTerms(through_model, search.ladder.back().fit);
+  diagnosis.initial = QualityOf(through_model, search.ladder.front(), fullest);
+  diagnosis.final = QualityOf(through_model, search.ladder.back(), fullest);
+  diagnosis.noise = NoiseOf(through_model, fullest);
   diagnosis.lens = search.ladder.back().fit.lens;
-  AddSteps(through_model, search, seed, &diagnosis);
-  diagnosis.rest = FindRest(through_model, search.ladder.back());
+  AddSteps(through_model, search, fullest, seed, &diagnosis);
+  diagnosis.rest = FindRest(through_model, search.ladder.back(), fullest);
   diagnosis.verdict = !diagnosis.rest.empty()    ? selection::Verdict::kUnexplained
                       : !diagnosis.steps.empty() ? selection::Verdict::kMissingEffects
                                                  : selection::Verdict::kAdequate;

@@ -28,6 +28,14 @@ inline constexpr double kMinGainNats = 3;
 struct BoardQuality {
   double rmse_px = 0;          // lens and poses fitted to all corners
   double heldout_rmse_px = 0;  // of left-out pictures, as above
+  double lack_of_fit_p = 0;    // LackOfFitP against the lens with all terms, named or not
+};
+
+// Of one coordinate of a corner, px: no two readings of a corner are repeats, so this is what the lens with all terms leaves,
+// and an upper bound.
+struct BoardNoise {
+  double sigma_px = 0;  // 0: fewer readings than values that were fitted
+  int degrees_of_freedom = 0;
 };
 
 struct BoardStep {
@@ -50,8 +58,9 @@ struct BoardRest {
 struct BoardDiagnosis {
   selection::Verdict verdict = selection::Verdict::kNone;
   std::string model_name, model_hash;
-  int pictures = 0, corners = 0;  // that took part; corners of all pictures
-  std::optional<BoardQuality> initial, final;
+  int pictures = 0, corners = 0;               // that took part; corners of all pictures
+  std::optional<BoardQuality> initial, final;  // none with kTooLittleData
+  BoardNoise noise;
   std::vector<BoardStep> steps;
   std::vector<BoardRest> rest;
   int pictures_needed = 0;               // with kTooLittleData

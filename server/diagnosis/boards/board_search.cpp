@@ -5,6 +5,8 @@
 #include <numeric>
 #include <optional>
 
+#include <boost/math/distributions/students_t.hpp>
+
 #include "server/diagnosis/boards/board_diagnosis.h"
 
 namespace touchstone::diagnosis::boards {
@@ -20,6 +22,22 @@ bool Holds(const std::vector<int>& terms, int term) {
 std::vector<int> Without(std::vector<int> terms, int term) {
   terms.erase(std::remove(terms.begin(), terms.end(), term), terms.end());
   return terms;
+}
+
+// Of the logarithm of a left-out picture's error, from one lens to the other.
+struct MeanFall {
+  double mean = 0, std_error = 0;
+};
+
+MeanFall MeanFallOf(const LensChoice& from, const LensChoice& to) {
+  const double count = static_cast<double>(from.unseen_px2.size());
+  double sum = 0, squares = 0;
+  for (size_t i = 0; i < from.unseen_px2.size(); ++i) {
+    const double fall = std::log((from.unseen_px2[i] + 1e-9) / (to.unseen_px2[i] + 1e-9));
+    sum += fall, squares += fall * fall;
+  }
+  const double mean = sum / count;
+  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / (count - 1))};
 }
 
 }  // namespace
@@ -61,14 +79,15 @@ LensChoice FitChoice(const BoardSet& set, const BoardFit& start, const std::vect
 
 bool PredictsBetter(const LensChoice& more, const LensChoice& less) {
   if (!(SumOf(more.unseen_px2) < SumOf(less.unseen_px2))) return false;
-  const double count = static_cast<double>(more.unseen_px2.size());
-  double sum = 0, squares = 0;
-  for (size_t i = 0; i < more.unseen_px2.size(); ++i) {
-    const double fall = std::log((less.unseen_px2[i] + 1e-9) / (more.unseen_px2[i] + 1e-9));
-    sum += fall, squares += fall * fall;
-  }
-  const double mean = sum / count, variance = std::max(0.0, squares / count - mean * mean) / (count - 1);
-  return mean > kMinPicturesAgree * std::sqrt(variance);
+  const MeanFall fall = MeanFallOf(less, more);
+  return fall.mean > kMinPicturesAgree * fall.std_error;
+}
+
+double LackOfFitP(const LensChoice& less, const LensChoice& more) {
+  const MeanFall fall = MeanFallOf(less, more);
+  if (!(fall.std_error > 0)) return fall.mean > 0 ? 0 : 1;
+  const boost::math::students_t distribution(static_cast<double>(more.unseen_px2.size()) - 1);
+  return boost::math::cdf(boost::math::complement(distribution, fall.mean / fall.std_error));
 }
 
 LensSearch SearchNamed(const BoardSet& set, const BoardFit& start) {

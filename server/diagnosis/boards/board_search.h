@@ -21,6 +21,10 @@ LensChoice FitChoice(const BoardSet& set, const BoardFit& start, const std::vect
 // Whether the terms of `more` predict left-out pictures better than those of `less`, picture by picture.
 bool PredictsBetter(const LensChoice& more, const LensChoice& less);
 
+// Probability of at least as large a gain on left-out pictures by `more` as these pictures show, if `less` lacked nothing:
+// Student's t over pictures of the logarithm of the ratio of the two errors, one-sided.
+double LackOfFitP(const LensChoice& less, const LensChoice& more);
+
 // From no term on, of those that are named or of all.
 struct LensSearch {
   std::vector<LensChoice> ladder;  // no term, one term, ...

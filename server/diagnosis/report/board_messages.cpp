@@ -1,39 +1,18 @@
 #include "server/diagnosis/report/board_messages.h"
 
-#include <cmath>
-
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
 #include "server/base/version.h"
+#include "server/diagnosis/report/message_parts.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
-v1::Report::Verdict BoardVerdict(selection::Verdict verdict) {
-  switch (verdict) {
-    case selection::Verdict::kAdequate:
-      return v1::Report::ADEQUATE;
-    case selection::Verdict::kMissingEffects:
-      return v1::Report::MISSING_EFFECTS;
-    case selection::Verdict::kUnexplained:
-      return v1::Report::UNEXPLAINED;
-    case selection::Verdict::kTooLittleData:
-      return v1::Report::TOO_LITTLE_DATA;
-    default:
-      return v1::Report::VERDICT_UNSPECIFIED;
-  }
-}
-
 std::string ErrorWords(const boards::BoardQuality& quality) {
   return absl::StrFormat("reprojection error %.4f px, %.4f px on left-out pictures", quality.rmse_px,
                          quality.heldout_rmse_px);
-}
-
-void WriteQuality(const boards::BoardQuality& from, v1::Quality* to) {
-  to->set_rmse_px(from.rmse_px);
-  to->set_heldout_rmse_px(from.heldout_rmse_px);
 }
 
 void WriteBoardStep(const boards::BoardStep& found, v1::Step* step) {
@@ -46,36 +25,35 @@ void WriteBoardStep(const boards::BoardStep& found, v1::Step* step) {
   step->set_remedy(found.remedy);
   step->set_scope("rig");
   step->set_words(ErrorWords(found.quality));
+  WriteParameters(found.parameters, step);
   step->set_rmse_px(found.quality.rmse_px);
   step->set_heldout_rmse_px(found.quality.heldout_rmse_px);
-  for (const inference::ParameterEstimate& estimate : found.parameters) {
-    v1::ParameterValue* value = step->add_parameters();
-    value->set_name(estimate.name);
-    value->set_value(estimate.value);
-    value->set_std_error(estimate.std_error);
-    value->set_unit(estimate.unit);
-    value->set_finger(estimate.entry);
-    value->set_lower(estimate.lower);
-    value->set_upper(estimate.upper);
-  }
+  step->set_lack_of_fit_p(found.quality.lack_of_fit_p);
+}
+
+void WriteBoardQuality(const boards::BoardQuality& quality, v1::Quality* message) {
+  message->set_rmse_px(quality.rmse_px);
+  message->set_heldout_rmse_px(quality.heldout_rmse_px);
+  message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
 }  // namespace
 
 v1::Report WriteBoardReport(const boards::BoardSet& set, const boards::BoardDiagnosis& diagnosis) {
   v1::Report report;
-  report.set_verdict(BoardVerdict(diagnosis.verdict));
+  report.set_verdict(ToMessage(diagnosis.verdict));
   report.set_images(static_cast<uint32_t>(diagnosis.pictures));
   report.set_model_name(diagnosis.model_name);
   report.set_model_hash(diagnosis.model_hash);
   report.set_summary(diagnosis.summary);
-  for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
-  if (diagnosis.initial) WriteQuality(*diagnosis.initial, report.mutable_initial());
-  if (diagnosis.final) {
-    WriteQuality(*diagnosis.final, report.mutable_final());
-    // There are no repeats of a corner: what the best lens leaves is an upper bound. An error has two coordinates.
-    report.mutable_noise_floor()->set_sigma_px(diagnosis.final->rmse_px / std::sqrt(2.0));
+  if (diagnosis.initial) WriteBoardQuality(*diagnosis.initial, report.mutable_initial());
+  if (diagnosis.final) WriteBoardQuality(*diagnosis.final, report.mutable_final());
+  if (diagnosis.noise.sigma_px > 0) {
+    report.mutable_noise_floor()->set_sigma_px(diagnosis.noise.sigma_px);
+    report.mutable_noise_floor()->set_degrees_of_freedom(
+        static_cast<uint32_t>(diagnosis.noise.degrees_of_freedom));
   }
+  for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
   for (const boards::BoardStep& step : diagnosis.steps) WriteBoardStep(step, report.add_steps());
   if (!diagnosis.rest.empty()) {
     std::vector<std::string> words;

@@ -1,5 +1,4 @@
-// A diagnosis of pictures of a board as the wire message. The message has no fields for pixels: errors in px stand in the
-// summary and in each step's words.
+// A diagnosis of pictures of a board as the wire message: errors in px.
 #pragma once
 
 #include "server/diagnosis/boards/board_diagnosis.h"

@@ -20,77 +20,36 @@ void WriteGreyQuality(const images::GreyQuality& quality, v1::Quality* message) 
 }
 
 void WritePhotographStep(const images::PhotographStep& step, v1::Step* message) {
-  message->set_effect(step.effect);
-  for (const std::string& name : step.equivalent) message->add_equivalent(name);
-  message->set_probability(step.probability);
-  WriteParameters(step.parameters, message);
+  WriteStepWithoutErrors(step, message);
   message->set_rmse_grey(step.quality.rmse_grey);
   message->set_heldout_rmse_grey(step.quality.heldout_rmse_grey);
-  message->set_lack_of_fit_p(step.quality.lack_of_fit_p);
   if (step.touch_quality) {
     message->set_rmse_us(Microseconds(step.touch_quality->rmse_s));
     message->set_heldout_rmse_us(Microseconds(step.touch_quality->heldout_rmse_s));
   }
   message->set_shown_by(step.shown_by);
-  message->set_gain_nats(step.gain_nats);
-  message->set_meaning(step.meaning);
-  message->set_check_on_rig(step.check_on_rig);
-  message->set_remedy(step.remedy);
-  message->set_discriminating_measurement(step.discriminating_measurement);
-  message->set_scope(ToMessage(step.scope));
-  message->set_words(step.words);
 }
 
 void WriteUnexplainedPhotographs(const images::UnexplainedPhotographs& rest, v1::Unexplained* message) {
-  for (const selection::CovariateTest& test : rest.covariates) {
-    v1::CovariateTest* covariate = message->add_covariates();
-    covariate->set_name(test.name);
-    covariate->set_p(test.p);
-    covariate->set_gain_nats(test.gain_nats);
-  }
-  message->set_formula(rest.formula);
-  message->set_formula_yaml(rest.formula_yaml);
-  message->set_lookup_yaml(rest.lookup_yaml);
-  message->set_words(rest.words);
+  WriteRestWithoutErrors(rest, message);
   message->set_rmse_grey(rest.rmse_grey);
   message->set_heldout_rmse_grey(rest.heldout_rmse_grey);
-  message->set_heldout_gain(rest.heldout_gain);
 }
 
 void WritePhotographCauses(const images::PhotographDiagnosis& diagnosis, v1::Report* report) {
-  for (const selection::RefittedEffect& refit : diagnosis.refitted) {
-    v1::Refit* message = report->add_refitted();
-    message->set_effect(refit.effect);
-    WriteParameters(refit.parameters, message);
-  }
+  WriteModelChanges(diagnosis, report);
   for (const images::PhotographStep& step : diagnosis.steps) WritePhotographStep(step, report->add_steps());
   for (const images::RankedPhotographCandidate& candidate : diagnosis.candidates) {
     v1::Candidate* message = report->add_candidates();
-    message->set_effect(candidate.effect);
-    WriteParameters(candidate.parameters, message);
-    message->set_probability(candidate.probability);
+    WriteCandidateWithoutErrors(candidate, message);
     message->set_rmse_grey(candidate.rmse_grey);
     message->set_heldout_rmse_grey(candidate.heldout_rmse_grey);
-    message->set_gain_nats(candidate.gain_nats);
-    message->set_note(ToMessage(candidate.note));
-    message->set_scope(ToMessage(candidate.scope));
   }
-  for (const selection::ConfoundedEffects& confounded : diagnosis.confounded) {
-    v1::Ambiguity* message = report->add_ambiguities();
-    for (const std::string& effect : confounded.effects) message->add_effects(effect);
-    message->set_discriminating_measurement(confounded.discriminating_measurement);
-  }
-  for (const std::string& effect : diagnosis.superfluous) report->add_superfluous(effect);
   if (diagnosis.unexplained)
     WriteUnexplainedPhotographs(*diagnosis.unexplained, report->mutable_unexplained());
-  report->set_improved_model_yaml(diagnosis.improved_model_yaml);
-  report->set_improved_model_hash(diagnosis.improved_model_hash);
   for (const images::PhotographDataProblem& problem : diagnosis.data_problems) {
     v1::DataProblem* message = report->add_data_problems();
-    message->set_kind(problem.kind);
-    message->set_detail(problem.detail);
-    message->set_words(problem.words);
-    message->set_fix(problem.fix);
+    WriteProblemWithoutErrors(problem, message);
     message->set_rmse_before_grey(problem.rmse_before_grey);
     message->set_rmse_after_grey(problem.rmse_after_grey);
   }

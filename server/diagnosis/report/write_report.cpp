@@ -26,31 +26,15 @@ void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message
 }
 
 void WriteStep(const selection::LadderStep& step, v1::Step* message) {
-  message->set_effect(step.effect);
-  for (const std::string& name : step.equivalent) message->add_equivalent(name);
-  message->set_probability(step.probability);
-  WriteParameters(step.parameters, message);
+  WriteStepWithoutErrors(step, message);
   message->set_rmse_us(Microseconds(step.quality.rmse_s));
   message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse_s));
-  message->set_lack_of_fit_p(step.quality.lack_of_fit_p);
-  message->set_gain_nats(step.gain_nats);
-  message->set_meaning(step.meaning);
-  message->set_check_on_rig(step.check_on_rig);
-  message->set_remedy(step.remedy);
-  message->set_discriminating_measurement(step.discriminating_measurement);
-  message->set_scope(ToMessage(step.scope));
-  message->set_words(step.words);
 }
 
 void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
-  message->set_effect(candidate.effect);
-  WriteParameters(candidate.parameters, message);
-  message->set_probability(candidate.probability);
+  WriteCandidateWithoutErrors(candidate, message);
   message->set_rmse_us(Microseconds(candidate.rmse_s));
   message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse_s));
-  message->set_gain_nats(candidate.gain_nats);
-  message->set_note(ToMessage(candidate.note));
-  message->set_scope(ToMessage(candidate.scope));
 }
 
 void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) {
@@ -68,32 +52,19 @@ void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) 
 }
 
 void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* message) {
-  for (const selection::CovariateTest& test : rest.covariates) {
-    v1::CovariateTest* covariate = message->add_covariates();
-    covariate->set_name(test.name);
-    covariate->set_p(test.p);
-    covariate->set_gain_nats(test.gain_nats);
-  }
-  message->set_formula(rest.formula);
-  message->set_formula_yaml(rest.formula_yaml);
+  WriteRestWithoutErrors(rest, message);
   WriteParameters(rest.parameters, message);
   message->set_rmse_us(Microseconds(rest.rmse_s));
   message->set_heldout_rmse_us(Microseconds(rest.heldout_rmse_s));
-  message->set_heldout_gain(rest.heldout_gain);
   message->set_nearest_effect(rest.nearest_effect);
   message->set_nearest_cosine(rest.nearest_cosine);
-  message->set_lookup_yaml(rest.lookup_yaml);
   message->set_nearest_formula(rest.nearest_formula);
   message->set_nearest_formula_share(rest.nearest_formula_share);
   if (rest.lookup != nullptr) WriteCurve(*rest.lookup->lookup, message->mutable_curve());
-  message->set_words(rest.words);
 }
 
 void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {
-  message->set_kind(problem.kind);
-  message->set_detail(problem.detail);
-  message->set_words(problem.words);
-  message->set_fix(problem.fix);
+  WriteProblemWithoutErrors(problem, message);
   message->set_rmse_before_us(Microseconds(problem.rmse_before_s));
   message->set_rmse_after_us(Microseconds(problem.rmse_after_s));
 }
@@ -121,23 +92,11 @@ void WriteData(const touches::DataSummary& data, v1::Report* report) {
 }
 
 void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
-  for (const selection::RefittedEffect& refit : diagnosis.refitted) {
-    v1::Refit* message = report->add_refitted();
-    message->set_effect(refit.effect);
-    WriteParameters(refit.parameters, message);
-  }
+  WriteModelChanges(diagnosis, report);
   for (const selection::LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
-  for (const selection::ConfoundedEffects& confounded : diagnosis.confounded) {
-    v1::Ambiguity* message = report->add_ambiguities();
-    for (const std::string& effect : confounded.effects) message->add_effects(effect);
-    message->set_discriminating_measurement(confounded.discriminating_measurement);
-  }
   for (const selection::RankedCandidate& candidate : diagnosis.candidates)
     WriteCandidate(candidate, report->add_candidates());
   if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
-  for (const std::string& effect : diagnosis.superfluous) report->add_superfluous(effect);
-  report->set_improved_model_yaml(diagnosis.improved_model_yaml);
-  report->set_improved_model_hash(diagnosis.improved_model_hash);
 }
 
 }  // namespace
