@@ -100,7 +100,7 @@ TEST(SharedEffects, SagOfTheToolIsNotToldAsAShiftOfTheObjects) {
   EXPECT_TRUE(of_tool.conflicts.empty());
 }
 
-// Not met: a camera that stands lower and a sag of the tool are told in its place, and the pose is not named beside them.
+// Not met: the pose is neither a step nor named beside what each kind names instead.
 TEST(SharedEffects, DISABLED_ShiftOfTheObjectsIsNotToldAsASagAndACamera) {
   const SharedEffects of_objects = Found(WithHidden({{"object_pose", {"translation_mm=0,0,0.5"}}}));
   // A camera that stands lower shows nearly the same: a sag and a camera may be named beside, and no sag alone.
