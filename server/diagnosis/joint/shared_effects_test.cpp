@@ -100,13 +100,19 @@ TEST(SharedEffects, SagOfTheToolIsNotToldAsAShiftOfTheObjects) {
   EXPECT_TRUE(of_tool.conflicts.empty());
 }
 
-// Not met: the pose is neither a step nor named beside what each kind names instead.
-TEST(SharedEffects, DISABLED_ShiftOfTheObjectsIsNotToldAsASagAndACamera) {
+TEST(SharedEffects, ShiftOfTheObjectsIsNotToldAsASagAndACamera) {
   const SharedEffects of_objects = Found(WithHidden({{"object_pose", {"translation_mm=0,0,0.5"}}}));
   // A camera that stands lower shows nearly the same: a sag and a camera may be named beside, and no sag alone.
   ASSERT_EQ(of_objects.steps.size() + of_objects.undecided.size(), 1u);
   EXPECT_EQ(of_objects.steps.empty() ? of_objects.undecided[0].effect : of_objects.steps[0].effect,
             "object_pose");
+}
+
+TEST(SharedEffects, SagAndACameraOfAnotherSizeAreNoShiftOfTheObjects) {
+  HiddenSession session = WithHidden({});
+  session.rig.hidden = {{"gravity_sag", {"drop_mm=0.5"}}};
+  session.camera.hidden = {{"camera_translation", {"offset_mm=0,0.8,0"}}};
+  EXPECT_TRUE(Found(session).steps.empty());
 }
 
 TEST(SharedEffects, ScaleOfTheModelIsPutRightByBoth) {

@@ -90,6 +90,24 @@ absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained&
   return list;
 }
 
+// Adds forms that promise nothing only because each kind names effects of its own that do the same: a sag of the tool and a
+// camera that stands lower are, together, objects that lie lower.
+absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::array<OwnEffects, 2>& own,
+                                 std::vector<Form>* forms) {
+  if (own[kTouches].size() == 0 || own[kPhotographs].size() == 0) return absl::OkStatus();
+  Explained bare;
+  TOUCHSTONE_ASSIGN_OR_RETURN(bare.fit, FitJointly(PartsOf(sides, bare)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Form> hidden, ListForms(sides, bare));
+  for (const Form& form : hidden) {
+    // What only one kind would gain from stands for nothing of the other's.
+    if (std::min(form.gain_nats[kTouches], form.gain_nats[kPhotographs]) < kWorthTrying) continue;
+    if (std::none_of(forms->begin(), forms->end(),
+                     [&](const Form& other) { return other.effect.Key() == form.effect.Key(); }))
+      forms->push_back(form);
+  }
+  return absl::OkStatus();
+}
+
 // Whether one kind, at the joint values, predicts blocks better that were left out.
 bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained& after) {
   for (const Side& side : sides) {
@@ -106,6 +124,8 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
   // Where it takes the place of what either kind named by itself, nothing is added but one cause put for others.
   int replaced = 0;
   for (const Kind kind : kKinds) replaced += before.own[kind].size() - after.own[kind].size();
+  // One cause for several needs no more than to explain as much: the several would each have had to be worth its entry.
+  if (replaced > 1) return gain > -Rules().equivalent_nats;
   if (replaced > 0)
     return gain >
            (after.fit.parameters.size() > before.fit.parameters.size() ? Rules().swap_nats : kSwapNats);
@@ -169,7 +189,8 @@ absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.none, ExplainWith(sides, {}, own));
   selection.best = selection.none;
   for (int round = 0; round < kMaxShared; ++round) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Form> forms, ListForms(sides, selection.best));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Form> forms, ListForms(sides, selection.best));
+    if (round == 0) TOUCHSTONE_RETURN_IF_ERROR(AddFormsHiddenByOwn(sides, own, &forms));
     int chosen = -1;
     std::vector<Explained> tried;
     for (const Form& form : forms) {
@@ -177,8 +198,10 @@ absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
       shared.push_back(form.effect);
       TOUCHSTONE_ASSIGN_OR_RETURN(Explained with, ExplainWith(sides, shared, selection.best.own));
       // What either kind shows by itself may have stood in for the effect.
-      TOUCHSTONE_ASSIGN_OR_RETURN(Explained afresh, ExplainWith(sides, shared, own));
-      if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
+      for (const std::array<OwnEffects, 2>& start : {own, std::array<OwnEffects, 2>()}) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(Explained afresh, ExplainWith(sides, shared, start));
+        if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
+      }
       tried.push_back(std::move(with));
       if (IsWorthIt(sides, selection.best, tried.back(), forms.size()) &&
           (chosen < 0 || tried.back().fit.log_evidence > tried[chosen].fit.log_evidence))

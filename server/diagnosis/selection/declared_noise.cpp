@@ -35,6 +35,7 @@ inference::DeclaredNoise DeclaredNoiseOf(const model::Model& model) {
       case EffectRole::kNoiseByFinger:
         declared.channel_sigma_s = instance.values;
         break;
+      case EffectRole::kPixelNoise:
       case EffectRole::kSystematic:
       case EffectRole::kNoiseMemory:
       case EffectRole::kSmoothError:
