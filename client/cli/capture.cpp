@@ -40,8 +40,13 @@ absl::Status AddViews(const CaptureOptions& options, v1::CaptureRequest* request
   if (given != 1)
     return absl::InvalidArgumentError(
         "where from? Give exactly one of --approach (the camera of that touch), --eye-mm (a camera of your "
-        "own) and --plan FILE (the cameras of its touches)");
+        "own) and --plan FILE (the cameras of its touches or photographs)");
   if (!options.plan.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto pictures, ReadPictures(options.plan, options.object));
+    if (pictures.has_value()) {
+      for (const PlannedPicture& picture : *pictures) *request->add_views() = picture.view;
+      return absl::OkStatus();
+    }
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<client::MeasuredTouch> touches, ReadTouches(options.plan));
     for (client::MeasuredTouch& touch : touches)
       *request->add_views()->mutable_touch() = std::move(touch.commanded);
@@ -191,7 +196,10 @@ void AddCapture(Cli* cli) {
   camera("--at-mm", options->at_mm, "What it looks at. Default: 0,0,0");
   camera("--up", options->up, "What is up in the picture. Default: 0,0,1");
   cli->AddInput(command,
-                command->add_option("--plan", options->plan, "The cameras of the touches of a CSV file")
+                command
+                    ->add_option("--plan", options->plan,
+                                 "The cameras of the touches of a CSV file, or of the rows of a plan of "
+                                 "photographs (images.csv) that are of OBJECT")
                     ->type_name("FILE")
                     ->group("Camera"));
   cli->AddInput(command,

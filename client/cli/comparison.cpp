@@ -16,6 +16,7 @@
 #include <set>
 
 #include "client/cli/journal_session.h"
+#include "client/cli/session_images.h"
 #include "client/report/report.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -83,8 +84,15 @@ absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
     return set;
   }
   if (std::error_code error; fs::is_directory(text, error)) return ReadFolder(text);
+  if (IsHdf5Path(text)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(service::StoredSession stored, ReadImageSession(text));
+    set.images = std::move(stored.images), set.csv = std::move(stored.csv);
+    return set;
+  }
   // A rig's journal with one session is as good as its measurement file.
   if (IsJournalPath(text)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(set.images, JournalPhotographs(cli, text));
+    if (set.images) return set;
     TOUCHSTONE_ASSIGN_OR_RETURN(set.measured, JournalSet(text));
     return set;
   }
@@ -209,7 +217,8 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
   add_input(
       "SET", options->set, "",
       "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG files; with a "
-      "touches.csv in it `compare` takes both), or the journal (.db) of a rig's session; -: stdin; with "
+      "touches.csv in it `compare` and `diagnose` take both), or the journal (.db) of a rig's session; -: "
+      "stdin; with "
       "--server "
       "also a stored session's name")
       ->required();

@@ -1,12 +1,12 @@
-// The folder of `touchstone rig photos` as an image set: images.csv with one row per picture, its commanded and its
-// measured pose, and camera.yaml with the intrinsics of all of them.
+// The folder of `touchstone rig photos` as an image set (server/session/measurement_files.md) that grows picture by
+// picture: images.csv and camera.yaml are written as every other image set is.
 #pragma once
 
-#include <map>
 #include <string>
 
 #include <absl/status/statusor.h>
 
+#include "server/session/image_set.h"
 #include "touchstone/v1/source.pb.h"
 
 namespace touchstone::cli {
@@ -15,8 +15,10 @@ namespace touchstone::cli {
 struct ImageSetRow {
   std::string file;  // without its folder
   std::string object;
+  int round = 0;
   v1::CameraPose commanded;
   v1::Photograph photograph;
+  bool emulated = false;
 };
 
 // Ideal pinhole of all pictures.
@@ -33,15 +35,19 @@ class ImageSet {
 
   // Whether the picture and its row are there. FAILED_PRECONDITION: a picture without a row, whose pose is unknown.
   absl::StatusOr<bool> Has(const std::string& file) const;
-  // Before the picture itself is written; images.csv is whole on the disk when this returns.
+  // Before the picture itself is written; images.csv is whole on the disk when this returns. A row of the same file is
+  // replaced: its picture was never written.
   absl::Status Add(const ImageSetRow& row);
-  size_t size() const { return lines_.size(); }
+  size_t size() const { return set_.size(); }
   std::string PathOf(const std::string& file) const;
 
  private:
+  const session::PhotographRow* Find(const std::string& file) const;
+
   std::string folder_;
-  std::map<std::string, std::string> lines_;  // of images.csv after its number, by file
-  double first_unix_s_ = 0;                   // of the oldest row; 0: there is none
+  session::ImageSet set_;     // without pixels
+  double first_unix_s_ = 0;   // of the oldest row; 0: there is none
+  uint64_t next_number_ = 1;  // of the next row
 };
 
 }  // namespace touchstone::cli

@@ -4,9 +4,12 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/cli/output_file.h"
+#include "client/cli/session_images.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/journalled_session.h"
 #include "server/session/session_files.h"
+#include "server/session/session_images.h"
 #include "server/session/session_measurements.h"
 
 namespace touchstone::cli {
@@ -52,6 +55,21 @@ absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path) {
   return session::SessionMeasurementSet(*journal, found.name, path);
 }
 
+absl::StatusOr<std::optional<v1::ImageSetFiles>> JournalPhotographs(const Cli& cli, const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, ""));
+  if (found.images == 0) return std::optional<v1::ImageSetFiles>();
+  if (found.done > 0) {
+    cli.Log(absl::StrCat(Counted(found.images, "photograph", "photographs"), " of session '", found.name,
+                         "' are left out: touchstone session export ", path, " ", found.name,
+                         " -o FOLDER writes the folder of touches and photographs together"));
+    return std::optional<v1::ImageSetFiles>();
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::ImageSetFiles files, session::SessionImageSetFiles(*journal, found.name));
+  files.set_origin(path);
+  return std::optional<v1::ImageSetFiles>(std::move(files));
+}
+
 namespace {
 
 absl::StatusOr<std::string> CsvOf(const session::Journal& journal, const std::string& path,
@@ -71,18 +89,24 @@ absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::strin
   return CsvOf(*journal, path, found.name);
 }
 
-absl::Status ExportFromJournal(const std::string& path, const std::string& session, const std::string& output,
-                               bool force, session::Journal::SkipDamaged skip_damaged) {
+absl::Status ExportFromJournal(const Cli& cli, const std::string& path, const std::string& session,
+                               const std::string& output, session::Journal::SkipDamaged skip_damaged) {
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const auto journal,
       session::Journal::Open(path, session::Journal::Mode::kReadOnly, std::move(skip_damaged)));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
-    return WriteOutputFileBy(output, force, [&](const std::string& free_path) {
+    return WriteOutputFileBy(output, cli.output().force, [&](const std::string& free_path) {
       return session::ExportSessionHdf5(*journal, found.name, free_path);
     });
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, CsvOf(*journal, path, found.name));
-  return WriteOutputFile(output, csv, force);
+  if (found.images == 0) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string csv, CsvOf(*journal, path, found.name));
+    return WriteOutputFile(output, csv, cli.output().force);
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const service::JournalledSession made,
+                              service::FilesOfJournal(*journal, found));
+  if (!made.left_out.empty()) cli.Log(made.left_out);
+  return WriteExportedSession(cli, found.name, made.files, output);
 }
 
 absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,

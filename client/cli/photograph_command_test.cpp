@@ -135,7 +135,7 @@ TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
   }
 }
 
-TEST_F(PhotographCommand, TouchesBesideArePartOfAComparisonAndOfNoVerdict) {
+TEST_F(PhotographCommand, TouchesBesideArePartOfAComparison) {
   WriteSet("photos", Small());
   ASSERT_EQ(
       Run({"plan", "lat00", "--plan", "faces", "--samples-per-face", "1", "--rounds", "2", "-o", "plan.csv"})
@@ -145,9 +145,9 @@ TEST_F(PhotographCommand, TouchesBesideArePartOfAComparisonAndOfNoVerdict) {
   const nlohmann::json compared = Report({"compare", "photos", "--model", "nominal.yaml"});
   EXPECT_GT(compared["initial"]["rmse_grey"].get<double>(), 0);
   EXPECT_GE(compared["touches"].get<int>(), 8);
-  const Outcome outcome = Run({"diagnose", "photos", "--model", "nominal.yaml", "--mesh-dir", "meshes"});
+  const Outcome outcome = Run({"propose", "photos", "--model", "nominal.yaml", "--mesh-dir", "meshes"});
   EXPECT_NE(outcome.exit_code, 0);
-  EXPECT_THAT(outcome.err, HasSubstr("not yet diagnosed together"));
+  EXPECT_THAT(outcome.err, HasSubstr("nothing is proposed for both"));
 }
 
 TEST_F(PhotographCommand, MessagesNameWhatIsWrong) {

@@ -1,6 +1,9 @@
 #include "client/cli/plan_options.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +13,8 @@
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
+#include "server/service/convert.h"
+#include "server/session/images_csv.h"
 
 namespace touchstone::cli {
 namespace {
@@ -137,6 +142,28 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
       objects->push_back(touch.object);
   }
   return plan;
+}
+
+absl::StatusOr<std::optional<std::vector<PlannedPicture>>> ReadPictures(const std::string& path,
+                                                                        const std::string& object) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxPlanBytes));
+  const std::string header = text.substr(0, text.find('\n'));
+  if (!absl::StrContains(header, "eye_x_mm")) return std::optional<std::vector<PlannedPicture>>();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet plan, session::ParseImagesCsv(text, path));
+  std::vector<PlannedPicture> pictures;
+  for (const session::PhotographRow& row : plan.photographs) {
+    if (plan.objects[row.object] != object) continue;
+    PlannedPicture& picture = pictures.emplace_back();
+    picture.file = row.file;
+    v1::CameraPose* camera = picture.view.mutable_camera();
+    *camera->mutable_eye_m() = service::ToProto(row.commanded.eye_m);
+    *camera->mutable_at_m() = service::ToProto(row.commanded.at_m);
+    *camera->mutable_up() = service::ToProto(row.commanded.up);
+  }
+  if (pictures.empty())
+    return absl::NotFoundError(absl::StrCat(path, ": has no picture of '", object, "'; it has pictures of ",
+                                            absl::StrJoin(plan.objects, ", ")));
+  return std::make_optional(std::move(pictures));
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path) {

@@ -50,6 +50,16 @@ struct TouchFlags {
 void AddTouchOptions(CLI::App* command, TouchFlags* options);
 absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& options);
 
+// One row of a plan of photographs: a file with the columns of images.csv.
+struct PlannedPicture {
+  std::string file;  // its name
+  v1::View view;
+};
+// Those of `object`, in the order of the rows. None (no value) if the file is a plan of touches. NOT_FOUND, with the
+// objects that it has, where no row is of it.
+absl::StatusOr<std::optional<std::vector<PlannedPicture>>> ReadPictures(const std::string& path,
+                                                                        const std::string& object);
+
 // Reads a plan or measurement file.
 absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path);
 

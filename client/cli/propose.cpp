@@ -1,4 +1,4 @@
-// touchstone propose: what to touch next, to tell the explanations apart that are left.
+// touchstone propose: what to touch, or to photograph, next, to tell the explanations apart that are left.
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
@@ -8,15 +8,23 @@
 #include "client/cli/comparison.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/session/images_csv.h"
 
 namespace touchstone::cli {
 namespace {
 
 struct ProposeOptions : ComparisonOptions {
-  uint32_t touches = 24;
+  uint32_t touches = 24, photographs = 12;
   std::string output;
 };
+
+// A name that says from where: the same view has the same name in every plan, so that a folder keeps those of several.
+std::string PictureName(const v1::ProposedPhotograph& next) {
+  const v1::Vector3& eye = next.camera().eye_m();
+  return absl::StrFormat("%s_from_%.0f_%.0f_%.0f.png", next.object(), FromSi(Unit::kMillimetre, eye.x()),
+                         FromSi(Unit::kMillimetre, eye.y()), FromSi(Unit::kMillimetre, eye.z()));
+}
 
 // Proposed pictures as the images.csv that they would have.
 std::string PlanOfPhotographs(const v1::Report& report) {
@@ -24,7 +32,9 @@ std::string PlanOfPhotographs(const v1::Report& report) {
   for (const v1::ProposedPhotograph& next : report.next_photographs()) {
     session::PhotographRow row;
     row.image = plan.photographs.size();
-    row.file = absl::StrFormat("%04d.png", row.image);
+    row.file = PictureName(next);
+    for (const session::PhotographRow& other : plan.photographs)
+      if (other.file == row.file) row.file = absl::StrFormat("%d_%s", row.image, PictureName(next));
     const auto found = std::find(plan.objects.begin(), plan.objects.end(), next.object());
     row.object = static_cast<int>(found - plan.objects.begin());
     if (found == plan.objects.end()) plan.objects.push_back(next.object());
@@ -40,6 +50,12 @@ absl::Status WritePlanOfPhotographs(const Cli& cli, const ProposeOptions& option
   for (const v1::ProposedPhotograph& next : report.next_photographs()) ++purposes[next.purpose()];
   for (const auto& [purpose, pictures] : purposes)
     cli.Log(absl::StrCat(Counted(pictures, "picture", "pictures"), ": ", purpose));
+  if (report.verdict() == v1::Report::TOO_LITTLE_DATA) cli.Log(report.summary());
+  // What no picture can decide needs another measurement.
+  for (const v1::Ambiguity& ambiguity : report.ambiguities())
+    if (!ambiguity.discriminating_measurement().empty())
+      cli.Log(absl::StrCat("to tell ", absl::StrJoin(ambiguity.effects(), " from "), ": ",
+                           ambiguity.discriminating_measurement()));
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (report.next_photographs().empty()) {
     cli.Log(report.data_problems().empty()
@@ -57,11 +73,14 @@ absl::Status WritePlanOfPhotographs(const Cli& cli, const ProposeOptions& option
 absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
   if (options.touches < 1)
     return absl::InvalidArgumentError("--touches: 0 is out of range; 1 or more was expected");
+  if (options.photographs < 1)
+    return absl::InvalidArgumentError("--photographs: 0 is out of range; 1 or more was expected");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::ProposeRequest request;
   *request.mutable_evidence() = comparison->evidence();
   request.set_touches(options.touches);
+  request.set_photographs(options.photographs);
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
                                 return comparison->connection().diagnosis().Propose(context, request);
@@ -107,11 +126,16 @@ void AddPropose(Cli* cli) {
       "that are left.",
       "touchstone propose set.csv --model nominal.yaml --mesh-dir meshes --touches 24 -o plan.csv\n"
       "touchstone touch --plan plan.csv -o more.csv\n"
-      "touchstone propose photos --model nominal.yaml --mesh-dir meshes --touches 12 -o images.csv",
+      "touchstone propose photos --model nominal.yaml --mesh-dir meshes --photographs 12 -o next.csv\n"
+      "touchstone capture lat20 --plan next.csv -o more/picture.png             its pictures of lat20\n"
+      "touchstone rig photos lat20 --plan next.csv -o photos --server 127.0.0.1:50052",
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
+  command->add_option("--touches", options->touches, "How many touches to propose. Default: 24")
+      ->type_name("N");
   command
-      ->add_option("--touches", options->touches, "How many (touches or photographs) to propose. Default: 24")
+      ->add_option("--photographs", options->photographs,
+                   "Of a folder of photographs: how many pictures to propose. Default: 12")
       ->type_name("N");
   cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) to write. Default: stdout");
 }

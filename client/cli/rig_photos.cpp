@@ -1,4 +1,5 @@
 // touchstone rig photos: the fixed sequence of camera poses, once for every way in which the object lies.
+#include <algorithm>
 #include <cmath>
 
 #include <absl/strings/str_format.h>
@@ -13,17 +14,20 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/service/convert.h"
+#include "server/session/emulated.h"
 
 namespace touchstone::cli {
 namespace {
 
 constexpr double kMargin = 1.05;  // the object's sphere fills the picture but for this
+constexpr int kMaxRounds = 1000;
 
 struct PhotosOptions {
+  std::string plan;  // a file, in place of the sequence; empty: none
   MotionFlags motion;
   ImageFlags image;
   std::string object, folder, sequence = "ring";
-  int turns = 4;
+  int turns = 4, rounds = 1;
 };
 
 // Angles of a ring of views from straight above, and how many stand on it. All lie well within 45 deg, so
@@ -63,6 +67,7 @@ v1::View ViewOf(const Eigen::Vector3d& centre, double distance_m, const Eigen::V
 // One picture of the sequence.
 struct SequenceView {
   std::string up_face, file;
+  int round = 0;
   v1::View view;
   bool wanted = true;  // it does not stand already, and the rig can take it
 };
@@ -77,6 +82,9 @@ class Photos {
     if (options_.turns < 1 || options_.turns > static_cast<int>(Turns().size()))
       return absl::InvalidArgumentError(absl::StrCat(
           "--turns: ", options_.turns, " is out of range; an object can lie on 1 to 6 of its faces"));
+    if (options_.rounds < 1 || options_.rounds > kMaxRounds)
+      return absl::InvalidArgumentError(
+          absl::StrCat("--rounds: ", options_.rounds, " is out of range; 1 to ", kMaxRounds));
     request_.set_object(options_.object);
     TOUCHSTONE_ASSIGN_OR_RETURN(*request_.mutable_image(), MakeImageSpec(cli_, options_.image, "png"));
     TOUCHSTONE_ASSIGN_OR_RETURN(rig_, ConnectToRig(cli_));
@@ -109,17 +117,46 @@ class Photos {
     TOUCHSTONE_RETURN_IF_ERROR(OneOf("OBJECT", options_.object, names).status());
     const Eigen::Vector3d low = service::FromProto(object->bounds_min_m()),
                           high = service::FromProto(object->bounds_max_m());
+    if (!options_.plan.empty()) return PlanFromFile((low + high) / 2);
     const double distance_m =
         kMargin * (high - low).norm() / 2 / std::sin(request_.image().vertical_fov_rad() / 2);
     for (int turn = 0; turn < options_.turns; ++turn) {
       const auto& [face, top] = Turns()[turn];
-      int number = 0;
-      for (const Ring& ring : RingsOf(options_.sequence))
-        for (int k = 0; k < ring.views; ++k, ++number)
-          views_.push_back({face, absl::StrFormat("%s_top%s_%02d.png", options_.object, face, number),
-                            ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
-                                   2 * kPi * k / ring.views)});
+      // All rounds while the object lies like this; the first one's names are those of a single round.
+      for (int round = 0; round < options_.rounds; ++round) {
+        const std::string suffix = round == 0 ? "" : absl::StrCat("_round", round);
+        int number = 0;
+        for (const Ring& ring : RingsOf(options_.sequence))
+          for (int k = 0; k < ring.views; ++k, ++number)
+            views_.push_back(
+                {face, absl::StrFormat("%s_top%s_%02d%s.png", options_.object, face, number, suffix), round,
+                 ViewOf((low + high) / 2, distance_m, top, ring.polar_deg * kRadiansPerDegree,
+                        2 * kPi * k / ring.views)});
+      }
     }
+    return absl::OkStatus();
+  }
+
+  // The rows of a plan that are of the object, each while that face is up which the camera sees most of.
+  absl::Status PlanFromFile(const Eigen::Vector3d& centre) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto pictures, ReadPictures(options_.plan, options_.object));
+    if (!pictures.has_value())
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--plan: ", options_.plan,
+          " is no plan of photographs; the columns of images.csv were expected (touchstone propose FOLDER)"));
+    for (const auto& [face, top] : Turns())
+      for (const PlannedPicture& picture : *pictures) {
+        const Eigen::Vector3d from = service::FromProto(picture.view.camera().eye_m()) - centre;
+        const auto most = std::max_element(
+            Turns().begin(), Turns().end(),
+            [&from](const auto& a, const auto& b) { return a.second.dot(from) < b.second.dot(from); });
+        if (most->first != face) continue;
+        SequenceView view;
+        view.up_face = face;
+        view.file = picture.file;
+        view.view = picture.view;
+        views_.push_back(std::move(view));
+      }
     return absl::OkStatus();
   }
 
@@ -155,6 +192,8 @@ class Photos {
 
   absl::Status TakeAll() {
     TOUCHSTONE_ASSIGN_OR_RETURN(source_, OpenLeased(cli_, rig_.connection.get(), options_.motion));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState rig, GetRig(rig_.connection.get()));
+    emulated_ = session::NamesAnEmulator(rig.provenance());
     const StopOnInterrupt stop_on_interrupt(source_.get());
     std::string mounted;
     for (size_t k = 0; k < views_.size(); ++k) {
@@ -184,8 +223,8 @@ class Photos {
       return absl::InternalError("the source did not send one encoded picture with its pose");
     TOUCHSTONE_RETURN_IF_ERROR(client::ValidateColumn(response.columns(0), response.rows()));
     // The row first: interrupted in between, a row without its picture is taken again.
-    TOUCHSTONE_RETURN_IF_ERROR(
-        set_.Add({view.file, options_.object, view.view.camera(), response.photographs(0)}));
+    TOUCHSTONE_RETURN_IF_ERROR(set_.Add(
+        {view.file, options_.object, view.round, view.view.camera(), response.photographs(0), emulated_}));
     return cli_.Write(set_.PathOf(view.file), client::FileOf(response.columns(0), 0));
   }
 
@@ -203,7 +242,8 @@ class Photos {
         options_.folder, ": ", Counted(files.size(), "picture", "pictures"),
         kept_ > 0 ? absl::StrCat(", ", kept_, " of them stood already") : "",
         left_out_ > 0 ? absl::StrCat("; ", left_out_, " that the rig cannot take are left out") : "",
-        "; poses in images.csv, intrinsics in camera.yaml"));
+        "; poses in images.csv, intrinsics in camera.yaml",
+        emulated_ ? "; an emulator took them: they measure nothing" : ""));
     if (files.empty()) return absl::FailedPreconditionError("the rig can take none of these pictures");
     return absl::OkStatus();
   }
@@ -217,6 +257,7 @@ class Photos {
   std::vector<SequenceView> views_;  // in the order in which they are taken
   ImageSet set_;
   size_t kept_ = 0, left_out_ = 0;
+  bool emulated_ = false;
 };
 
 }  // namespace
@@ -227,12 +268,14 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
       cli->AddCommand(group, "photos",
                       "Photographs an object in a fixed sequence of camera poses, and asks "
                       "for it to be turned in between. Pictures "
-                      "that stand already are not taken again. The folder is an image set: "
-                      "images.csv has the commanded and the measured pose of each, camera.yaml "
-                      "the intrinsics.",
+                      "that stand already are not taken again. The folder is an image set "
+                      "for compare, diagnose and session import: images.csv has the commanded and the "
+                      "measured pose of each, its time and its round, camera.yaml the intrinsics.",
                       "touchstone rig photos lat20 -o photos --server 127.0.0.1:50052\n"
                       "touchstone rig photos lat20 -o photos --sequence seed --turns 6 "
-                      "--image 640x480 --server 127.0.0.1:50052",
+                      "--image 640x480 --server 127.0.0.1:50052\n"
+                      "touchstone rig photos lat20 -o photos --rounds 3 --server 127.0.0.1:50052\n"
+                      "touchstone compare photos --model nominal.yaml --mesh-dir meshes",
                       [cli, options] { return Photos(*cli, *options).Run(); });
   command->add_option("OBJECT", options->object, "What to photograph (touchstone objects)")
       ->type_name("")
@@ -240,6 +283,12 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
   cli->AddOutput(command, "-o,--output", &options->folder,
                  "The folder for the pictures; those that are there are kept", OutputKind::kFolder)
       ->required();
+  cli->AddInput(command,
+                command
+                    ->add_option("--plan", options->plan,
+                                 "In place of the sequence the rows of a plan of photographs that are of "
+                                 "OBJECT (touchstone propose FOLDER -o FILE)")
+                    ->type_name("FILE"));
   command
       ->add_option(
           "--sequence", options->sequence,
@@ -249,6 +298,10 @@ void AddRigPhotos(Cli* cli, CLI::App* group) {
   command
       ->add_option("--turns", options->turns,
                    "On how many of its faces the object is laid, 1 to 6. Default: 4")
+      ->type_name("N");
+  command
+      ->add_option("--rounds", options->rounds,
+                   "How often each view is taken; repeats tell the noise floor. Default: 1")
       ->type_name("N");
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);

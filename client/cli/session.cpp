@@ -17,6 +17,8 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/session/image_set_file.h"
+#include "server/session/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {
@@ -161,14 +163,19 @@ absl::Status ImportToServer(const Cli& cli, const SessionOptions& options) {
 absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
   std::error_code error;
   const bool folder = std::filesystem::is_directory(options.file, error);
+  const bool image_set_file = !folder && IsHdf5Path(options.file) && session::IsImageSetHdf5(options.file);
+  if (image_set_file && !options.output.empty() && !IsJournalPath(options.output)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadImageSession(options.file));
+    return WriteExportedSession(cli, options.file, session, options.output);
+  }
   if (options.output.empty() && (folder || !cli.source().servers.empty()))
     return ImportToServer(cli, options);
-  if (folder)
-    return absl::InvalidArgumentError(absl::StrCat(
-        "-o: ", options.file,
-        " is a folder of photographs, whose poses are in the object's frame; a journal keeps them "
-        "in a rig's. A server keeps it: touchstone session import ",
-        options.file, " --server 127.0.0.1:50051"));
+  if (folder || image_set_file)
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: ", options.file,
+                     " is an image set, whose poses are in the object's frame; a journal keeps them "
+                     "in a rig's. A server keeps it: touchstone session import ",
+                     options.file, " --server 127.0.0.1:50051"));
   if (options.output.empty())
     return absl::InvalidArgumentError(
         "say where to: -o SESSION.db puts the touches into a journal, --server ADDRESS has a server keep "
@@ -251,8 +258,8 @@ absl::Status ExportJournal(const Cli& cli, const SessionOptions& options) {
       ++damaged;
       cli.Log(absl::StrCat("left out: ", damage.message()));
     };
-  TOUCHSTONE_RETURN_IF_ERROR(ExportFromJournal(options.name, options.in_journal, options.output,
-                                               cli.output().force, std::move(skip)));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      ExportFromJournal(cli, options.name, options.in_journal, options.output, std::move(skip)));
   if (options.skip_damaged)
     cli.Log(damaged == 0 ? "nothing was damaged"
                          : "what was damaged is not in this export: see the lines above");
@@ -262,22 +269,21 @@ absl::Status ExportJournal(const Cli& cli, const SessionOptions& options) {
 absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options.name, options.in_journal));
   if (IsJournalPath(options.name)) return ExportJournal(cli, options);
+  // A folder of photographs as one file; nothing else is a name with a slash or a folder's.
+  if (session::IsImageSetFolder(options.name) && IsHdf5Path(options.output)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadImageSession(options.name));
+    return WriteExportedSession(cli, options.name, session, options.output);
+  }
   if (options.skip_damaged)
     return absl::InvalidArgumentError(
         "--skip-damaged is for a journal (.db): copy the rig's with sqlite3 rig.db '.backup copy.db', and "
         "export that");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  std::string left_out;
   TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session,
-                              FetchSession(connection.get(), options.name));
-  if (!session.images) return cli.Write(options.output, session.csv);
-  if (options.output.empty() || IsStandardOutput(options.output))
-    return absl::InvalidArgumentError(absl::StrCat(
-        "-o is missing: session '", options.name, "' holds photographs, and a folder for them was expected"));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteSessionFolder(session, options.output));
-  cli.Log(absl::StrCat(options.output, ": ",
-                       Counted(session.images->files_size(), "photograph", "photographs"),
-                       session.csv.empty() ? "" : ", and touches.csv"));
-  return absl::OkStatus();
+                              FetchSession(connection.get(), options.name, &left_out));
+  if (!left_out.empty()) cli.Log(left_out);
+  return WriteExportedSession(cli, options.name, session, options.output);
 }
 
 }  // namespace
@@ -300,11 +306,12 @@ void AddSession(Cli* cli) {
         ->required();
   };
   const auto add_place = [&](CLI::App* command) {
-    cli->AddInput(
-        command,
-        command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
-            ->type_name("")
-            ->required());
+    cli->AddInput(command, command
+                               ->add_option("NAME", options->name,
+                                            "The name of a server's session, a journal (.db), or for export "
+                                            "to .h5 the folder of an image set")
+                               ->type_name("")
+                               ->required());
     command
         ->add_option("SESSION", options->in_journal,
                      "The session's name in that journal. Default: its only one")
@@ -350,12 +357,15 @@ void AddSession(Cli* cli) {
                                   "touchstone session export monday -o set.csv" + server + "\n" +
                                       "touchstone session export pictures -o photos" + server + "\n" +
                                       "touchstone session export session.db -o set.csv\n"
-                                      "touchstone session export session.db monday -o set.h5",
+                                      "touchstone session export session.db monday -o set.h5\n"
+                                      "touchstone session export session.db -o photos\n"
+                                      "touchstone session export photos -o photos.h5",
                                   [cli, options] { return RunExport(*cli, *options); });
   add_place(out);
-  cli->AddOutput(
-      out, "-o,--output", &options->output,
-      "The file to write, or the folder; from a journal also .h5, with poses and pictures. Default: stdout");
+  cli->AddOutput(out, "-o,--output", &options->output,
+                 "The file to write, or the folder for photographs; .h5: photographs with poses and lens as "
+                 "one file, or all "
+                 "that a journal has. Default: stdout");
   out->add_flag(
       "--skip-damaged", options->skip_damaged,
       "Leave out touches and pictures of a journal that differ from their checksums, naming each; else one "
@@ -373,7 +383,7 @@ void AddSession(Cli* cli) {
   cli->AddInput(in,
                 in->add_option("FILE", options->file,
                                "The measurement file (.csv), what session export wrote (.h5), or the folder "
-                               "of an image set")
+                               "of an image set; of one as .h5, -o FOLDER makes the folder again")
                     ->type_name("")
                     ->required());
   cli->AddOutput(in, "-o,--output", &options->output,

@@ -1,16 +1,19 @@
 #include "client/cli/session_images.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <filesystem>
 #include <fstream>
 
 #include "client/cli/interrupt.h"
+#include "client/cli/output_file.h"
 #include "client/source/errors.h"
 #include "client/source/image_set_files.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/image_set_file.h"
+#include "server/session/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {
@@ -36,6 +39,18 @@ absl::Status ReadFileInPieces(const std::string& path, const TakePiece& take) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<service::StoredSession> ReadSessionHdf5(const std::string& path) {
+  if (std::error_code error; !fs::is_regular_file(path, error))
+    return absl::NotFoundError(
+        absl::StrCat(path, ": cannot be read; the HDF5 file of an image set was expected"));
+  if (!session::IsImageSetHdf5(path))
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, ": is not the HDF5 file of an image set; a session of a rig's journal goes into a journal: ",
+        "touchstone session import ", path, " -o session.db"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(session::ImageSetWithTouches set, session::ReadImageSetHdf5(path));
+  return service::StoredSession{std::move(set.touches_csv), std::move(set.images)};
+}
+
 absl::StatusOr<service::StoredSession> ReadSessionFolder(const std::string& folder) {
   service::StoredSession session;
   TOUCHSTONE_ASSIGN_OR_RETURN(session.images, client::ReadImageSetFiles(folder));
@@ -45,16 +60,33 @@ absl::StatusOr<service::StoredSession> ReadSessionFolder(const std::string& fold
   return session;
 }
 
+absl::Status WriteSessionFolder(const service::StoredSession& session, const std::string& folder) {
+  if (client::HasTouches(folder))
+    return absl::AlreadyExistsError(absl::StrCat((fs::path(folder) / client::kTouchesCsv).string(),
+                                                 " exists already; a new folder was expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(client::WriteImageSetFiles(*session.images, folder));
+  if (session.csv.empty()) return absl::OkStatus();
+  return WriteFileAtomically((fs::path(folder) / client::kTouchesCsv).string(), session.csv);
+}
+
 }  // namespace
+
+bool IsHdf5Path(const std::string& path) {
+  return absl::EndsWith(path, ".h5") || absl::EndsWith(path, ".hdf5");
+}
+
+absl::StatusOr<service::StoredSession> ReadImageSession(const std::string& path) {
+  return IsHdf5Path(path) ? ReadSessionHdf5(path) : ReadSessionFolder(path);
+}
 
 absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const std::string& path,
                                         const std::string& name, bool check) {
   std::error_code error;
   std::string folder_bytes;
-  const bool folder = fs::is_directory(path, error);
+  const bool folder = fs::is_directory(path, error) || IsHdf5Path(path);
   // What is wrong with a folder is said before anything is sent.
   if (folder) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadSessionFolder(path));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadImageSession(path));
     folder_bytes = service::PackSession(session);
   } else {
     // ... and of a file that is not there.
@@ -85,7 +117,8 @@ absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const st
   return session;
 }
 
-absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connection, const std::string& name) {
+absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connection, const std::string& name,
+                                                    std::string* left_out) {
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
   v1::ExportSessionRequest request;
@@ -99,17 +132,42 @@ absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connecti
   const absl::Status finished = client::FromGrpc(reader->Finish());
   TOUCHSTONE_RETURN_IF_ERROR(wrong);
   TOUCHSTONE_RETURN_IF_ERROR(finished);
+  const auto& trailing = context.GetServerTrailingMetadata();
+  if (const auto words = trailing.find(service::kLeftOutMetadata); words != trailing.end())
+    left_out->assign(words->second.data(), words->second.size());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, pieces.Take());
   return service::UnpackSession(bytes);
 }
 
-absl::Status WriteSessionFolder(const service::StoredSession& session, const std::string& folder) {
-  if (client::HasTouches(folder))
-    return absl::AlreadyExistsError(absl::StrCat((fs::path(folder) / client::kTouchesCsv).string(),
-                                                 " exists already; a new folder was expected"));
-  TOUCHSTONE_RETURN_IF_ERROR(client::WriteImageSetFiles(*session.images, folder));
-  if (session.csv.empty()) return absl::OkStatus();
-  return WriteFileAtomically((fs::path(folder) / client::kTouchesCsv).string(), session.csv);
+absl::Status WriteExportedSession(const Cli& cli, const std::string& name,
+                                  const service::StoredSession& session, const std::string& output) {
+  const bool a_file = output.empty() || IsStandardOutput(output) || absl::EndsWith(output, ".csv");
+  if (!session.images && IsHdf5Path(output))
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: session '", name,
+                     "' has touches alone, which a server gives as a measurement file; "
+                     "name one (.csv). A journal's session is also written as .h5"));
+  if (!session.images) return cli.Write(output, session.csv);
+  const std::string photographs = Counted(session.images->files_size(), "photograph", "photographs");
+  if (!a_file) {
+    TOUCHSTONE_RETURN_IF_ERROR(
+        IsHdf5Path(output)
+            ? WriteOutputFileBy(
+                  output, cli.output().force,
+                  [&](const std::string& free_path) {
+                    return session::WriteImageSetHdf5({*session.images, session.csv}, free_path);
+                  })
+            : WriteSessionFolder(session, output));
+    cli.Log(absl::StrCat(output, ": ", photographs, session.csv.empty() ? "" : ", and touches.csv"));
+    return absl::OkStatus();
+  }
+  if (session.csv.empty())
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: session '", name, "' holds photographs, and a folder for them was expected"));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(output, session.csv));
+  cli.Log(absl::StrCat(photographs, " of session '", name,
+                       "' are not in a measurement file: -o FOLDER writes them too"));
+  return absl::OkStatus();
 }
 
 }  // namespace touchstone::cli

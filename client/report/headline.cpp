@@ -6,6 +6,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/report/error_scale.h"
+#include "client/report/joint.h"
 
 namespace touchstone::client {
 namespace {
@@ -113,6 +114,8 @@ std::string WrongValues(const v1::Report& report) {
   if (names.empty() && superfluous.empty()) what += ", but the noise is not what the model says";
   const ErrorScale scale(report);
   const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
+  if (IsJoint(report) && !FallsOfBoth(report).empty())
+    return absl::StrCat(what, ": put right, the error ", FallsOfBoth(report), ".");
   return absl::StrCat(
       what, FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "", ".");
 }
@@ -131,6 +134,9 @@ std::string MissingEffects(const v1::Report& report) {
         FallsAtAll(scale, from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
         Time(unseen), ".");
   }
+  if (IsJoint(report) && !FallsOfBoth(report).empty())
+    return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", "the error ",
+                        FallsOfBoth(report), ".");
   if (!FallsAtAll(scale, from, to)) return absl::StrCat(lacks, "the error stays ", scale.Text(to), ".");
   const Floor floor = NoiseFloorOf(report);
   const bool reached = floor.sigma > 0 && to <= 1.05 * floor.sigma;

@@ -123,11 +123,14 @@ std::string HtmlNextPhotographs(const v1::Report& report) {
                                    "<tbody>");
   int number = 0;
   for (const v1::ProposedPhotograph& next : report.next_photographs())
-    absl::StrAppend(&table, "<tr>", NumberCell(absl::StrCat(++number)), Cell(Escape(next.object())),
-                    NumberCell(Place(next.camera().eye_m(), 1000, 1)),
-                    NumberCell(Place(next.camera().at_m(), 1000, 1)),
-                    NumberCell(Place(next.camera().up(), 1, 2)), NumberCell(Number(next.separation(), 2)),
-                    Cell(Typeset(next.purpose())), "</tr>\n");
+    absl::StrAppend(
+        &table, "<tr>", NumberCell(absl::StrCat(++number)), Cell(Escape(next.object())),
+        NumberCell(Place(next.camera().eye_m(), 1000, 1)), NumberCell(Place(next.camera().at_m(), 1000, 1)),
+        NumberCell(Place(next.camera().up(), 1, 2)),
+        NumberCell(next.separation() > 0 ? Number(next.separation(), 2) : ""),
+        Cell(absl::StrCat(Typeset(next.purpose()), VerdictPictures(next).empty() ? "" : "<br><small>",
+                          VerdictPictures(next), VerdictPictures(next).empty() ? "" : "</small>")),
+        "</tr>\n");
   return Section(
       "next-pictures", "Next pictures",
       "Pictures that would discriminate between the remaining explanations.",

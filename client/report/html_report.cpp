@@ -2,6 +2,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/report/html_page.h"
+#include "client/report/joint.h"
 #include "client/report/report.h"
 #include "client/report/words.h"
 #include "server/base/units.h"
@@ -21,9 +22,9 @@ std::string HtmlReport(const v1::Report& report) {
   // Where nothing of the catalogue is the answer, what is known of the rest comes before what was tried.
   const bool no_name = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
   for (const auto part :
-       {HtmlHead, HtmlDataProblems, HtmlWhatToDo, HtmlDistributions, no_name ? HtmlUnexplained : HtmlWhy,
-        no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere, HtmlObjects, HtmlFit,
-        HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
+       {HtmlHead, HtmlDataProblems, HtmlJoint, HtmlWhatToDo, HtmlDistributions,
+        no_name ? HtmlUnexplained : HtmlWhy, no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere,
+        HtmlObjects, HtmlFit, HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
     page += part(report);
   }
   absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",

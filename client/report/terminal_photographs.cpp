@@ -72,8 +72,9 @@ void AddNextPhotographs(const v1::Report& report, TextLayout* out) {
     rows.push_back(
         {{absl::StrCat("picture of ", next.object())},
          {absl::StrCat("from ", Place(next.camera().eye_m()), " mm at ", Place(next.camera().at_m()), " mm")},
-         {absl::StrCat(Number(next.separation(), 2), " sigmas"), true},
-         {next.purpose(), false, TextLayout::kDim}});
+         {next.separation() > 0 ? absl::StrCat(Number(next.separation(), 2), " sigmas") : "", true},
+         {absl::StrCat(next.purpose(), VerdictPictures(next).empty() ? "" : ": ", VerdictPictures(next)),
+          false, TextLayout::kDim}});
   out->Rows(rows);
 }
 

@@ -8,6 +8,7 @@
 #include <absl/strings/str_join.h>
 
 #include "client/report/error_scale.h"
+#include "client/report/joint.h"
 #include "client/report/report.h"
 #include "client/report/terminal_parts.h"
 
@@ -53,12 +54,6 @@ void AddHowWrong(const v1::Report& report, TextLayout* out) {
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
     out->Paragraph(absl::StrCat("Of the fingers, ", FingerScatterWords(report), "."));
   AddSilhouettes(report, out);
-  if (scale.grey() && report.initial().rmse_us() > 0)
-    out->Paragraph(absl::StrCat("Of the touches: RMSE ",
-                                report.final().rmse_us() > 0
-                                    ? TimeChange(report.initial().rmse_us(), report.final().rmse_us())
-                                    : Time(report.initial().rmse_us()),
-                                ", noise floor ", Time(report.noise_floor_us()), "."));
   if (report.finger_bias_us_size() > 0) {
     std::vector<std::string> fingers;
     for (int i = 0; i < report.finger_bias_us_size(); ++i) {
@@ -171,6 +166,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddOpening(report, &out);
   AddHowWrong(report, &out);
   AddDataProblems(report, &out);
+  AddJoint(report, &out);
   AddDistributions(report, &out);
   AddWhere(report, &out);
   AddWorstPhotographs(report, &out);

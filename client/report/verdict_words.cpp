@@ -82,4 +82,11 @@ std::string VerdictTouches(const v1::ProposedTouch& touch) {
                       " to a verdict (6 nats)");
 }
 
+std::string VerdictPictures(const v1::ProposedPhotograph& picture) {
+  const uint32_t count = picture.photographs_to_verdict();
+  if (count == 0) return "";
+  return absl::StrCat("about ", Count(count), count == 1 ? " such picture" : " such pictures",
+                      " to a verdict (6 nats)");
+}
+
 }  // namespace touchstone::client

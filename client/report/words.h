@@ -88,6 +88,8 @@ std::string NearestEffectWords(const v1::Unexplained& rest);
 std::string RungName(const v1::Step& step);
 // "about 9 such touches to a verdict (6 nats)", or empty.
 std::string VerdictTouches(const v1::ProposedTouch& touch);
+// The same of a picture: "about 3 such pictures to a verdict (6 nats)".
+std::string VerdictPictures(const v1::ProposedPhotograph& picture);
 
 // A command over as many lines as it needs, so that a shell takes them as one.
 std::string ShellLines(const std::string& command, int columns);

@@ -215,6 +215,15 @@ TEST(CovariateName, IsInWords) {
   EXPECT_EQ(CovariateName("approach_z"), "approach_z");
 }
 
+TEST(VerdictPictures, SayHowManyAreNeeded) {
+  v1::ProposedPhotograph picture;
+  EXPECT_EQ(VerdictPictures(picture), "");
+  picture.set_photographs_to_verdict(1);
+  EXPECT_EQ(VerdictPictures(picture), "about 1 such picture to a verdict (6 nats)");
+  picture.set_photographs_to_verdict(3);
+  EXPECT_EQ(VerdictPictures(picture), "about 3 such pictures to a verdict (6 nats)");
+}
+
 TEST(VerdictTouches, SaysHowManyAreNeeded) {
   v1::ProposedTouch touch;
   EXPECT_EQ(VerdictTouches(touch), "");

@@ -90,10 +90,10 @@ struct PhotographEffects {
 
 // The residuals of the initial and of the improved model, described.
 residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
-                                        const std::vector<double>& before,
+                                        const touches::Prediction& initial, const std::vector<double>& before,
                                         const touches::Prediction& improved, const std::vector<double>& after,
                                         double sigma_s) {
-  return residuals::DescribeResiduals(*workspace.observations, workspace.nominal, improved, before, after,
+  return residuals::DescribeResiduals(*workspace.observations, initial, improved, before, after,
                                       {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
 }
 
@@ -224,8 +224,13 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const PhotographEffects& photo
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   AddLadder(ladder, photographs, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
-  diagnosis.residuals =
-      DescribeBoth(*workspace, before, ladder.prediction, ladder.residuals, ladder.noise_floor.sigma_s);
+  // A part of a joint diagnosis describes what the model had left before anything was put in place.
+  touches::Prediction initial = workspace->nominal;
+  if (input.initial_model != nullptr) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(initial, workspace->predictor->Run(*input.initial_model, true, true));
+  }
+  diagnosis.residuals = DescribeBoth(*workspace, initial, touches::Residuals(o, initial), ladder.prediction,
+                                     ladder.residuals, ladder.noise_floor.sigma_s);
   AddSentences(&diagnosis);
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
   if (touches_needed > 0) {
@@ -258,8 +263,8 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& given, const Dia
   const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
   AddHowWrong(*workspace, residuals, &diagnosis);
   if (diagnosis.data.touches > 0)
-    diagnosis.residuals =
-        DescribeBoth(*workspace, residuals, workspace->nominal, residuals, diagnosis.noise_floor->sigma_s);
+    diagnosis.residuals = DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,
+                                       residuals, diagnosis.noise_floor->sigma_s);
   photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);
   diagnosis.duration_s = Now() - began;

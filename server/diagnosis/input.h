@@ -1,6 +1,7 @@
 // What a diagnosis is asked: a model, a measurement set or photographs, and the surfaces of the objects.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,6 +26,14 @@ struct DiagnosisInput {
   uint64_t seed = 0;
   // Where the surfaces are what is left: put a map of them into the improved model instead of their size.
   bool with_surface_map = false;
+  // Part of a joint diagnosis of touches and photographs. Names of effects that are settled by both: they are no candidates,
+  // and where the model has them their values stay.
+  std::vector<std::string> settled;
+  // Whose errors are told as the initial ones; null: the model's.
+  std::shared_ptr<const model::Model> initial_model;
+  bool IsSettled(const std::string& effect) const {
+    return std::find(settled.begin(), settled.end(), effect) != settled.end();
+  }
 };
 
 struct DiagnosisContext {

@@ -3,19 +3,25 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/base/status.h"
 #include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/design/propose_photographs.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
+#include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/report/photograph_summary.h"
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/diagnosis/selection/candidates.h"
 
 namespace touchstone::diagnosis {
 namespace {
+
+constexpr int kDefaultPhotographs = 6;  // proposed by Diagnose where something is confounded
 
 using Engine = std::function<absl::StatusOr<images::PhotographDiagnosis>(images::Expectation*)>;
 
@@ -96,14 +102,40 @@ absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
   return std::optional<v1::Report>(std::move(report));
 }
 
+// Diagnose, and the pictures that would tell what is left apart. `always`: Propose, which names pictures even where
+// nothing is confounded.
+absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInput& input,
+                                                              int max_photographs, bool always,
+                                                              const DiagnosisContext& context,
+                                                              images::Expectation* expectation) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
+                              images::DiagnosePhotographs(input, context, expectation));
+  const images::ExplanationsLeft& left = expectation->left;
+  if (diagnosis.verdict == selection::Verdict::kTooLittleData) {
+    const int missing = std::max(diagnosis.images_needed - expectation->photographs.poses, 1);
+    diagnosis.next_photographs =
+        design::PhotographsToBegin(expectation->photographs, always ? max_photographs : missing, input.seed);
+    return diagnosis;
+  }
+  if (!always && !left.confounded) return diagnosis;
+  if (context.progress && !context.progress("choosing pictures", 0.9))
+    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      diagnosis.next_photographs,
+      design::ProposePhotographs(expectation->photographs, left, max_photographs, input.seed, context.pool));
+  if (!always || !diagnosis.next_photographs.empty()) return diagnosis;
+  if (left.models.size() < 2) {
+    diagnosis.warnings.push_back("No picture would tell more than those at hand.");
+    return diagnosis;
+  }
+  const std::string other = selection::DiscriminatingMeasurement({left.models[0].name, left.models[1].name});
+  diagnosis.warnings.push_back(absl::StrCat("No picture of this camera tells ", left.models[0].name, " from ",
+                                            left.models[1].name, other.empty() ? "." : ": ", other));
+  return diagnosis;
+}
+
 absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
                                          const Engine& engine) {
-  // A verdict on the photographs alone would pass for one on both.
-  if (input.set != nullptr)
-    return absl::UnimplementedError(
-        absl::StrCat(input.images->origin,
-                     ": touches and photographs are compared together, but not yet diagnosed together: "
-                     "diagnose its touches.csv by itself, and the folder without it"));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
   if (blunders) return *std::move(blunders);
   return Reported(input, context, engine);
@@ -120,15 +152,26 @@ absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context) {
+  if (input.set != nullptr) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
+    if (blunders) return *std::move(blunders);
+    return DiagnoseJointSet(input, context);
+  }
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
-    return images::DiagnosePhotographs(input, context, expectation);
+    return DiagnosedWithNext(input, kDefaultPhotographs, false, context, expectation);
   });
 }
 
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context) {
+  // A proposal for the photographs alone would pass for one for both.
+  if (input.set != nullptr)
+    return absl::UnimplementedError(
+        absl::StrCat(input.images->origin,
+                     ": touches and photographs are diagnosed together, but nothing is proposed for both: "
+                     "propose for its touches.csv by itself, and for the folder without it"));
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
-    return images::ProposePhotographs(input, max_photographs, context, expectation);
+    return DiagnosedWithNext(input, max_photographs, true, context, expectation);
   });
 }
 

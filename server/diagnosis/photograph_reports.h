@@ -14,12 +14,12 @@ namespace touchstone::diagnosis {
 // How wrong and where. `input.images` is set; `input.set` too for a joint report.
 absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input, const DiagnosisContext& context);
 
-// Also why, what to add, and what the error becomes. UNIMPLEMENTED with touches beside the photographs. Errors of the improved model are those that a comparison with it
-// finds.
+// Also why, what to add, and what the error becomes; with touches beside the photographs of both together
+// (joint_reports.h). Errors of the improved model are those that a comparison with it finds.
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context);
 
-// Diagnose, with at most `max_photographs` further pictures that would tell the explanations that are left apart.
+// UNIMPLEMENTED with touches beside the photographs. Diagnose, with at most `max_photographs` further pictures that would tell the explanations that are left apart.
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context);
 

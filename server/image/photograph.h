@@ -21,6 +21,9 @@ struct Intrinsics {
   std::vector<double> distortion;  // k1 k2 p1 p2 k3; empty: none
 };
 
+// The lens for pictures of another size of the same sensor; one that says no size of its own is left as it is.
+Intrinsics ScaledTo(const Intrinsics& lens, int width, int height);
+
 // An ideal pinhole of this vertical field of view (radians), its axis through the middle of the picture.
 Intrinsics PinholeIntrinsics(int width, int height, double vertical_fov_rad);
 

@@ -17,6 +17,7 @@
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
+#include "server/session/emulated.h"
 
 namespace touchstone::service {
 namespace {
@@ -29,7 +30,7 @@ absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diag
 }
 
 constexpr std::chrono::milliseconds kProgressInterval{250};
-constexpr int kDefaultProposedTouches = 24;
+constexpr int kDefaultProposedTouches = 24, kDefaultProposedPhotographs = 12;
 
 // The work runs in a thread of its own and only leaves notes here, so that progress is sent in time whatever
 // the work is at, and a client that reads slowly does not hold it up.
@@ -92,6 +93,10 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   } else if (input.images != nullptr && input.set == nullptr) {
     provenance->set_set_sha256(input.images->sha256);
   }
+  // Wherever a set was copied to, its report says that no camera saw it.
+  if (input.images != nullptr)
+    if (const std::string emulated = session::EmulatedPhotographs(*input.images); !emulated.empty())
+      report->add_warnings(emulated);
   std::vector<std::string> objects;
   if (input.set != nullptr) objects = input.set->objects;
   if (input.images != nullptr)
@@ -214,9 +219,15 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
         absl::InvalidArgumentError(absl::StrCat("touches = ", request->touches(), ": at most ", most)));
   const int touches =
       request->touches() == 0 ? kDefaultProposedTouches : static_cast<int>(request->touches());
-  const Work work = [touches](const diagnosis::DiagnosisInput& input,
-                              const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
-    if (input.images != nullptr) return touchstone::diagnosis::ProposePhotographSet(input, touches, how);
+  if (request->photographs() > most)
+    return ToGrpc(absl::InvalidArgumentError(
+        absl::StrCat("photographs = ", request->photographs(), ": at most ", most)));
+  const int photographs =
+      request->photographs() == 0 ? kDefaultProposedPhotographs : static_cast<int>(request->photographs());
+  const Work work = [touches, photographs](
+                        const diagnosis::DiagnosisInput& input,
+                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+    if (input.images != nullptr) return touchstone::diagnosis::ProposePhotographSet(input, photographs, how);
     return AsReport(touchstone::diagnosis::Propose(input, touches, how));
   };
   v1::Report report;

@@ -5,7 +5,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
-#include "server/session/session_measurements.h"
+#include "server/service/journalled_session.h"
 
 namespace touchstone::service {
 namespace {
@@ -20,15 +20,10 @@ v1::Session SessionToProto(const session::JournalSession& session) {
   message.set_fingers(session.fingers);
   for (const std::string& object : session.objects) message.add_objects(object);
   message.set_has_poses(true);
+  message.set_images(session.images);
   message.set_deleted_unix_s(session.deleted_unix_s);
   message.set_deleted_by(session.deleted_by);
   return message;
-}
-
-absl::StatusOr<std::string> Csv(const session::Journal& journal, const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::MeasuredTouch> touches,
-                              session::SessionMeasurements(journal, session));
-  return session::FormatMeasurements(touches);
 }
 
 }  // namespace
@@ -56,25 +51,40 @@ grpc::Status JournalSessionsService::GetSession(grpc::ServerContext*, const v1::
                                                 v1::Session* response) {
   const auto session = journal_->Session(request->name());
   if (!session.ok()) return ToGrpc(session.status());
-  const auto csv = Csv(*journal_, session->name);
-  if (!csv.ok()) return ToGrpc(csv.status());
   *response = SessionToProto(*session);
-  response->set_hash(Sha256Hex(*csv));
-  response->set_bytes(csv->size());
+  const auto made = FilesOfJournal(*journal_, *session);
+  // Photographs that no file can hold are described all the same.
+  if (absl::IsFailedPrecondition(made.status())) return grpc::Status::OK;
+  if (!made.ok()) return ToGrpc(made.status());
+  if (!made->files.images) {
+    response->set_hash(Sha256Hex(made->files.csv));
+    response->set_bytes(made->files.csv.size());
+    return grpc::Status::OK;
+  }
+  // As a server describes what it keeps, so that an imported session can be compared with the rig's.
+  const auto stored = DescribeSession(session->name, PackSession(made->files), session->name);
+  if (!stored.ok()) return ToGrpc(stored.status());
+  response->set_hash(stored->hash());
+  response->set_bytes(stored->bytes());
+  *response->mutable_objects() = stored->objects();
   return grpc::Status::OK;
 }
 
-grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext*,
+grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext* context,
                                                    const v1::ExportSessionRequest* request,
                                                    grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
-  const auto csv = Csv(*journal_, request->name());
-  if (!csv.ok()) return ToGrpc(csv.status());
+  const auto session = journal_->Session(request->name());
+  if (!session.ok()) return ToGrpc(session.status());
+  const auto made = FilesOfJournal(*journal_, *session);
+  if (!made.ok()) return ToGrpc(made.status());
+  if (!made->left_out.empty()) context->AddTrailingMetadata(kLeftOutMetadata, made->left_out);
   v1::ExportSessionResponse response;
-  for (size_t begin = 0; begin < csv->size(); begin += kPiece) {
-    response.set_csv(csv->substr(begin, kPiece));
-    if (!writer->Write(response)) break;
-  }
-  return grpc::Status::OK;
+  return ToGrpc(
+      ForEachPiece(PackSession(made->files), kPiece, [&](const std::string& file, absl::string_view piece) {
+        response.set_file(file);
+        response.set_csv(std::string(piece));
+        return writer->Write(response);
+      }));
 }
 
 absl::Status JournalSessionsService::Admit(const std::string& lease_token, const char* event,

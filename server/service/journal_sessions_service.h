@@ -1,4 +1,4 @@
-// touchstone.v1.Sessions over a journal: its sessions as measurement files.
+// touchstone.v1.Sessions over a journal: its sessions as measurement files, with photographs as image sets.
 #pragma once
 
 #include "server/gateway/audit/audit_log.h"

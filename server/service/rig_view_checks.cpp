@@ -31,7 +31,7 @@ absl::Status RigService::DoCheck(const v1::CheckViewsRequest& request, v1::Check
     if (const absl::Status valid = image::ValidateImageRequest(camera, image::ImageOptions()); !valid.ok())
       return absl::Status(valid.code(), absl::StrCat(where, ": ", valid.message()));
     const source::ViewCommand command{"", request.object(), object->surface->bounds(),
-                                      source::ObjectFromCamera(camera)};
+                                      source::ObjectFromCamera(camera), std::nullopt};
     v1::TouchCheck* check = response->add_checks();
     check->set_up_face(static_cast<v1::UpFace>(
         gateway::calibration::UpFaceFor(command.object_from_camera.rotation().col(2))));

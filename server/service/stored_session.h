@@ -14,6 +14,9 @@
 
 namespace touchstone::service {
 
+// Trailing metadata of ExportSession: what of the session is not in the export, in words; absent: nothing.
+inline constexpr char kLeftOutMetadata[] = "touchstone-left-out-bin";
+
 struct StoredSession {
   std::string csv;  // the measurement file; of an image set its touches.csv. Empty: photographs alone
   std::optional<v1::ImageSetFiles> images;

@@ -103,6 +103,11 @@ void Hdf5Columns::Bytes(const std::string& name, const std::vector<std::string>&
   Whole(name + "_offset", offsets, {offsets.size()});
 }
 
+void Hdf5Columns::Pixels(const std::string& name, const std::vector<uint8_t>& values,
+                         std::vector<hsize_t> shape) {
+  Write(name, "", H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), shape);
+}
+
 absl::Status Hdf5Columns::Finish() {
   if (failed_.empty() && !file_.Close()) failed_ = "the file";
   if (failed_.empty() && SyncAndRename(part_, path_)) {
@@ -205,6 +210,17 @@ absl::StatusOr<std::vector<std::string>> Hdf5ColumnsReader::Bytes(const std::str
   for (uint64_t i = 0; i < count; ++i)
     strings.push_back(bytes.substr(offsets[i], offsets[i + 1] - offsets[i]));
   return strings;
+}
+
+absl::StatusOr<std::vector<uint8_t>> Hdf5ColumnsReader::Pixels(const std::string& name,
+                                                               uint64_t count) const {
+  uint64_t there = 0;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Hdf5Handle dataset, Dataset(name, &there));
+  if (there != count) return Wrong(name, absl::StrCat("has ", there, " values, not ", count));
+  std::vector<uint8_t> values(count);
+  if (count > 0 && H5Dread(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
+    return Wrong(name, "cannot be read as pixels");
+  return values;
 }
 
 }  // namespace touchstone::session

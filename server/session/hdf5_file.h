@@ -53,6 +53,8 @@ class Hdf5Columns {
              const std::vector<std::string>& texts);  // without zero bytes at their ends
   // Byte strings end to end as `name`, and where each begins (one more than there are) as `name`_offset.
   void Bytes(const std::string& name, const std::vector<std::string>& strings);
+  // 8-bit numbers of any shape: pictures.
+  void Pixels(const std::string& name, const std::vector<uint8_t>& values, std::vector<hsize_t> shape);
   absl::Status Finish();
 
  private:
@@ -76,6 +78,7 @@ class Hdf5ColumnsReader {
   absl::StatusOr<std::vector<uint64_t>> Whole(const std::string& name, uint64_t count) const;
   absl::StatusOr<std::vector<std::string>> Texts(const std::string& name, uint64_t count) const;
   absl::StatusOr<std::vector<std::string>> Bytes(const std::string& name, uint64_t count) const;
+  absl::StatusOr<std::vector<uint8_t>> Pixels(const std::string& name, uint64_t count) const;
 
  private:
   Hdf5ColumnsReader(std::string path, Hdf5Handle file) : path_(std::move(path)), file_(std::move(file)) {}

@@ -60,6 +60,16 @@ struct JournalTouch {
   std::optional<int> round, face;        // of a measurement file that was imported
 };
 
+// How a picture was taken, as an image set has it. Metres, radians, object frame where nothing else is said.
+struct JournalView {
+  std::array<double, 3> eye_m{}, at_m{}, up{};  // as it was commanded
+  std::array<double, 6> base_from_object{};     // position (m) and rotation vector (rad)
+  double session_time_s = kNaN;                 // NaN: unknown
+  // The camera's lens for a picture of this size, as OpenCV writes it: pixel centres lie at integers.
+  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+  std::vector<double> distortion;  // k1 k2 p1 p2 k3 ...; empty: none
+};
+
 struct JournalImage {
   std::string id;  // the client's, or made
   uint64_t number = 0;
@@ -72,6 +82,7 @@ struct JournalImage {
   double unix_s = 0;
   int width = 0, height = 0;
   std::string png;
+  std::optional<JournalView> view;  // none: journalled before views were kept
 };
 
 // What was recorded during a touch: the bytes of its columns, and how they stand there.
@@ -106,7 +117,8 @@ class Journal {
   enum class Mode { kReadWrite, kCreateOrReadWrite, kReadOnly };
   // Errors say whether the file is missing, is no journal, or is of another version. Another process that has
   // it open for writing is an error too (one gateway per journal).
-  // A journal of version 1 has no checksums: it is read as it is, and gets them when it is opened for writing.
+  // A journal of version 1 has no checksums: it is read as it is, and gets them when it is opened for writing. One of
+  // version 2 has no views, and becomes version 3 likewise.
   // Every other row is checked when it is read; DATA_LOSS names the touch that is damaged. With `skip_damaged`, for
   // reading only, a touch or picture that is damaged or missing is told to it and left out.
   using SkipDamaged = std::function<void(const absl::Status&)>;

@@ -199,11 +199,11 @@ TEST_F(JournalDamage, OtherFilesAreNoJournalsAndStayAsTheyAre) {
 
 TEST_F(JournalDamage, AnotherVersionIsNamed) {
   Make(1);
-  Sql("PRAGMA user_version = 3");
+  Sql("PRAGMA user_version = 4");
   const absl::Status status = Opened(Mode::kReadWrite);
   EXPECT_TRUE(absl::IsFailedPrecondition(status));
   EXPECT_THAT(Message(status),
-              HasSubstr("is of version 3; this program reads versions 1 to 2: use the newer program"));
+              HasSubstr("is of version 4; this program reads versions 1 to 3: use the newer program"));
 }
 
 TEST_F(JournalDamage, ADamagedFileIsNotWrittenTo) {

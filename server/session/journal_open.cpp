@@ -15,6 +15,7 @@
 #include "server/session/journal_schema.h"
 #include "server/session/journal_seal.h"
 #include "server/session/journal_version1.h"
+#include "server/session/journal_version2.h"
 
 namespace touchstone::session {
 namespace {
@@ -58,6 +59,7 @@ absl::StatusOr<std::unique_ptr<SqliteFile>> OpenForReading(const std::string& pa
 absl::Status MakeTables(SqliteFile* file) {
   return file->Transact([&]() -> absl::Status {
     TOUCHSTONE_RETURN_IF_ERROR(file->Run(kJournalSchema));
+    TOUCHSTONE_RETURN_IF_ERROR(file->Run(kViewSchema));
     TOUCHSTONE_RETURN_IF_ERROR(InsertHead(file));
     static const std::string identity = absl::StrCat("PRAGMA application_id = ", kJournalApplicationId,
                                                      "; PRAGMA user_version = ", kJournalVersion);
@@ -90,11 +92,12 @@ absl::StatusOr<int64_t> CheckIdentity(SqliteFile* file, bool may_create) {
 }
 
 // The tables are those that a journal of this version has: a damaged schema could exchange columns.
-absl::Status CheckTables(SqliteFile* file) {
+absl::Status CheckTables(SqliteFile* file, int64_t version) {
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const std::unique_ptr<SqliteFile> whole,
       SqliteFile::Open("schema", ":memory:", SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE));
   TOUCHSTONE_RETURN_IF_ERROR(whole->Run(kJournalSchema));
+  if (version > 2) TOUCHSTONE_RETURN_IF_ERROR(whole->Run(kViewSchema));
   const char* const query = "SELECT name, sql FROM main.sqlite_master WHERE sql IS NOT NULL";
   std::map<std::string, std::string> found;
   SqliteStatement rows = file->Prepare(query);
@@ -109,8 +112,8 @@ absl::Status CheckTables(SqliteFile* file) {
     if (!more) return absl::OkStatus();
     if (found[expected.Text(0)] != expected.Text(1))
       return absl::DataLossError(absl::StrCat("journal ", file->path(), " is damaged: its table '",
-                                              expected.Text(0), "' is not that of version ", kJournalVersion,
-                                              "; ", kRescueTheFile));
+                                              expected.Text(0), "' is not that of version ", version, "; ",
+                                              kRescueTheFile));
   }
 }
 
@@ -153,8 +156,9 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   if (mode == Journal::Mode::kReadOnly) {
     TOUCHSTONE_ASSIGN_OR_RETURN(opened.file, OpenForReading(path));
     TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t version, CheckIdentity(opened.file.get(), false));
-    TOUCHSTONE_RETURN_IF_ERROR(version == 1 ? ReadAsVersion1(opened.file.get())
-                                            : CheckTables(opened.file.get()));
+    if (version > 1) TOUCHSTONE_RETURN_IF_ERROR(CheckTables(opened.file.get(), version));
+    if (version == 1) TOUCHSTONE_RETURN_IF_ERROR(ReadAsVersion1(opened.file.get()));
+    if (version == 2) TOUCHSTONE_RETURN_IF_ERROR(ReadAsVersion2(opened.file.get()));
     return opened;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(opened.lock, WriterLock::Take(path));
@@ -182,7 +186,11 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   if (version == 1) {
     TOUCHSTONE_RETURN_IF_ERROR(MigrateFromVersion1(&file));
   }
-  TOUCHSTONE_RETURN_IF_ERROR(CheckTables(&file));
+  if (version == 2) {
+    TOUCHSTONE_RETURN_IF_ERROR(CheckTables(&file, version));
+    TOUCHSTONE_RETURN_IF_ERROR(MigrateFromVersion2(&file));
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckTables(&file, kJournalVersion));
   TOUCHSTONE_RETURN_IF_ERROR(CheckSessionCount(&file));
   return opened;
 }

@@ -4,6 +4,7 @@
 
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
+#include "server/session/journal_views.h"
 
 namespace touchstone::session {
 namespace {
@@ -187,6 +188,7 @@ absl::Status InsertImage(SqliteFile* file, int64_t session_id, const JournalImag
   insert.Bind(image.unix_s).Bind(int64_t{image.width}).Bind(int64_t{image.height}).BindBlob(image.png);
   TOUCHSTONE_RETURN_IF_ERROR(insert.Run());
   TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t image_id, file->Number("SELECT last_insert_rowid()"));
+  if (image.view) TOUCHSTONE_RETURN_IF_ERROR(InsertView(file, image_id, *image.view));
   return SealNewImage(file, image_id, tally);
 }
 
@@ -262,6 +264,7 @@ absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
   image.png = row.Text(13);
   image.measured_base_from_camera = ReadPose(row, 14);
   image.measured_unix_s = row.Double(20);
+  TOUCHSTONE_ASSIGN_OR_RETURN(image.view, ReadView(file, image_id));
   return image;
 }
 

@@ -4,8 +4,9 @@
 namespace touchstone::session {
 
 inline constexpr int kJournalApplicationId =
-    0x54736A31;                            // "Tsj1": distinguishes a journal from other SQLite files
-inline constexpr int kJournalVersion = 2;  // PRAGMA user_version; 1 had no checksums (journal_version1.h)
+    0x54736A31;  // "Tsj1": distinguishes a journal from other SQLite files
+// PRAGMA user_version; 1 had no checksums (journal_version1.h), 2 no image_view (journal_version2.h).
+inline constexpr int kJournalVersion = 3;
 
 inline constexpr char kJournalSchema[] = R"sql(
 CREATE TABLE head(                      -- one row: what the other tables must add up to
@@ -103,6 +104,21 @@ CREATE TABLE image(
   UNIQUE(session_id, id),
   UNIQUE(session_id, number));
 CREATE TABLE fact(key TEXT PRIMARY KEY, value TEXT NOT NULL, checksum INTEGER NOT NULL) WITHOUT ROWID;
+)sql";
+
+// What version 3 added. image.checksum covers a picture's row here too.
+inline constexpr char kViewSchema[] = R"sql(
+CREATE TABLE image_view(                -- how a picture was taken; none for those of before version 3
+  image_id INTEGER PRIMARY KEY REFERENCES image,
+  eye_x_m REAL, eye_y_m REAL, eye_z_m REAL,  -- as it was commanded, object frame
+  at_x_m REAL, at_y_m REAL, at_z_m REAL,
+  up_x REAL, up_y REAL, up_z REAL,
+  object_x_m REAL, object_y_m REAL, object_z_m REAL,  -- base_from_object
+  object_rotation_x_rad REAL, object_rotation_y_rad REAL, object_rotation_z_rad REAL,
+  session_time_s REAL,                  -- NULL: unknown
+  -- The lens, as OpenCV writes it: pixel centres at integers; k1 k2 p1 p2 k3 ... with spaces between.
+  fx_px REAL NOT NULL, fy_px REAL NOT NULL, cx_px REAL NOT NULL, cy_px REAL NOT NULL,
+  distortion TEXT NOT NULL);
 )sql";
 
 }  // namespace touchstone::session

@@ -44,7 +44,17 @@ absl::StatusOr<uint64_t> TouchChecksum(SqliteFile* file, int64_t touch_id) {
 }
 
 absl::StatusOr<uint64_t> ImageChecksum(SqliteFile* file, int64_t image_id) {
-  return Checksum(file, {"SELECT * FROM image WHERE image_id = ?"}, image_id);
+  static constexpr char kImage[] = "SELECT * FROM image WHERE image_id = ?";
+  static constexpr char kView[] = "SELECT * FROM image_view WHERE image_id = ?";
+  bool has_view = false;
+  {
+    SqliteStatement view = file->Prepare("SELECT 1 FROM image_view WHERE image_id = ?");
+    view.Bind(image_id);
+    TOUCHSTONE_ASSIGN_OR_RETURN(has_view, view.Step());
+  }
+  // A picture of version 2 keeps the checksum that it got there.
+  if (!has_view) return Checksum(file, {kImage}, image_id);
+  return Checksum(file, {kImage, kView}, image_id);
 }
 
 absl::StatusOr<uint64_t> SessionChecksum(SqliteFile* file, int64_t session_id) {

@@ -106,9 +106,10 @@ absl::Status JournalFile::Erase(int64_t session_id) {
   for (const char* sql :
        {"DELETE FROM touch_series WHERE touch_id IN (SELECT touch_id FROM touch WHERE session_id = ?)",
         "DELETE FROM touch_finger WHERE touch_id IN (SELECT touch_id FROM touch WHERE session_id = ?)",
-        "DELETE FROM touch WHERE session_id = ?", "DELETE FROM image WHERE session_id = ?",
-        "DELETE FROM session_object WHERE session_id = ?", "DELETE FROM session_tally WHERE session_id = ?",
-        "DELETE FROM session WHERE session_id = ?"})
+        "DELETE FROM touch WHERE session_id = ?",
+        "DELETE FROM image_view WHERE image_id IN (SELECT image_id FROM image WHERE session_id = ?)",
+        "DELETE FROM image WHERE session_id = ?", "DELETE FROM session_object WHERE session_id = ?",
+        "DELETE FROM session_tally WHERE session_id = ?", "DELETE FROM session WHERE session_id = ?"})
     TOUCHSTONE_RETURN_IF_ERROR(file_->Prepare(sql).Bind(session_id).Run());
   return AddToSessionCount(file_.get(), -1);
 }

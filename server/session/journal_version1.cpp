@@ -5,6 +5,7 @@
 #include "server/base/status.h"
 #include "server/session/journal_schema.h"
 #include "server/session/journal_seal.h"
+#include "server/session/journal_version2.h"
 
 namespace touchstone::session {
 namespace {
@@ -128,13 +129,15 @@ absl::Status SealAll(SqliteFile* file) {
 absl::Status ReadAsVersion1(SqliteFile* file) {
   TOUCHSTONE_RETURN_IF_ERROR(WantNoLaterTable(file));
   file->set_has_checksums(false);
-  return file->Run(kVersion1Views);
+  TOUCHSTONE_RETURN_IF_ERROR(file->Run(kVersion1Views));
+  return file->Run(kNoViews);
 }
 
 absl::Status MigrateFromVersion1(SqliteFile* file) {
   TOUCHSTONE_RETURN_IF_ERROR(WantNoLaterTable(file));
   return file->Transact([&]() -> absl::Status {
-    for (const char* sql : {kMoveAside, kJournalSchema, kCopy}) TOUCHSTONE_RETURN_IF_ERROR(file->Run(sql));
+    for (const char* sql : {kMoveAside, kJournalSchema, kViewSchema, kCopy})
+      TOUCHSTONE_RETURN_IF_ERROR(file->Run(sql));
     TOUCHSTONE_RETURN_IF_ERROR(SealAll(file));
     TOUCHSTONE_RETURN_IF_ERROR(file->Run(kDropOld));
     static const std::string version = absl::StrCat("PRAGMA user_version = ", kJournalVersion);

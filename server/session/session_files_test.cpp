@@ -251,6 +251,15 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
   image.unix_s = 1.7e9;
   image.png = std::string("\x89PNG\0\0", 6);
   ASSERT_TRUE(journal_->AddImage("s", image).ok());
+  JournalImage viewed = image;
+  viewed.id = "side";
+  JournalView& view = viewed.view.emplace();
+  view.eye_m = {0.1, 1.0 / 3, 0.3}, view.at_m = {0, 0.1, 0}, view.up = {0, 0, 2};
+  view.base_from_object = {0.3, 0, 0.1, 0, 0, 1.0 / 7};
+  view.session_time_s = 1.0 / 3;
+  view.fx_px = 60.1, view.fy_px = 60.2, view.cx_px = 31.5, view.cy_px = 23.5;
+  view.distortion = {-0.2, 1.0 / 9};
+  ASSERT_TRUE(journal_->AddImage("s", viewed).ok());
 
   const std::string path = folder_ + "/session.h5";
   const absl::Status exported = ExportSessionHdf5(*journal_, "s", path);
@@ -305,7 +314,21 @@ TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
   ASSERT_TRUE(journal_
                   ->ForEachImage("again",
                                  [&](const JournalImage& kept) {
+                                   if (kept.id == "side") {
+                                     EXPECT_TRUE(kept.view.has_value());
+                                     if (!kept.view) return true;
+                                     EXPECT_EQ(kept.view->eye_m, view.eye_m);
+                                     EXPECT_EQ(kept.view->at_m, view.at_m);
+                                     EXPECT_EQ(kept.view->up, view.up);
+                                     EXPECT_EQ(kept.view->base_from_object, view.base_from_object);
+                                     EXPECT_EQ(kept.view->session_time_s, view.session_time_s);
+                                     EXPECT_EQ(kept.view->fx_px, view.fx_px);
+                                     EXPECT_EQ(kept.view->cy_px, view.cy_px);
+                                     EXPECT_EQ(kept.view->distortion, view.distortion);
+                                     return true;
+                                   }
                                    EXPECT_EQ(kept.id, "front");
+                                   EXPECT_FALSE(kept.view.has_value());
                                    EXPECT_EQ(kept.png, image.png);
                                    EXPECT_EQ(kept.width, 64);
                                    EXPECT_EQ(kept.base_from_camera, image.base_from_camera);

@@ -1,14 +1,13 @@
 // A session as HDF5, in SI so that every number comes back bit for bit.
 #include <absl/strings/str_cat.h>
 
-#include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
 #include "server/session/hdf5_file.h"
 #include "server/session/session_files.h"
+#include "server/session/session_hdf5_images.h"
 #include "server/session/touch_series.h"
 
 namespace touchstone::session {
@@ -197,67 +196,6 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
   return absl::OkStatus();
 }
 
-void WriteImages(const std::vector<JournalImage>& images, Hdf5Columns* columns) {
-  const hsize_t rows = images.size();
-  std::vector<std::string> ids, objects, up_faces, pngs;
-  std::vector<uint64_t> sizes;
-  std::vector<double> poses, measured, measured_unix_s, unix_s;
-  for (const JournalImage& image : images) {
-    ids.push_back(image.id);
-    objects.push_back(image.object);
-    up_faces.push_back(image.up_face);
-    pngs.push_back(image.png);
-    sizes.insert(sizes.end(), {static_cast<uint64_t>(image.width), static_cast<uint64_t>(image.height)});
-    poses.insert(poses.end(), image.base_from_camera.begin(), image.base_from_camera.end());
-    measured.insert(measured.end(), image.measured_base_from_camera.begin(),
-                    image.measured_base_from_camera.end());
-    measured_unix_s.push_back(image.measured_unix_s);
-    unix_s.push_back(image.unix_s);
-  }
-  columns->Texts("images/id", ids);
-  columns->Texts("images/object", objects);
-  columns->Texts("images/placement", up_faces);
-  columns->Whole("images/width_height_px", sizes, {rows, 2});
-  columns->Numbers("images/base_from_camera_m_rad", "m, rad", poses, {rows, 6});
-  columns->Numbers("images/measured_base_from_camera_m_rad", "m, rad", measured, {rows, 6});
-  columns->Numbers("images/measured_unix_s", "s", measured_unix_s, {rows});
-  columns->Numbers("images/unix_s", "s", unix_s, {rows});
-  columns->Bytes("images/png", pngs);
-}
-
-absl::Status ReadImages(const Hdf5ColumnsReader& file, uint64_t rows, std::vector<JournalImage>* images) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("images/id", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("images/object", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto up_faces, file.Texts("images/placement", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto sizes, file.Whole("images/width_height_px", 2 * rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto poses, file.Numbers("images/base_from_camera_m_rad", 6 * rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto unix_s, file.Numbers("images/unix_s", rows));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto pngs, file.Bytes("images/png", rows));
-  // Files of before these were kept have none.
-  std::vector<double> measured(6 * rows, kNaN), measured_unix_s(rows, kNaN);
-  if (file.Has("images/measured_base_from_camera_m_rad")) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(measured, file.Numbers("images/measured_base_from_camera_m_rad", 6 * rows));
-    TOUCHSTONE_ASSIGN_OR_RETURN(measured_unix_s, file.Numbers("images/measured_unix_s", rows));
-  }
-  images->resize(rows);
-  for (uint64_t k = 0; k < rows; ++k) {
-    JournalImage& image = (*images)[k];
-    image.id = ids[k];
-    image.object = objects[k];
-    image.up_face = up_faces[k];
-    image.width = static_cast<int>(sizes[2 * k]);
-    image.height = static_cast<int>(sizes[2 * k + 1]);
-    for (int i = 0; i < 6; ++i) {
-      image.base_from_camera[i] = poses[6 * k + i];
-      image.measured_base_from_camera[i] = measured[6 * k + i];
-    }
-    image.measured_unix_s = measured_unix_s[k];
-    image.unix_s = unix_s[k];
-    image.png = pngs[k];
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, const std::string& path) {
@@ -287,7 +225,7 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, 
   columns.Whole("session/fingers_touches_images", {fingers, touches.size(), images.size()}, {3});
   WriteTouches(touches, fingers, &columns);
   TOUCHSTONE_RETURN_IF_ERROR(WriteSeries(journal, name, touches, &columns));
-  WriteImages(images, &columns);
+  WriteHdf5Images(images, &columns);
   return columns.Finish();
 }
 
@@ -316,7 +254,7 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
   std::vector<JournalTouch> touches;
   std::vector<JournalImage> images;
   TOUCHSTONE_RETURN_IF_ERROR(ReadTouches(file, counts[1], counts[0], &touches));
-  TOUCHSTONE_RETURN_IF_ERROR(ReadImages(file, counts[2], &images));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadHdf5Images(file, counts[2], &images));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto series, ReadSeriesOf(file, counts[1]));
   if (journal->Session(session.name).ok())
     return absl::AlreadyExistsError(absl::StrCat("there is a session '", session.name, "' already; import ",

@@ -120,7 +120,7 @@ absl::Status PhysicalSamples::MakeSample(uint32_t row, const MotionGuard& guard,
   if (!specification.columns.image) return absl::OkStatus();
   const image::Camera camera =
       image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
-  const ViewCommand view{request_.session, command.object, command.bounds, ObjectFromCamera(camera)};
+  const ViewCommand view{request_.session, command.object, command.bounds, ObjectFromCamera(camera), camera};
   TOUCHSTONE_ASSIGN_OR_RETURN(const Photograph photograph, device_->Photograph(view, guard));
   return columns.AppendPicture(ImageOf(photograph, *device_, rectify_, specification.image),
                                specification.image, batch);

@@ -115,7 +115,8 @@ absl::Status PhysicalSource::MakePictures(const CaptureRequest& request, const S
                                           const MotionGuard& guard, const TakePicture& take) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckPhotograph(request.image));
   for (const image::Camera& camera : request.cameras) {
-    const ViewCommand command{"default", request.object, object.surface->bounds(), ObjectFromCamera(camera)};
+    const ViewCommand command{"default", request.object, object.surface->bounds(), ObjectFromCamera(camera),
+                              camera};
     TOUCHSTONE_ASSIGN_OR_RETURN(const Photograph photograph, device_->Photograph(command, guard));
     const PhotographPose pose = PoseOf(photograph, (camera.at_m - camera.eye_m).norm());
     TOUCHSTONE_RETURN_IF_ERROR(take(ImageOf(photograph, *device_, rectify_, request.image), &pose));

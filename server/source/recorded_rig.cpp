@@ -10,7 +10,8 @@
 namespace touchstone::source {
 namespace {
 
-constexpr double kVerticalFovRad = 0.7853981633974483;  // 45 deg: a journal does not say what the lens was
+constexpr double kVerticalFovRad =
+    0.7853981633974483;  // 45 deg, where a journal does not say what the lens was
 
 }  // namespace
 
@@ -27,6 +28,7 @@ absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Open(const std::string
           source->images_[image.id] = image;
           return true;
         }));
+  for (const auto& [id, image] : source->images_) source->frames_[source->frames_.size() + 1] = &image;
   return source;
 }
 
@@ -66,6 +68,8 @@ absl::StatusOr<source::Photograph> RecordedRig::Photograph(const ViewCommand& co
   image::Frame& frame = photograph.frame;
   frame.width = image.width, frame.height = image.height;
   frame.rgb = std::move(image.pixels);
+  for (const auto& [number, shown] : frames_)
+    if (shown == &found->second) frame.number = number;
   photograph.unix_s = found->second.unix_s;
   const Eigen::Isometry3d base_from_camera = geometry::PoseFromVector(found->second.base_from_camera),
                           measured = geometry::PoseFromVector(found->second.measured_base_from_camera);
@@ -78,6 +82,10 @@ absl::StatusOr<source::Photograph> RecordedRig::Photograph(const ViewCommand& co
 }
 
 image::Intrinsics RecordedRig::IntrinsicsOf(const image::Frame& frame) const {
+  if (const auto shown = frames_.find(frame.number); shown != frames_.end() && shown->second->view) {
+    const session::JournalView& view = *shown->second->view;
+    return {frame.width, frame.height, view.fx_px, view.fy_px, view.cx_px, view.cy_px, view.distortion};
+  }
   return image::PinholeIntrinsics(frame.width, frame.height, kVerticalFovRad);
 }
 

@@ -38,6 +38,8 @@ class RecordedRig : public RigDevice {
   std::unique_ptr<session::Journal> journal_;
   std::unique_ptr<session::RecordedTouches> touches_;
   std::map<std::string, session::JournalImage> images_;  // by id
+  std::map<uint64_t, const session::JournalImage*>
+      frames_;  // by the number of the frame that shows it, from 1
 };
 
 }  // namespace touchstone::source

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/test_folder.h"
+#include "server/image/encode.h"
 #include "server/session/command_bytes.h"
 #include "server/source/test_source.h"
 
@@ -66,6 +67,31 @@ TEST_F(RecordedRigTest, SaysWhatWasNotRecorded) {
   ViewCommand view;
   view.object = "lat00";
   EXPECT_EQ(rig_->Photograph(view, NoObjection).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RecordedRigTest, ShowsAPictureThroughTheLensThatItWasTakenWith) {
+  rig_.reset();
+  ViewCommand view;
+  view.object = "lat00";
+  session::JournalImage image;
+  image.id = ViewId(view), image.object = "lat00";
+  image.width = 4, image.height = 3;
+  const std::vector<uint8_t> rgb(4 * 3 * 3, 9);
+  image.png = *image::EncodePng(rgb.data(), 4, 3, 3);
+  session::JournalView& taken = image.view.emplace();
+  taken.fx_px = 6.5, taken.fy_px = 6.4, taken.cx_px = 1.25, taken.cy_px = 1;
+  taken.distortion = {-0.2};
+  {
+    auto journal = *session::Journal::Open(folder_.Path("rig.db"), session::Journal::Mode::kReadWrite);
+    ASSERT_TRUE(journal->AddImage("monday", image).ok());
+  }
+  rig_ = *RecordedRig::Open(folder_.Path("rig.db"));
+  const auto photograph = rig_->Photograph(view, NoObjection);
+  ASSERT_TRUE(photograph.ok()) << photograph.status();
+  const image::Intrinsics lens = rig_->IntrinsicsOf(photograph->frame);
+  EXPECT_EQ(lens.fx_px, 6.5);
+  EXPECT_EQ(lens.cx_px, 1.25);
+  EXPECT_EQ(lens.distortion, std::vector<double>{-0.2});
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "server/geometry/mesh.h"
+#include "server/image/image.h"
 #include "server/image/photograph.h"
 #include "server/session/journal.h"
 #include "server/source/motion_guard.h"
@@ -33,6 +34,8 @@ struct ViewCommand {
   std::string object;
   geometry::Bounds bounds;                                               // of the object, object frame
   Eigen::Isometry3d object_from_camera = Eigen::Isometry3d::Identity();  // z looks ahead, y down
+  // The same as the client said it, which the journal keeps; none: a check, which photographs nothing.
+  std::optional<image::Camera> commanded;
 };
 
 // A picture, and where it was taken from.

@@ -127,6 +127,13 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
     throw std::invalid_argument("no arm is called '" + options.arm + "'; there are ur3, ur3e");
   if (options.fingers < 1 || options.fingers > 8)
     throw std::invalid_argument(std::to_string(options.fingers) + " fingers; must be 1 to 8");
+  if (options.camera_width < 1 || options.camera_width > 2048 || options.camera_height < 1 ||
+      options.camera_height > 2048)
+    throw std::invalid_argument("the camera's pictures have " + std::to_string(options.camera_width) + " x " +
+                                std::to_string(options.camera_height) + " pixels; must be 1 to 2048 a side");
+  if (options.jpeg_quality < 1 || options.jpeg_quality > 100)
+    throw std::invalid_argument("the JPEG quality is " + std::to_string(options.jpeg_quality) +
+                                "; must be 1 to 100");
   std::filesystem::create_directories(options.dir);
   options_.dir = std::filesystem::canonical(options.dir).string();
   for (std::string& mesh : options_.meshes)
@@ -139,7 +146,12 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   scenario.fingers = options.fingers, scenario.spacing_mm = options.spacing_mm,
   scenario.sigma_us = options.sigma_us;
   scenario.objects = ReadObjects(options_.meshes, options.supershape_triangles);
-  for (const std::string& each : options.hide) Hide(each, &scenario);
+  CameraOptions camera;
+  for (const std::string& each : options.hide)
+    if (HideInCamera(each, &camera.hidden))
+      camera.anything_hidden = true;
+    else
+      Hide(each, &scenario);
   for (const std::string& each : options.unlisted) AddUnlisted(each, &scenario);
   std::map<std::string, Eigen::Isometry3d> base_from_object;
   for (const auto& object : scenario.objects) {
@@ -172,7 +184,8 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   controller.finger_give_m = options.finger_give_mm * 1e-3;
   controller_ = Controller::Start(controller, clock_.get(), &faults_, fingers_.get());
 
-  CameraOptions camera;
+  camera.width = options.camera_width, camera.height = options.camera_height;
+  camera.jpeg_quality = options.jpeg_quality;
   camera.address = options.address, camera.port = options.camera_port, camera.seed = options.seed;
   camera.vertical_fov_rad = kVerticalFovDeg * M_PI / 180;
   camera_ = std::make_unique<EmulatedCamera>(

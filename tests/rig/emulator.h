@@ -22,13 +22,16 @@ struct EmulatorOptions {
   int dashboard_port = 0, primary_port = 0, secondary_port = 0, rtde_port = 0, camera_port = 0,
       control_port = 0;
 
-  std::vector<std::string> hide;      // "tip_radius.radius_mm=2": world/hidden_physics.h
+  // "tip_radius.radius_mm=2", "radial_distortion.k1=-0.2": world/hidden_physics.h, world/hidden_camera.h
+  std::vector<std::string> hide;
   std::vector<std::string> unlisted;  // "lead_screw=0.3,4"
   double sigma_us = 5000;             // Gaussian noise of every finger's time
   uint64_t seed = 1;
   std::vector<std::string> meshes;     // "NAME=FILE", mm; none: the five built-in supershapes
   int supershape_triangles = 20'000;   // as the virtual source has them
   std::string object, up_face = "+z";  // mounted from the beginning; empty: nothing
+
+  int camera_width = 640, camera_height = 480, jpeg_quality = 90;
 
   double speedup = 1;  // simulated seconds in one of the host's
   int fingers = 3;

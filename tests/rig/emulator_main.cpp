@@ -80,8 +80,13 @@ int main(int argc, char** argv) {
                  "Folder for gateway.toml, calibration.yaml, emulator.json, the log and the port");
   app.add_option("--arm", options.arm, "Arm to emulate")->check(CLI::IsMember({"ur3", "ur3e"}));
   app.add_flag("--powered", options.powered, "The arm's power is on from the beginning");
-  app.add_option("--hide", options.hide,
-                 "Hidden effect, EFFECT.PARAMETER=VALUE[,VALUE...]; names and units of the catalogue");
+  app.add_option(
+      "--hide", options.hide,
+      "Hidden effect, EFFECT.PARAMETER=VALUE[,VALUE...]; names and units of the catalogue; of touches, or "
+      "of the camera (tests/rig/README.md)");
+  app.add_option("--camera-width", options.camera_width, "Of its pictures, pixels");
+  app.add_option("--camera-height", options.camera_height, "Of its pictures, pixels");
+  app.add_option("--jpeg-quality", options.jpeg_quality, "Of its pictures, 1 to 100");
   app.add_option("--unlisted", options.unlisted, "Hidden physics of no catalogue, NAME=K_MM[,SECOND]");
   app.add_option("--sigma-us", options.sigma_us, "Gaussian noise of each finger's time");
   app.add_option("--seed", options.seed, "Of noise, bumps, clocks and line faults");

@@ -265,9 +265,9 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   diagnosis.pictures = static_cast<int>(set.pictures.size());
   diagnosis.corners = diagnosis.pictures * set.board.corners();
   if (!set.without_board.empty())
-    diagnosis.warnings.push_back(absl::StrCat(set.without_board.size(), " pictures show no whole board of ",
-                                              set.board.columns, "x", set.board.rows,
-                                              " inner corners: ", absl::StrJoin(set.without_board, ", ")));
+    diagnosis.warnings.push_back(absl::StrCat("no whole board of ", set.board.columns, "x", set.board.rows,
+                                              " inner corners was found in ",
+                                              absl::StrJoin(set.without_board, ", ")));
   if (diagnosis.pictures < kMinBoardPictures) {
     diagnosis.verdict = selection::Verdict::kTooLittleData;
     diagnosis.pictures_needed = kMinBoardPictures;

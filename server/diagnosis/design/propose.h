@@ -8,6 +8,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/design/sequential_choice.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 #include "server/touch/commanded_touch.h"
@@ -32,8 +33,6 @@ struct ProposedTouch {
   // kVerdictNats; 0: one model only, or more than anybody would make.
   int touches_to_verdict = 0;
 };
-
-inline constexpr double kVerdictNats = 6;
 
 // At most `max_touches` touches, most informative first. `models` are fitted to the observations, best first.
 //

@@ -11,8 +11,6 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kMinPoses = 6;  // that a verdict needs
-
 double SecondsNow() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -77,20 +75,12 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
                                 SelectPhotoExplanation(input, expectation->photographs, context));
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
+    expectation->left = FindExplanationsLeft(selection);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,
                                                    expectation->before, &diagnosis, &expectation->after));
   }
   diagnosis.duration_s = SecondsNow() - began;
   TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "done", 1));
-  return diagnosis;
-}
-
-absl::StatusOr<PhotographDiagnosis> ProposePhotographs(const DiagnosisInput& input, int max_photographs,
-                                                       const DiagnosisContext& context,
-                                                       Expectation* expectation) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis,
-                              DiagnosePhotographs(input, context, expectation));
-  diagnosis.warnings.push_back("No further photographs are proposed yet.");
   return diagnosis;
 }
 

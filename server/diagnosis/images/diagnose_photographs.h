@@ -12,6 +12,8 @@
 
 namespace touchstone::diagnosis::images {
 
+inline constexpr int kMinPoses = 6;  // that a verdict needs
+
 // How wrong. The verdict is kNone.
 absl::StatusOr<PhotographDiagnosis> ComparePhotographs(const DiagnosisInput& input,
                                                        const DiagnosisContext& context,
@@ -21,10 +23,5 @@ absl::StatusOr<PhotographDiagnosis> ComparePhotographs(const DiagnosisInput& inp
 absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& input,
                                                         const DiagnosisContext& context,
                                                         Expectation* expectation = nullptr);
-
-// Diagnose, with at most `max_photographs` further ones that would tell the explanations that are left apart.
-absl::StatusOr<PhotographDiagnosis> ProposePhotographs(const DiagnosisInput& input, int max_photographs,
-                                                       const DiagnosisContext& context,
-                                                       Expectation* expectation = nullptr);
 
 }  // namespace touchstone::diagnosis::images

@@ -34,18 +34,22 @@ std::shared_ptr<const model::Effect> ImageFieldEffect() {
 }
 
 Eigen::MatrixXf ImageFieldFunctions(int width, int height) {
+  // Waves of one direction, a column each.
+  const auto waves_along = [](int pixels) {
+    Eigen::MatrixXf waves(pixels, kMaxHalfWaves + 1);
+    for (int k = 0; k <= kMaxHalfWaves; ++k)
+      for (int x = 0; x < pixels; ++x)
+        waves(x, k) = static_cast<float>(std::cos(M_PI * k * (x + 0.5) / pixels));
+    return waves;
+  };
+  const Eigen::MatrixXf across_waves = waves_along(width), down_waves = waves_along(height);
   Eigen::MatrixXf functions(static_cast<Eigen::Index>(width) * height, kImageFieldSize);
   int column = 0;
   for (int waves = 0; waves <= kMaxHalfWaves; ++waves)
-    for (int across = 0; across <= waves; ++across, ++column) {
-      const int down = waves - across;
-      for (int y = 0; y < height; ++y) {
-        const double along = std::cos(M_PI * down * (y + 0.5) / height);
-        for (int x = 0; x < width; ++x)
-          functions(static_cast<Eigen::Index>(y) * width + x, column) =
-              static_cast<float>(along * std::cos(M_PI * across * (x + 0.5) / width));
-      }
-    }
+    for (int across = 0; across <= waves; ++across, ++column)
+      for (int y = 0; y < height; ++y)
+        functions.col(column).segment(static_cast<Eigen::Index>(y) * width, width) =
+            down_waves(y, waves - across) * across_waves.col(across);
   return functions;
 }
 

@@ -68,14 +68,21 @@ Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey
   return variance.cwiseSqrt().cwiseInverse();
 }
 
-Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights) {
+Eigen::VectorXf CellSums(const CellGrid& grid, const float* image) {
   Eigen::VectorXf sums = Eigen::VectorXf::Zero(grid.size());
   for (int y = 0; y < grid.height; ++y) {
     float* row = &sums[y / grid.cell * grid.columns()];
     const float* from = image + static_cast<size_t>(y) * grid.width;
-    for (int x = 0; x < grid.width; ++x) row[x / grid.cell] += from[x];
+    for (int column = 0; column < grid.columns(); ++column) {
+      const int end = std::min((column + 1) * grid.cell, grid.width);
+      for (int x = column * grid.cell; x < end; ++x) row[column] += from[x];
+    }
   }
-  return sums.cwiseProduct(weights);
+  return sums;
+}
+
+Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights) {
+  return CellSums(grid, image).cwiseProduct(weights);
 }
 
 Eigen::VectorXf Smooth(const CellGrid& grid, const Eigen::VectorXf& cells) {

@@ -27,7 +27,9 @@ CellGrid GridOfPicture(int width, int height, int cells);
 Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& expected_grey,
                             const RecordTable& record, double contour_px2 = 1.0 / 12);
 
-// Sums over cells, times their weights. [cell]
+// Sums over cells. [cell]
+Eigen::VectorXf CellSums(const CellGrid& grid, const float* image);
+// The same, times their weights. [cell]
 Eigen::VectorXf CellSums(const CellGrid& grid, const float* image, const Eigen::VectorXf& weights);
 
 // Over neighbouring cells, 1 2 1 in both directions.

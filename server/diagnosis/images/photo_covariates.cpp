@@ -1,7 +1,5 @@
 #include "server/diagnosis/images/photo_covariates.h"
 
-#include <absl/strings/str_cat.h>
-#include <absl/strings/str_format.h>
 #include <boost/math/distributions/students_t.hpp>
 
 #include <algorithm>
@@ -128,17 +126,6 @@ std::vector<PhotoCovariate> TestCovariates(const Photographs& p, const std::vect
     return a.unseen_gain > b.unseen_gain;
   });
   return tests;
-}
-
-std::string LookupYaml(const PhotoCovariate& covariate) {
-  std::string knots, values;
-  for (size_t i = 0; i < covariate.knots.size(); ++i) {
-    absl::StrAppendFormat(&knots, "%s%.6g", i > 0 ? ", " : "", covariate.knots[i]);
-    absl::StrAppendFormat(&values, "%s%.4g", i > 0 ? ", " : "", covariate.mean_grey[i]);
-  }
-  return absl::StrCat("- lookup:\n    name: rest_", covariate.name,
-                      "\n    adds: grey\n    covariate: ", covariate.name, "\n    knots: [", knots,
-                      "]\n    values: [", values, "]\n");
 }
 
 }  // namespace touchstone::diagnosis::images

@@ -23,7 +23,4 @@ struct PhotoCovariate {
 std::vector<PhotoCovariate> TestCovariates(const Photographs& photographs,
                                            const std::vector<image::Photo>& expected);
 
-// The curve as a whole effect for a model file.
-std::string LookupYaml(const PhotoCovariate& covariate);
-
 }  // namespace touchstone::diagnosis::images

@@ -8,7 +8,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/images/photo_candidates.h"
 #include "server/diagnosis/images/photo_covariates.h"
+#include "server/diagnosis/images/photo_formula.h"
 #include "server/diagnosis/selection/ladder.h"
 
 namespace touchstone::diagnosis::images {
@@ -51,11 +53,8 @@ class PhotoLadder {
     const std::vector<image::Photo>& best = changed_ ? *after_ : before_;
     d_.noise_floor = NoiseFloorOfPhotographs(photographs_, best, pool_);
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
-    SetHeldOut(fit_, &*d_.final);
-    for (PhotographStep& step : d_.steps) {
-      SetHeldOut(fit_, &step.quality);
-      JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
-    }
+    d_.final->heldout_rmse_grey *= selection_.heldout_ratio;
+    for (PhotographStep& step : d_.steps) JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
     for (GreyQuality* quality : {&*d_.initial, &*d_.final})
       JudgeByPixels(photographs_, d_.noise_floor, quality);
     const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2),
@@ -64,7 +63,10 @@ class PhotoLadder {
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        d_.candidates, RankPhotoCandidates(photographs_, selection_, d_.noise_floor.sigma_grey, pool_));
     JudgeRest();
+    DoubtCandidates();
     d_.verdict = d_.unexplained      ? selection::Verdict::kUnexplained
                  : !d_.steps.empty() ? selection::Verdict::kMissingEffects
                  : values_wrong_     ? selection::Verdict::kWrongValues
@@ -128,7 +130,12 @@ class PhotoLadder {
       kept.push_back(open[chosen]->effect);
       // The last step is the whole explanation.
       const bool last = open.size() == 1 && selection_.field < 0;
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next));
+      double heldout_ratio = selection_.heldout_ratio;
+      if (!last) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(
+            heldout_ratio, HeldOutRatio(*selection_.photographs, *selection_.fine.rows, experiment, *next));
+      }
+      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*open[chosen], last ? values_ : *next, heldout_ratio));
       open.erase(open.begin() + static_cast<long>(chosen));
     }
     return absl::OkStatus();
@@ -143,7 +150,8 @@ class PhotoLadder {
     return part;
   }
 
-  absl::Status DescribeStep(const selection::SelectedStep& from, const inference::Fit& with_it) {
+  absl::Status DescribeStep(const selection::SelectedStep& from, const inference::Fit& with_it,
+                            double heldout_ratio) {
     const model::EffectInstance& instance = fit_.model.base().effects[from.effect];
     PhotographStep step;
     step.effect = inference::NameOf(*instance.effect);
@@ -169,19 +177,48 @@ class PhotoLadder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                                 ExpectPhotographs(photographs_, step.model, false, pool_));
     step.quality = QualityOfPhotographs(photographs_, expected, with_it.model.size(), pool_);
+    step.quality.heldout_rmse_grey *= heldout_ratio;
     d_.steps.push_back(std::move(step));
     return absl::OkStatus();
-  }
-
-  void SetHeldOut(const inference::Fit& fit, GreyQuality* quality) const {
-    const double excess = HeldOutExcess(selection_.fine, fit, photographs_, d_.noise_floor.sigma_grey);
-    quality->heldout_rmse_grey = std::sqrt(quality->rmse_grey * quality->rmse_grey + excess);
   }
 
   // On what the improved model leaves, expected with the noise that it leaves.
   std::vector<PhotoCovariate> CovariatesOf(const model::Model& model) const {
     const auto expected = ExpectPhotographs(*selection_.photographs, model, true, pool_);
     return expected.ok() ? TestCovariates(*selection_.photographs, *expected) : std::vector<PhotoCovariate>();
+  }
+
+  // The most that a step can be sure of beside a rest that remains.
+  double MostBesideRest() const {
+    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
+    const double before2 = std::pow(d_.initial->rmse_grey, 2) - floor2,
+                 after2 = std::pow(d_.final->rmse_grey, 2) - floor2;
+    const double explained = before2 > 0 ? std::clamp(1 - after2 / before2, 0.0, 1.0) : 0;
+    return kDoubted + (kMaxBesideRest - kDoubted) * explained;
+  }
+
+  // What was not found good enough for a step, or leaves a rest, is not probable, whatever it is compared with.
+  void DoubtCandidates() {
+    double most = selection_.steps.empty() ? kDoubted : selection::kMaxProbability;
+    if (d_.unexplained && !selection_.steps.empty()) most = MostBesideRest();
+    for (RankedPhotographCandidate& candidate : d_.candidates)
+      candidate.probability = std::min(candidate.probability, most);
+  }
+
+  // A formula or a curve that says what is left.
+  void AddSuggestion(UnexplainedPhotographs* rest) const {
+    const std::optional<RestSuggestion> found =
+        SuggestForRest(photographs_, *selection_.photographs, improved_,
+                       {rest->rmse_grey, rest->heldout_rmse_grey, d_.noise_floor.sigma_grey}, pool_);
+    if (!found) return;
+    rest->formula = found->formula;
+    rest->formula_yaml = found->formula_yaml;
+    rest->lookup_yaml = found->lookup_yaml;
+    rest->rmse_grey = found->rmse_grey;
+    rest->heldout_rmse_grey = found->heldout_rmse_grey;
+    rest->heldout_gain = found->heldout_gain;
+    std::stable_partition(rest->covariates.begin(), rest->covariates.end(),
+                          [&](const auto& test) { return test.name == found->covariate; });
   }
 
   // A structure that no named effect explains.
@@ -203,36 +240,28 @@ class PhotoLadder {
     rest.rmse_grey = d_.final->rmse_grey;
     rest.heldout_rmse_grey = d_.final->heldout_rmse_grey;
     for (const PhotoCovariate& c : curves)
-      if (c.p < kRestP && c.unseen_gain > 0) rest.covariates.push_back({c.name, c.p, c.gain_nats});
-    if (!curves.empty() && curves[0].p < kRestP && curves[0].unseen_gain > kCurveGain) {
-      rest.lookup_yaml = LookupYaml(curves[0]);
-      const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2), all2 = std::pow(rest.rmse_grey, 2);
-      rest.heldout_gain =
-          all2 > floor2 ? std::clamp(curves[0].unseen_gain * all2 / (all2 - floor2), 0.0, 1.0) : 0;
-      rest.heldout_rmse_grey = rest.heldout_rmse_grey * std::sqrt(std::max(1 - curves[0].unseen_gain, 0.0));
-    }
-    if (selection_.field >= 0)
+      if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
+    AddSuggestion(&rest);
+    // What a formula or a curve says as well is not said again.
+    const bool said = !rest.formula.empty() || !rest.lookup_yaml.empty();
+    if (selection_.field >= 0 && !said)
       absl::StrAppend(
           &rest.words,
           "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
           "reflection, stray light. Photograph a plain white sheet.");
-    if (albedo)
+    if (albedo && !said)
       absl::StrAppend(
           &rest.words, rest.words.empty() ? "" : " ",
           "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
           "dirt, or a shape that departs from its mesh.");
-    if (misfit && rest.words.empty())
+    if (misfit && rest.words.empty() && !said)
       rest.words =
           "Pictures differ from what is expected by more than their pixels scatter, and nothing in the "
           "catalogue "
           "explains it.";
     d_.unexplained = std::move(rest);
-    const double floor2 = std::pow(d_.noise_floor.sigma_grey, 2);
-    const double before2 = std::pow(d_.initial->rmse_grey, 2) - floor2,
-                 after2 = std::pow(d_.final->rmse_grey, 2) - floor2;
-    const double explained = before2 > 0 ? std::clamp(1 - after2 / before2, 0.0, 1.0) : 0;
     for (PhotographStep& step : d_.steps) {
-      step.probability = std::min(step.probability, kDoubted + (kMaxBesideRest - kDoubted) * explained);
+      step.probability = std::min(step.probability, MostBesideRest());
       absl::StrAppend(&step.words, step.words.empty() ? "" : " ",
                       "Beside it a rest remains unexplained: it may stand in for something else.");
     }

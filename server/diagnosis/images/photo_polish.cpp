@@ -75,12 +75,17 @@ absl::StatusOr<bool> SearchValleys(const inference::Experiment& experiment, infe
 
 }  // namespace
 
+absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
+                                           const DiagnosisContext& context) {
+  return MakePhotoSearch(photographs, anchor, {}, kPolish, context);
+}
+
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection) {
   selection->polished = selection->fit;
   if (selection->fit.model.size() == 0) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const PhotoSearch all, MakePhotoSearch(photographs, selection->fit.model.base(), {}, kPolish, context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch all,
+                              MakePolishRows(photographs, selection->fit.model.base(), context));
   const inference::Likelihood plain(all.rows->GroupRows(), nullptr, 0, nullptr);
   inference::Experiment experiment = *all.experiment;
   if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;

@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <set>
 
 #include "server/base/normal.h"
+#include "server/base/status.h"
 #include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/inference/held_out.h"
 
@@ -103,6 +106,35 @@ void JudgeByPixels(const Photographs& p, const GreyNoiseFloor& floor, GreyQualit
   if (!(floor.sigma_grey > 0) || ratio <= 1) return;
   quality->lack_of_fit_p =
       std::min(quality->lack_of_fit_p, boost::math::gamma_q(0.5 * freedom, 0.5 * freedom * ratio * ratio));
+}
+
+absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
+                                    const inference::Experiment& experiment, const inference::Fit& fit) {
+  if (fit.model.size() == 0) return 1;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<inference::RefitWithoutPart>> divisions,
+                              inference::RefitWithoutParts(experiment, fit));
+  const auto squares_of = [&](const model::Model& model,
+                              const std::set<int>& which) -> absl::StatusOr<double> {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::vector<double> squares,
+        SquaredErrors(photographs, model, std::vector<int>(which.begin(), which.end()), experiment.pool));
+    return std::accumulate(squares.begin(), squares.end(), 0.0);
+  };
+  std::set<int> all;
+  for (int row = 0; row < rows.rows(); ++row) all.insert(rows.PhotographOfRow(row));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double seen, squares_of(fit.model.base(), all));
+  double largest = seen;
+  for (const std::vector<inference::RefitWithoutPart>& refits : divisions) {
+    double unseen = 0;
+    for (const inference::RefitWithoutPart& refit : refits) {
+      std::set<int> which;
+      for (const int row : refit.rows) which.insert(rows.PhotographOfRow(row));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_of(refit.fit.model.base(), which));
+      unseen += squares;
+    }
+    largest = std::max(largest, unseen);
+  }
+  return seen > 0 ? std::sqrt(largest / seen) : 1;
 }
 
 double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,

@@ -21,7 +21,7 @@ PixelNoise NoiseOfResiduals(const Photographs& photographs, const std::vector<im
 double PatchMisfitP(const Photographs& photographs, const std::vector<image::Photo>& expected, int parameters,
                     ThreadPool* pool);
 
-// Error and lack of fit; the held-out error is the same error.
+// Error and lack of fit; the held-out error is the same error, as it is where nothing was fitted.
 GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
                                  int parameters, ThreadPool* pool);
 
@@ -29,7 +29,15 @@ GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vect
 // lies farther above the floor than contours that were sampled at pixel centres explain (a tenth).
 void JudgeByPixels(const Photographs& photographs, const GreyNoiseFloor& floor, GreyQuality* quality);
 
-// What pictures that a fit did not see have beyond those that it saw, as mean square grey levels.
+// The error on photographs that a fit did not see over the error on the same photographs where it saw them, over all
+// their pixels; at least 1. The fit is made anew without each object, without each fifth of the poses and without each
+// fifth of the session (inference/held_out.h): of the three the largest. `experiment`: of these rows. Errors as
+// inference::RefitWithoutParts.
+absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
+                                    const inference::Experiment& experiment, const inference::Fit& fit);
+
+// For a ranking of many fits, quickly: what pictures have as mean square grey levels beyond those that the fit saw, where
+// one linear step of it makes up for what is left out. Of a step that is claimed, see HeldOutRatio.
 double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
                      double floor_grey);
 

@@ -48,6 +48,10 @@ absl::StatusOr<std::unique_ptr<PhotoRows>> PhotoRows::Make(
     ThreadPool* pool) {
   std::unique_ptr<PhotoRows> rows(new PhotoRows(photographs, pool));
   rows->grid_ = GridOfPicture(photographs.width(), photographs.height(), options.cells);
+  const Eigen::MatrixXf functions = ImageFieldFunctions(photographs.width(), photographs.height());
+  rows->field_cells_.resize(rows->grid_.size(), kImageFieldSize);
+  for (int f = 0; f < kImageFieldSize; ++f)
+    rows->field_cells_.col(f) = CellSums(rows->grid_, functions.col(f).data());
   rows->Choose(options.max_photographs);
   const std::vector<Direction> directions = DirectionsOf(anchor, effects);
   const int count = static_cast<int>(rows->views_.size());

@@ -82,6 +82,7 @@ class PhotoRows : public inference::ObservationModel {
   const Photographs& photographs_;
   ThreadPool* pool_;
   CellGrid grid_;
+  Eigen::MatrixXf field_cells_;  // functions of the image field, summed over cells: the same of every view
   std::vector<std::unique_ptr<View>> views_;
   std::vector<int> first_row_, first_row_of_group_, photograph_of_row_;
   std::map<std::pair<std::string, int>, int> slope_of_;  // (effect, value) -> column of the views' slopes

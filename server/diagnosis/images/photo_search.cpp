@@ -20,6 +20,9 @@ constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
 constexpr double kFaint = 0.1;  // of the noise
+constexpr int kAnchorPasses = 5;
+constexpr double kAnchorStays =
+    1;  // standard errors by which a value moves from an anchor that is near enough
 
 bool HasEffect(const model::Model& model, const model::Effect& effect) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
@@ -134,6 +137,31 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
   return absl::OkStatus();
 }
 
+// Derivatives by what moves rays are the anchor's. A value that moved contours by several pixels away from it may have
+// stopped where those derivatives no longer lead downwards: from there they are taken again, until nothing moves.
+absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& context,
+                        selection::Explanation* explanation) {
+  const std::vector<model::EffectInstance>& effects = explanation->fit.model.base().effects;
+  if (std::none_of(effects.begin() + explanation->initial_effects, effects.end(),
+                   [](const model::EffectInstance& instance) { return MovesRays(*instance.effect); }))
+    return absl::OkStatus();
+  for (int pass = 0; pass < kAnchorPasses; ++pass) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const PhotoSearch there,
+        MakePhotoSearch(photographs, explanation->fit.model.base(), {}, kCoarse, context));
+    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit,
+                                inference::FitModel(*there.experiment, explanation->fit.model));
+    double farthest = 0;  // standard errors
+    for (int i = 0; i < fit.model.size(); ++i)
+      if (fit.covariance(i, i) > 0)
+        farthest = std::max(
+            farthest, std::abs(fit.point[i] - explanation->fit.point[i]) / std::sqrt(fit.covariance(i, i)));
+    explanation->fit = std::move(fit);
+    if (farthest < kAnchorStays) break;
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
@@ -141,7 +169,7 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
   std::vector<selection::Candidate> candidates;
   std::vector<std::shared_ptr<const model::Effect>> effects;
   for (const auto& effect : effects::TouchEffects())
-    if (effect->moves_surface) effects.push_back(effect);
+    if (effect->moves_surface && !input.IsSettled(effect->name)) effects.push_back(effect);
   for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
   effects.push_back(ImageFieldEffect());
   for (const auto& effect : effects) {
@@ -187,8 +215,10 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   made.experiment->observations = made.rows.get();
   made.experiment->likelihood = made.likelihood.get();
   made.experiment->pool = context.pool;
-  made.search = std::make_unique<selection::StepwiseSearch>(
-      *made.experiment, candidates, selection::SearchRules(), [](const std::string&) {});
+  selection::SearchRules rules;
+  rules.cv_gain_over_noise = true;
+  made.search = std::make_unique<selection::StepwiseSearch>(*made.experiment, candidates, rules,
+                                                            [](const std::string&) {});
   return made;
 }
 
@@ -208,9 +238,11 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   {
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch coarse,
                                 MakePhotoSearch(photographs, *input.model, candidates, kCoarse, context));
+    coarse.experiment->settled = input.settled;
     TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
   }
+  TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &explanation));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
   // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is depends on the noise.
   selection.photographs = std::make_unique<Photographs>(photographs);
@@ -222,6 +254,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.fine,
       MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, kFine, context));
+  selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
@@ -234,6 +267,9 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
       selection.field = static_cast<int>(e);
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.heldout_ratio,
+      HeldOutRatio(*selection.photographs, *selection.fine.rows, *selection.fine.experiment, selection.fit));
   TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(*selection.photographs, context, &selection));
   const inference::Likelihood& likelihood = *selection.fine.likelihood;
   const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});

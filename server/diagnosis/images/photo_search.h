@@ -41,12 +41,18 @@ struct PhotoSelection {
   int field = -1;                              // index of the image field's effect; -1: none
   std::vector<selection::SelectedStep> steps;  // named effects
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
-  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
+  // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
+  double heldout_ratio = 1;
+  double albedo_nats = 0;  // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
+
+// Rows of every photograph at an anchor that is near, contours trusted to a tenth of a pixel: no candidates.
+absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
+                                           const DiagnosisContext& context);
 
 // Fits the explanation to every photograph: `polished` and `covariance`.
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,

@@ -127,9 +127,11 @@ class DirectionColumns {
   DirectionColumns(const CellGrid& grid, const Eigen::VectorXf& weights, int smoothing)
       : grid_(grid), weights_(weights), smoothing_(smoothing) {}
 
-  // Returns the cells of the image before they are smoothed.
-  Eigen::VectorXf Add(const std::vector<float>& image) {
-    Eigen::VectorXf cells = CellSums(grid_, image.data(), weights_);
+  // Returns the weighted cells of the image before they are smoothed.
+  Eigen::VectorXf Add(const std::vector<float>& image) { return AddSums(CellSums(grid_, image.data())); }
+  // The same of an image that was summed over cells.
+  Eigen::VectorXf AddSums(const Eigen::VectorXf& sums) {
+    Eigen::VectorXf cells = sums.cwiseProduct(weights_);
     Eigen::VectorXf smooth = cells;
     for (int pass = 0; pass < smoothing_; ++pass) smooth = Smooth(grid_, smooth);
     columns_.push_back(std::move(smooth));
@@ -172,20 +174,21 @@ void AddDisplacements(const std::vector<float>& grey, int width, int height, Dir
 
 // Smooth light over the object: nameless albedo or lamps.
 void AddObjectLight(const image::Photo& photo, DirectionColumns* columns) {
-  std::vector<float> image(photo.grey.size());
-  for (int across = 0; across <= kObjectWaves; ++across)
+  std::vector<float> image(photo.grey.size()), along(photo.width);
+  for (int across = 0; across <= kObjectWaves; ++across) {
+    for (int x = 0; x < photo.width; ++x)
+      along[x] = static_cast<float>(std::cos(2 * M_PI * across * (x + 0.5) / photo.width));
     for (int down = 0; down <= kObjectWaves; ++down) {
-      for (int y = 0; y < photo.height; ++y)
+      for (int y = 0; y < photo.height; ++y) {
+        const auto here = static_cast<float>(std::cos(2 * M_PI * down * (y + 0.5) / photo.height));
         for (int x = 0; x < photo.width; ++x) {
           const size_t at = static_cast<size_t>(y) * photo.width + x;
-          image[at] = photo.mask[at] == 0
-                          ? 0
-                          : static_cast<float>(photo.grey[at] *
-                                               std::cos(2 * M_PI * across * (x + 0.5) / photo.width) *
-                                               std::cos(2 * M_PI * down * (y + 0.5) / photo.height));
+          image[at] = photo.mask[at] == 0 ? 0 : photo.grey[at] * along[x] * here;
         }
+      }
       columns->Add(image);
     }
+  }
 }
 
 // Patches of the surface as the picture sees them: where a smooth error of the albedo enters the rows.
@@ -278,11 +281,8 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
       const Eigen::VectorXf cells = columns.Add(change.difference);
       if (rays) slopes.push_back(cells / static_cast<float>(step));
     }
-  const Eigen::MatrixXf functions = ImageFieldFunctions(width, height);
   std::vector<Eigen::VectorXf> field;
-  for (int f = 0; f < kImageFieldSize; ++f)
-    field.push_back(
-        columns.Add(std::vector<float>(functions.col(f).data(), functions.col(f).data() + functions.rows())));
+  for (int f = 0; f < kImageFieldSize; ++f) field.push_back(columns.AddSums(field_cells_.col(f)));
   AddDisplacements(photo.grey, width, height, &columns);
   AddObjectLight(photo, &columns);
 

@@ -95,6 +95,7 @@ struct ProposedPhotograph {
   session::CameraPlacement camera;
   std::string purpose;
   double separation = 0;
+  int photographs_to_verdict = 0;  // as design::ProposedTouch::touches_to_verdict
 };
 
 struct UnexplainedPhotographs {

@@ -152,6 +152,30 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
   return photos;
 }
 
+absl::StatusOr<std::vector<double>> SquaredErrors(const Photographs& photographs, const model::Model& model,
+                                                  const std::vector<int>& which, ThreadPool* pool) {
+  const image::PhotoSimulator simulator(std::make_shared<const model::Model>(model));
+  const int count = static_cast<int>(which.size());
+  std::vector<double> squares(count);
+  std::vector<absl::Status> statuses(count);
+  ParallelFor(pool, count, 1, [&](int begin, int end) {
+    image::PhotoWorkspace workspace;
+    for (int i = begin; i < end; ++i) {
+      const absl::StatusOr<image::Photo> photo =
+          simulator.Run(photographs.requests[which[i]], image::PhotoOutputs(), &workspace);
+      statuses[i] = photo.status();
+      if (!photo.ok()) continue;
+      const std::vector<float>& measured = photographs.measured_grey[which[i]];
+      for (size_t at = 0; at < measured.size(); ++at) {
+        const double residual = static_cast<double>(measured[at]) - photographs.record->Mean(photo->grey[at]);
+        squares[i] += residual * residual;
+      }
+    }
+  });
+  for (const absl::Status& status : statuses) TOUCHSTONE_RETURN_IF_ERROR(status);
+  return squares;
+}
+
 double RmseGrey(const Photographs& photographs, const std::vector<image::Photo>& expected) {
   double squares = 0, count = 0;
   for (int k = 0; k < photographs.size(); ++k) {

@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/images/photo_explanations.h"
 #include "server/diagnosis/images/pixel_noise.h"
 #include "server/diagnosis/input.h"
 #include "server/image/simulate_photo.h"
@@ -46,11 +47,16 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
 // Root mean square of measured minus expected over all pixels, grey levels.
 double RmseGrey(const Photographs& photographs, const std::vector<image::Photo>& expected);
 
+// Sum over the pixels of each of these photographs of (measured - expected)^2. Errors as ExpectPhotographs.
+absl::StatusOr<std::vector<double>> SquaredErrors(const Photographs& photographs, const model::Model& model,
+                                                  const std::vector<int>& which, ThreadPool* pool);
+
 // What a diagnosis expected, for those who describe what is left: no picture need be simulated again.
 struct Expectation {
   Photographs photographs;
   std::vector<image::Photo> before;  // of the given model, with details
   std::vector<image::Photo> after;   // of the improved model, with details; empty if nothing changed
+  ExplanationsLeft left;             // none unless a diagnosis was made
 };
 
 }  // namespace touchstone::diagnosis::images

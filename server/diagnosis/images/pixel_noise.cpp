@@ -11,6 +11,7 @@ constexpr double kWhite = 255, kGreyLevels = 256;
 constexpr int kPerGrey = 8;  // entries of a table
 constexpr int kEntries = 255 * kPerGrey + 1;
 constexpr double kRoundingVariance = 1.0 / 12;
+constexpr double kNoTail = 1e-12;
 constexpr double kKept = 0.8;             // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
 constexpr double kClipped = 4;            // standard deviations from black or white
@@ -32,10 +33,6 @@ double TrimmedVariance(const double* counts, const double* squares, int steps) {
   return total > 0 ? sum / (kKept * total) / kKeptVariance : 0;
 }
 
-double Density(double z) {
-  return 0.3989422804014327 * std::exp(-0.5 * z * z);
-}
-
 double Tail(double z) {  // P(Z > z)
   return 0.5 * std::erfc(z * 0.7071067811865476);
 }
@@ -47,15 +44,17 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
   const double sigma = std::sqrt(variance);
   const double low = -grey / sigma, high = (kWhite - grey) / sigma;
   if (low < -kClipped && high > kClipped) return {grey, variance, 0};
-  // x = min(max(grey + sigma z, 0), white): moments of the part between the ends, and what lies at them.
-  const double inside = Tail(low) - Tail(high);
-  const double first = Density(low) - Density(high);
-  const double second = inside + low * Density(low) - high * Density(high);
-  const double at_white = Tail(high);
-  const double mean = grey * inside + sigma * first + kWhite * at_white;
-  const double square =
-      grey * grey * inside + 2 * grey * sigma * first + variance * second + kWhite * kWhite * at_white;
-  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance, 1 - inside};
+  // The record is the light with its scatter, rounded, then cut at the ends: sums of the tails of its levels. (Cut before
+  // it is rounded, its mean at black would be a sixtieth of a grey level higher, which weighs millions of pixels.)
+  const double unrounded = std::sqrt(std::max(variance - kRoundingVariance, kRoundingVariance));
+  double mean = 0, square = 0;
+  for (int level = 1; level <= static_cast<int>(kWhite); ++level) {
+    const double reaches = Tail((level - 0.5 - grey) / unrounded);
+    if (reaches < kNoTail) break;
+    mean += reaches;
+    square += (2 * level - 1) * reaches;
+  }
+  return {mean, std::max(square - mean * mean, 0.0) + 0.02 * kRoundingVariance, 1 - (Tail(low) - Tail(high))};
 }
 
 RecordTable::RecordTable(const PixelNoise& noise) : noise_(noise), variance_(kEntries), clipped_(kEntries) {

@@ -22,6 +22,8 @@ struct Experiment {
   const Likelihood* likelihood = nullptr;
   ThreadPool* pool = nullptr;  // for columns; null: this thread
   std::function<bool()> cancelled;
+  // Effects of the model, by name, whose values another experiment has settled: a search does not set them free.
+  std::vector<std::string> settled;
 };
 
 struct Fit {

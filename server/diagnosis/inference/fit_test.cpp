@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/inference/linear_test_model.h"
@@ -156,6 +158,35 @@ TEST_F(FitTest, RefittedHeldOutErrorOfOwnValuesLeavesOutPartsOfEachGroup) {
     rows.measured[row] += rows.columns["object_push"][row] * kPushM * (1 + rows.GroupOfRow(row));
   const Fit fit = *FitModel(experiment, Free({"object_push"}, true));
   EXPECT_LT(*HeldOutRmseRefitted(experiment, fit), 1.2 * kSigma);
+}
+
+class ThreeRowsAtATime : public LinearTestModel {
+ public:
+  using LinearTestModel::LinearTestModel;
+  double TimeOfRow(int row) const override { return row / 3; }
+};
+
+// Half of a photograph that was seen tells of the other half.
+TEST_F(FitTest, RefitsWithoutAStretchOfTimeSeeNothingOfItsTouches) {
+  ThreeRowsAtATime three(4, 25, 2);
+  three.columns = rows.columns;
+  three.measured = rows.measured;
+  experiment.observations = &three;
+  const Fit fit = *FitModel(experiment, Free({"object_push"}));
+  const auto divisions = *RefitWithoutParts(experiment, fit);
+  ASSERT_EQ(divisions.size(), 3u);  // groups, places, times
+  for (const auto& refits : divisions) {
+    std::set<int> left_out;
+    for (const RefitWithoutPart& refit : refits)
+      for (const int row : refit.rows) EXPECT_TRUE(left_out.insert(row).second) << row;
+    EXPECT_EQ(static_cast<int>(left_out.size()), three.rows());
+  }
+  for (const RefitWithoutPart& refit : divisions[2]) {
+    const std::set<int> part(refit.rows.begin(), refit.rows.end());
+    for (const int row : part)
+      for (int other = row / 3 * 3; other < std::min(row / 3 * 3 + 3, three.rows()); ++other)
+        EXPECT_EQ(part.count(other), 1u) << row << " without " << other;
+  }
 }
 
 TEST_F(FitTest, RefittedHeldOutErrorEndsWhenItIsCancelled) {

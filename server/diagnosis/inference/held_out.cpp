@@ -38,7 +38,8 @@ Folds BlockFolds(const ObservationModel& observations) {
 }
 
 // Stretches of time with as many rows each; of each group's own time where groups have values of their own, since the
-// rest of the session may say nothing of them.
+// rest of the session may say nothing of them. What was measured at one time (a touch, a photograph) is not parted: the
+// half that was seen would tell of the other. Empty where all has one time.
 Folds TimeFolds(const ObservationModel& observations, bool own_values) {
   Folds folds(kFolds);
   const auto divide = [&](int begin, int end) {
@@ -46,13 +47,17 @@ Folds TimeFolds(const ObservationModel& observations, bool own_values) {
     std::iota(order.begin(), order.end(), begin);
     std::stable_sort(order.begin(), order.end(),
                      [&](int a, int b) { return observations.TimeOfRow(a) < observations.TimeOfRow(b); });
-    for (size_t place = 0; place < order.size(); ++place)
-      folds[place * kFolds / order.size()].push_back(order[place]);
+    size_t first = 0;  // of the rows of this time
+    for (size_t place = 0; place < order.size(); ++place) {
+      if (observations.TimeOfRow(order[place]) != observations.TimeOfRow(order[first])) first = place;
+      folds[first * kFolds / order.size()].push_back(order[place]);
+    }
   };
   const int groups = static_cast<int>(observations.groups().size());
   if (!own_values) divide(0, observations.rows());
   for (int group = 0; own_values && group < groups; ++group)
     divide(observations.FirstRowOfGroup(group), observations.FirstRowOfGroup(group + 1));
+  if (static_cast<int>(folds[0].size()) == observations.rows()) return {};
   return folds;
 }
 
@@ -109,20 +114,19 @@ Parameterization StartWithout(const Fit& fit, const std::vector<int>& left_out) 
   return start;
 }
 
-// Sum of squares over all rows, each predicted by a fit that did not see it.
-absl::StatusOr<double> RefittedSquares(const Experiment& experiment, const Fit& fit, const Folds& folds) {
-  double sum = 0;
+// The fit without each of the parts in turn.
+absl::StatusOr<std::vector<RefitWithoutPart>> Refit(const Experiment& experiment, const Fit& fit,
+                                                    const Folds& folds) {
+  std::vector<RefitWithoutPart> refits;
   for (const std::vector<int>& fold : folds) {
     if (fold.empty()) continue;
     const WithoutRows others(*experiment.observations, fold);
     Experiment without = experiment;
     without.observations = &others;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Fit again,
-                                FitModel(without, StartWithout(fit, fold), kRefitIterations));
-    const Eigen::VectorXd residual = experiment.observations->Residual(again.predicted);
-    for (const int row : fold) sum += residual[row] * residual[row];
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit again, FitModel(without, StartWithout(fit, fold), kRefitIterations));
+    refits.push_back({fold, std::move(again)});
   }
-  return sum;
+  return refits;
 }
 
 // The least squares step within the parameters' bounds: what runs out of them is held there.
@@ -198,21 +202,38 @@ double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit) {
   return LinearHeldOut(BlockFolds(*experiment.observations), fit);
 }
 
-absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit) {
+absl::StatusOr<std::vector<std::vector<RefitWithoutPart>>> RefitWithoutParts(const Experiment& experiment,
+                                                                             const Fit& fit) {
   const ObservationModel& observations = *experiment.observations;
-  const int n = observations.rows();
-  if (n == 0 || fit.model.size() == 0) return HeldOutRmse(experiment, fit);
   std::vector<int> group_rows;
   for (size_t group = 0; group <= observations.groups().size(); ++group)
     group_rows.push_back(observations.FirstRowOfGroup(static_cast<int>(group)));
   const Likelihood plain(group_rows, nullptr, 0, nullptr);
   Experiment without_surface = experiment;
   without_surface.likelihood = &plain;
-  double largest = 0;
+  std::vector<std::vector<RefitWithoutPart>> divisions;
   for (const Folds& folds : {GroupFolds(observations, fit.model), BlockFolds(observations),
                              TimeFolds(observations, HasOwnValues(fit.model))}) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, RefittedSquares(without_surface, fit, folds));
-    largest = std::max(largest, squares);
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<RefitWithoutPart> refits, Refit(without_surface, fit, folds));
+    if (!refits.empty()) divisions.push_back(std::move(refits));
+  }
+  return divisions;
+}
+
+absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit) {
+  const ObservationModel& observations = *experiment.observations;
+  const int n = observations.rows();
+  if (n == 0 || fit.model.size() == 0) return HeldOutRmse(experiment, fit);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<RefitWithoutPart>> divisions,
+                              RefitWithoutParts(experiment, fit));
+  double largest = 0;
+  for (const std::vector<RefitWithoutPart>& refits : divisions) {
+    double sum = 0;
+    for (const RefitWithoutPart& refit : refits) {
+      const Eigen::VectorXd residual = observations.Residual(refit.fit.predicted);
+      for (const int row : refit.rows) sum += residual[row] * residual[row];
+    }
+    largest = std::max(largest, sum);
   }
   return std::sqrt(largest / n);
 }

@@ -2,6 +2,10 @@
 // reported.
 #pragma once
 
+#include <vector>
+
+#include <absl/status/statusor.h>
+
 #include "server/diagnosis/inference/fit.h"
 
 namespace touchstone::diagnosis::inference {
@@ -13,11 +17,22 @@ double HeldOutRmse(const Experiment& experiment, const Fit& fit);
 // By block in any case, so that fits with and without values of single groups compare.
 double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit);
 
-// The same with every value fitted anew, by the simulator and not by a linear step, to what is left: without a group,
-// without a fifth of the blocks, without a fifth of the time (of
-// each group's own time where groups have values of their own). Of the three the largest, since a model must hold on
-// other objects, at other places and at other times. A smooth error takes no part: nothing of it is known where a
-// group is left out. Error: CANCELLED, or what the simulator says.
+// A fit that did not see these rows.
+struct RefitWithoutPart {
+  std::vector<int> rows;
+  Fit fit;
+};
+
+// Every value fitted anew, by the simulator and not by a linear step, to what is left: without each group, without
+// each fifth of the blocks, without each fifth of the time (of each group's own time where groups have values of
+// their own). Each of these divisions leaves every row out once; without groups only where there are three or more, and
+// none has values of its own. A smooth error takes no part: nothing of it is known where a group is left out. Error:
+// CANCELLED, or what the simulator says.
+absl::StatusOr<std::vector<std::vector<RefitWithoutPart>>> RefitWithoutParts(const Experiment& experiment,
+                                                                             const Fit& fit);
+
+// Root mean square of rows that those fits did not see, of the divisions the largest: a model must hold on other
+// objects, at other places and at other times. Errors as RefitWithoutParts.
 absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const Fit& fit);
 
 }  // namespace touchstone::diagnosis::inference

@@ -16,6 +16,8 @@ struct ParameterEstimate {
   std::string object;  // of a value that differs from object to object
   double lower = 0;    // 95 % interval, within the parameter's bounds
   double upper = 0;
+  // Of a value that touches and photographs gave together: what either alone would have left; none: it says nothing.
+  std::optional<double> std_error_touches, std_error_photographs;
   std::optional<double> before;  // of an effect that the model has: the value there
 };
 

@@ -34,6 +34,8 @@ const char* ToMessage(selection::CandidateNote note) {
       return "this experiment cannot see it";
     case selection::CandidateNote::kNeutral:
       return "fits best where it changes nothing";
+    case selection::CandidateNote::kAtBound:
+      return "its best value lies at its bound";
     case selection::CandidateNote::kLinearised:
       return "not among the eight most probable; its gain is a linearised prediction";
   }

@@ -27,6 +27,8 @@ void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters
     value->set_lower(estimate.lower);
     value->set_upper(estimate.upper);
     if (estimate.before) value->set_before(*estimate.before);
+    if (estimate.std_error_touches) value->set_std_error_touches(*estimate.std_error_touches);
+    if (estimate.std_error_photographs) value->set_std_error_photographs(*estimate.std_error_photographs);
   }
 }
 

@@ -209,6 +209,7 @@ void WritePhotographs(const images::PhotographDiagnosis& diagnosis, const sessio
     message->set_object(proposed.object);
     message->set_purpose(proposed.purpose);
     message->set_separation(proposed.separation);
+    message->set_photographs_to_verdict(static_cast<uint32_t>(proposed.photographs_to_verdict));
     const auto write = [](const Eigen::Vector3d& from, v1::Vector3* to) {
       to->set_x(from.x()), to->set_y(from.y()), to->set_z(from.z());
     };

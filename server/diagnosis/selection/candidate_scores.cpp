@@ -184,6 +184,8 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const inference::Fit& fit,
   for (int index = 0; index < initial_effects; ++index) {
     const model::Effect& own = *model.effects[index].effect;
     if (fit.model.IsFree(index) || own.random() || own.parameters.empty()) continue;
+    const std::vector<std::string>& settled = experiment_.settled;
+    if (std::find(settled.begin(), settled.end(), own.name) != settled.end()) continue;
     Extension extension;
     extension.name = inference::NameOf(*model.effects[index].effect);
     extension.start = fit.model;

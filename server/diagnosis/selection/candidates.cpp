@@ -55,7 +55,7 @@ std::vector<Candidate> MakeCandidates(const DiagnosisInput& input, const touches
   };
   for (const auto& effect : effects::TouchEffects()) {
     const bool describes_only = effect->parameters.empty();  // the entry for formulas
-    if (describes_only || effect->random() || has(effect->name)) continue;
+    if (describes_only || effect->random() || has(effect->name) || input.IsSettled(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
     if (searched.objects.size() < 2 || effect->always_per_object) continue;

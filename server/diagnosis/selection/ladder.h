@@ -58,6 +58,9 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                     const SelectionResult& selection, const Quality& final,
                                                     double floor_s);
 
+// The effect as it stands in a model file: "- lookup: ...". Of `model` only the rig counts.
+std::string EffectYaml(model::Model model, model::EffectInstance instance);
+
 // A value that a person can read: three more digits than the standard error leaves uncertain.
 double RoundedTo(double value, double std_error);
 

@@ -74,6 +74,7 @@ enum class CandidateNote {
   kNone,
   kInvisible,   // this experiment cannot see it
   kNeutral,     // fits best where it changes nothing
+  kAtBound,     // its best value lies at its bound
   kLinearised,  // not among the most probable: its gain is a linearised prediction
 };
 

@@ -55,7 +55,10 @@ bool StepwiseSearch::Accepts(const inference::Fit& before, const inference::Fit&
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
   // Values of single objects cannot be predicted from other objects.
   const auto unseen = rare ? inference::HeldOutRmseByBlock : inference::HeldOutRmse;
-  return unseen(experiment_, after) < (1 - rules_.min_relative_cv_gain) * unseen(experiment_, before);
+  const double had = unseen(experiment_, before), has = unseen(experiment_, after);
+  const double kept = 1 - rules_.min_relative_cv_gain;
+  if (!rules_.cv_gain_over_noise) return has < kept * had;
+  return had * had - has * has > (1 - kept * kept) * before.sigma * before.sigma;
 }
 
 absl::StatusOr<inference::Fit> StepwiseSearch::FitExtension(const Extension& extension) const {

@@ -20,6 +20,9 @@ struct SearchRules {
   double enter_rare_nats = 9;           // ... that an effect needs which does not act on all objects alike
   double swap_nats = 4;                 // that a swap to an effect of more values needs
   double min_relative_cv_gain = 0.003;  // share by which the held-out error must fall
+  // ... its square by that share of the noise's square, not of its own: where a smooth error of the surface may hold
+  // most of the error that a later step explains, and the first step's share of that is nothing.
+  bool cv_gain_over_noise = false;
   double equivalent_nats = 3;           // explanations as near as this are named together
   double complexity_penalty_nats = 11;  // of a formula term that was picked from a dictionary
   int min_rows_per_parameter = 8;       // that each fitted value needs

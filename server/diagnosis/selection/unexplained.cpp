@@ -32,15 +32,6 @@ double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const E
   return (s * s.colPivHouseholderQr().solve(c)).norm() / c.norm();
 }
 
-// "- lookup: ..." as it stands in a model file.
-std::string EffectYaml(model::Model model, model::EffectInstance instance) {
-  model.effects = {std::move(instance)};
-  const std::string text = model::FormatModel(model);
-  const size_t at = text.find("effects:");
-  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
-  return line == std::string::npos ? text : text.substr(line + 1);
-}
-
 // The formula as it stands in a model file.
 std::string FormulaYaml(const inference::Fit& fit, int index) {
   model::Model only = fit.model.base();
@@ -182,6 +173,14 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
 }
 
 }  // namespace
+
+std::string EffectYaml(model::Model model, model::EffectInstance instance) {
+  model.effects = {std::move(instance)};
+  const std::string text = model::FormatModel(model);
+  const size_t at = text.find("effects:");
+  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
+  return line == std::string::npos ? text : text.substr(line + 1);
+}
 
 absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                     const SelectionResult& selection, const Quality& final,

@@ -285,6 +285,7 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
   experiment.observations = workspace->rows.get();
   experiment.likelihood = workspace->likelihood.get();
   experiment.pool = workspace->context.pool;
+  experiment.settled = workspace->input.settled;
   return absl::OkStatus();
 }
 

@@ -44,12 +44,8 @@ std::vector<uint8_t> Rectify(const image::Frame& frame, const image::Intrinsics&
   double fx = frame.height / (2 * std::tan(0.5 * vertical_fov_rad)), fy = fx;
   double cx = 0.5 * (frame.width - 1), cy = 0.5 * (frame.height - 1);
   if (intrinsics.fx_px > 0) {
-    const double x_scale = intrinsics.width > 0 ? static_cast<double>(frame.width) / intrinsics.width : 1;
-    const double y_scale = intrinsics.height > 0 ? static_cast<double>(frame.height) / intrinsics.height : 1;
-    fx = intrinsics.fx_px * x_scale;
-    fy = intrinsics.fy_px * y_scale;
-    cx = (intrinsics.cx_px + 0.5) * x_scale - 0.5;
-    cy = (intrinsics.cy_px + 0.5) * y_scale - 0.5;
+    const image::Intrinsics scaled = image::ScaledTo(intrinsics, frame.width, frame.height);
+    fx = scaled.fx_px, fy = scaled.fy_px, cx = scaled.cx_px, cy = scaled.cy_px;
   }
   const double focal = height / (2 * std::tan(0.5 * vertical_fov_rad));
 

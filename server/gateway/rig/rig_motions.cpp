@@ -12,6 +12,29 @@
 #include "server/image/encode.h"
 
 namespace touchstone::gateway {
+namespace {
+
+std::array<double, 3> ArrayOf(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// Without the time.
+session::JournalView ViewOf(const source::ViewCommand& command, const Eigen::Isometry3d& base_from_object,
+                            const image::Intrinsics& lens, const image::Frame& frame) {
+  session::JournalView view;
+  const Eigen::Isometry3d& camera = command.object_from_camera;
+  const image::Camera commanded = command.commanded.value_or(image::Camera{
+      camera.translation(), camera.translation() + camera.linear().col(2), -camera.linear().col(1)});
+  view.eye_m = ArrayOf(commanded.eye_m), view.at_m = ArrayOf(commanded.at_m), view.up = ArrayOf(commanded.up);
+  view.base_from_object = geometry::PoseVectorOf(base_from_object);
+  const image::Intrinsics scaled = image::ScaledTo(lens, frame.width, frame.height);
+  view.fx_px = scaled.fx_px, view.fy_px = scaled.fy_px, view.cx_px = scaled.cx_px, view.cy_px = scaled.cy_px;
+  view.distortion = scaled.distortion;
+  return view;
+}
+
+}  // namespace
+
 absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   constexpr double kPatienceS = 10;
   LookAtSafety(/*refused=*/true);
@@ -58,6 +81,10 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const arm::PlannedTouch plan,
       parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, up_face, "view"));
+  // Whatever the session's beginning writes goes before the motion, as with a touch.
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
+  const double began_s = timing::HostNowS();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double session_time_s, session_clock_.NowS(command.session));
   TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
   const double asked_s = timing::HostNowS();
   const absl::StatusOr<image::Frame> frame = parts_.camera->Take(asked_s);
@@ -73,7 +100,6 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
     Remember(measured.status());
     return measured.status();
   }
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
   session::JournalImage image;
   image.id = source::ViewId(command);
   image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
@@ -83,6 +109,8 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   image.measured_unix_s = image.unix_s;
   image.width = frame->width, image.height = frame->height;
   TOUCHSTONE_ASSIGN_OR_RETURN(image.png, image::EncodePng(frame->rgb.data(), frame->width, frame->height, 3));
+  image.view = ViewOf(command, base_from_object, IntrinsicsOf(*frame), *frame);
+  image.view->session_time_s = session_time_s + (frame->host_time_s - began_s) * options_.time_scale;
   // A view that was taken before is a repeat, under a name of its own.
   absl::Status added = journal().AddImage(command.session, image);
   for (int repeat = 2; absl::IsAlreadyExists(added); ++repeat) {

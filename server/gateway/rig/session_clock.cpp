@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/gateway/timing/host_time.h"
 
@@ -39,12 +40,23 @@ absl::StatusOr<double> SessionClock::NowS(const std::string& session) {
   if (has_clock && clock.boot_id == now.boot_id && now.boot_s >= clock.origin_s)
     return (now.boot_s - clock.origin_s) * time_scale_;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<session::JournalTouch> last, journal_->LastDone(session));
-  double session_s = 0;
-  if (last.has_value()) {
-    const double last_s = last->result.session_time_s;
-    session_s = std::isfinite(last_s) ? last_s : 0;
-    session_s += PassedS(now, last->result.start_unix_s, has_clock) * time_scale_;
+  // The last that is known of the session, a touch or a photograph; once a boot, so that reading the pictures along does
+  // not matter.
+  double last_s = 0, last_unix_s = kNaN;
+  bool known = last.has_value();
+  if (known) {
+    if (std::isfinite(last->result.session_time_s)) last_s = last->result.session_time_s;
+    last_unix_s = last->result.start_unix_s;
   }
+  const absl::Status read = journal_->ForEachImage(session, [&](const session::JournalImage& image) {
+    if (image.view && image.view->session_time_s >= last_s)
+      last_s = image.view->session_time_s, last_unix_s = image.unix_s, known = true;
+    return true;
+  });
+  // A damaged picture keeps nobody from touching.
+  if (!read.ok() && !absl::IsDataLoss(read)) return read;
+  double session_s = last_s;
+  if (known) session_s += PassedS(now, last_unix_s, has_clock) * time_scale_;
   TOUCHSTONE_RETURN_IF_ERROR(
       journal_->SetSessionClock(session, {now.boot_id, now.boot_s - session_s / time_scale_}));
   return session_s;

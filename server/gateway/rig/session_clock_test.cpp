@@ -56,6 +56,17 @@ class SessionClockTest : public testing::Test {
     return began_s;
   }
 
+  // A photograph that is taken now.
+  double Photograph() {
+    const double taken_s = NowS();
+    session::JournalImage image;
+    image.id = "picture " + std::to_string(touches_++);
+    image.unix_s = now_.unix_s;
+    image.view.emplace().session_time_s = taken_s;
+    EXPECT_TRUE(journal_->AddImage("s", image).ok());
+    return taken_s;
+  }
+
   const TestFolder folder_;
   double time_scale_ = 1;
   HostClocks now_{"boot", 5000, 1.7e9};
@@ -101,6 +112,21 @@ TEST_F(SessionClockTest, GoesOnAfterARebootByWhatTheWallClockHasGone) {
   now_.unix_s += kHourS;
   Pass(5);
   EXPECT_NEAR(Touch(), 195, 1e-5);
+}
+
+TEST_F(SessionClockTest, CountsPhotographsAndTouchesOnOneClock) {
+  EXPECT_EQ(Photograph(), 0);
+  Pass(10);
+  EXPECT_NEAR(Touch(), 10, 1e-6);
+  // The wall clock was wrong when the photographs were taken, and corrected before the last touch.
+  now_.unix_s += kHourS;
+  Pass(10);
+  EXPECT_NEAR(Touch(), 20, 1e-6);
+  Reboot(30, 40);
+  EXPECT_NEAR(Photograph(), 90, 1e-5);
+  Pass(5);
+  Reboot(10, 20);
+  EXPECT_NEAR(Touch(), 125, 1e-5);
 }
 
 TEST_F(SessionClockTest, NeverGoesBackWhenTheWallClockWasSetBackAcrossAReboot) {

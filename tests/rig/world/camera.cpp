@@ -12,7 +12,6 @@ namespace touchstone::rig {
 namespace {
 
 constexpr int kGroundLevel = 14, kNoiseLevels = 5;
-constexpr int kJpegQuality = 90;
 constexpr double kLookAheadM = 0.2;
 constexpr char kBoundary[] = "touchstone-emulated-frame";
 
@@ -44,27 +43,52 @@ uint64_t EmulatedCamera::frames() const {
   return rendered_;
 }
 
+Light EmulatedCamera::SeenThroughLens(const CameraView& view) {
+  const double ground = options_.hidden.ground_grey.value_or(0) / 255;
+  if (view.surface && (!light_ || light_->surface() != view.surface))
+    light_ = std::make_unique<CameraLight>(view.surface);
+  return ThroughLens(options_.hidden, options_.width, options_.height, options_.vertical_fov_rad,
+                     [&](const std::vector<Eigen::Vector2d>& rays) {
+                       if (!view.surface) return std::vector<double>(rays.size(), ground);
+                       return light_->Along(rays, RealPose(options_.hidden, view.mesh_from_camera),
+                                            view.mesh_from_camera, ground);
+                     });
+}
+
+Light EmulatedCamera::SeenByPinhole(const CameraView& view) {
+  Light light{options_.width, options_.height,
+              std::vector<double>(static_cast<size_t>(options_.width) * options_.height, 0)};
+  if (!view.surface) return light;
+  image::Camera camera;
+  camera.eye_m = view.mesh_from_camera.translation();
+  const Eigen::Vector3d ahead = view.mesh_from_camera.linear().col(2).normalized();
+  camera.at_m = camera.eye_m + ahead * kLookAheadM;
+  camera.up = -view.mesh_from_camera.linear().col(1);
+  camera.vertical_fov_rad = options_.vertical_fov_rad;
+  image::ImageOptions image;
+  image.width = options_.width, image.height = options_.height;
+  // An object that is not before the camera at all gives no picture, but a dark one.
+  if (const auto rendered = renderer_->Render(view.surface, camera, image); rendered.ok())
+    for (size_t k = 0; k < light.level.size(); ++k) light.level[k] = rendered->pixels[k] / 255.0;
+  return light;
+}
+
 std::string EmulatedCamera::Picture() {
   const CameraView view = look_();
-  std::vector<uint8_t> pixels(static_cast<size_t>(options_.width) * options_.height, 0);
-  if (view.surface) {
-    image::Camera camera;
-    camera.eye_m = view.mesh_from_camera.translation();
-    const Eigen::Vector3d ahead = view.mesh_from_camera.linear().col(2).normalized();
-    camera.at_m = camera.eye_m + ahead * kLookAheadM;
-    camera.up = -view.mesh_from_camera.linear().col(1);
-    camera.vertical_fov_rad = options_.vertical_fov_rad;
-    image::ImageOptions image;
-    image.width = options_.width, image.height = options_.height;
-    // An object that is not before the camera at all gives no picture, but a dark one.
-    if (auto rendered = renderer_->Render(view.surface, camera, image); rendered.ok())
-      pixels = rendered->pixels;
+  Light light = options_.anything_hidden ? SeenThroughLens(view) : SeenByPinhole(view);
+  Develop(options_.hidden, &light);
+  std::vector<uint8_t> pixels;
+  if (options_.hidden.sigma_grey) {
+    pixels = Record(options_.hidden, light, &random_);
+  } else {
+    const int ground = options_.hidden.ground_grey ? 0 : kGroundLevel;
+    for (const double lit : light.level) {
+      const int noise = static_cast<int>(random_() % (2 * kNoiseLevels + 1)) - kNoiseLevels;
+      const int level = std::max(static_cast<int>(std::lround(255 * lit)), ground);
+      pixels.push_back(static_cast<uint8_t>(std::clamp(level + noise, 0, 255)));
+    }
   }
-  for (uint8_t& level : pixels) {
-    const int noise = static_cast<int>(random_() % (2 * kNoiseLevels + 1)) - kNoiseLevels;
-    level = static_cast<uint8_t>(std::clamp(std::max<int>(level, kGroundLevel) + noise, 0, 255));
-  }
-  auto jpeg = image::EncodeJpeg(pixels.data(), options_.width, options_.height, 1, kJpegQuality);
+  auto jpeg = image::EncodeJpeg(pixels.data(), options_.width, options_.height, 1, options_.jpeg_quality);
   return jpeg.ok() ? *jpeg : std::string();
 }
 

@@ -1,6 +1,6 @@
 // The emulated camera, carried by the flange: pictures of the mounted object from where the arm truly is, as
 // MJPEG over HTTP ("/video.mjpg") and one by one ("/frame.jpg"). A plain matt object on a dark ground with a
-// little noise, so that no two pictures are equal; not a likeness of any real camera.
+// little noise, so that no two pictures are equal, seen as hidden_camera.h says; not a likeness of any real camera.
 #pragma once
 
 #include <condition_variable>
@@ -18,6 +18,8 @@
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "tests/rig/world.h"
+#include "tests/rig/world/camera_light.h"
+#include "tests/rig/world/hidden_camera.h"
 #include "tests/rig/world/tcp_server.h"
 
 namespace touchstone::rig {
@@ -28,7 +30,10 @@ struct CameraOptions {
   int width = 640, height = 480;
   double vertical_fov_rad = 0.7853981633974483;
   double frames_per_host_s = 10;
+  int jpeg_quality = 90;
   uint64_t seed = 1;
+  HiddenCamera hidden;
+  bool anything_hidden = false;  // among `hidden`
 };
 
 // What is before the camera now.
@@ -50,6 +55,9 @@ class EmulatedCamera {
  private:
   void Run();
   std::string Picture();
+  // As hidden_camera.h says, and as the plain pinhole that it is if nothing is hidden.
+  Light SeenThroughLens(const CameraView& view);
+  Light SeenByPinhole(const CameraView& view);
   void Serve(LineConnection& connection);
   // The first picture after number *number, which is then its number; empty: it ends, or the
   // camera is unplugged.
@@ -59,6 +67,7 @@ class EmulatedCamera {
   const std::function<CameraView()> look_;
   const Faults* const faults_;
   std::shared_ptr<image::Renderer> renderer_;
+  std::unique_ptr<CameraLight> light_;  // of the surface that was seen last
   std::mt19937_64 random_;
 
   mutable std::mutex mutex_;

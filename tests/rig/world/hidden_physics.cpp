@@ -6,6 +6,7 @@
 
 #include "server/geometry/supershape.h"
 #include "tests/hidden_effects/generator/unlisted.h"
+#include "tests/rig/world/hidden_camera.h"
 
 namespace touchstone::rig {
 namespace {
@@ -89,9 +90,11 @@ void Hide(const std::string& assignment, hidden::Scenario* scenario) {
     if (effect == each.effect) known += (known.empty() ? "" : ", ") + effect + "." + each.parameter;
   }
   if (row == nullptr) {
-    if (known.empty())
+    if (known.empty()) {
       for (const Row& each : kRows)
         known += (known.empty() ? "" : ", ") + std::string(each.effect) + "." + each.parameter;
+      known += ", and in the camera " + HiddenCameraNames();
+    }
     throw std::invalid_argument("'" + name + "' cannot be hidden; there are " + known);
   }
   const int count = row->count == kAFinger ? scenario->fingers : row->count;

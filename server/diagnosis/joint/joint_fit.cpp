@@ -1,0 +1,246 @@
+#include "server/diagnosis/joint/joint_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/base/status.h"
+
+namespace touchstone::diagnosis::joint {
+namespace {
+
+constexpr int kMaxIterations = 15, kMaxHalvings = 6, kNoisePasses = 6;
+constexpr double kConvergedNats = 0.02;
+
+using inference::Likelihood;
+
+// One kind at some point: what its rows say there.
+struct State {
+  Eigen::VectorXd point;
+  std::vector<double> predicted;
+  Likelihood::Columns columns;  // residual, derivatives
+};
+
+class JointGaussNewton {
+ public:
+  JointGaussNewton(const std::array<Part, 2>& parts, bool tied, JointFit* fit) : parts_(parts), fit_(*fit) {
+    const inference::Parameterization& touches = parts[kTouches].start;
+    fit_.parameters = touches.parameters();
+    fit_.place[kTouches].resize(touches.size());
+    std::iota(fit_.place[kTouches].begin(), fit_.place[kTouches].end(), 0);
+    const inference::Parameterization& photographs = parts[kPhotographs].start;
+    for (int j = 0; j < photographs.size(); ++j) {
+      int place = -1;
+      for (int i = 0; i < touches.size() && tied; ++i)
+        if (IsSameValue(touches, i, photographs, j)) place = i;
+      if (place < 0) {
+        place = static_cast<int>(fit_.parameters.size());
+        fit_.parameters.push_back(photographs.parameters()[j]);
+      }
+      fit_.place[kPhotographs].push_back(place);
+    }
+    rows_ =
+        parts[kTouches].experiment->likelihood->rows() + parts[kPhotographs].experiment->likelihood->rows();
+    // Noise of one: each kind's inner products come in units of its own.
+    unit_ = std::make_unique<Likelihood>(std::vector<int>{0, rows_}, nullptr, 0, nullptr);
+    unit_->SetLeastNoise(1);
+  }
+
+  absl::Status Run() {
+    Eigen::VectorXd point(static_cast<int>(fit_.parameters.size()));
+    for (const Kind kind : {kPhotographs, kTouches}) {  // where both have a start, that of touches
+      const Eigen::VectorXd start = parts_[kind].start.Clip(parts_[kind].start.Start());
+      for (int i = 0; i < start.size(); ++i) point[fit_.place[kind][i]] = start[i];
+    }
+    TOUCHSTONE_RETURN_IF_ERROR(Predict(point, &states_));
+    for (const Kind kind : kKinds) TOUCHSTONE_RETURN_IF_ERROR(Linearise(kind));
+    for (const Kind kind : kKinds) hypothesis_[kind] = Alone(kind).hypothesis;
+    for (int iteration = 0; iteration < kMaxIterations && point.size() > 0; ++iteration) {
+      if (iteration > 0)
+        for (const Kind kind : kKinds) TOUCHSTONE_RETURN_IF_ERROR(Linearise(kind));
+      const double here = Objective(states_, point);
+      const Eigen::VectorXd step = Step(point).step;
+      double gain = 0;
+      Eigen::VectorXd moved;
+      for (int halving = 0; halving <= kMaxHalvings; ++halving) {
+        moved = Clip(point + std::ldexp(1.0, -halving) * step);
+        std::array<State, 2> states;
+        TOUCHSTONE_RETURN_IF_ERROR(Predict(moved, &states));
+        gain = Objective(states, moved) - here;
+        if (!(gain > 0)) continue;
+        for (const Kind kind : kKinds) {
+          states[kind].columns = Likelihood::Join(
+              states[kind].columns, Likelihood::Pick(states_[kind].columns, DerivativesOf(kind)));
+        }
+        states_ = std::move(states);
+        point = moved;
+        break;
+      }
+      if (!(gain > kConvergedNats)) break;
+    }
+    return Finish(point);
+  }
+
+ private:
+  std::vector<int> DerivativesOf(Kind kind) const {
+    std::vector<int> columns(parts_[kind].start.size());
+    std::iota(columns.begin(), columns.end(), 1);
+    return columns;
+  }
+  Eigen::VectorXd Own(Kind kind, const Eigen::VectorXd& point) const {
+    Eigen::VectorXd own(parts_[kind].start.size());
+    for (int i = 0; i < own.size(); ++i) own[i] = point[fit_.place[kind][i]];
+    return own;
+  }
+  Eigen::VectorXd Clip(Eigen::VectorXd point) const {
+    for (int i = 0; i < point.size(); ++i)
+      point[i] = std::clamp(point[i], fit_.parameters[i].lower, fit_.parameters[i].upper);
+    return point;
+  }
+
+  absl::Status Predict(const Eigen::VectorXd& point, std::array<State, 2>* states) const {
+    for (const Kind kind : kKinds) {
+      State& state = (*states)[kind];
+      const inference::Experiment& experiment = *parts_[kind].experiment;
+      state.point = Own(kind, point);
+      TOUCHSTONE_ASSIGN_OR_RETURN(state.predicted,
+                                  experiment.observations->Predict(parts_[kind].start.At(state.point)));
+      state.columns = experiment.likelihood->Prepare(experiment.observations->Residual(state.predicted));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Linearise(Kind kind) {
+    State& state = states_[kind];
+    const inference::Experiment& experiment = *parts_[kind].experiment;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const Eigen::MatrixXd derivatives,
+        inference::Derivatives(experiment, parts_[kind].start, state.point, state.predicted, 0));
+    Eigen::MatrixXd values(experiment.likelihood->rows(), derivatives.cols() + 1);
+    values << experiment.observations->Residual(state.predicted), derivatives;
+    state.columns = experiment.likelihood->Prepare(values);
+    return absl::OkStatus();
+  }
+
+  Eigen::MatrixXd Gram(Kind kind) const {
+    return parts_[kind].experiment->likelihood->Gram(states_[kind].columns, hypothesis_[kind]);
+  }
+
+  // What this kind alone says, from where it stands.
+  inference::LaplaceEvidence Alone(Kind kind) const {
+    const Likelihood& likelihood = *parts_[kind].experiment->likelihood;
+    std::vector<int> members(parts_[kind].start.size() + 1);
+    std::iota(members.begin(), members.end(), 0);
+    return inference::ComputeLaplaceEvidence(likelihood, inference::Grams(likelihood, states_[kind].columns),
+                                             members, parts_[kind].start.parameters(), states_[kind].point);
+  }
+
+  double Objective(const std::array<State, 2>& states, const Eigen::VectorXd& point) const {
+    double sum = inference::LogPriorOfValues(fit_.parameters, point);
+    for (const Kind kind : kKinds) {
+      const Likelihood& likelihood = *parts_[kind].experiment->likelihood;
+      const Likelihood::Columns residual = Likelihood::Pick(states[kind].columns, {0});
+      sum += likelihood.LogLikelihood(likelihood.Gram(residual, hypothesis_[kind])(0, 0), hypothesis_[kind]) /
+             parts_[kind].variance_factor;
+    }
+    return sum;
+  }
+
+  // The step of both together. The noise of each kind is what the step leaves of it.
+  inference::LaplaceEvidence Step(const Eigen::VectorXd& point) const {
+    const int size = static_cast<int>(point.size());
+    std::array<Eigen::MatrixXd, 2> grams = {Gram(kTouches), Gram(kPhotographs)};
+    std::array<double, 2> q = {grams[0](0, 0), grams[1](0, 0)};
+    std::vector<int> members(size + 1);
+    std::iota(members.begin(), members.end(), 0);
+    inference::LaplaceEvidence found;
+    for (int pass = 0; pass < kNoisePasses; ++pass) {
+      Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(size + 1, size + 1);
+      for (const Kind kind : kKinds) {
+        const double sigma = parts_[kind].experiment->likelihood->Sigma(q[kind], 0);
+        const double weight = 1 / (sigma * sigma * parts_[kind].variance_factor);
+        const int own = parts_[kind].start.size();
+        for (int a = 0; a <= own; ++a)
+          for (int b = 0; b <= own; ++b)
+            joint(a == 0 ? 0 : 1 + fit_.place[kind][a - 1], b == 0 ? 0 : 1 + fit_.place[kind][b - 1]) +=
+                weight * grams[kind](a, b);
+      }
+      found = inference::ComputeLaplaceEvidence(*unit_, {joint}, members, fit_.parameters, point);
+      for (const Kind kind : kKinds) {
+        Eigen::VectorXd along(parts_[kind].start.size() + 1);
+        along[0] = 1;
+        for (int i = 1; i < along.size(); ++i) along[i] = -found.step[fit_.place[kind][i - 1]];
+        q[kind] = std::max(along.dot(grams[kind] * along), 0.0);
+      }
+    }
+    return found;
+  }
+
+  absl::Status Finish(const Eigen::VectorXd& point) {
+    for (const Kind kind : kKinds) TOUCHSTONE_RETURN_IF_ERROR(Linearise(kind));
+    fit_.point = point;
+    const inference::LaplaceEvidence both = Step(point);
+    fit_.covariance = both.covariance;
+    fit_.log_evidence =
+        both.log_evidence - both.log_likelihood;  // the prior of the values, and Occam's factor
+    for (const Kind kind : kKinds) {
+      const Likelihood& likelihood = *parts_[kind].experiment->likelihood;
+      const Likelihood::Columns residual = Likelihood::Pick(states_[kind].columns, {0});
+      std::vector<double> logs;
+      for (int s = 0; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
+        logs.push_back(likelihood.LogPrior(s) +
+                       likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
+      const double averaged = inference::LogSum(logs) / parts_[kind].variance_factor;
+      fit_.log_likelihood += averaged;
+      fit_.log_evidence += averaged;
+
+      const inference::LaplaceEvidence alone = Alone(kind);
+      inference::Fit& fit = fit_.fits[kind];
+      fit.model = parts_[kind].start;
+      fit.model.MoveTo(states_[kind].point);
+      fit.point = states_[kind].point;
+      fit.columns = states_[kind].columns;
+      fit.predicted = states_[kind].predicted;
+      fit.log_likelihood = averaged;
+      fit.log_evidence = alone.log_evidence;
+      fit.hypothesis = hypothesis_[kind];
+      fit.sigma = alone.sigma;
+      fit.covariance = parts_[kind].variance_factor * alone.covariance;
+      fit_.alone[kind] = fit.point + alone.step;
+    }
+    return absl::OkStatus();
+  }
+
+  const std::array<Part, 2>& parts_;
+  JointFit& fit_;
+  std::unique_ptr<Likelihood> unit_;
+  int rows_ = 0;
+  std::array<State, 2> states_;
+  std::array<int, 2> hypothesis_ = {0, 0};
+};
+
+}  // namespace
+
+Eigen::MatrixXd JointFit::CovarianceOf(Kind kind) const {
+  const std::vector<int>& places = place[kind];
+  const int size = static_cast<int>(places.size());
+  Eigen::MatrixXd part(size, size);
+  for (int a = 0; a < size; ++a)
+    for (int b = 0; b < size; ++b) part(a, b) = covariance(places[a], places[b]);
+  return part;
+}
+
+bool IsSameValue(const inference::Parameterization& a, int i, const inference::Parameterization& b, int j) {
+  const inference::FreeParameter &one = a.parameters()[i], &other = b.parameters()[j];
+  const model::Effect& effect = *a.base().effects[one.effect].effect;
+  return effect.moves_surface && effect.name == b.base().effects[other.effect].effect->name &&
+         one.parameter == other.parameter && one.object == other.object && one.weights == other.weights;
+}
+
+absl::StatusOr<JointFit> FitJointly(const std::array<Part, 2>& parts, bool tied) {
+  JointFit fit;
+  TOUCHSTONE_RETURN_IF_ERROR(JointGaussNewton(parts, tied, &fit).Run());
+  return fit;
+}
+
+}  // namespace touchstone::diagnosis::joint

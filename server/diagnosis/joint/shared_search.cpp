@@ -1,0 +1,194 @@
+#include "server/diagnosis/joint/shared_search.h"
+
+#include <boost/math/special_functions/gamma.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "server/base/status.h"
+#include "server/diagnosis/inference/held_out.h"
+
+namespace touchstone::diagnosis::joint {
+namespace {
+
+constexpr int kPasses = 2;          // of values and what stands beside them
+constexpr int kMaxTried = 3;        // forms per round, beside those that either kind names by itself
+constexpr double kWorthTrying = 3;  // nats that either kind, or both together, expect of a form
+constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
+constexpr int kMaxShared = 2;       // effects
+
+selection::SearchRules Rules() {
+  return {};
+}
+
+double ChiSquaredP(double x, int freedom) {
+  return x > 0 && freedom > 0 ? boost::math::gamma_q(0.5 * freedom, 0.5 * x) : 1;
+}
+
+// A form of a shared effect with the evidence that each kind expects of it by itself, linearly.
+struct Form {
+  SharedEffect effect;
+  std::array<double, 2> gain_nats = {0, 0};
+  bool named = false;  // by the explanation of one kind alone
+
+  double Sum() const { return gain_nats[0] + gain_nats[1]; }
+  bool IsWorthTrying() const { return named || std::max({gain_nats[0], gain_nats[1], Sum()}) > kWorthTrying; }
+};
+
+SharedEffect FormOf(const Side& side, const selection::Extension& extension) {
+  SharedEffect effect;
+  if (extension.candidate < 0) {
+    effect.given = true;
+    effect.instance = side.given->effects[IndexOf(*side.given, extension.name)];
+    return effect;
+  }
+  const selection::Candidate& candidate = side.search->candidates()[extension.candidate];
+  effect.instance.effect = candidate.effect;
+  effect.instance.values = candidate.effect->NeutralValues(side.given->fingers);
+  effect.instance.per_object =
+      candidate.per_object || candidate.effect->always_per_object || !candidate.object.empty();
+  effect.object = candidate.object;
+  effect.rare = candidate.rare;
+  return effect;
+}
+
+// Every form that the explanation lacks, most promising first.
+absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained& so_far) {
+  std::map<std::string, Form> forms;
+  for (const Side& side : sides) {
+    const inference::Fit& fit = so_far.fit.fits[side.kind];
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::Extension> extensions,
+                                side.search->Score(fit, static_cast<int>(side.given->effects.size())));
+    for (const selection::Extension& extension : extensions) {
+      const bool shared = extension.candidate >= 0
+                              ? IsShared(*side.search->candidates()[extension.candidate].effect)
+                              : IsShared(*side.given->effects[IndexOf(*side.given, extension.name)].effect);
+      if (!shared || !extension.visible) continue;
+      const SharedEffect effect = FormOf(side, extension);
+      Form& form = forms.emplace(effect.Key(), Form{effect, {0, 0}, false}).first->second;
+      form.gain_nats[side.kind] = extension.log_evidence - fit.log_evidence;
+    }
+    for (const SharedEffect& effect : side.SharedOf(side.alone)) {
+      const bool present = std::any_of(so_far.shared.begin(), so_far.shared.end(),
+                                       [&](const SharedEffect& e) { return e.name() == effect.name(); });
+      if (present) continue;
+      Form& form = forms.emplace(effect.Key(), Form{effect, {0, 0}, false}).first->second;
+      form.named = true;
+      // Where that kind has it is where the joint fit starts.
+      form.effect.instance = effect.instance;
+    }
+  }
+  std::vector<Form> list;
+  for (auto& [key, form] : forms)
+    if (form.IsWorthTrying()) list.push_back(std::move(form));
+  std::stable_sort(list.begin(), list.end(), [](const Form& a, const Form& b) {
+    return a.named != b.named ? a.named : a.Sum() > b.Sum();
+  });
+  const auto named = std::count_if(list.begin(), list.end(), [](const Form& form) { return form.named; });
+  if (list.size() > static_cast<size_t>(named + kMaxTried)) list.resize(named + kMaxTried);
+  return list;
+}
+
+// Whether one kind, at the joint values, predicts blocks better that were left out.
+bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained& after) {
+  for (const Side& side : sides) {
+    const double was = inference::HeldOutRmseByBlock(*side.experiment, before.fit.fits[side.kind]);
+    const double is = inference::HeldOutRmseByBlock(*side.experiment, after.fit.fits[side.kind]);
+    if (is < (1 - Rules().min_relative_cv_gain) * was) return true;
+  }
+  return false;
+}
+
+bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& after, size_t forms) {
+  const bool rare = after.shared.back().rare;
+  const double gain = after.fit.log_evidence - before.fit.log_evidence;
+  // Where it takes the place of what either kind named by itself, nothing is added but one cause put for others.
+  int replaced = 0;
+  for (const Kind kind : kKinds) replaced += before.own[kind].size() - after.own[kind].size();
+  if (replaced > 0)
+    return gain >
+           (after.fit.parameters.size() > before.fit.parameters.size() ? Rules().swap_nats : kSwapNats);
+  if (gain < (rare ? Rules().enter_rare_nats : Rules().enter_nats)) return false;
+  const int added = std::max(
+      static_cast<int>(after.fit.parameters.size()) - static_cast<int>(before.fit.parameters.size()), 1);
+  const double ratio = 2 * (after.fit.log_likelihood - before.fit.log_likelihood);
+  if (static_cast<double>(forms) * ChiSquaredP(ratio, added) > Rules().family_wise_p) return false;
+  return PredictsUnseen(sides, before, after);
+}
+
+}  // namespace
+
+std::vector<std::string> OwnBeside(const Explained& one, const Explained& other) {
+  std::vector<std::string> beside;
+  for (const Kind kind : kKinds) {
+    const std::vector<std::string> others = other.own[kind].Names();
+    for (const std::string& name : one.own[kind].Names())
+      if (std::find(others.begin(), others.end(), name) == others.end()) beside.push_back(name);
+  }
+  return beside;
+}
+
+std::array<Part, 2> PartsOf(const Sides& sides, const Explained& explained) {
+  std::array<Part, 2> parts;
+  for (const Side& side : sides)
+    parts[side.kind] = {side.experiment, side.Free(explained.shared, explained.own[side.kind]), 1};
+  return parts;
+}
+
+absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
+                                      std::array<OwnEffects, 2> own) {
+  Explained best{std::move(shared), std::move(own), {}};
+  TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Explained next = best;
+    for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
+    bool same = true;
+    for (const Side& side : sides) {
+      selection::Explanation explanation;
+      explanation.initial_effects = side.InitialEffects(next.shared);
+      explanation.fit.model = side.Held(next.shared, best.own[side.kind]);
+      TOUCHSTONE_ASSIGN_OR_RETURN(explanation, side.own_search->Continue(std::move(explanation)));
+      next.own[side.kind] = side.OwnOf(explanation.fit, explanation.initial_effects);
+      same &= next.own[side.kind].Key() == best.own[side.kind].Key();
+    }
+    if (same) break;
+    TOUCHSTONE_ASSIGN_OR_RETURN(next.fit, FitJointly(PartsOf(sides, next)));
+    if (next.fit.log_evidence <= best.fit.log_evidence) break;
+    best = std::move(next);
+  }
+  for (SharedEffect& effect : best.shared) effect = WithValues(effect, best.fit);
+  return best;
+}
+
+absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
+  std::array<OwnEffects, 2> own;
+  for (const Side& side : sides)
+    own[side.kind] = side.OwnOf(side.alone, static_cast<int>(side.given->effects.size()));
+  SharedSelection selection;
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection.none, ExplainWith(sides, {}, own));
+  selection.best = selection.none;
+  for (int round = 0; round < kMaxShared; ++round) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Form> forms, ListForms(sides, selection.best));
+    int chosen = -1;
+    std::vector<Explained> tried;
+    for (const Form& form : forms) {
+      std::vector<SharedEffect> shared = selection.best.shared;
+      shared.push_back(form.effect);
+      TOUCHSTONE_ASSIGN_OR_RETURN(Explained with, ExplainWith(sides, shared, selection.best.own));
+      // What either kind shows by itself may have stood in for the effect.
+      TOUCHSTONE_ASSIGN_OR_RETURN(Explained afresh, ExplainWith(sides, shared, own));
+      if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
+      tried.push_back(std::move(with));
+      if (IsWorthIt(sides, selection.best, tried.back(), forms.size()) &&
+          (chosen < 0 || tried.back().fit.log_evidence > tried[chosen].fit.log_evidence))
+        chosen = static_cast<int>(tried.size()) - 1;
+    }
+    if (round == 0 || chosen >= 0) selection.tried.insert(selection.tried.end(), tried.begin(), tried.end());
+    if (chosen < 0) break;
+    selection.best = tried[chosen];
+  }
+  return selection;
+}
+
+}  // namespace touchstone::diagnosis::joint

@@ -1,0 +1,55 @@
+"""A plan of photographs, as `touchstone propose FOLDER` writes it, taken by the emulated rig."""
+import csv
+import json
+
+import pytest
+
+from test_rig_commands import emulated_rig, touchstone
+
+SPEEDUP = 10
+COLUMNS = ["image", "file", "object", "eye_x_mm", "eye_y_mm", "eye_z_mm", "at_x_mm", "at_y_mm", "at_z_mm", "up_x", "up_y",
+           "up_z"]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "3") as address:
+        yield address
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write_plan(path, rows):
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows({column: row[column] for column in COLUMNS} for row in rows)
+
+
+def test_rig_photos_takes_the_rows_of_a_plan(rig, tmp_path):
+    options = ["--image", "64x48", "--json"]
+    touchstone("rig", "photos", "lat20", "-o", tmp_path / "ring", "--sequence", "seed", "--turns", "1", *options, server=rig)
+    # Views that the rig can take, turned about the viewing axis, in a plan with one of another object.
+    views = [dict(row, image=n, file=f"lat20_from_{n}.png", up_x=row["up_y"], up_y=1)
+             for n, row in enumerate(rows_of(tmp_path / "ring/images.csv")[:2])]
+    plan = tmp_path / "next.csv"
+    write_plan(plan, [*views, dict(views[0], image=2, file="other.png", object="lat10")])
+    command = ["rig", "photos", "lat20", "--plan", plan, "-o", tmp_path / "more", *options]
+    taken = json.loads(touchstone(*command, server=rig))
+    rows = rows_of(tmp_path / "more/images.csv")
+    assert taken["left_out"] == 0 and [row["file"] for row in rows] == [view["file"] for view in views]
+    for row, view in zip(rows, views):
+        for column in COLUMNS[3:]:
+            assert float(row[column]) == pytest.approx(float(view[column]), abs=1e-6), (row["file"], column)
+    # Again, nothing is taken twice.
+    assert json.loads(touchstone(*command, server=rig))["kept"] == 2
+
+    absent = ["rig", "photos", "lat00", "--plan", plan, "-o", tmp_path / "none", *options]
+    assert "has no picture of 'lat00'; it has pictures of lat20, lat10" in touchstone(*absent, server=rig, code=2)
+    touches = tmp_path / "touches.csv"
+    touchstone("plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o", touches)
+    wrong = ["rig", "photos", "lat20", "--plan", touches, "-o", tmp_path / "none", *options]
+    assert "is no plan of photographs" in touchstone(*wrong, server=rig, code=2)
