@@ -85,7 +85,7 @@ TEST_F(PhotographPlanCommand, TooFewPicturesGetPicturesToAdd) {
   WriteSet(2);
   const Outcome outcome = Propose({"--photographs", "3", "-o", "next.csv"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("too little for a verdict; 6 pictures would do"));
+  EXPECT_THAT(outcome.err, HasSubstr("too little for a verdict; pictures from 6 poses would do"));
   const auto plan = session::ParseImagesCsv(Read("next.csv"), "next.csv");
   ASSERT_TRUE(plan.ok()) << plan.status();
   EXPECT_EQ(plan->size(), 3u);

@@ -92,8 +92,11 @@ std::string CheckData(const v1::Report& report) {
 std::string TooLittle(const v1::Report& report) {
   const ErrorScale scale(report);
   const uint32_t used = scale.Readings(report);
-  const std::string needed =
-      absl::StrCat(Count(report.touches_needed()), " usable ", scale.readings(), " would do.");
+  // A picture that is taken again shows noise and nothing else: photographs are counted by pose.
+  std::string needed = absl::StrCat(Count(report.touches_needed()), " usable touches would do.");
+  if (scale.grey())
+    needed = absl::StrCat("usable pictures from ", Count(report.touches_needed()), " poses would do.");
+  if (scale.grey() && report.touches() > 0) needed = "the summary says which kind needs more.";
   if (used == 0)
     return absl::StrCat("No ", scale.one_reading(), " could be used, so nothing can be said; ", needed);
   return absl::StrCat("Too little data for a verdict: ", Count(used), " ",

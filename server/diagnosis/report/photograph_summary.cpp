@@ -83,8 +83,8 @@ std::string Summarize(const images::PhotographDiagnosis& diagnosis) {
             absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
       break;
     case selection::Verdict::kTooLittleData:
-      sentences.push_back(
-          absl::StrCat("That is too little for a verdict; ", diagnosis.images_needed, " pictures would do."));
+      sentences.push_back(absl::StrCat("That is too little for a verdict; pictures from ",
+                                       diagnosis.images_needed, " poses would do."));
       break;
     case selection::Verdict::kNone:
       break;
