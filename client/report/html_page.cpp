@@ -69,6 +69,7 @@ std::string Escape(absl::string_view text) {
 
 std::string Typeset(absl::string_view text) {
   std::string out = Signs(Escape(text));
+  if (absl::StartsWith(out, "+- ")) out.replace(0, 3, "\u00b1\u00a0");
   // A number and its unit stay on one line.
   for (const char* unit : {"us", "ms", "s", "mm", "deg", "%", "mm/s", "mm/s2", "1/m"}) {
     const std::string shown =

@@ -28,6 +28,7 @@ TEST(Escape, LeavesNoMarkup) {
 
 TEST(Typeset, SetsNumbersInType) {
   EXPECT_EQ(Typeset("-3.1 +- 0.2 us"), "\u22123.1\u00a0\u00b1\u00a00.2\u00a0\u00b5s");
+  EXPECT_EQ(Typeset("+- 0.2 us"), "\u00b1\u00a00.2\u00a0\u00b5s");
   EXPECT_EQ(Typeset("p 3e-9"), "p 3\u00d710<sup>\u22129</sup>");
   EXPECT_EQ(Typeset("41.0 -> 5.0 ms"), "41.0 \u2192 5.0\u00a0ms");
   EXPECT_EQ(Typeset("25 deg"), "25\u00b0");
