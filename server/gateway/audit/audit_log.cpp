@@ -39,17 +39,20 @@ std::string UtcNow() {
   return absl::StrCat(day, fraction);
 }
 
-std::string Line(const std::string& event, const std::vector<std::pair<std::string, std::string>>& fields) {
+std::string Line(const std::string& event, const std::vector<std::pair<std::string, std::string>>& fields,
+                 const std::string& lease_holder) {
   nlohmann::ordered_json line;
   line["time"] = UtcNow();
   line["event"] = event;
   for (const auto& [name, value] : fields) line[name] = value;
+  if (!lease_holder.empty() && !line.contains("holder")) line["lease_holder"] = lease_holder;
   // Bytes that are no UTF-8 must not lose the line.
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 class NoAuditLog : public AuditLog {
  public:
+  void NameHolders(std::function<std::string()>) override {}
   absl::Status Write(const std::string&, const std::vector<std::pair<std::string, std::string>>&) override {
     return absl::OkStatus();
   }
@@ -60,11 +63,16 @@ class FileAuditLog : public AuditLog {
   FileAuditLog(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
   ~FileAuditLog() override { close(descriptor_); }
 
+  void NameHolders(std::function<std::string()> lease_holder) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    lease_holder_ = std::move(lease_holder);
+  }
+
   absl::Status Write(const std::string& event,
                      const std::vector<std::pair<std::string, std::string>>& fields) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     // The time is taken under the lock, so that the lines stand in its order.
-    std::string line = Line(event, fields);
+    std::string line = Line(event, fields, lease_holder_ ? lease_holder_() : "");
     if (cut_line_) line.insert(line.begin(), '\n');
     size_t written = 0;
     while (written < line.size()) {
@@ -99,6 +107,7 @@ class FileAuditLog : public AuditLog {
  private:
   const std::string path_;
   const int descriptor_;
+  std::function<std::string()> lease_holder_;
   std::mutex mutex_;
   bool cut_line_ = false;
 };

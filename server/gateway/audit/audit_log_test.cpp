@@ -49,6 +49,22 @@ TEST_F(AuditLogTest, EveryEventIsOneJsonObjectALine) {
   EXPECT_THAT(lines[0], HasSubstr("{\"time\":"));
 }
 
+TEST_F(AuditLogTest, LinesNameWhoHoldsTheLeaseUnlessTheyNameAHolder) {
+  auto log = AuditLog::Open(path_);
+  ASSERT_TRUE(log.ok()) << log.status();
+  std::string holder = "ana@lab rig-run 4711";
+  (*log)->NameHolders([&] { return holder; });
+  ASSERT_TRUE((*log)->Write("touch_failed", {{"id", "t1"}}).ok());
+  ASSERT_TRUE((*log)->Write("lease_acquired", {{"holder", "ben@lab"}}).ok());
+  holder = "";
+  ASSERT_TRUE((*log)->Write("latched", {}).ok());
+  const std::vector<std::string> lines = Lines();
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(nlohmann::json::parse(lines[0])["lease_holder"], "ana@lab rig-run 4711");
+  EXPECT_FALSE(nlohmann::json::parse(lines[1]).contains("lease_holder"));
+  EXPECT_FALSE(nlohmann::json::parse(lines[2]).contains("lease_holder"));
+}
+
 TEST_F(AuditLogTest, LinesAreAppendedToWhatIsThere) {
   for (const char* event : {"first", "second"}) {
     auto log = AuditLog::Open(path_);
