@@ -100,9 +100,9 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
 
 struct GatewayServer::Parts {
   Resources resources;
+  std::unique_ptr<LeaseBook> leases;  // before the rig, whose audit log asks who holds one
   std::unique_ptr<source::PhysicalSource> source;
   gateway::Rig* rig = nullptr;  // the source's device, if it is one
-  std::unique_ptr<LeaseBook> leases;
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<RigService> rig_service;
@@ -142,6 +142,8 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   parts.source = std::make_unique<source::PhysicalSource>(&resources.objects, options.common.Limits(),
                                                           std::move(device), gateway::camera::Rectify);
   parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
+  if (parts.rig != nullptr)
+    parts.rig->audit().NameHolders([leases = parts.leases.get()] { return leases->Holder(); });
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.sessions = std::make_unique<JournalSessionsService>(
       journal, parts.leases.get(), parts.rig == nullptr ? nullptr : &parts.rig->audit());

@@ -34,7 +34,8 @@ TEST_F(Safety, StopDuringMotionNeedsNoLeaseAndHolds) {
   ExpectEveryResultIsItsOwnTouch();
   std::ifstream audit(folder_.Path("rig/audit.jsonl"));
   const std::string log((std::istreambuf_iterator<char>(audit)), {});
-  EXPECT_THAT(log, testing::AllOf(HasSubstr("\"stop\""), HasSubstr("a test")));
+  EXPECT_THAT(log, testing::AllOf(HasSubstr("\"stop\""), HasSubstr("a test"),
+                                  HasSubstr("\"up_face\":\"+z\",\"lease_holder\":\"client\"")));
 }
 
 TEST_F(Safety, AClientThatRetriesDoesNotReleaseAStop) {

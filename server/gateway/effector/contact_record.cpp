@@ -43,6 +43,11 @@ bool ContactRecord::OnArmed(const firmware::Armed& armed, uint64_t min_ticks, ui
   return true;
 }
 
+void ContactRecord::EndCapture() {
+  if (armed_ && !Complete()) reconciled_ = has_reading_ = false;
+  armed_ = false;
+}
+
 void ContactRecord::MarkLost(std::string why) {
   if (Final()) return;
   armed_ = false;

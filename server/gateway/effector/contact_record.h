@@ -30,8 +30,9 @@ class ContactRecord {
   Verdict OnEvent(const firmware::Event& event, uint64_t max_ticks);
   // One reading of the device's record. Once two in succession agree it replaces the events; returns whether.
   bool OnReading(const firmware::Recalled& recalled, uint64_t max_ticks);
-  // No more events will come.
-  void EndCapture() { armed_ = false; }
+  // No more events will come. What was read of the record before says nothing of a finger that had no contact yet: its
+  // event may have been lost.
+  void EndCapture();
   void MarkLost(std::string why);
 
   const EffectorTouch& touch() const { return touch_; }

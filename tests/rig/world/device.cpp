@@ -110,31 +110,42 @@ void Device::Plugging() {
   }
 }
 
-void Device::Run() {
+// What the sensors showed until now.
+void Device::TakeEdges() {
   std::vector<Edge> edges;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    edges.swap(edges_);
+  }
+  const bool bounce = faults_->Get("bounce") > 0;
+  for (const Edge& edge : edges) pins_->Add(edge, bounce);
+  const double now_s = clock_->NowS();
+  counter_->SetDriftPpm(options_.drift_ppm + faults_->Get("clock_drift_ppm"), now_s);
+  pins_->Run(now_s, static_cast<int>(faults_->Get("stuck_finger")));
+  // For debouncing it is as late as the edges are that it has been told, however long this thread was away.
+  frozen_s_ = now_s;
+  core_->OnTime();
+  frozen_s_.reset();
+}
+
+void Device::Run() {
   while (!stopping_) {
     bool reset = false;
     {
       std::lock_guard<std::mutex> lock(mutex_);
-      edges.swap(edges_);
       std::swap(reset, reset_);
     }
     if (reset) Boot();
     Plugging();
-    const bool bounce = faults_->Get("bounce") > 0;
-    for (const Edge& edge : edges) pins_->Add(edge, bounce);
-    edges.clear();
-
-    const double now_s = clock_->NowS();
-    counter_->SetDriftPpm(options_.drift_ppm + faults_->Get("clock_drift_ppm"), now_s);
-    pins_->Run(now_s, static_cast<int>(faults_->Get("stuck_finger")));
-    // For debouncing it is as late as the edges are that it has been told, however long this thread was away.
-    frozen_s_ = now_s;
-    core_->OnTime();
-    frozen_s_.reset();
-    for (const uint8_t byte : line_->Exchange(clock_->NowS())) core_->OnByte(byte);
-    // What the core has just written leaves at once.
-    for (const uint8_t byte : line_->Exchange(clock_->NowS())) core_->OnByte(byte);
+    TakeEdges();
+    // Once more for what the core writes in answer, which leaves at once.
+    for (int turn = 0; turn < 2; ++turn) {
+      const std::vector<uint8_t> bytes = line_->Exchange(clock_->NowS());
+      // An edge interrupts a microcontroller at once: nothing that arrives later is answered before it, however long
+      // this thread was away in between.
+      if (!bytes.empty()) TakeEdges();
+      for (const uint8_t byte : bytes) core_->OnByte(byte);
+    }
     Wait();
   }
 }

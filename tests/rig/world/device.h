@@ -47,6 +47,7 @@ class Device {
   double tick_hz() const { return options_.tick_hz; }
 
  private:
+  void TakeEdges();
   void Run();
   void Boot();
   void Plugging();

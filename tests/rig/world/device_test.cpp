@@ -158,6 +158,26 @@ TEST_F(DeviceTest, StampsContactsToTheTickHoweverLateTheyAreHandedOver) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(ErrorS(contacts->ticks[i], at_s[i]), 0, 1.5 / 16e6) << i;
 }
 
+TEST_F(DeviceTest, AContactComesBeforeWhatIsSentAfterIt) {
+  Start();
+  Host host(Port());
+  host.Begin(3, firmware::Sensor::kOptical);
+  for (uint32_t touch = 1; touch <= 400; ++touch) {
+    ASSERT_TRUE(host.Arm(touch));
+    // The device is awake, at another place of its turn every time, when the finger presses and "disarm" follows.
+    host.Send(firmware::Clock{touch});
+    for (const double until_s = HostS() + touch % 40 * 1e-6; HostS() < until_s;) continue;
+    const double now_s = clock_.NowS();
+    device_->OnEdge({0, true, now_s, now_s});
+    host.Send(firmware::Disarm{});
+    const auto recalled = host.Ask<firmware::Recalled>(firmware::Recall{touch});
+    ASSERT_TRUE(recalled);
+    ASSERT_EQ(recalled->contact_mask, 1) << "touch " << touch;
+    const double released_s = clock_.NowS();
+    device_->OnEdge({0, false, released_s, released_s});
+  }
+}
+
 TEST_F(DeviceTest, AnswersClockQueriesWithItsOwnDriftingCounter) {
   Start();
   Host host(Port());
