@@ -7,6 +7,7 @@
 #include <numeric>
 #include <thread>
 
+#include "server/base/sanitizers.h"
 #include "server/geometry/brute_force_oracle.h"
 #include "server/geometry/line_triangle.h"
 #include "server/geometry/supershape.h"
@@ -103,7 +104,7 @@ TEST(CastLines, AgreesWithEricsonsSegmentOnEveryTriangle) {
   for (const Case& c : Cases()) {
     SCOPED_TRACE(c.name);
     const TriangleMesh& mesh = c.surface->mesh();
-    const Lines lines = AimedLines(mesh, 3000, 2);
+    const Lines lines = AimedLines(mesh, kUnderSanitizers ? 300 : 3000, 2);
     Contacts contacts;
     c.surface->CastLines(lines.origins_m, lines.directions, kLongestM, &contacts);
     double worst = 0;
