@@ -84,7 +84,9 @@ constexpr NamedPut kTouchColumns[] = {
 }  // namespace
 
 BatchColumns::Writer::Writer(absl::Span<DatasetBatch> batches, size_t column, size_t bytes_per_sample)
-    : batch_size_(batches[0].rows), bytes_(bytes_per_sample) {
+    : batch_size_(batches[0].rows),
+      shift_(batch_size_ > 0 && (batch_size_ & (batch_size_ - 1)) == 0 ? __builtin_ctz(batch_size_) : -1),
+      bytes_(bytes_per_sample) {
   for (DatasetBatch& batch : batches) {
     batch.data[column].resize(batch.rows * bytes_);
     begin_.push_back(batch.data[column].data());
@@ -111,7 +113,7 @@ BatchColumns::BatchColumns(const std::vector<ColumnInfo>& columns, size_t object
           if (is_index)
             writer.Put(slot, 0, index);
           else
-            writer.Put(slot, 0, static_cast<int32_t>(index % objects));
+            writer.Put(slot, 0, objects == 1 ? 0 : static_cast<int32_t>(index % objects));
         }
     } else if (name == "image" || name == "depth_m" || name == "mask") {
       for (DatasetBatch& batch : batches) batch.data[column].reserve(batch.rows * bytes);

@@ -39,7 +39,10 @@ class BatchColumns {
   class Writer {
    public:
     Writer(absl::Span<DatasetBatch> batches, size_t column, size_t bytes_per_sample);
-    char* At(uint32_t slot) const { return begin_[slot / batch_size_] + (slot % batch_size_) * bytes_; }
+    char* At(uint32_t slot) const {
+      const uint32_t batch = shift_ >= 0 ? slot >> shift_ : slot / batch_size_;
+      return begin_[batch] + (slot - batch * batch_size_) * bytes_;
+    }
     template <typename T>
     void Put(uint32_t slot, size_t k, T value) const {
       std::memcpy(At(slot) + k * sizeof(T), &value, sizeof(T));
@@ -51,6 +54,7 @@ class BatchColumns {
    private:
     std::vector<char*> begin_;
     uint32_t batch_size_;
+    int shift_;  // batch_size_ is 1 << shift_, or -1: a division is most of what it costs to find a row
     size_t bytes_;
   };
   // What a column takes from a block of touches.

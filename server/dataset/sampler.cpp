@@ -15,7 +15,7 @@ namespace touchstone::dataset {
 namespace {
 
 // Touches that go through the stages together: their arrays stay in the second-level cache.
-constexpr size_t kBlock = 1024;
+constexpr size_t kBlock = 512;
 // After this many rounds of misses one index is followed to its end, so that a hopeless object fails at once.
 constexpr uint32_t kProbeAfter = 16;
 
@@ -108,7 +108,11 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
     for (size_t begin = 0; begin < pending; begin += kBlock) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
       block.clear();
-      for (uint32_t place : order.subspan(begin, kBlock)) block.push_back(slots[place]);
+      const absl::Span<const uint32_t> places = order.subspan(begin, kBlock);
+      if (pending == indices.size())  // none is done yet: every place is its own slot
+        block.assign(places.begin(), places.end());
+      else
+        for (const uint32_t place : places) block.push_back(slots[place]);
       DrawBlock(object, indices, attempt, workspace);
       TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, until, previous_press_m, workspace));
       sink({workspace->batch, block, workspace->accepted, workspace->poses});

@@ -12,7 +12,7 @@ namespace {
 // Samples a task makes: few at first, so that the first batch comes soon; then many, since sorting more
 // touches together makes each cheaper.
 constexpr uint64_t kFirstChunkSamples = 8192;
-constexpr uint64_t kMaxChunkSamples = 262144;
+constexpr uint64_t kMaxChunkSamples = 524288;
 // Bytes that one chunk may hold, whatever its columns.
 constexpr uint64_t kMaxChunkBytes = 16 << 20;
 // Bytes of one batch, safely below the message limit.

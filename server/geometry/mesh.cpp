@@ -10,6 +10,7 @@
 
 #include "server/base/check.h"
 #include "server/base/text.h"
+#include "server/geometry/pieces.h"
 
 namespace touchstone::geometry {
 namespace {
@@ -71,18 +72,25 @@ std::array<PositionBits, 3> SortedPlaces(const TriangleMesh& mesh, uint32_t tria
 // clears all triangles but those whose bit another one shares, one in ten; only these are compared in full.
 std::vector<bool> FindRepeated(const TriangleMesh& mesh) {
   std::vector<uint64_t> vertex_hash(mesh.vertices_m.size());
-  for (size_t v = 0; v < vertex_hash.size(); ++v) {
-    const PositionBits bits = BitsOf(mesh.vertices_m[v]);
-    vertex_hash[v] = Mix(Mix((uint64_t{bits[0]} << 32) | bits[1]) + bits[2] + 0x9E3779B97F4A7C15u);
-  }
+  InPieces(vertex_hash.size(), [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const PositionBits bits = BitsOf(mesh.vertices_m[v]);
+      vertex_hash[v] = Mix(Mix((uint64_t{bits[0]} << 32) | bits[1]) + bits[2] + 0x9E3779B97F4A7C15u);
+    }
+  });
   const size_t count = mesh.triangles.size();
   std::vector<uint64_t> keys(count);
+  InPieces(count, [&](size_t begin, size_t end) {
+    for (size_t t = begin; t < end; ++t) {
+      const auto& corner = mesh.triangles[t];
+      keys[t] = Mix(vertex_hash[corner[0]] + vertex_hash[corner[1]] + vertex_hash[corner[2]]);
+    }
+  });
+  // By one core: all triangles share the tables of bits.
   KeyBits seen(count), shared(count);
-  for (size_t t = 0; t < count; ++t) {
-    const auto& corner = mesh.triangles[t];
-    keys[t] = Mix(vertex_hash[corner[0]] + vertex_hash[corner[1]] + vertex_hash[corner[2]]);
-    if (seen.Has(keys[t])) shared.Set(keys[t]);
-    seen.Set(keys[t]);
+  for (const uint64_t key : keys) {
+    if (seen.Has(key)) shared.Set(key);
+    seen.Set(key);
   }
   std::vector<bool> repeated(count);
   absl::flat_hash_set<std::array<PositionBits, 3>> places;
@@ -167,9 +175,13 @@ MeshReport InspectMesh(const TriangleMesh& mesh) {
 
 TriangleMesh WithoutDegenerateAndDuplicate(TriangleMesh mesh) {
   const std::vector<bool> repeated = FindRepeated(mesh);
+  std::vector<uint8_t> dropped(mesh.triangles.size());
+  InPieces(dropped.size(), [&](size_t begin, size_t end) {
+    for (size_t t = begin; t < end; ++t) dropped[t] = repeated[t] || HasNoArea(mesh, t);
+  });
   size_t kept = 0;
-  for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    if (!repeated[t] && !HasNoArea(mesh, t)) mesh.triangles[kept++] = mesh.triangles[t];
+  for (size_t t = 0; t < dropped.size(); ++t)
+    if (!dropped[t]) mesh.triangles[kept++] = mesh.triangles[t];
   mesh.triangles.resize(kept);
   return mesh;
 }

@@ -4,9 +4,11 @@
 #include <absl/strings/str_split.h>
 
 #include <cmath>
+#include <mutex>
 #include <thread>
 
 #include "server/base/check.h"
+#include "server/geometry/pieces.h"
 
 namespace touchstone::geometry {
 namespace {
@@ -35,53 +37,96 @@ RTCDevice NewDevice() {
 // farther out. Single precision may miss a triangle that a line meets right at its border; where the border
 // is a silhouette, nothing but a surface far behind would be proposed. On the inflated mesh the line passes
 // well inside, something near the border is proposed, and the exact search is asked.
-std::vector<Eigen::Vector3f> InflateVertices(const TriangleMesh& mesh, double distance_m) {
-  const size_t count = mesh.vertices_m.size();
-  const auto corners = [&](const std::array<uint32_t, 3>& triangle, Eigen::Vector3f* corner) {
-    for (int c = 0; c < 3; ++c) corner[c] = mesh.vertices_m[triangle[c]];
+class VertexInflation {
+ public:
+  VertexInflation(const TriangleMesh& mesh, double distance_m)
+      : mesh_(mesh),
+        distance_m_(static_cast<float>(distance_m)),
+        normal_(mesh.vertices_m.size(), Eigen::Vector3f::Zero()),
+        outwards_(normal_.size(), Eigen::Vector3f::Zero()),
+        loop_(normal_.size(), Eigen::Vector3f::Zero()),
+        lift_(normal_.size(), 1.0f) {}
+
+  // Vertices are shared among the cores. Each sums over its own triangles in their order, whoever does it, so the
+  // bits do not depend on the number of cores; triangles between two pieces are looked at twice.
+  std::vector<Eigen::Vector3f> Inflated() {
+    InPieces(normal_.size(), [this](size_t begin, size_t end) { SumFaces(begin, end); });
+    std::vector<Eigen::Vector3f> inflated;
+    inflated.reserve(normal_.size() + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
+    inflated.resize(normal_.size());
+    InPieces(normal_.size(), [&](size_t begin, size_t end) { Move(begin, end, inflated.data()); });
+    return inflated;
+  }
+
+ private:
+  // Calls body(triangle) for the triangles with a corner among the vertices begin .. end - 1.
+  template <typename Body>
+  void ForTrianglesAt(size_t begin, size_t end, const Body& body) const {
+    const uint32_t size = static_cast<uint32_t>(end - begin), first = static_cast<uint32_t>(begin);
+    for (const auto& triangle : mesh_.triangles)
+      if ((triangle[0] - first < size) | (triangle[1] - first < size) | (triangle[2] - first < size))
+        body(triangle);
+  }
+
+  // The corners and the unit normal of a triangle.
+  Eigen::Vector3f Corners(const std::array<uint32_t, 3>& triangle, Eigen::Vector3f* corner) const {
+    for (int c = 0; c < 3; ++c) corner[c] = mesh_.vertices_m[triangle[c]];
     return (corner[1] - corner[0]).cross(corner[2] - corner[0]).stableNormalized();
-  };
-  std::vector<Eigen::Vector3f> normal(count, Eigen::Vector3f::Zero());
+  }
+
+  void SumFaces(size_t begin, size_t end) {
+    float longest_edge_m = 0;
+    Eigen::Vector3f corner[3];
+    ForTrianglesAt(begin, end, [&](const std::array<uint32_t, 3>& triangle) {
+      const Eigen::Vector3f unit = Corners(triangle, corner);
+      Eigen::Vector3f away[3];
+      for (int c = 0; c < 3; ++c) {
+        const Eigen::Vector3f edge = corner[(c + 1) % 3] - corner[c];
+        longest_edge_m = std::max(longest_edge_m, edge.norm());
+        away[c] = edge.stableNormalized().cross(unit);
+      }
+      for (int c = 0; c < 3; ++c) {
+        const uint32_t v = triangle[c];
+        if (v < begin || v >= end) continue;
+        normal_[v] += unit;
+        outwards_[v] += away[c] + away[(c + 2) % 3];
+        loop_[v] += corner[(c + 2) % 3] - corner[(c + 1) % 3];
+      }
+    });
+    for (size_t v = begin; v < end; ++v) normal_[v] = normal_[v].stableNormalized();
+    const std::lock_guard<std::mutex> lock(longest_mutex_);
+    longest_edge_m_ = std::max(longest_edge_m_, longest_edge_m);
+  }
+
+  void Move(size_t begin, size_t end, Eigen::Vector3f* inflated) {
+    // How much farther a sharp tip must go than the faces round it, within reason.
+    Eigen::Vector3f corner[3];
+    ForTrianglesAt(begin, end, [&](const std::array<uint32_t, 3>& triangle) {
+      const Eigen::Vector3f unit = Corners(triangle, corner);
+      for (const uint32_t v : triangle)
+        if (v >= begin && v < end) lift_[v] = std::min(lift_[v], std::max(0.2f, unit.dot(normal_[v])));
+    });
+    for (size_t v = begin; v < end; ++v) {
+      // A border seen at a flat angle moves less than its plane's distance; fifty times is enough to 1 degree.
+      const bool border = loop_[v].norm() > 1e-5f * longest_edge_m_;
+      const float square = std::max(1e-6f, outwards_[v].squaredNorm());
+      const float factor = border ? 50 * 2 / square : 1 / lift_[v];
+      const Eigen::Vector3f move = factor * (border ? outwards_[v] : normal_[v]);
+      inflated[v] = mesh_.vertices_m[v] + distance_m_ * move;
+    }
+  }
+
+  const TriangleMesh& mesh_;
+  const float distance_m_;
+  std::vector<Eigen::Vector3f> normal_;
   // In the faces' planes, away from the edges that meet at the vertex: the two sides of an inner edge cancel.
-  std::vector<Eigen::Vector3f> outwards(count, Eigen::Vector3f::Zero());
+  std::vector<Eigen::Vector3f> outwards_;
   // The opposite edges: a closed loop, unless the vertex is on a border.
-  std::vector<Eigen::Vector3f> loop(count, Eigen::Vector3f::Zero());
-  float longest_edge = 0;
-  Eigen::Vector3f corner[3];
-  for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3f unit = corners(triangle, corner);
-    Eigen::Vector3f away[3];
-    for (int c = 0; c < 3; ++c) {
-      const Eigen::Vector3f edge = corner[(c + 1) % 3] - corner[c];
-      longest_edge = std::max(longest_edge, edge.norm());
-      away[c] = edge.stableNormalized().cross(unit);
-    }
-    for (int c = 0; c < 3; ++c) {
-      normal[triangle[c]] += unit;
-      outwards[triangle[c]] += away[c] + away[(c + 2) % 3];
-      loop[triangle[c]] += corner[(c + 2) % 3] - corner[(c + 1) % 3];
-    }
-  }
-  // How much farther a sharp tip must go than the faces round it, within reason.
-  std::vector<float> lift(count, 1.0f);
-  for (size_t v = 0; v < count; ++v) normal[v] = normal[v].stableNormalized();
-  for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3f unit = corners(triangle, corner);
-    for (const uint32_t v : triangle) lift[v] = std::min(lift[v], std::max(0.2f, unit.dot(normal[v])));
-  }
-  const float distance = static_cast<float>(distance_m);
-  std::vector<Eigen::Vector3f> inflated;
-  inflated.reserve(count + 2);  // Embree reads vertices in 16 bytes, a little beyond the last one
-  for (size_t v = 0; v < count; ++v) {
-    // A border seen at a flat angle moves less than its plane's distance; fifty times is enough to 1 degree.
-    const bool border = loop[v].norm() > 1e-5f * longest_edge;
-    const float square = std::max(1e-6f, outwards[v].squaredNorm());
-    const float factor = border ? 50 * 2 / square : 1 / lift[v];
-    const Eigen::Vector3f move = factor * (border ? outwards[v] : normal[v]);
-    inflated.push_back(mesh.vertices_m[v] + distance * move);
-  }
-  return inflated;
-}
+  std::vector<Eigen::Vector3f> loop_;
+  std::vector<float> lift_;
+  std::mutex longest_mutex_;
+  float longest_edge_m_ = 0;
+};
 
 }  // namespace
 
@@ -113,7 +158,7 @@ Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
   reach_m_ = 0.5 * bounds.DiagonalM() * 1.0001;
   // Rounding of a coordinate is 6e-8 of it; sums and products of a few of them follow.
   rounding_m_ = 5e-7 * (bounds.min_m.cwiseAbs().cwiseMax(bounds.max_m.cwiseAbs()).maxCoeff() + reach_m_);
-  inflated_vertices_m_ = InflateVertices(mesh, rounding_m_);
+  inflated_vertices_m_ = VertexInflation(mesh, rounding_m_).Inflated();
 
   const std::lock_guard<std::mutex> turn(BuildTurn());
   const int64_t before = embree_bytes;

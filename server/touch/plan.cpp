@@ -17,15 +17,23 @@ uint64_t Below(uint64_t word, uint64_t bound) {
   return static_cast<uint64_t>((static_cast<unsigned __int128>(word) * bound) >> 64);
 }
 
-// Cosines and sines of the multiples of a step, from `first` steps on.
-struct AngleTable {
-  std::vector<double> cosine, sine;
+// Cosines and sines of the multiples of a step, from `first` steps on; side by side, because fine steps make
+// tables that no longer fit into the second-level cache.
+class AngleTable {
+ public:
+  struct Entry {
+    double cosine, sine;
+  };
   AngleTable(int64_t first, int64_t count, double step_rad) {
-    for (int64_t k = first; k < first + count; ++k) {
-      cosine.push_back(std::cos(k * step_rad));
-      sine.push_back(std::sin(k * step_rad));
-    }
+    for (int64_t k = first; k < first + count; ++k)
+      entries_.push_back({std::cos(k * step_rad), std::sin(k * step_rad)});
   }
+  uint64_t size() const { return entries_.size(); }
+  const Entry& operator[](uint64_t k) const { return entries_[k]; }
+  void Prefetch(uint64_t k) const { __builtin_prefetch(&entries_[k]); }
+
+ private:
+  std::vector<Entry> entries_;
 };
 
 class SphereGenerator : public PoseGenerator {
@@ -42,28 +50,39 @@ class SphereGenerator : public PoseGenerator {
         roll_(0, roll_steps_, 2 * kPi / roll_steps_) {}
 
   void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
-    for (size_t k = 0; k < numbers.size(); ++k) {
-      const auto words = RandomBlock(seed_, RandomDomain::kPose, numbers[k], attempt, 0);
-      const uint64_t theta = Below(words[0], theta_.cosine.size());
-      const uint64_t phi = Below(words[1], phi_.cosine.size());
-      const double ct = theta_.cosine[theta], st = theta_.sine[theta];
-      const double cp = phi_.cosine[phi], sp = phi_.sine[phi];
-      TouchPose& pose = poses[k];
-      pose.target_m = centre_m_;
-      pose.standoff_m = radius_m_;
-      pose.approach = Eigen::Vector3d(-cp * ct, -cp * st, -sp);
-      pose.lateral = Eigen::Vector3d(-st, ct, 0);
-      if (roll_steps_ > 1) {
-        const uint64_t roll = Below(words[2], roll_steps_);
-        const Eigen::Vector3d perpendicular = pose.approach.cross(pose.lateral);
-        pose.lateral = roll_.cosine[roll] * pose.lateral + roll_.sine[roll] * perpendicular;
+    // All random numbers of a tile come first, so that its look-ups are on their way together.
+    constexpr size_t kTile = 64;
+    struct Angles {
+      uint64_t theta, phi, roll;
+    } angles[kTile];
+    for (size_t begin = 0; begin < numbers.size(); begin += kTile) {
+      const size_t count = std::min(kTile, numbers.size() - begin);
+      for (size_t k = 0; k < count; ++k) {
+        const auto words = RandomBlock(seed_, RandomDomain::kPose, numbers[begin + k], attempt, 0);
+        angles[k] = {Below(words[0], theta_.size()), Below(words[1], phi_.size()),
+                     Below(words[2], roll_steps_)};
+        theta_.Prefetch(angles[k].theta);
+        phi_.Prefetch(angles[k].phi);
       }
+      for (size_t k = 0; k < count; ++k)
+        SetPose(theta_[angles[k].theta], phi_[angles[k].phi], roll_[angles[k].roll], &poses[begin + k]);
     }
   }
   uint64_t Count() const override { return 0; }
   bool CanRedraw() const override { return true; }
 
  private:
+  void SetPose(const AngleTable::Entry& theta, const AngleTable::Entry& phi, const AngleTable::Entry& roll,
+               TouchPose* pose) const {
+    pose->target_m = centre_m_;
+    pose->standoff_m = radius_m_;
+    pose->approach = Eigen::Vector3d(-phi.cosine * theta.cosine, -phi.cosine * theta.sine, -phi.sine);
+    pose->lateral = Eigen::Vector3d(-theta.sine, theta.cosine, 0);
+    if (roll_steps_ == 1) return;
+    const Eigen::Vector3d perpendicular = pose->approach.cross(pose->lateral);
+    pose->lateral = roll.cosine * pose->lateral + roll.sine * perpendicular;
+  }
+
   const uint64_t seed_;
   const Eigen::Vector3d centre_m_;
   const double radius_m_;

@@ -46,6 +46,7 @@ BENCHMARK(Touches20k)
     ->Arg(16)
     ->Arg(32)
     ->Arg(64)
+    ->Arg(128)
     ->Unit(benchmark::kMillisecond);
 
 // Steps so fine that no pose comes twice: what the default plan's 65,160 poses, cast once a chunk, save.
@@ -56,10 +57,11 @@ BENCHMARK(TouchesWithoutRepeats)
     ->Name("touches/without_repeats")
     ->Arg(32)
     ->Arg(64)
+    ->Arg(128)
     ->Unit(benchmark::kMillisecond);
 
 void TouchesByTriangles(benchmark::State& state) {
-  MakeChunks(state, kNoise, state.range(0), 64);
+  MakeChunks(state, kNoise, state.range(0), 128);
 }
 BENCHMARK(TouchesByTriangles)
     ->Name("touches/triangles")
