@@ -63,6 +63,11 @@ class NormalizeRun {
   NormalizeRun(const Cli& cli, const NormalizeOptions& options) : cli_(cli), options_(options) {}
 
   absl::Status Run() {
+    // Before an output folder is made that would stay empty.
+    if (std::error_code error; !fs::is_directory(options_.folder, error))
+      return absl::NotFoundError(absl::StrCat(options_.folder,
+                                              error ? ": " + error.message() : ": is no folder",
+                                              "; a folder with pictures or an image set was expected"));
     TOUCHSTONE_RETURN_IF_ERROR(CheckOutput());
     if (!options_.background.empty()) {
       TOUCHSTONE_ASSIGN_OR_RETURN(background_, ReadPicture(options_.background));
@@ -178,19 +183,22 @@ class NormalizeRun {
 
 void AddNormalize(Cli* cli) {
   auto options = std::make_shared<NormalizeOptions>();
-  CLI::App* command =
-      cli->AddCommand(nullptr, "normalize",
-                      "Makes photographs alike: a dark object on white, without the ground, its uneven light "
-                      "and its shadows, as "
-                      "recognisers that were trained on such pictures expect. An image set stays one, with "
-                      "its poses and its lens; of any "
-                      "other folder every PNG and JPEG file is taken. The object must differ from a plain "
-                      "ground: darker than it, or "
-                      "brighter; with a picture of the empty place the ground may have a pattern.",
-                      "touchstone normalize photos -o normalized\n"
-                      "touchstone normalize photos -o normalized --masks\n"
-                      "touchstone normalize photos -o normalized --background empty.png",
-                      [cli, options] { return NormalizeRun(*cli, *options).Run(); });
+  CLI::App* command = cli->AddCommand(
+      nullptr, "normalize",
+      "Makes photographs alike: a dark object on white, without the ground, its uneven light "
+      "and its shadows, as "
+      "recognisers that were trained on such pictures expect. An image set stays one, with "
+      "its poses and its lens; of any "
+      "other folder every PNG and JPEG file is taken. The object must differ from a plain "
+      "ground: darker than it, "
+      "brighter, or of another colour; with a picture of the empty place the ground may have a pattern. "
+      "Pictures of 16 bits are read as 8 bits, transparency and colour profiles are not "
+      "looked at; sides from 16 to 2048 pixels. A picture in which no object parts from the "
+      "ground becomes white and is named.",
+      "touchstone normalize photos -o normalized\n"
+      "touchstone normalize photos -o normalized --masks\n"
+      "touchstone normalize photos -o normalized --background empty.png",
+      [cli, options] { return NormalizeRun(*cli, *options).Run(); });
   command->add_option("FOLDER", options->folder, "An image set, or a folder with pictures")
       ->type_name("")
       ->required();

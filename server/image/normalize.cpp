@@ -6,21 +6,14 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/image/normalize_parting.h"
 #include "server/image/normalize_region.h"
 #include "server/image/shading.h"
 
 namespace touchstone::image {
 namespace {
 
-constexpr double kMinObjectShare = 0.001, kMaxObjectShare = 0.9;  // of the picture
-constexpr double kMaxRimShare =
-    0.5;  // of the picture's rim: an object that takes more of it hides the ground
-constexpr float kMinSteepness = 0.02f;  // of an outline, per pixel: fainter is noise or light
-constexpr float kSmoothPx = 0.6f;
-constexpr float kSmoothNoise = 0.2f;        // what is left of white noise then
-constexpr double kMaxEnclosedShare = 0.08;  // of the object's pixels
-constexpr double kMinShadowShare = 0.6;     // of a shadow's pixels, in its umbra
-constexpr float kBrightShare = 0.98f;       // of the object's pixels, in grey: as bright as it gets
+constexpr float kBrightShare = 0.98f;  // of the object's pixels, in grey: as bright as it gets
 
 // Grey levels, the mean of the channels.
 Plane GreyOf(const Image& image) {
@@ -46,101 +39,43 @@ absl::Status CheckPicture(const Image& image, const char* name) {
   return absl::OkStatus();
 }
 
-Plane SlopeOf(const Plane& plane) {
-  Plane slope(plane.width, plane.height);
-  for (int y = 0; y < plane.height; ++y)
-    for (int x = 0; x < plane.width; ++x) {
-      const float across = plane.at(std::min(x + 1, plane.width - 1), y) - plane.at(std::max(x - 1, 0), y);
-      const float down = plane.at(x, std::min(y + 1, plane.height - 1)) - plane.at(x, std::max(y - 1, 0));
-      slope.at(x, y) = 0.5f * std::sqrt(across * across + down * down);
-    }
-  return slope;
+bool IsGrey(const Image& image) {
+  for (size_t k = 0; k + 2 < image.pixels.size(); k += 3)
+    if (image.pixels[k] != image.pixels[k + 1] || image.pixels[k] != image.pixels[k + 2]) return false;
+  return true;
 }
 
-// What differs from the ground, without what may be its shadow.
-class Parting {
- public:
-  // `calm`: the picture without its noise.
-  Parting(const Plane& calm, const Plane& ground, float noise)
-      : relative_(calm.width, calm.height), is_ground_(calm.width, calm.height) {
-    // Grey levels near black say little: below the floor the logarithm becomes flat.
-    const float floor = std::max(8.0f, 4 * noise), smooth_noise = kSmoothNoise * noise;
-    const Plane smooth = Blurred(calm, kSmoothPx);
-    for (size_t k = 0; k < calm.values.size(); ++k) {
-      relative_.values[k] = std::log((smooth.values[k] + floor) / (ground.values[k] + floor));
-      const float tolerance = (3.2f * smooth_noise + 1.2f) / (ground.values[k] + floor) + 0.02f;
-      is_ground_.inside[k] = std::abs(relative_.values[k]) < tolerance;
-      if (!is_ground_.inside[k]) different_ += std::abs(relative_.values[k]);
-      mode_width_ += tolerance;
-    }
-    mode_width_ = 0.03f + 0.5f * mode_width_ / static_cast<float>(calm.values.size());
-    slope_ = SlopeOf(relative_);
-  }
+// One plane of a picture without colour, else three.
+std::vector<Plane> ChannelsOf(const Image& image, bool grey) {
+  if (grey) return {GreyOf(image)};
+  std::vector<Plane> channels(3, Plane(image.width, image.height));
+  for (size_t k = 0; k < image.pixels.size(); ++k) channels[k % 3].values[k / 3] = image.pixels[k];
+  return channels;
+}
 
-  // The best region; empty if none has an outline.
-  Region Best() {
-    static constexpr float kLevels[] = {0.0f, 0.08f, 0.12f, 0.17f, 0.23f, 0.3f, 0.38f, 0.47f, 0.57f, 0.68f,
-                                        0.8f, 0.95f, 1.1f,  1.3f,  1.5f,  1.8f, 2.1f,  2.5f,  1e9f};
-    for (const float level : kLevels) Try(level);
-    if (!best_.inside.empty()) best_ = Filled(best_);
-    return best_;
+GroundedPicture FindGround(const Image& photograph, const Image* background) {
+  GroundedPicture picture;
+  const bool grey =
+      photograph.channels == 1 || IsGrey(photograph) || (background != nullptr && background->channels == 1);
+  picture.grey = ChannelsOf(photograph, grey);
+  for (const Plane& channel : picture.grey) picture.noise = std::max(picture.noise, NoiseOf(channel));
+  const std::vector<Plane> empty =
+      background == nullptr ? std::vector<Plane>() : ChannelsOf(*background, grey);
+  for (size_t c = 0; c < picture.channels(); ++c) {
+    picture.calm.push_back(WithoutNoise(picture.grey[c], picture.noise));
+    picture.ground.push_back(background == nullptr ? FitGround(picture.calm[c], kCalmNoise * picture.noise)
+                                                   : GroundOf(empty[c], picture.grey[c]));
   }
+  return picture;
+}
 
- private:
-  // Ground that object and shadow enclose lies in the shadow too: what is as bright as lit ground there is the object.
-  Region Filled(const Region& object) const {
-    Region taken = object;
-    for (size_t k = 0; k < taken.inside.size(); ++k)
-      if (!is_ground_.inside[k] && relative_.values[k] < 0) taken.inside[k] = 1;
-    return WithSmallHoles(object, taken, kMaxEnclosedShare);
-  }
-
-  // A shadow is darker than the ground, and everywhere by the same factor but for its rim.
-  bool MayBeShadow(const Region& object) const {
-    std::vector<float> values;
-    const int width = object.width, height = object.height;
-    const auto left_out = [&](int x, int y) {
-      return !object.at(x, y) && !is_ground_.at(x, y) && relative_.at(x, y) < 0;
-    };
-    for (int y = 2; y + 2 < height; ++y)
-      for (int x = 2; x + 2 < width; ++x)
-        if (left_out(x, y) && left_out(x - 2, y) && left_out(x + 2, y) && left_out(x, y - 2) &&
-            left_out(x, y + 2))
-          values.push_back(relative_.at(x, y));
-    if (values.size() < 30) return true;
-    std::sort(values.begin(), values.end());
-    size_t most = 0;
-    for (size_t first = 0, last = 0; first < values.size(); ++first) {
-      while (last < values.size() && values[last] <= values[first] + 2 * mode_width_) ++last;
-      most = std::max(most, last - first);
-    }
-    return static_cast<double>(most) >= kMinShadowShare * static_cast<double>(values.size());
-  }
-
-  // Everything that is brighter than the ground, or darker than a shadow of this level.
-  void Try(float level) {
-    Region raw(relative_.width, relative_.height);
-    for (size_t k = 0; k < raw.inside.size(); ++k)
-      raw.inside[k] = !is_ground_.inside[k] && (relative_.values[k] > 0 || relative_.values[k] < -level);
-    const Region region = Cleaned(raw, is_ground_);
-    const double share = static_cast<double>(region.Count()) / static_cast<double>(region.inside.size());
-    if (share < kMinObjectShare || share > kMaxObjectShare || RimShare(region) > kMaxRimShare) return;
-    const float steepness = OutlineSteepness(region, slope_);
-    if (steepness < kMinSteepness) return;
-    double explained = 0;
-    for (size_t k = 0; k < region.inside.size(); ++k)
-      if (region.inside[k] && !is_ground_.inside[k]) explained += std::abs(relative_.values[k]);
-    const double score = steepness * std::sqrt(explained / std::max(different_, 1e-9));
-    if (score <= best_score_ || !MayBeShadow(region)) return;
-    best_score_ = score;
-    best_ = region;
-  }
-
-  Plane relative_, slope_;
-  Region is_ground_, best_;
-  double different_ = 0, best_score_ = 0;
-  float mode_width_ = 0;
-};
+Plane MeanOf(const std::vector<Plane>& planes) {
+  Plane mean = planes[0];
+  if (planes.size() == 1) return mean;
+  for (size_t k = 0; k < mean.values.size(); ++k)
+    mean.values[k] = (planes[0].values[k] + planes[1].values[k] + planes[2].values[k]) / 3.0f;
+  return mean;
+}
 
 // The object as a white one is drawn dark on white; its light without the ground's unevenness.
 void Paint(const Plane& grey, const Plane& ground, const Region& object, Image* picture) {
@@ -178,20 +113,16 @@ absl::StatusOr<Image> Normalize(const Image& photograph, const Image* background
                           "were expected",
                           background->width, background->height, photograph.width, photograph.height));
   }
-  const Plane grey = GreyOf(photograph);
-  const float noise = NoiseOf(grey);
-  const Plane calm = WithoutNoise(grey, noise);
-  const Plane ground =
-      background == nullptr ? FitGround(calm, kSmoothNoise * noise) : GroundOf(GreyOf(*background), grey);
-  Region object = Parting(calm, ground, noise).Best();
+  const GroundedPicture grounded = FindGround(photograph, background);
+  Region object = PartFromGround(grounded).object;
   Image picture;
   picture.width = photograph.width, picture.height = photograph.height, picture.channels = 1;
-  picture.pixels.assign(grey.values.size(), 255);
-  picture.mask.assign(grey.values.size(), 0);
+  picture.pixels.assign(grounded.grey[0].values.size(), 255);
+  picture.mask.assign(picture.pixels.size(), 0);
   if (object.inside.empty()) return picture;
-  object = Refined(object, grey);
+  object = Refined(object, grounded.grey);
   for (size_t k = 0; k < object.inside.size(); ++k) picture.mask[k] = object.inside[k] ? 255 : 0;
-  Paint(grey, ground, object, &picture);
+  Paint(GreyOf(photograph), MeanOf(grounded.ground), object, &picture);
   return picture;
 }
 

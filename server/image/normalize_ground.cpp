@@ -57,8 +57,9 @@ Terms FitTerms(const Plane& plane, const std::vector<GroundSample>& samples, int
 }
 
 // How far a pixel of the ground may lie from a surface that is `expected` there.
+// Little on a dark ground: a surface that may bend would follow its shadow.
 double ToleranceAt(double expected, float noise, double share) {
-  return 4 * noise + 1.5 + share * std::abs(expected);
+  return 2.5 * noise + 0.6 + share * std::abs(expected);
 }
 
 std::vector<GroundSample> Agreeing(const Plane& plane, const std::vector<GroundSample>& samples,

@@ -176,7 +176,7 @@ float OutlineSteepness(const Region& region, const Plane& slope) {
   return count == 0 ? 0 : static_cast<float>(sum / static_cast<double>(count));
 }
 
-Region Refined(const Region& region, const Plane& grey) {
+Region Refined(const Region& region, const std::vector<Plane>& channels) {
   constexpr int kBand = 2, kReach = 6;
   const std::vector<int> steps = StepsToOutline(region, kBand + 1);
   const int width = region.width, height = region.height;
@@ -184,11 +184,12 @@ Region Refined(const Region& region, const Plane& grey) {
     const size_t at = static_cast<size_t>(y) * width + x;
     return region.inside[at] == side && steps[at] >= kBand;
   };
-  BoxSums sums[2] = {{width, height}, {width, height}}, counts[2] = {{width, height}, {width, height}};
+  std::vector<BoxSums> sums(2 * channels.size(), {width, height}), counts(2, {width, height});
   for (const uint8_t side : {uint8_t{0}, uint8_t{1}}) {
     counts[side].Fill([&](int x, int y) { return deep(x, y, side) ? 1.0 : 0.0; });
-    sums[side].Fill(
-        [&](int x, int y) { return deep(x, y, side) ? static_cast<double>(grey.at(x, y)) : 0.0; });
+    for (size_t c = 0; c < channels.size(); ++c)
+      sums[2 * c + side].Fill(
+          [&](int x, int y) { return deep(x, y, side) ? static_cast<double>(channels[c].at(x, y)) : 0.0; });
   }
   Region result = region;
   for (int y = 0; y < height; ++y)
@@ -196,11 +197,15 @@ Region Refined(const Region& region, const Plane& grey) {
       if (steps[static_cast<size_t>(y) * width + x] >= kBand) continue;
       const double outside = counts[0].Around(x, y, kReach), inside = counts[1].Around(x, y, kReach);
       if (outside < 4 || inside < 4) continue;
-      const double ground = sums[0].Around(x, y, kReach) / outside,
-                   object = sums[1].Around(x, y, kReach) / inside;
-      if (std::abs(object - ground) < 4) continue;
-      const double share = (grey.at(x, y) - ground) / (object - ground);
-      result.at(x, y) = share > 0.5;
+      double along = 0, squares = 0;
+      for (size_t c = 0; c < channels.size(); ++c) {
+        const double ground = sums[2 * c].Around(x, y, kReach) / outside,
+                     object = sums[2 * c + 1].Around(x, y, kReach) / inside;
+        along += (channels[c].at(x, y) - ground) * (object - ground);
+        squares += (object - ground) * (object - ground);
+      }
+      if (squares < 16) continue;
+      result.at(x, y) = along > 0.5 * squares;
     }
   return Majority(result);
 }

@@ -36,7 +36,7 @@ Region WithSmallHoles(const Region& region, const Region& taken, double max_shar
 // How steep `slope` (size of the gradient) is along the region's outline, on average; what leaves the picture counts 0.
 float OutlineSteepness(const Region& region, const Plane& slope);
 
-// Moves the outline by a pixel or two to where `grey` is halfway between the means of both sides nearby.
-Region Refined(const Region& region, const Plane& grey);
+// Moves the outline by a pixel or two to where the picture (`channels`) is halfway between the means of both sides nearby.
+Region Refined(const Region& region, const std::vector<Plane>& channels);
 
 }  // namespace touchstone::image
