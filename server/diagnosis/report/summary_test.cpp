@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/report/example_diagnosis.h"
+#include "server/diagnosis/report/write_joint_report.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
 using selection::Verdict;
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -172,6 +174,21 @@ TEST(DataWarnings, NameWhatLimitsTheSet) {
   EXPECT_THAT(warnings, Contains(StartsWith("One object only")));
   EXPECT_THAT(warnings, Contains(StartsWith("No touch was repeated")));
   EXPECT_THAT(warnings, Contains(StartsWith("9 of 10 rows could not be used")));
+}
+
+TEST(SummarizeJointly, NamesVerdictsThatAgreeWithTheirWords) {
+  JointDiagnosis d;
+  d.touches.verdict = d.photographs.verdict = Verdict::kAdequate;
+  d.touches.summary = "Nothing is missing that these data could show.";
+  d.photographs.summary = "Nothing is missing that these pictures could show.";
+  EXPECT_THAT(SummarizeJointly(d),
+              HasSubstr("Photographs (ADEQUATE): Nothing is missing that these pictures"));
+  joint::SharedStep step;
+  step.effect = "object_pose", step.shown_by = "both";
+  d.shared.steps.push_back(step);
+  EXPECT_THAT(SummarizeJointly(d),
+              AllOf(HasSubstr("Photographs (ADEQUATE, with object_pose in place): Nothing else is missing"),
+                    Not(HasSubstr("Nothing is missing")), Not(HasSubstr("MISSING_EFFECTS"))));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -238,11 +239,17 @@ std::string SummarizeJointly(const JointDiagnosis& d) {
   const std::string place =
       in_place.empty() ? "" : absl::StrCat(", with ", absl::StrJoin(in_place, " and "), " in place");
   // A conflict is the verdict of both: what each would say by itself would contradict it.
+  // The verdicts named here are those that hold with the shared effects in place, as the words after them do.
   if (d.shared.conflicts.empty()) {
-    sentences.push_back(
-        absl::StrCat("Touches (", NameOf(VerdictOfTouches(d)), ")", place, ": ", d.touches.summary));
-    sentences.push_back(absl::StrCat("Photographs (", NameOf(VerdictOfPhotographs(d)), ")", place, ": ",
-                                     d.photographs.summary));
+    const auto with_shared = [&](const char* kind, Verdict verdict, const std::string& summary) {
+      return absl::StrCat(
+          kind, " (", NameOf(verdict), place, "): ",
+          in_place.empty()
+              ? summary
+              : absl::StrReplaceAll(summary, {{"Nothing is missing", "Nothing else is missing"}}));
+    };
+    sentences.push_back(with_shared("Touches", d.touches.verdict, d.touches.summary));
+    sentences.push_back(with_shared("Photographs", d.photographs.verdict, d.photographs.summary));
   }
   return absl::StrJoin(sentences, " ");
 }
