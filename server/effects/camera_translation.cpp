@@ -44,6 +44,10 @@ model::Effect CameraTranslation() {
               {"object_pose",
                "Turn the camera about its viewing axis by 90 deg: the error of the camera turns along, a "
                "misplaced object stays where it is."},
+              {"object_scale",
+               "Photograph from two distances, or measure the object with a caliper: a camera that stands "
+               "nearer "
+               "enlarges the near picture more, an object of another size enlarges both alike."},
           },
       .rows = kRows,
       .apply_to_photo = Apply,

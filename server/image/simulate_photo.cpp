@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <absl/strings/str_format.h>
 
@@ -145,6 +146,23 @@ effects::PhotoSettings PhotoSimulator::SettingsFor(const std::string& object) co
       if (instance.effect->stage == stage && instance.effect->apply_to_photo)
         instance.effect->apply_to_photo(instance.ValuesFor(object), settings);
   return settings;
+}
+
+std::vector<Eigen::Vector2d> PhotoSimulator::Project(const PhotoRequest& request,
+                                                     const std::vector<Eigen::Vector3f>& points_m) const {
+  const effects::PhotoSettings settings = SettingsFor(request.object);
+  const PhotoLens lens = EffectiveLens(request.lens, settings);
+  const PhotoCamera camera =
+      RealCamera(request.camera, settings, PlaceOf(*model_, request.object), request.surface->bounds());
+  std::vector<Eigen::Vector2d> pixels;
+  pixels.reserve(points_m.size());
+  for (const Eigen::Vector3f& point_m : points_m) {
+    const Eigen::Vector3d way = point_m.cast<double>() - camera.eye_m;
+    const Eigen::Vector3d in_camera(way.dot(camera.right), -way.dot(camera.up), way.dot(camera.forward));
+    pixels.push_back(in_camera.z() > 0 ? lens.Project(in_camera)
+                                       : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return pixels;
 }
 
 absl::StatusOr<Photo> PhotoSimulator::Run(const PhotoRequest& request, const PhotoOutputs& outputs,

@@ -72,6 +72,11 @@ class PhotoSimulator {
   absl::StatusOr<Photo> Run(const PhotoRequest& request, const PhotoOutputs& outputs,
                             PhotoWorkspace* workspace) const;
 
+  // Where points of the nominal mesh lie in the picture, px: column, row; pixel centres at half-integers. NaN behind the
+  // camera. Whether something hides them does not count.
+  std::vector<Eigen::Vector2d> Project(const PhotoRequest& request,
+                                       const std::vector<Eigen::Vector3f>& points_m) const;
+
   // What the model's effects make of the settings for one object.
   effects::PhotoSettings SettingsFor(const std::string& object) const;
 

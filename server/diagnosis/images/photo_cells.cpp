@@ -30,22 +30,20 @@ std::vector<float> LargestAround(const std::vector<float>& image, int width, int
   return around;
 }
 
-// Variance that a contour's place adds, at the contour and around it, grey^2.
-std::vector<float> ContourVariance(const std::vector<float>& grey, int width, int height,
-                                   double contour_px2) {
+}  // namespace
+
+std::vector<float> ContourSquares(const std::vector<float>& grey, int width, int height) {
   const std::vector<float> most = LargestAround(grey, width, height);
   std::vector<float> negative(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) negative[i] = -grey[i];
   const std::vector<float> least = LargestAround(negative, width, height);
-  std::vector<float> variance(grey.size());
+  std::vector<float> squares(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) {
     const double step = std::max(static_cast<double>(most[i]) + least[i] - kMinStepGrey, 0.0);
-    variance[i] = static_cast<float>(contour_px2 * step * step);
+    squares[i] = static_cast<float>(step * step);
   }
-  return LargestAround(variance, width, height);
+  return LargestAround(squares, width, height);
 }
-
-}  // namespace
 
 CellGrid GridOfPicture(int width, int height, int cells) {
   CellGrid grid{width, height, 1};
@@ -55,7 +53,7 @@ CellGrid GridOfPicture(int width, int height, int cells) {
 
 Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey, const RecordTable& record,
                             double contour_px2) {
-  const std::vector<float> contour = ContourVariance(grey, grid.width, grid.height, contour_px2);
+  const std::vector<float> contour = ContourSquares(grey, grid.width, grid.height);
   Eigen::VectorXf variance = Eigen::VectorXf::Zero(grid.size());
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {
@@ -63,7 +61,7 @@ Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey
       const double variance_here = record.Variance(grey[pixel]);
       const double clipped = kClippedSigmas * kClippedSigmas * variance_here * record.Clipped(grey[pixel]);
       variance[y / grid.cell * grid.columns() + x / grid.cell] +=
-          contour[pixel] + static_cast<float>(variance_here + clipped);
+          static_cast<float>(contour_px2 * contour[pixel] + variance_here + clipped);
     }
   return variance.cwiseSqrt().cwiseInverse();
 }

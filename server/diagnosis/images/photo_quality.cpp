@@ -19,7 +19,8 @@ namespace {
 constexpr int kPatches = 1600;           // of a picture
 constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
 constexpr double kMinRepeatPixels = 1000;
-constexpr double kContours = 1.1;    // an error so many times the floor may come from contours alone
+constexpr double kContours = 1.1;  // an error so many times the floor may come from contours alone
+constexpr double kLeastPlacePx2 = 1e-4;
 constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
 
 }  // namespace
@@ -71,6 +72,26 @@ GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<i
   floor.lower_grey = floor.sigma_grey * (1 - share);
   floor.upper_grey = floor.sigma_grey * (1 + share);
   return floor;
+}
+
+double ContourPlaceVariance(const Photographs& p, const std::vector<image::Photo>& expected,
+                            ThreadPool* pool) {
+  std::vector<double> excess(p.size(), 0.0), squares(p.size(), 0.0);
+  ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      const std::vector<float> contours = ContourSquares(expected[k].grey, p.width(), p.height());
+      for (size_t i = 0; i < contours.size(); ++i) {
+        if (!(contours[i] > 0)) continue;
+        const double residual = static_cast<double>(p.measured_grey[k][i]) - expected[k].grey[i];
+        excess[k] += residual * residual - p.record->Variance(expected[k].grey[i]);
+        squares[k] += contours[i];
+      }
+    }
+  });
+  const double all = std::accumulate(squares.begin(), squares.end(), 0.0);
+  if (!(all > 0)) return kUnknownPlacePx2;
+  return std::clamp(std::accumulate(excess.begin(), excess.end(), 0.0) / all, kLeastPlacePx2,
+                    kUnknownPlacePx2);
 }
 
 double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expected, int parameters,

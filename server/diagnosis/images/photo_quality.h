@@ -16,6 +16,11 @@ GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& photographs,
 PixelNoise NoiseOfResiduals(const Photographs& photographs, const std::vector<image::Photo>& expected,
                             ThreadPool* pool);
 
+// The variance of a contour's place, px^2, that `expected` leaves: what pixels near contours scatter beyond their noise,
+// over the squares of the contours' steps. Between a least that simulations of one scene differ by and kUnknownPlacePx2.
+double ContourPlaceVariance(const Photographs& photographs, const std::vector<image::Photo>& expected,
+                            ThreadPool* pool);
+
 // P of at least this misfit of patches of some pixels if nothing but noise were there; the noise's variance is taken to
 // be known to a twentieth. `parameters` were fitted.
 double PatchMisfitP(const Photographs& photographs, const std::vector<image::Photo>& expected, int parameters,

@@ -25,11 +25,10 @@ bool ShowsInPhotographs(const model::Effect& effect);
 bool MovesRays(const model::Effect& effect);
 
 struct PhotoRowsOptions {
-  int cells = 12544;              // of a picture, at most
-  int smoothing = 1;              // passes over the directions
-  int max_photographs = 40;       // that the search sees
-  bool central = false;           // differences of what moves rays, to both sides
-  double contour_px2 = 1.0 / 12;  // variance of a contour's place: within a pixel, if nothing is known of it
+  int cells = 12544;                      // of a picture, at most
+  int smoothing = 1;                      // passes over the directions
+  int max_photographs = 40;               // that the search sees
+  double contour_px2 = kUnknownPlacePx2;  // variance of a contour's place
 };
 
 class PhotoRows : public inference::ObservationModel {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
@@ -19,7 +20,12 @@ constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
 constexpr double kSameLikelihoodNats = 1;
-constexpr double kFaint = 0.1;  // of the noise
+// Two causes that are known to move contours nearly alike are told apart by a clear share of what they explain only: a
+// contour is sampled at points, so that an explanation that is off by a twentieth of a pixel, for its values or for its
+// place in the search, loses more than the likelihood knows.
+constexpr double kClearShare = 0.2;
+constexpr double kFaint = 0.1;                 // of the noise
+constexpr double kWidthStarts[] = {0.5, 1.0};  // over the typical size
 constexpr int kAnchorPasses = 5;
 constexpr double kAnchorStays =
     1;  // standard errors by which a value moves from an anchor that is near enough
@@ -30,13 +36,19 @@ bool HasEffect(const model::Model& model, const model::Effect& effect) {
   });
 }
 
-// Where the last of several parameters changes nothing until the first does, further places to start from.
+// Where the last of several parameters changes nothing until the first does, further places to start from; and for
+// widths, which blur so little near zero that no slope leads away from there.
 void AddStarts(const selection::Candidate& candidate, int fingers, std::vector<selection::Candidate>* all) {
   const model::Effect& effect = *candidate.effect;
-  if (MovesRays(effect) || effect.parameters.size() < 2 || effect.formula != nullptr) return;
+  if (MovesRays(effect) || effect.parameters.empty() || effect.formula != nullptr) return;
   const model::ParameterInfo& last = effect.parameters.back();
+  const bool width = effect.parameters.size() == 1 && last.unit == Unit::kPixel && last.lower == last.neutral;
+  if (effect.parameters.size() < 2 && !width) return;
   std::vector<double> tried = {last.neutral};
-  for (const double times : {-1.0, 1.0, 2.0}) {
+  const std::vector<double> starts =
+      width ? std::vector<double>(std::begin(kWidthStarts), std::end(kWidthStarts))
+            : std::vector<double>{-1.0, 1.0, 2.0};
+  for (const double times : starts) {
     const double value = std::clamp(last.neutral + times * last.typical, last.lower, last.upper);
     if (std::find(tried.begin(), tried.end(), value) != tried.end()) continue;
     tried.push_back(value);
@@ -87,9 +99,10 @@ absl::Status FindCompetitors(PhotoSelection* selection) {
       const double evidence = other.fit.log_evidence - fit.log_evidence;
       const bool same = other.name == inference::NameOf(own);
       const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
+      const bool declared = selection::IsDeclaredConfounded(own, other.name);
       const bool equivalent = evidence > -search.rules().equivalent_nats ||
-                              (as_likely && (selection::IsDeclaredConfounded(own, other.name) ||
-                                             other.fit.model.size() <= fit.model.size()));
+                              (as_likely && (declared || other.fit.model.size() <= fit.model.size())) ||
+                              (declared && MovesRays(own) && evidence > -kClearShare * step.gain_nats);
       all.push_back(evidence);
       if (same || equivalent) same_or_equivalent.push_back(evidence);
       if (!same && other.name != kImageFieldName)
@@ -251,9 +264,11 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
       ExpectPhotographs(photographs, explanation.fit.model.base(), false, context.pool));
   selection.photographs->noise = NoiseOfResiduals(photographs, expected, context.pool);
   selection.photographs->record = std::make_shared<const RecordTable>(selection.photographs->noise);
+  PhotoRowsOptions options = kFine;
+  options.contour_px2 = ContourPlaceVariance(*selection.photographs, expected, context.pool);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.fine,
-      MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, kFine, context));
+      MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, options, context));
   selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));

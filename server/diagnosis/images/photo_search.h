@@ -35,7 +35,8 @@ struct PhotoSelection {
   PhotoSearch fine;
   inference::Fit initial;  // the given model, in fine rows
   inference::Fit fit;      // the explanation; the image field among its effects where it takes part
-  // The explanation fitted to every photograph, contours trusted to a tenth of a pixel: what its values are taken from.
+  // The explanation fitted to every photograph, contours trusted as what the explanation leaves shows: what its values
+  // are taken from.
   inference::Fit polished;
   int initial_effects = 0;
   int field = -1;                              // index of the image field's effect; -1: none
@@ -50,7 +51,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
 
-// Rows of every photograph at an anchor that is near, contours trusted to a tenth of a pixel: no candidates.
+// Rows of every photograph at an anchor that is near, contours trusted as what it leaves shows: no candidates.
 absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
                                            const DiagnosisContext& context);
 

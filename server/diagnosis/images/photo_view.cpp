@@ -5,14 +5,15 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/images/photo_flow.h"
 #include "server/diagnosis/inference/parameterization.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kRayStep = 0.3, kSensorStep = 0.5;              // over a parameter's typical size
-constexpr double kMinMovePx = 0.5, kMaxMovePx = 2, kMovePx = 1;  // of contours, by a step
+constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typical size
+constexpr double kStepPx = 0.5;  // that a step moves contours, at most: they stay among pixels near contours
 constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
 constexpr int kObjectWaves = 2, kPatchPx = 12;
 constexpr double kMinPatch = 0.25;  // of a patch's pixels that see the object
@@ -34,27 +35,6 @@ const model::ParameterInfo& ParameterOf(const model::Effect& effect, int fingers
     if (value < next) return parameter;
   }
   return effect.parameters.back();
-}
-
-struct ImageChange {
-  std::vector<float> difference;
-  double MovePx(double squares_of_a_pixel) const {
-    double sum = 0;
-    for (const float value : difference) sum += static_cast<double>(value) * value;
-    return squares_of_a_pixel > 0 ? sum / squares_of_a_pixel : 0;
-  }
-};
-
-// Sum of squares by which the picture changes where it moves by a pixel: a contour's grows as the way.
-double SquaresOfAPixel(const std::vector<float>& grey, int width, int height) {
-  double sum = 0;
-  for (int y = 0; y + 1 < height; ++y)
-    for (int x = 0; x + 1 < width; ++x) {
-      const size_t at = static_cast<size_t>(y) * width + x;
-      const double right = grey[at + 1] - grey[at], down = grey[at + width] - grey[at];
-      sum += 0.5 * (right * right + down * down);
-    }
-  return sum;
 }
 
 }  // namespace
@@ -241,44 +221,40 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
   photo.grey = RecordedGrey(photo, *photographs_.record);
   view->weights = CellWeights(grid_, photo.grey, *photographs_.record, options.contour_px2);
-  const double pixel_squares = SquaresOfAPixel(photo.grey, width, height);
+  const std::vector<float> contours = ContourSquares(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
   std::vector<Eigen::VectorXf> slopes;
   // What moves no rays first: the workspace keeps them.
   for (const bool rays : {false, true})
     for (const Direction& direction : directions) {
       if (MovesRays(*direction.effect) != rays) continue;
-      ImageChange change{std::vector<float>(photo.grey.size(), 0.0f)};
+      std::vector<float> change(photo.grey.size(), 0.0f);
       double step = direction.step;
-      for (int tries = 0; tries < 2; ++tries) {
-        model::Model moved = direction.moved;
-        if (tries > 0) {
+      model::Model moved = direction.moved;
+      PictureFlow flow;
+      if (rays && direction.value >= 0) {
+        flow = FlowOfPicture(request, photo, contours,
+                             image::PhotoSimulator(std::make_shared<const model::Model>(direction.base)),
+                             image::PhotoSimulator(std::make_shared<const model::Model>(direction.moved)));
+        if (flow.farthest_px > kStepPx) {
+          const float share = static_cast<float>(kStepPx) / flow.farthest_px;
+          step *= share;
+          for (Eigen::Vector2f& move_px : flow.move_px) move_px *= share;
           moved = direction.base;
           MoveValue(&moved.effects[direction.instance], direction.value, step, direction.lower,
                     direction.upper);
         }
-        const absl::StatusOr<image::Photo> there = simulate(moved, false);
-        if (!there.ok()) break;
+      }
+      if (const absl::StatusOr<image::Photo> there = simulate(moved, false); there.ok()) {
         const std::vector<float> grey = RecordedGrey(*there, *photographs_.record);
-        for (size_t i = 0; i < grey.size(); ++i) change.difference[i] = grey[i] - photo.grey[i];
-        const double move_px = change.MovePx(pixel_squares);
-        if (!rays || tries > 0 || (move_px > kMinMovePx && move_px < kMaxMovePx) || move_px == 0) break;
-        step *= std::clamp(kMovePx / move_px, 0.1, 5.0);
-      }
-      if (rays && options.central) {
-        // The same way in all, half of it to each side.
-        std::vector<float> sides[2];
-        for (const int side : {0, 1}) {
-          model::Model moved = direction.base;
-          MoveValue(&moved.effects[direction.instance], direction.value, (side == 0 ? -0.5 : 0.5) * step,
-                    direction.lower, direction.upper);
-          const absl::StatusOr<image::Photo> there = simulate(moved, false);
-          if (there.ok()) sides[side] = RecordedGrey(*there, *photographs_.record);
+        for (size_t i = 0; i < grey.size(); ++i) change[i] = grey[i] - photo.grey[i];
+        if (!flow.move_px.empty()) {
+          const std::vector<float> carried = CarriedBy(flow, photo, photo.grey);
+          for (size_t i = 0; i < grey.size(); ++i)
+            if (contours[i] > 0) change[i] = carried[i];
         }
-        if (!sides[0].empty() && !sides[1].empty())
-          for (size_t i = 0; i < photo.grey.size(); ++i) change.difference[i] = sides[1][i] - sides[0][i];
       }
-      const Eigen::VectorXf cells = columns.Add(change.difference);
+      const Eigen::VectorXf cells = columns.Add(change);
       if (rays) slopes.push_back(cells / static_cast<float>(step));
     }
   std::vector<Eigen::VectorXf> field;
