@@ -73,7 +73,11 @@ class NormalizeRun {
       TOUCHSTONE_ASSIGN_OR_RETURN(background_, ReadPicture(options_.background));
     }
     const bool is_set = session::IsImageSetFolder(options_.folder);
-    TOUCHSTONE_RETURN_IF_ERROR(is_set ? RunSet() : RunFolder());
+    if (const absl::Status status = is_set ? RunSet() : RunFolder(); !status.ok()) {
+      std::error_code not_empty;
+      fs::remove(options_.output, not_empty);  // pictures that were written before the error stay
+      return status;
+    }
     if (cli_.output().json)
       PrintJson({{"folder", options_.output},
                  {"pictures", done_},

@@ -185,6 +185,8 @@ absl::StatusOr<Image> DecodePicture(const std::string& bytes) {
   if (image.width < 1 || image.width > kMaxImageSide || image.height < 1 || image.height > kMaxImageSide)
     return absl::InvalidArgumentError(absl::StrFormat(
         "JPEG: is %d x %d pixels; each side must be from 1 to %d", image.width, image.height, kMaxImageSide));
+  if (colours == TJCS_CMYK || colours == TJCS_YCCK)
+    return absl::InvalidArgumentError("JPEG: holds inks for print (CMYK); grey or RGB was expected");
   image.channels = colours == TJCS_GRAY ? 1 : 3;
   image.pixels.resize(static_cast<size_t>(image.width) * image.height * image.channels);
   if (tjDecompress2(handle, data, bytes.size(), image.pixels.data(), image.width, 0, image.height,

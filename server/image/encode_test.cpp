@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <turbojpeg.h>
 
 #include "server/base/random.h"
 
@@ -49,6 +50,17 @@ TEST(Jpeg, IsOneAndShrinksWithQuality) {
   EXPECT_EQ(fine->substr(0, 3), "\xff\xd8\xff");
   EXPECT_EQ(fine->substr(fine->size() - 2), "\xff\xd9");
   EXPECT_LT(coarse->size(), fine->size());
+}
+
+TEST(Jpeg, OfInksForPrintIsRefusedInWords) {
+  const std::vector<uint8_t> inks(16 * 16 * 4, 90);
+  const tjhandle handle = tjInitCompress();
+  unsigned char* out = nullptr;
+  unsigned long size = 0;
+  ASSERT_EQ(tjCompress2(handle, inks.data(), 16, 0, 16, TJPF_CMYK, &out, &size, TJSAMP_444, 90, 0), 0);
+  const auto picture = DecodePicture(std::string(reinterpret_cast<const char*>(out), size));
+  EXPECT_THAT(std::string(picture.status().message()), HasSubstr("CMYK"));
+  tjFree(out), tjDestroy(handle);
 }
 
 TEST(Encoding, RefusesWhatIsNoImage) {

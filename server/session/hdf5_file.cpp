@@ -28,7 +28,21 @@ Hdf5Handle Create(const std::string& part) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // errors are ours to report
   Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
-  return Hdf5Handle(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
+  // Times of objects would make other bytes of the same content; the root group keeps them unless told not to.
+  Hdf5Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+  H5Pset_obj_track_times(creation, false);
+  return Hdf5Handle(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose);
+}
+
+// The groups on the way to a dataset. Those that HDF5 makes by itself keep the time of their making.
+void CreateGroupsOf(hid_t file, const std::string& name) {
+  Hdf5Handle creation(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  H5Pset_obj_track_times(creation, false);
+  for (size_t slash = name.find('/', 1); slash != std::string::npos; slash = name.find('/', slash + 1)) {
+    const std::string group = name.substr(0, slash);
+    if (H5Lexists(file, group.c_str(), H5P_DEFAULT) > 0) continue;
+    Hdf5Handle(H5Gcreate2(file, group.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose);
+  }
 }
 
 // On the disk under its last name.
@@ -54,12 +68,11 @@ Hdf5Columns::~Hdf5Columns() {
 void Hdf5Columns::Write(const std::string& name, const std::string& unit, hid_t file_type, hid_t memory_type,
                         const void* values, const std::vector<hsize_t>& shape) {
   if (!failed_.empty()) return;
-  Hdf5Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
-  H5Pset_create_intermediate_group(links, 1);
+  CreateGroupsOf(file_, name);
   Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_obj_track_times(creation, false);
   Hdf5Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
-  Hdf5Handle dataset(H5Dcreate2(file_, name.c_str(), file_type, space, links, creation, H5P_DEFAULT),
+  Hdf5Handle dataset(H5Dcreate2(file_, name.c_str(), file_type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
                      H5Dclose);
   bool written = dataset.ok();
   const bool empty = std::find(shape.begin(), shape.end(), hsize_t{0}) != shape.end();

@@ -1,6 +1,7 @@
 #include "server/session/image_set_hdf5.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -8,6 +9,7 @@
 #include <filesystem>
 
 #include "server/base/test_folder.h"
+#include "server/base/text.h"
 #include "server/session/image_set.h"
 #include "server/session/image_set_file.h"
 
@@ -113,6 +115,15 @@ TEST_F(ImageSetHdf5, PicturesAreADatasetThatOtherProgramsRead) {
   EXPECT_GE(H5Dread(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, pixels.data()), 0);
   EXPECT_EQ(pixels[kSetHeight * kSetWidth + 3], 3 * 5 + 1);
   H5Sclose(space), H5Dclose(dataset), H5Fclose(file);
+}
+
+TEST_F(ImageSetHdf5, ALaterFileOfTheSameSetIsTheSameBytes) {
+  ImageSetWithTouches set;
+  set.images = *FormatImageSet(FullSet(false));
+  Again(set, "a.h5");
+  absl::SleepFor(absl::Milliseconds(1100));  // times in HDF5 files are whole seconds
+  Again(set, "b.h5");
+  EXPECT_TRUE(*ReadFile(Path("a.h5"), 1 << 24) == *ReadFile(Path("b.h5"), 1 << 24));
 }
 
 TEST_F(ImageSetHdf5, WrongFilesAreErrorsThatNameTheDataset) {
