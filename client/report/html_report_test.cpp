@@ -146,6 +146,17 @@ TEST(HtmlReport, TestsEachFingerAgainstThePlaceInTheSession) {
             1);
 }
 
+TEST(HtmlReport, SaysWhichObjectACandidateWasTriedAt) {
+  v1::Report report = MissingEffectsReport();
+  v1::Candidate* candidate = report.mutable_candidates(0);
+  candidate->set_scope("object");
+  candidate->mutable_parameters(0)->set_object("lat10");
+  EXPECT_THAT(HtmlReport(report), HasSubstr("of lat10 only"));
+  *candidate->add_parameters() = candidate->parameters(0);
+  candidate->mutable_parameters(1)->set_object("lat20");
+  EXPECT_THAT(HtmlReport(report), HasSubstr("a value per object"));
+}
+
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
   const std::string html = HtmlReport(v1::Report());
   EXPECT_EQ(Occurrences(html, "<section"), 0);

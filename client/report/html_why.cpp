@@ -21,6 +21,15 @@ std::string ShortName(const v1::ParameterValue& parameter) {
                       parameter.object().empty() ? "" : " ", parameter.object());
 }
 
+// Where an effect of objects is tried: at one of them, or at each with a value of its own.
+std::string ScopeWords(const v1::Candidate& candidate) {
+  if (candidate.scope() != "object") return "";
+  std::set<std::string> objects;
+  for (const v1::ParameterValue& parameter : candidate.parameters()) objects.insert(parameter.object());
+  if (objects.size() != 1 || objects.begin()->empty()) return "<br><small>a value per object</small>";
+  return absl::StrCat("<br><small>of ", Escape(*objects.begin()), " only</small>");
+}
+
 // Effects without a fit, by the reason why there is none.
 std::string NotFitted(const v1::Report& report) {
   std::vector<std::string> notes;
@@ -89,8 +98,7 @@ std::string CandidateTable(const v1::Report& report) {
     absl::StrAppend(
         &table, p < 0.05 || none ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
-                          candidate.scope() == "object" ? "<br><small>a value per object</small>" : "",
-                          shares ? "<br><small>one of these</small>" : "")),
+                          ScopeWords(candidate), shares ? "<br><small>one of these</small>" : "")),
         NumberCell(EffectProbability(p)), NumberCell(left > 0 ? scale.Text(left) : ""),
         Cell(left > 0 ? Bar(left / largest, p < 0.05 || none ? "share" : "better",
                             floor > 0 ? floor / largest : -1)

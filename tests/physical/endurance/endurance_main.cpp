@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 #include <string>
 
 #include "tests/physical/endurance/endurance.h"
@@ -21,6 +22,17 @@ constexpr char kUsage[] =
 
 double Number(int argc, char** argv, int k, double otherwise) {
   return argc > k ? std::atof(argv[k]) : otherwise;
+}
+
+// Without it every touch would be tried again for ever.
+bool GatewayIsBeside() {
+  std::error_code error;
+  const std::filesystem::path gateway =
+      std::filesystem::read_symlink("/proc/self/exe", error).replace_filename("touchstone-gateway");
+  if (std::filesystem::exists(gateway, error)) return true;
+  std::fprintf(stderr, "touchstone-rig-endurance: %s: not there; the program was expected beside this one\n",
+               gateway.c_str());
+  return false;
 }
 
 int RunEndurance(int argc, char** argv) {
@@ -46,6 +58,7 @@ int RunEndurance(int argc, char** argv) {
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   const std::string what = argc > 1 ? argv[1] : "";
+  if (!what.empty() && !GatewayIsBeside()) return 2;
   if (what == "endurance") return RunEndurance(argc, argv);
   if (what == "overhead")
     return touchstone::MeasureOverhead(static_cast<int>(Number(argc, argv, 2, 60)), Number(argc, argv, 3, 4));
