@@ -157,6 +157,21 @@ TEST(HtmlReport, SaysWhichObjectACandidateWasTriedAt) {
   EXPECT_THAT(HtmlReport(report), HasSubstr("a value per object"));
 }
 
+TEST(HtmlReport, OfBothKindsRanksCandidatesWithWhatBothShowInPlace) {
+  v1::Report report = MissingEffectsReport();
+  EXPECT_THAT(HtmlReport(report), HasSubstr("as the first to be added"));
+  report.set_images(20);
+  report.mutable_initial()->set_rmse_grey(6.5);
+  report.mutable_final()->set_rmse_grey(1.4);
+  report.mutable_steps(0)->set_effect("object_pose");
+  report.mutable_steps(0)->set_shown_by("both");
+  v1::Candidate* tilt = report.mutable_candidates(0);
+  tilt->set_rmse_us(3210), tilt->set_heldout_rmse_us(3210);
+  const std::string html = HtmlReport(report);
+  EXPECT_THAT(html, HasSubstr("with object_pose in place"));
+  EXPECT_THAT(html, HasSubstr(Typeset("3.21 ms")));
+}
+
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
   const std::string html = HtmlReport(v1::Report());
   EXPECT_EQ(Occurrences(html, "<section"), 0);

@@ -56,6 +56,7 @@ h4{font-size:.9375rem;font-weight:600;margin:1.4rem 0 .4rem}
 svg.chart.interval{width:8.5rem;height:1rem}
 .arrows{grid-template-columns:repeat(auto-fill,minmax(min(15rem,100%),1fr))}
 .why .barcell{width:20%}
+figure+p{margin-top:1.25rem}
 .rest{margin-top:1rem;grid-template-columns:minmax(0,1fr) minmax(0,1fr);color:var(--soft);font-size:.875rem}
 details{margin-top:1.25rem}summary{cursor:pointer;color:var(--soft);font-size:.9375rem;margin-bottom:1rem}
 .why td>div{white-space:nowrap}

@@ -7,6 +7,7 @@
 
 #include "client/report/error_scale.h"
 #include "client/report/html_page.h"
+#include "client/report/joint.h"
 #include "client/report/svg_chart.h"
 #include "client/report/words.h"
 
@@ -28,6 +29,23 @@ std::string ScopeWords(const v1::Candidate& candidate) {
   for (const v1::ParameterValue& parameter : candidate.parameters()) objects.insert(parameter.object());
   if (objects.size() != 1 || objects.begin()->empty()) return "<br><small>a value per object</small>";
   return absl::StrCat("<br><small>of ", Escape(*objects.begin()), " only</small>");
+}
+
+// Beside what each effect is tried: candidates of a joint report are ranked with what both kinds of data show in place.
+std::string InPlace(const v1::Report& report) {
+  std::vector<std::string> shared;
+  if (IsJoint(report))
+    for (const v1::Step& step : report.steps())
+      if (step.shown_by() == "both") shared.push_back(step.effect());
+  return shared.empty() ? "as the first to be added"
+                        : absl::StrCat("with ", Join(shared, "and"), " in place");
+}
+
+// What a candidate alone would leave; one of a joint report that acts on touches has no error in grey levels.
+std::string LeftText(const ErrorScale& scale, const v1::Candidate& candidate) {
+  if (const double left = scale.Unseen(candidate); left > 0) return scale.Text(left);
+  const double left_us = UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us());
+  return left_us > 0 ? Time(left_us) : "";
 }
 
 // Effects without a fit, by the reason why there is none.
@@ -99,7 +117,7 @@ std::string CandidateTable(const v1::Report& report) {
         &table, p < 0.05 || none ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           ScopeWords(candidate), shares ? "<br><small>one of these</small>" : "")),
-        NumberCell(EffectProbability(p)), NumberCell(left > 0 ? scale.Text(left) : ""),
+        NumberCell(EffectProbability(p)), NumberCell(LeftText(scale, candidate)),
         Cell(left > 0 ? Bar(left / largest, p < 0.05 || none ? "share" : "better",
                             floor > 0 ? floor / largest : -1)
                       : "",
@@ -113,8 +131,8 @@ std::string CandidateTable(const v1::Report& report) {
   }
   return Figure(absl::StrCat(table, "</tbody></table></div>"),
                 absl::StrCat(
-                    "Each effect alone, as the first to be added. It would leave: the RMSE on ",
-                    scale.readings(),
+                    "Each effect alone, ", Escape(InPlace(report)), ". It would leave: the RMSE on ",
+                    IsJoint(report) ? "readings" : scale.readings(),
                     " left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
                     "zero, no effect.",
                     Typeset(shared))) +

@@ -15,6 +15,7 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kMaxMissed = 0.5;  // share of an object's touches
+constexpr double kOutsideM = 1e-6;  // less is rounding
 constexpr double kWarnMissed = 0.05;
 constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther has met nothing at the target
 constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
@@ -46,10 +47,11 @@ absl::Status CheckMeshes(const touches::Observations& o, const touches::Predicti
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * kMillimetresPerMetre;
     const std::string text = absl::StrFormat(
         "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
-        "far behind the target. The mesh measures %.4g x %.4g x %.4g mm, and targets lie up to %.3g mm "
-        "outside of it",
+        "far behind the target. The mesh measures %.4g x %.4g x %.4g mm%s",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
-        off_m[object] * kMillimetresPerMetre);
+        off_m[object] > kOutsideM ? absl::StrFormat(", and targets lie up to %.3g mm outside of it",
+                                                    off_m[object] * kMillimetresPerMetre)
+                                  : "; every target lies within it");
     if (missed[object] > kMaxMissed * touches[object])
       return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
                                                      ". Is it this object's mesh, in mm, with z up? (--mesh ",
