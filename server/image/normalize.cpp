@@ -114,7 +114,7 @@ absl::StatusOr<Image> Normalize(const Image& photograph, const Image* background
                           background->width, background->height, photograph.width, photograph.height));
   }
   const GroundedPicture grounded = FindGround(photograph, background);
-  Region object = PartFromGround(grounded).object;
+  Region object = PartFromGround(grounded);
   Image picture;
   picture.width = photograph.width, picture.height = photograph.height, picture.channels = 1;
   picture.pixels.assign(grounded.grey[0].values.size(), 255);

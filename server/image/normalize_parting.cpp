@@ -63,12 +63,11 @@ class LevelSearch {
       slope_.values[k] = std::hypot(slope_.values[k], tint_slope.values[k]);
   }
 
-  Parting Best() {
+  Region Best() {
     static constexpr float kLevels[] = {0.0f, 0.08f, 0.12f, 0.17f, 0.23f, 0.3f, 0.38f, 0.47f, 0.57f, 0.68f,
                                         0.8f, 0.95f, 1.1f,  1.3f,  1.5f,  1.8f, 2.1f,  2.5f,  1e9f};
     for (const float level : kLevels) Try(level);
-    if (!best_.object.inside.empty()) best_.object = Filled(best_.object);
-    return best_;
+    return best_.inside.empty() ? best_ : Filled(best_);
   }
 
  private:
@@ -101,8 +100,9 @@ class LevelSearch {
     return WithSmallHoles(object, taken, kMaxEnclosedShare);
   }
 
-  // A shadow is darker than the ground, and everywhere by the same factor but for its rim.
-  bool LeavesAShadow(const Region& object, Parting* parting) const {
+  // What `object` leaves out may all be its shadow, or there is too little of it to tell: a shadow is darker than the
+  // ground, and everywhere by the same factor but for its rim.
+  bool LeavesAShadow(const Region& object) const {
     std::vector<float> values;
     const int width = object.width, height = object.height;
     const auto left_out = [&](int x, int y) {
@@ -113,15 +113,13 @@ class LevelSearch {
         if (left_out(x, y) && left_out(x - 2, y) && left_out(x + 2, y) && left_out(x, y - 2) &&
             left_out(x, y + 2))
           values.push_back(relative_.at(x, y));
-    parting->has_shadow = values.size() >= kMinUmbraPixels;
-    if (!parting->has_shadow) return true;
+    if (values.size() < kMinUmbraPixels) return true;
     std::sort(values.begin(), values.end());
-    size_t most = 0, most_first = 0;
+    size_t most = 0;
     for (size_t first = 0, last = 0; first < values.size(); ++first) {
       while (last < values.size() && values[last] <= values[first] + 2 * mode_width_) ++last;
-      if (last - first > most) most = last - first, most_first = first;
+      most = std::max(most, last - first);
     }
-    parting->umbra = std::exp(values[most_first + most / 2]);
     return static_cast<double>(most) >= kMinShadowShare * static_cast<double>(values.size());
   }
 
@@ -131,9 +129,7 @@ class LevelSearch {
     for (size_t k = 0; k < raw.inside.size(); ++k)
       raw.inside[k] = !is_ground_.inside[k] &&
                       (relative_.values[k] > 0 || relative_.values[k] < -level || is_tinted_.inside[k]);
-    Parting parting;
-    parting.object = Cleaned(raw, is_ground_);
-    const Region& region = parting.object;
+    Region region = Cleaned(raw, is_ground_);
     const double share = static_cast<double>(region.Count()) / static_cast<double>(region.inside.size());
     if (share < kMinObjectShare || share > kMaxObjectShare || RimShare(region) > kMaxRimShare) return;
     const float steepness = OutlineSteepness(region, slope_);
@@ -142,21 +138,20 @@ class LevelSearch {
     for (size_t k = 0; k < region.inside.size(); ++k)
       if (region.inside[k] && !is_ground_.inside[k]) explained += DifferenceAt(k);
     const double score = steepness * std::sqrt(explained / std::max(different_, 1e-9));
-    if (score <= best_score_ || !LeavesAShadow(region, &parting)) return;
+    if (score <= best_score_ || !LeavesAShadow(region)) return;
     best_score_ = score;
-    best_ = std::move(parting);
+    best_ = std::move(region);
   }
 
   Plane relative_, slope_, tint_;
-  Region is_ground_, is_tinted_;
-  Parting best_;
+  Region is_ground_, is_tinted_, best_;
   double different_ = 0, best_score_ = 0;
   float mode_width_ = 0;
 };
 
 }  // namespace
 
-Parting PartFromGround(const GroundedPicture& picture) {
+Region PartFromGround(const GroundedPicture& picture) {
   return LevelSearch(picture).Best();
 }
 

@@ -23,15 +23,9 @@ struct GroundedPicture {
 // What is left of white noise in `calm`, as a share of it.
 inline constexpr float kCalmNoise = 0.2f;
 
-struct Parting {
-  Region object;  // empty: nothing parts from the ground
-  bool has_shadow = false;
-  float umbra = 1;  // the light that is left there, as a share of the ground's
-};
-
 // Relative grey (the logarithm of grey over ground) is cut at many levels; the region stays whose outline is the
 // steepest and which holds most of what differs from the ground. What is brighter than the ground or of another colour
-// is never its shadow.
-Parting PartFromGround(const GroundedPicture& picture);
+// is never its shadow. Empty: nothing parts from the ground.
+Region PartFromGround(const GroundedPicture& picture);
 
 }  // namespace touchstone::image

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <string_view>
 
 #include "server/base/random.h"
 #include "server/base/sanitizers.h"
@@ -67,18 +68,31 @@ std::vector<std::shared_ptr<const geometry::Surface>> AllMeshes() {
 class NormalizeEverywhere : public testing::TestWithParam<EmulatedPlace> {};
 INSTANTIATE_TEST_SUITE_P(Places, NormalizeEverywhere, testing::ValuesIn(kEmulatedPlaces));
 
+constexpr double kGoodIou = 0.97;
+
+// Where faces of the object differ from ground or shadow by less than the noise, less is reached: see README.md.
+struct Reach {
+  double min_iou = kGoodIou;
+  int max_low = 0;  // of 80 pictures, below kGoodIou
+};
+Reach ReachOf(std::string_view place) {
+  if (place == "dark ground, bright object") return {0.90, 6};
+  if (place == "white ground, grey object") return {0.85, 1};
+  return {};
+}
+
 void ExpectMasks(const EmulatedPlace& place, bool with_background) {
   const auto renderer = *CreateCpuRenderer();
-  constexpr int kViews = 16, kViewStep = kUnderSanitizers ? 12 : 4;
-  // Of 16 views each fourth. Among the others 6 of 80 lie below 0.97 on dark cloth and 1 on white: see README.md.
-  constexpr double kGoodIou = 0.97;
+  const Reach reach = ReachOf(place.name);
+  constexpr int kViews = 16;
+  const int view_step = kUnderSanitizers ? 12 : with_background ? 4 : 1;
   double worst = 1, sum = 0;
   int count = 0, low = 0;
   std::string worst_words;
   EmulatedPhotograph worst_picture;
   Image worst_result;
   for (const auto& surface : AllMeshes())
-    for (int view = 0; view < kViews; view += kViewStep) {
+    for (int view = 0; view < kViews; view += view_step) {
       EmulatedPhotograph emulated = EmulatePhotograph(
           renderer.get(), surface, SpiralView(surface->bounds(), view, kViews), place, view);
       auto normalized = Normalize(emulated.photograph, with_background ? &emulated.background : nullptr);
@@ -97,7 +111,8 @@ void ExpectMasks(const EmulatedPlace& place, bool with_background) {
   std::printf("%-40s %s IoU mean %.4f worst %.4f (%s), %d of %d below %.2f\n", place.name,
               with_background ? "with background" : "alone          ", sum / count, worst,
               worst_words.c_str(), low, count, kGoodIou);
-  EXPECT_GE(worst, kGoodIou) << worst_words;
+  EXPECT_GE(worst, reach.min_iou) << worst_words;
+  EXPECT_LE(low, reach.max_low);
 }
 
 TEST_P(NormalizeEverywhere, FindsTheObjectAndNotItsShadow) {
