@@ -45,7 +45,8 @@ absl::StatusOr<std::vector<NormalizeJob>> PicturesOf(const std::string& folder) 
   std::error_code error;
   fs::directory_iterator entries(folder, error);
   if (error)
-    return absl::NotFoundError(absl::StrCat(folder, ": ", error.message(), "; a folder was expected"));
+    return absl::NotFoundError(
+        absl::StrCat(folder, ": ", error.message(), "; a folder with pictures or an image set was expected"));
   for (const auto& entry : entries) {
     const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
     if (extension == ".png" || extension == ".jpg" || extension == ".jpeg")
@@ -63,19 +64,12 @@ class NormalizeRun {
   NormalizeRun(const Cli& cli, const NormalizeOptions& options) : cli_(cli), options_(options) {}
 
   absl::Status Run() {
-    // Before an output folder is made that would stay empty.
-    if (std::error_code error; !fs::is_directory(options_.folder, error))
-      return absl::NotFoundError(absl::StrCat(options_.folder,
-                                              error ? ": " + error.message() : ": is no folder",
-                                              "; a folder with pictures or an image set was expected"));
-    TOUCHSTONE_RETURN_IF_ERROR(CheckOutput());
-    if (!options_.background.empty()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(background_, ReadPicture(options_.background));
-    }
+    bool is_new = false;
+    TOUCHSTONE_RETURN_IF_ERROR(MakeOutput(&is_new));
     const bool is_set = session::IsImageSetFolder(options_.folder);
-    if (const absl::Status status = is_set ? RunSet() : RunFolder(); !status.ok()) {
+    if (const absl::Status status = RunInto(is_set); !status.ok()) {
       std::error_code not_empty;
-      fs::remove(options_.output, not_empty);  // pictures that were written before the error stay
+      if (is_new) fs::remove(options_.output, not_empty);  // pictures that were written before the error stay
       return status;
     }
     if (cli_.output().json)
@@ -93,17 +87,24 @@ class NormalizeRun {
   }
 
  private:
-  absl::Status CheckOutput() const {
+  absl::Status MakeOutput(bool* is_new) const {
     std::error_code error;
     if (fs::exists(options_.output, error) && !fs::is_empty(options_.output, error))
       return absl::AlreadyExistsError(
           absl::StrCat("-o: ", options_.output,
                        " is there and not empty; a new folder was expected, so that nothing is replaced"));
-    fs::create_directories(options_.output, error);
+    *is_new = fs::create_directories(options_.output, error);
     if (error)
       return absl::InvalidArgumentError(
           absl::StrCat("-o: ", options_.output, " cannot be made: ", error.message()));
     return absl::OkStatus();
+  }
+
+  absl::Status RunInto(bool is_set) {
+    if (!options_.background.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(background_, ReadPicture(options_.background));
+    }
+    return is_set ? RunSet() : RunFolder();
   }
 
   absl::StatusOr<image::Image> NormalizeOne(const image::Image& picture, const std::string& name) {

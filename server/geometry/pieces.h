@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <thread>
-#include <vector>
+
+#include "server/base/thread_pool.h"
 
 namespace touchstone::geometry {
 
@@ -14,13 +15,10 @@ namespace touchstone::geometry {
 template <typename Body>
 void InPieces(size_t count, const Body& body) {
   constexpr size_t kSmall = 1 << 16;
-  const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-  const size_t pieces = count < kSmall ? 1 : std::min<size_t>(8, cores);
-  std::vector<std::thread> helpers;
-  for (size_t i = 1; i < pieces; ++i)
-    helpers.emplace_back([&, i] { body(count * i / pieces, count * (i + 1) / pieces); });
-  body(size_t{0}, count / pieces);
-  for (std::thread& helper : helpers) helper.join();
+  if (count < kSmall) return body(size_t{0}, count);
+  const int pieces = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  ThreadPool helpers(std::max(1, pieces - 1));
+  helpers.ParallelFor(static_cast<int>(count), static_cast<int>((count + pieces - 1) / pieces), body);
 }
 
 }  // namespace touchstone::geometry

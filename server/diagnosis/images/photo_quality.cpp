@@ -20,7 +20,7 @@ constexpr int kPatches = 1600;           // of a picture
 constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
 constexpr double kMinRepeatPixels = 1000;
 constexpr double kContours = 1.1;  // an error so many times the floor may come from contours alone
-constexpr double kLeastPlacePx2 = 1e-4;
+constexpr double kMinPlacePx2 = 1e-4;
 constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
 
 }  // namespace
@@ -90,8 +90,7 @@ double ContourPlaceVariance(const Photographs& p, const std::vector<image::Photo
   });
   const double all = std::accumulate(squares.begin(), squares.end(), 0.0);
   if (!(all > 0)) return kUnknownPlacePx2;
-  return std::clamp(std::accumulate(excess.begin(), excess.end(), 0.0) / all, kLeastPlacePx2,
-                    kUnknownPlacePx2);
+  return std::clamp(std::accumulate(excess.begin(), excess.end(), 0.0) / all, kMinPlacePx2, kUnknownPlacePx2);
 }
 
 double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expected, int parameters,

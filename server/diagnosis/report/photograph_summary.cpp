@@ -59,13 +59,14 @@ void AddSteps(const images::PhotographDiagnosis& diagnosis, std::vector<std::str
 
 }  // namespace
 
-std::string Summarize(const images::PhotographDiagnosis& diagnosis) {
+std::string Summarize(const images::PhotographDiagnosis& diagnosis, bool others_in_place) {
   if (diagnosis.images == 0) return "No picture could be used: nothing can be said of the model.";
   std::vector<std::string> sentences = {HowWrongInGrey(diagnosis)};
   AddSteps(diagnosis, &sentences);
   switch (diagnosis.verdict) {
     case selection::Verdict::kAdequate:
-      sentences.push_back("Nothing is missing that these pictures could show.");
+      sentences.push_back(absl::StrCat("Nothing ", others_in_place ? "else " : "",
+                                       "is missing that these pictures could show."));
       break;
     case selection::Verdict::kUnexplained:
       sentences.push_back(diagnosis.unexplained

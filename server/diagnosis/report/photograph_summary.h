@@ -9,8 +9,9 @@
 
 namespace touchstone::diagnosis::report {
 
-// One paragraph for people: what is wrong, and what to do.
-std::string Summarize(const images::PhotographDiagnosis& diagnosis);
+// One paragraph for people: what is wrong, and what to do. `others_in_place`: effects that were found elsewhere are in the
+// model already.
+std::string Summarize(const images::PhotographDiagnosis& diagnosis, bool others_in_place = false);
 
 // What limits the report: few pictures, one object, no outline to be seen.
 std::vector<std::string> PhotographWarnings(const images::PhotographDiagnosis& diagnosis,

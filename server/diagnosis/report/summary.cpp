@@ -116,7 +116,7 @@ std::vector<std::string> DataWarnings(const touches::DataSummary& data) {
   return warnings;
 }
 
-std::string Summarize(const Diagnosis& diagnosis) {
+std::string Summarize(const Diagnosis& diagnosis, bool others_in_place) {
   if (diagnosis.data.touches == 0 && diagnosis.data_problems.empty()) {
     if (diagnosis.touches_needed == 0) return kNoTouch;
     return absl::StrCat(kNoTouch, " ", diagnosis.touches_needed, " usable touches would do.");
@@ -140,7 +140,8 @@ std::string Summarize(const Diagnosis& diagnosis) {
   }
   switch (diagnosis.verdict) {
     case selection::Verdict::kAdequate:
-      sentences.push_back("Nothing is missing that these data could show.");
+      sentences.push_back(
+          absl::StrCat("Nothing ", others_in_place ? "else " : "", "is missing that these data could show."));
       break;
     case selection::Verdict::kUnexplained:
       if (diagnosis.noise_floor && selection::SharesTime(*diagnosis.noise_floor))

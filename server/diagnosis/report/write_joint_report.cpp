@@ -3,13 +3,13 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
-#include <absl/strings/str_replace.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/units.h"
 #include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/photograph_summary.h"
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/report/write_photograph_report.h"
 #include "server/diagnosis/report/write_report.h"
@@ -40,6 +40,11 @@ int RankOf(Verdict verdict) {
       return 6;
   }
   return 0;
+}
+
+// A conflict is worse than what a named effect explains.
+Verdict WorseOf(Verdict one, Verdict other) {
+  return RankOf(one) >= RankOf(other) ? one : other;
 }
 
 Verdict WithShared(const JointDiagnosis& diagnosis, const char* kind, Verdict own) {
@@ -204,8 +209,7 @@ void WriteSteps(const JointDiagnosis& d, const std::vector<v1::Step>& touches,
   }
 }
 
-}  // namespace
-
+// The verdict of one kind of data, counting the shared effects that it shows.
 Verdict VerdictOfTouches(const JointDiagnosis& diagnosis) {
   return WithShared(diagnosis, "touches", diagnosis.touches.verdict);
 }
@@ -214,9 +218,7 @@ Verdict VerdictOfPhotographs(const JointDiagnosis& diagnosis) {
   return WithShared(diagnosis, "photographs", diagnosis.photographs.verdict);
 }
 
-Verdict WorseOf(Verdict one, Verdict other) {
-  return RankOf(one) >= RankOf(other) ? one : other;
-}
+}  // namespace
 
 std::string SummarizeJointly(const JointDiagnosis& d) {
   std::vector<std::string> sentences = {absl::StrCat("The model is off by ", ErrorsInWords(d.initial), ".")};
@@ -241,15 +243,11 @@ std::string SummarizeJointly(const JointDiagnosis& d) {
   // A conflict is the verdict of both: what each would say by itself would contradict it.
   // The verdicts named here are those that hold with the shared effects in place, as the words after them do.
   if (d.shared.conflicts.empty()) {
-    const auto with_shared = [&](const char* kind, Verdict verdict, const std::string& summary) {
-      return absl::StrCat(
-          kind, " (", NameOf(verdict), place, "): ",
-          in_place.empty()
-              ? summary
-              : absl::StrReplaceAll(summary, {{"Nothing is missing", "Nothing else is missing"}}));
-    };
-    sentences.push_back(with_shared("Touches", d.touches.verdict, d.touches.summary));
-    sentences.push_back(with_shared("Photographs", d.photographs.verdict, d.photographs.summary));
+    const bool shared = !in_place.empty();
+    sentences.push_back(
+        absl::StrCat("Touches (", NameOf(d.touches.verdict), place, "): ", Summarize(d.touches, shared)));
+    sentences.push_back(absl::StrCat("Photographs (", NameOf(d.photographs.verdict), place,
+                                     "): ", Summarize(d.photographs, shared)));
   }
   return absl::StrJoin(sentences, " ");
 }

@@ -27,12 +27,6 @@ struct JointDiagnosis {
   std::string improved_model_yaml, improved_model_hash;  // both kinds' effects; empty if nothing changed
 };
 
-// The verdict of one kind of data, counting the shared effects that it shows.
-selection::Verdict VerdictOfTouches(const JointDiagnosis& diagnosis);
-selection::Verdict VerdictOfPhotographs(const JointDiagnosis& diagnosis);
-// The worse of two; a conflict is worse than what a named effect explains.
-selection::Verdict WorseOf(selection::Verdict one, selection::Verdict other);
-
 // One paragraph: what both show together, then each kind.
 std::string SummarizeJointly(const JointDiagnosis& diagnosis);
 

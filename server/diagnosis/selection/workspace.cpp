@@ -15,8 +15,8 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kMaxMissed = 0.5;  // share of an object's touches
-constexpr double kOutsideM = 1e-6;  // less is rounding
 constexpr double kWarnMissed = 0.05;
+constexpr double kOutsideM = 1e-6;   // of the mesh's box: less is rounding
 constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther has met nothing at the target
 constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
 constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
