@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <list>
+#include <mutex>
+#include <utility>
 
 #include <absl/strings/str_format.h>
 
@@ -43,6 +47,49 @@ StageKey KeyOfPoints(const PhotoCamera& camera, const StageKey& lens) {
   for (const Eigen::Vector3d& v : {camera.eye_m, camera.right, camera.up, camera.forward}) Append(v, &key);
   key.insert(key.end(), {camera.near_m, camera.far_m, camera.scale});
   return key;
+}
+
+// Where the pixels look, which costs a few Newton steps each where the lens distorts: photographs through one lens
+// share it, also those of other threads.
+struct LensView {
+  PixelSlopes slopes;
+  bool sees = false;
+};
+
+class LensViewCache {
+ public:
+  std::shared_ptr<const LensView> Get(const PhotoLens& lens, const StageKey& key) {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      const auto found =
+          std::find_if(views_.begin(), views_.end(), [&](const auto& entry) { return entry.first == key; });
+      if (found != views_.end()) {
+        views_.splice(views_.begin(), views_, found);
+        return found->second;
+      }
+    }
+    auto view = std::make_shared<LensView>();
+    FillSlopes(lens, &view->slopes, &view->sees);
+    std::lock_guard<std::mutex> lock(mutex_);
+    views_.emplace_front(key, view);
+    size_t pixels = 0;
+    for (auto entry = views_.begin(); entry != views_.end();) {
+      pixels += entry->second->slopes.up.size();
+      entry = pixels > kMaxPixels && entry != views_.begin() ? views_.erase(entry) : std::next(entry);
+    }
+    return view;
+  }
+
+ private:
+  static constexpr size_t kMaxPixels = size_t{1} << 22;  // 32 MiB, 80 lenses of 224 x 224 pixels
+
+  std::mutex mutex_;
+  std::list<std::pair<StageKey, std::shared_ptr<const LensView>>> views_;  // the last used first
+};
+
+std::shared_ptr<const LensView> SharedLensView(const PhotoLens& lens, const StageKey& key) {
+  static LensViewCache& views = *new LensViewCache;
+  return views.Get(lens, key);
 }
 
 SurfacePlace PlaceOf(const model::Model& model, const std::string& object) {
@@ -94,8 +141,7 @@ struct PhotoWorkspace::Kept {
   std::shared_ptr<const geometry::Surface> surface;
   std::shared_ptr<const ShadingMesh> mesh;
   StageKey lens_key, points_key, lamps_key;
-  bool lens_sees = false;
-  PixelSlopes slopes;
+  std::shared_ptr<const LensView> lens_view;
   PhotoPoints points;
   PhotoLamps lamps;
   std::vector<float> light;  // of the points
@@ -110,14 +156,14 @@ struct PhotoWorkspace::Kept {
   void UseLens(const PhotoLens& lens) {
     const StageKey key = KeyOfLens(lens);
     if (key == lens_key) return;
-    FillSlopes(lens, &slopes, &lens_sees);
+    lens_view = SharedLensView(lens, key);
     lens_key = key;
     points_key.clear(), lamps_key.clear();
   }
   void UseCamera(const PhotoCamera& camera, const PhotoLens& lens) {
     const StageKey key = KeyOfPoints(camera, lens_key);
     if (key == points_key) return;
-    FindPoints(*surface, *mesh, camera, lens, slopes, &points);
+    FindPoints(*surface, *mesh, camera, lens, lens_view->slopes, &points);
     points_key = key;
     lamps_key.clear();
   }
@@ -178,7 +224,7 @@ absl::StatusOr<Photo> PhotoSimulator::Run(const PhotoRequest& request, const Pho
 
   kept.UseSurface(request.surface);
   kept.UseLens(lens);
-  if (!kept.lens_sees)
+  if (!kept.lens_view->sees)
     return absl::InvalidArgumentError(absl::StrFormat(
         "the lens sees nothing: with fx %g px, k1 %g and k2 %g no pixel of %d x %d has a viewing ray",
         lens.fx, lens.k1, lens.k2, lens.width, lens.height));
