@@ -1,7 +1,7 @@
 # Precompiled headers. Most of a file's compile time went into parsing the same headers again: gRPC and the generated
 # messages are 300,000 lines, Eigen, CLI11 and GoogleTest 60,000 each. Four sets, each compiled once, serve every target:
-# with the protocol or without it, for libraries or for tests. A file still includes all that it uses: the steps no_egl
-# and tsan of deploy/test compile without precompiled headers.
+# with the protocol or without it, for libraries or for tests. A file still includes all that it uses: the step tsan
+# of deploy/test compiles without precompiled headers.
 option(TOUCHSTONE_PRECOMPILE "Use precompiled headers" ON)
 
 set(touchstone_core_headers
