@@ -88,9 +88,16 @@ void FindShadows(const geometry::Surface& surface, const PhotoPoints& points, co
   };
   for (int i = 0; i < points.count; ++i) {
     if (!(result->key_cosine[i] > 0.0f)) continue;  // has no key light to lose
-    const float x = points.point_m[0][i] + offset_m * points.face[0][i];
-    const float y = points.point_m[1][i] + offset_m * points.face[1][i];
-    const float z = points.point_m[2][i] + offset_m * points.face[2][i];
+    const Eigen::Vector3f point(points.point_m[0][i], points.point_m[1][i], points.point_m[2][i]);
+    const Eigen::Vector3f face(points.face[0][i], points.face[1][i], points.face[2][i]);
+    // Interpolated normals see the lamp where a flat triangle beside the border of the light does not. A ray from above
+    // such a triangle would slip over its edge.
+    if (face.dot(key - point) <= 0.0f) {
+      result->in_shadow[i] = 1;
+      continue;
+    }
+    const Eigen::Vector3f start = point + offset_m * face;
+    const float x = start.x(), y = start.y(), z = start.z();
     rays.org_x[lanes] = x, rays.org_y[lanes] = y, rays.org_z[lanes] = z;
     rays.dir_x[lanes] = key.x() - x, rays.dir_y[lanes] = key.y() - y, rays.dir_z[lanes] = key.z() - z;
     rays.tnear[lanes] = 0.0f;

@@ -155,6 +155,34 @@ TEST(PhotoShading, ABallThrowsNoShadowOnItsLitSide) {
   EXPECT_EQ(darker, 0);
 }
 
+TEST(PhotoShading, AFlatTriangleTurnedAwayFromTheLampLiesInItsShadow) {
+  const geometry::TriangleMesh mesh = BallMesh(0.07, 24, 36);
+  const PhotoRequest request = RequestOf(MakeSurface("ball", mesh), CameraAt({0.1, -0.3, 0.12}), 240, 240);
+  const Photo photo = MustPhotograph({{"cast_shadow", {"strength=1"}}}, request);
+  const View view = MakeView(request.camera, ComputeBounds(mesh), WithAll(240, 240));
+  const double radius_m = 0.5 * ComputeBounds(mesh).DiagonalM();
+  const auto lamp = [&](double right, double up, double towards) -> Eigen::Vector3d {
+    return radius_m * (right * view.right + up * view.up - towards * view.forward);
+  };
+  const Eigen::Vector3d key_m = lamp(-3.5, 4, 4), fill_m = lamp(4, -1, 2.5);
+  int turned_away = 0;
+  for (int i = 0; i < 240 * 240; ++i) {
+    const Eigen::Vector3d point_m = photo.point_m[i].cast<double>();
+    const Eigen::Vector3d round = point_m.normalized();  // what the shading makes of flat triangles
+    const double key = round.dot((key_m - point_m).normalized());
+    const double x = i % 240 + 0.5, y = i / 240 + 0.5;
+    if (photo.mask[i] == 0 || key < 0.02 || key > 0.2 || !IsSteady(mesh, view, x, y, 0.1, true)) continue;
+    const uint32_t t = LookAtPixel(mesh, view, x, y).triangle;
+    const Eigen::Vector3d a = mesh.Corner(t, 0);
+    const Eigen::Vector3d face = (mesh.Corner(t, 1) - a).cross(mesh.Corner(t, 2) - a);
+    if (face.dot(point_m) * face.dot(key_m - point_m) >= 0) continue;
+    ++turned_away;
+    EXPECT_NEAR(photo.light[i], 0.07 + 0.26 * std::max(0.0, round.dot((fill_m - point_m).normalized())), 0.01)
+        << x << ' ' << y;
+  }
+  EXPECT_GT(turned_away, 10);
+}
+
 TEST(PhotoShading, BackgroundLevelIsTheGroundsAlone) {
   const PhotoRequest request = RequestOf(MakeSurface("letter", LetterMesh()), CameraAt({0.12, -0.26, 0.09}));
   const Photo black = MustPhotograph(EffectLines{}, request);
