@@ -85,7 +85,7 @@ void ExpectMasks(const EmulatedPlace& place, bool with_background) {
   const auto renderer = *CreateCpuRenderer();
   const Reach reach = ReachOf(place.name);
   constexpr int kViews = 16;
-  const int view_step = kUnderSanitizers ? 12 : with_background ? 4 : 1;
+  const int view_step = kUnderSanitizers ? 16 : with_background ? 4 : 1;
   double worst = 1, sum = 0;
   int count = 0, low = 0;
   std::string worst_words;
