@@ -68,9 +68,9 @@ class PhysicalSourceTest : public testing::Test {
   PhysicalSourceTest() {
     auto device = std::make_unique<FakeDevice>();
     device_ = device.get();
-    const Rectifier grey_picture = [](const image::Frame&, const image::Intrinsics&, int width, int height,
-                                      double, bool) {
-      return std::vector<uint8_t>(static_cast<size_t>(width) * height, 9);
+    const Rectifier grey_picture = [this](const image::Frame&, const image::Intrinsics&, int width,
+                                          int height, double, bool) {
+      return picture_.empty() ? std::vector<uint8_t>(static_cast<size_t>(width) * height, 9) : picture_;
     };
     source_ =
         std::make_unique<PhysicalSource>(&SmallObjects(), SourceLimits(), std::move(device), grey_picture);
@@ -89,6 +89,7 @@ class PhysicalSourceTest : public testing::Test {
 
   FakeDevice* device_;
   std::unique_ptr<PhysicalSource> source_;
+  std::vector<uint8_t> picture_;  // that the camera sees; empty: nothing but grey
 };
 
 TEST_F(PhysicalSourceTest, RepeatsOfATouchAreNumbered) {
@@ -183,6 +184,35 @@ TEST_F(PhysicalSourceTest, PhotographsEverySampleFromItsTouch) {
              (touch.target_m - touch.approach * touch.standoff_m))
                 .norm(),
             1e-12);
+}
+
+TEST_F(PhysicalSourceTest, CapturesAndSamplesAreNormalizedAsThoseOfAVirtualSourceAre) {
+  constexpr int kSide = 64;
+  for (int k = 0; k < kSide * kSide; ++k) {  // a bright ball on a ground that is lit from the left
+    const int x = k % kSide - kSide / 2, y = k / kSide - kSide / 2;
+    picture_.push_back(static_cast<uint8_t>(x * x + y * y < 200 ? 180 + y : 60 - x / 4));
+  }
+  CaptureRequest capture;
+  capture.object = "lat00";
+  capture.image.options.width = capture.image.options.height = kSide;
+  capture.cameras.resize(1);
+  capture.cameras[0].eye_m = {0.3, 0, 0};
+  const auto plain = source_->Capture(capture, NoObjection);
+  ASSERT_TRUE(plain.ok()) << plain.status();
+  EXPECT_EQ(plain->batch.data[0], BytesOf(picture_));
+  capture.image.normalize = capture.image.options.mask = true;
+  const auto normalized = source_->Capture(capture, NoObjection);
+  ASSERT_TRUE(normalized.ok()) << normalized.status();
+  const image::Image expected = NormalizedOf(plain->batch.data[0], kSide);
+  ASSERT_EQ(normalized->columns.size(), 2u);
+  EXPECT_EQ(normalized->batch.data[0], BytesOf(expected.pixels));
+  EXPECT_EQ(normalized->batch.data[1], BytesOf(expected.mask));
+
+  SampleRequest samples = Faces({"image"});
+  samples.specification.image = capture.image;
+  const auto batch = (*source_->Stream(samples))->Next(NoObjection);
+  ASSERT_TRUE(batch.ok() && batch->has_value()) << batch.status();
+  EXPECT_EQ((*batch)->data[0], BytesOf(expected.pixels));
 }
 
 }  // namespace

@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/image/normalize.h"
 #include "server/source/source.h"
 
 namespace touchstone::source {
@@ -30,6 +35,20 @@ inline touch::CommandedTouch FromAbove(double x_m = 0) {
   touch.lateral = {1, 0, 0};
   touch.standoff_m = 0.2;
   return touch;
+}
+
+// What Normalize makes of the plain picture that `data` begins with, side x side pixels.
+inline image::Image NormalizedOf(const std::string& data, int side) {
+  image::Image plain;
+  plain.width = plain.height = side, plain.channels = 1;
+  plain.pixels.assign(data.begin(), data.begin() + side * side);
+  auto normalized = image::Normalize(plain);
+  EXPECT_TRUE(normalized.ok() && image::FoundObject(*normalized)) << normalized.status();
+  return *std::move(normalized);
+}
+
+inline std::string BytesOf(const std::vector<uint8_t>& values) {
+  return {values.begin(), values.end()};
 }
 
 }  // namespace touchstone::source

@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "server/effects/all_effects.h"
-#include "server/image/normalize.h"
 #include "server/source/test_source.h"
 
 namespace touchstone::source {
@@ -170,19 +169,6 @@ TEST_F(VirtualSourceTest, ItsTouchesAndTheSamplesOfAListAreTheSame) {
   EXPECT_FALSE((*stream)->Next(NoObjection)->has_value());
 }
 
-// What Normalize makes of the plain picture that `data` begins with.
-image::Image NormalizedOf(const std::string& data) {
-  image::Image plain;
-  plain.width = plain.height = 64, plain.channels = 1;
-  plain.pixels.assign(data.begin(), data.begin() + 64 * 64);
-  auto normalized = image::Normalize(plain);
-  EXPECT_TRUE(normalized.ok() && image::FoundObject(*normalized)) << normalized.status();
-  return *std::move(normalized);
-}
-std::string BytesOf(const std::vector<uint8_t>& values) {
-  return {values.begin(), values.end()};
-}
-
 TEST_F(VirtualSourceTest, CapturesAndSamplesAreNormalizedAlike) {
   CaptureRequest capture;
   capture.object = "lat00";
@@ -195,7 +181,7 @@ TEST_F(VirtualSourceTest, CapturesAndSamplesAreNormalizedAlike) {
   capture.image.normalize = capture.image.options.mask = true;
   const auto normalized = source_.Capture(capture, NoObjection);
   ASSERT_TRUE(normalized.ok()) << normalized.status();
-  const image::Image expected = NormalizedOf(plain->batch.data[0]);
+  const image::Image expected = NormalizedOf(plain->batch.data[0], 64);
   ASSERT_EQ(normalized->columns.size(), 2u);
   EXPECT_EQ(normalized->batch.data[0], BytesOf(expected.pixels));
   EXPECT_EQ(normalized->batch.data[1], BytesOf(expected.mask)) << "the mask that was found";
