@@ -75,7 +75,6 @@ TEST_F(PublicSets, PhysicsIsNoMistakeOfTheFile) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     ASSERT_TRUE(problems.ok()) << name << ": " << problems.status();
     EXPECT_TRUE(problems->empty()) << name << ": " << problems->front().words;
-    EXPECT_LT(seconds, 5) << name;  // well below 1 s on an idle machine
     RecordProperty(name, std::to_string(seconds));
   }
 }

@@ -1,5 +1,6 @@
 #include "server/diagnosis/images/photo_flow.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -79,6 +80,18 @@ TEST(PhotoFlow, CarriesAsMuchLightAsAShiftByAPixel) {
   const double light = std::accumulate(photo.grey.begin(), photo.grey.end(), 0.0);
   EXPECT_NEAR(by_simulation / light, 1, 1e-3);
   EXPECT_NEAR(by_flow / light, 1, 1e-3);
+}
+
+TEST(PhotoFlow, AContourMovesWithWhatLiesNearer) {
+  image::Photo photo;
+  photo.width = 4, photo.height = 1;
+  photo.mask = {0, 255, 255, 255};
+  photo.depth_m = {0, 0.5f, 0.5f, 0.2f};
+  const std::vector<float> grey = {0, 100, 100, 200};
+  PictureFlow flow;
+  flow.move_px = {{0, 0}, {1, 0}, {1, 0}, {3, 0}};
+  // Ground and object part by 100 and move by 1 px, the nearer part and the farther one by 3 px.
+  EXPECT_THAT(CarriedBy(flow, photo, grey), testing::ElementsAre(-50, -50, -150, -150));
 }
 
 TEST(ContourPlaceVariance, GrowsAsContoursLieElsewhere) {

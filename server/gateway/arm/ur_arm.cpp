@@ -247,8 +247,9 @@ absl::Status UrArmOnTcp::TakePowerSteps(const StartGuard& guard, bool* began) {
   bool powered = false, released = false;
   while (true) {
     const uint64_t seen = changes_->count();
-    TOUCHSTONE_RETURN_IF_ERROR(guard());
     TOUCHSTONE_ASSIGN_OR_RETURN(const ArmState state, State());
+    // After the state is known: released brakes that a stop came before are no success.
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
     if (state.robot_mode == RobotMode::kRunning) return SafetyPermitsMotion(state.safety_mode);
     TOUCHSTONE_RETURN_IF_ERROR(SafetyPermitsMotion(state.safety_mode));
     if (!powered && state.robot_mode < RobotMode::kIdle) {

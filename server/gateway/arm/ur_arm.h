@@ -22,7 +22,7 @@ struct UrArmOptions {
   MotionLimits body_limits;              // of these only max_arm_speed_m_s is looked at
   calibration::Calibration calibration;  // and of this only where the camera is
   double frozen_after_s = 0.5;      // host time without a state after which the controller counts as frozen
-  double program_start_s = 1.5;     // host time that a program may take to begin
+  double program_start_s = 4;       // host time that a program may take to begin: tenths, but on a busy host
   double connect_wait_s = 2;        // host time that ConnectUrArm waits for the first state
   double assumed_delay_s = 0.0005;  // of a state on its way, host time; the clock is as uncertain
 };
