@@ -2,7 +2,9 @@
 
 add_library(touchstone_flags INTERFACE)
 target_include_directories(touchstone_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
-target_compile_options(touchstone_flags INTERFACE -Wall -Wextra -Wno-unused-parameter -ffp-contract=off)
+# Macros name files from the root of the repository: an object is the same wherever a clone lies, and ccache finds it.
+target_compile_options(touchstone_flags INTERFACE -Wall -Wextra -Wno-unused-parameter -ffp-contract=off
+  -fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64" AND TOUCHSTONE_ARCH)
   target_compile_options(touchstone_flags INTERFACE -march=${TOUCHSTONE_ARCH})
 endif()
@@ -46,13 +48,15 @@ function(touchstone_library name)
   touchstone_link(touchstone_${name} PUBLIC ${ARG_LINKS})
 endfunction()
 
-# Where the tests find files: macros in a header, "touchstone_test_paths.h", so that a test that uses none is found in
-# ccache although the clone lies elsewhere.
-set(TOUCHSTONE_TEST_PATHS ${CMAKE_BINARY_DIR}/generated/touchstone_test_paths.h)
-file(CONFIGURE OUTPUT ${TOUCHSTONE_TEST_PATHS} CONTENT [[
-#define TOUCHSTONE_SOURCE_DIR "@CMAKE_SOURCE_DIR@"
-#define TOUCHSTONE_SHARED_DATA "@CMAKE_SOURCE_DIR@/../shared/data"
+# What server/base/test_paths.h declares.
+set(test_paths ${CMAKE_BINARY_DIR}/generated/test_paths.cpp)
+file(CONFIGURE OUTPUT ${test_paths} CONTENT [[
+#include "server/base/test_paths.h"
+std::string touchstone::SourceDir() { return "@CMAKE_SOURCE_DIR@"; }
+std::string touchstone::SharedData() { return "@CMAKE_SOURCE_DIR@/../shared/data"; }
 ]] @ONLY)
+add_library(touchstone_test_paths STATIC ${test_paths})
+target_link_libraries(touchstone_test_paths PRIVATE touchstone_flags)
 
 # Sanitizers cost a factor of ten and more.
 set(TOUCHSTONE_TEST_TIMEOUT_S 600)
@@ -71,7 +75,7 @@ function(touchstone_test name)
   if(TOUCHSTONE_SANITIZE MATCHES "address")
     target_compile_options(${name}_test PRIVATE -fno-sanitize=undefined -fno-sanitize-address-use-after-scope)
   endif()
-  touchstone_link(${name}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main)
+  touchstone_link(${name}_test PRIVATE ${ARG_LINKS} touchstone_test_paths GTest::gmock GTest::gtest_main)
   set(tests ${name})
   if(ARG_SHARDS)
     set(tests)

@@ -11,14 +11,14 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/real_binary_test.h"
-#include "touchstone_test_paths.h"
+#include "server/base/test_paths.h"
 
 namespace touchstone::cli {
 namespace {
 
 using ::testing::HasSubstr;
 
-const std::string kMeasurements = std::string(TOUCHSTONE_SHARED_DATA) + "/measurements";
+const std::string kMeasurements = SharedData() + "/measurements";
 
 class AdviceCommand : public RealBinaryTest {
  protected:

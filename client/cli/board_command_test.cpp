@@ -11,7 +11,7 @@
 
 #include "client/cli/real_binary_test.h"
 #include "server/base/sanitizers.h"
-#include "touchstone_test_paths.h"
+#include "server/base/test_paths.h"
 
 namespace touchstone::cli {
 namespace {
@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 // OpenCV's chessboard pictures; TOUCHSTONE_CHESSBOARD names another folder of them.
 std::string Chessboards() {
   const char* other = std::getenv("TOUCHSTONE_CHESSBOARD");
-  return other != nullptr ? other : TOUCHSTONE_SHARED_DATA "/camera/opencv_chessboard";
+  return other != nullptr ? other : SharedData() + "/camera/opencv_chessboard";
 }
 // OpenCV's own calibration of the same corners, and its error on left-out pictures: board_pictures_test.cpp computes both.
 constexpr double kOpenCvK1 = -0.2843, kOpenCvHeldoutPx = 0.1943;

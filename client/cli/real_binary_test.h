@@ -1,4 +1,4 @@
-// For tests that run the real binary (TOUCHSTONE_BINARY) in a folder of their own.
+// For tests that run the real binary, which lies beside them, in a folder of their own.
 #pragma once
 
 #include <fcntl.h>
@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +27,8 @@ class RealBinaryTest : public ::testing::Test {
 
   // Starts touchstone in the test's folder, its output in files.
   pid_t Start(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), TOUCHSTONE_BINARY);
+    arguments.insert(arguments.begin(),
+                     std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone");
     const pid_t child = ::fork();
     if (child != 0) return child;
     if (::chdir(folder_.path().c_str()) != 0) ::_exit(99);

@@ -1,5 +1,4 @@
 #include "firmware/core/portable_checks.h"
-#include "touchstone_test_paths.h"
 
 #include <fstream>
 #include <sstream>
@@ -7,11 +6,13 @@
 
 #include <gtest/gtest.h>
 
+#include "server/base/test_paths.h"
+
 namespace touchstone::firmware {
 namespace {
 
 std::string ReadVectors() {
-  std::ifstream file(TOUCHSTONE_SOURCE_DIR "/firmware/vectors.txt");
+  std::ifstream file(SourceDir() + "/firmware/vectors.txt");
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();

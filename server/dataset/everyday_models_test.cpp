@@ -5,9 +5,9 @@
 #include <cstring>
 #include <filesystem>
 
+#include "server/base/test_paths.h"
 #include "server/dataset/test_support.h"
 #include "server/geometry/mesh_file.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::dataset {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 class EverydayModel : public testing::TestWithParam<const char*> {};
 
 TEST_P(EverydayModel, IsReadScaledAndTouched) {
-  const std::string path = std::string(TOUCHSTONE_SHARED_DATA) + "/psb10/" + GetParam() + ".off";
+  const std::string path = SharedData() + "/psb10/" + GetParam() + ".off";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here";
   geometry::MeshImport import;
   import.fit_mm = 150;

@@ -6,14 +6,14 @@
 
 #include <filesystem>
 
+#include "server/base/test_paths.h"
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::geometry {
 namespace {
 
-const char kCorpus[] = TOUCHSTONE_SHARED_DATA "/meshes";
+const std::string kCorpus = SharedData() + "/meshes";
 
 struct Row {
   std::string path;
@@ -25,7 +25,7 @@ struct Row {
 };
 
 std::vector<Row> ReadIndex() {
-  const absl::StatusOr<std::string> text = ReadFile(std::string(kCorpus) + "/INDEX.tsv");
+  const absl::StatusOr<std::string> text = ReadFile(kCorpus + "/INDEX.tsv");
   std::vector<Row> rows;
   if (!text.ok()) return rows;
   const std::vector<std::string> lines = absl::StrSplit(*text, '\n', absl::SkipEmpty());
@@ -49,7 +49,7 @@ TEST(MeshCorpus, LoadsWhatIsAMeshAndRefusesWhatIsNot) {
   EXPECT_GE(rows.size(), 84u);
   for (const Row& row : rows) {
     SCOPED_TRACE(row.path);
-    const std::string path = std::string(kCorpus) + "/" + row.path;
+    const std::string path = kCorpus + "/" + row.path;
     std::vector<std::string> notes;
     const absl::StatusOr<TriangleMesh> mesh = ReadMeshFile(path, MeshImport(), &notes);
     if (row.expected_class == "invalid") {
@@ -81,7 +81,7 @@ TEST(MeshCorpus, LoadsWhatIsAMeshAndRefusesWhatIsNot) {
 }
 
 TEST(MeshCorpus, EverydayModelsLoadAndScale) {
-  const std::string folder = TOUCHSTONE_SHARED_DATA "/psb10";
+  const std::string folder = SharedData() + "/psb10";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no everyday models at " << folder;
   int models = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {

@@ -8,9 +8,9 @@
 #include <filesystem>
 
 #include "server/base/random.h"
+#include "server/base/test_paths.h"
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::geometry {
 namespace {
@@ -65,7 +65,7 @@ std::vector<Seed> Seeds() {
        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 7\n"},
       {"binary", "ply", BinaryPly()},
   };
-  const std::string corpus = TOUCHSTONE_SHARED_DATA "/meshes";
+  const std::string corpus = SharedData() + "/meshes";
   if (!std::filesystem::exists(corpus)) return seeds;
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(corpus))

@@ -3,15 +3,15 @@
 
 #include <filesystem>
 
+#include "server/base/test_paths.h"
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::geometry {
 namespace {
 
-const std::string kFolder = TOUCHSTONE_SOURCE_DIR "/meshes/";
+const std::string kFolder = SourceDir() + "/meshes/";
 
 TEST(SupershapeFolder, HoldsWhatTheCodeMakes) {
   const auto files = SupershapeFolderFiles();

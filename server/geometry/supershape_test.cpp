@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <set>
 
+#include "server/base/test_paths.h"
 #include "server/geometry/mesh_file.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::geometry {
 namespace {
@@ -177,7 +177,7 @@ TEST(Supershape, RefusesWhatGivesNoSurface) {
 
 // Meshes of the same five that were made elsewhere: 256 x 128 segments, a line at every 180/128 deg.
 TEST(Supershape, AgreesWithMeshesMadeElsewhere) {
-  const std::string folder = TOUCHSTONE_SHARED_DATA "/measurements/";
+  const std::string folder = SharedData() + "/measurements/";
   if (!std::filesystem::exists(folder + "lat20.off"))
     GTEST_SKIP() << "no meshes to compare with at " << folder;
   for (int n2 : {0, 5, 10, 15, 20}) {

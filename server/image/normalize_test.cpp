@@ -15,13 +15,13 @@
 
 #include "server/base/random.h"
 #include "server/base/sanitizers.h"
+#include "server/base/test_paths.h"
 #include "server/geometry/mesh_file.h"
 #include "server/image/emulated_photograph.h"
 #include "server/image/encode.h"
 #include "server/image/normalize_region.h"
 #include "server/image/shading.h"
 #include "server/image/test_scene.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::image {
 namespace {
@@ -60,8 +60,8 @@ void WritePicture(const EmulatedPhotograph& emulated, const Image& normalized, c
 std::vector<std::shared_ptr<const geometry::Surface>> AllMeshes() {
   std::vector<std::shared_ptr<const geometry::Surface>> surfaces;
   for (const char* name : {"lat00", "lat05", "lat10", "lat15", "lat20"})
-    surfaces.push_back(MakeSurface(
-        name, *geometry::ReadMeshFile(absl::StrCat(TOUCHSTONE_SOURCE_DIR, "/meshes/", name, ".off"))));
+    surfaces.push_back(
+        MakeSurface(name, *geometry::ReadMeshFile(absl::StrCat(SourceDir(), "/meshes/", name, ".off"))));
   return surfaces;
 }
 

@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <random>
 
+#include "server/base/test_paths.h"
 #include "server/base/text.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::session {
 namespace {
@@ -267,7 +267,7 @@ TEST(MeasurementSet, KeepsEveryRowOfALargeFile) {
 }
 
 TEST(MeasurementSet, PublicSetsAreRead) {
-  const std::string folder = TOUCHSTONE_SHARED_DATA "/measurements/";
+  const std::string folder = SharedData() + "/measurements/";
   for (const char* name :
        {"nothing_hidden", "tip_radius", "two_effects", "unlisted", "surface_error", "object_push"}) {
     if (!std::filesystem::exists(absl::StrCat(folder, name, ".csv")))

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "server/base/test_paths.h"
 #include "server/geometry/mesh_file.h"
 #include "server/image/emulated_photograph.h"
 #include "server/image/normalize.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::image {
 namespace {
@@ -77,7 +77,7 @@ int Run(int count, char** words) {
   std::vector<std::string> files(words + std::min(count, 2), words + count);
   if (files.empty())
     for (const char* name : {"lat00", "lat05", "lat10", "lat15", "lat20"})
-      files.push_back(std::string(TOUCHSTONE_SOURCE_DIR) + "/meshes/" + name + ".off");
+      files.push_back(SourceDir() + "/meshes/" + name + ".off");
   Surfaces surfaces;
   if (!ReadSurfaces(files, &surfaces)) return 1;
   const auto renderer = CreateCpuRenderer();

@@ -14,8 +14,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/test_folder.h"
+#include "server/base/test_paths.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 // OpenCV's chessboard pictures; TOUCHSTONE_CHESSBOARD names another folder of them.
 std::string ChessboardFolder() {
   const char* other = std::getenv("TOUCHSTONE_CHESSBOARD");
-  return other != nullptr ? other : TOUCHSTONE_SHARED_DATA "/camera/opencv_chessboard";
+  return other != nullptr ? other : SharedData() + "/camera/opencv_chessboard";
 }
 
 // A drawn chessboard as a pinhole sees it: every pixel's ray meets the board, four by four rays a pixel.

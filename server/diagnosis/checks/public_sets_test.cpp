@@ -5,16 +5,16 @@
 #include <chrono>
 #include <filesystem>
 
+#include "server/base/test_paths.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/session/measurement_fix.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
 
-const std::string kFolder = std::string(TOUCHSTONE_SHARED_DATA) + "/measurements/";
+const std::string kFolder = SharedData() + "/measurements/";
 
 class PublicSets : public ::testing::Test {
  protected:

@@ -12,8 +12,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "server/base/test_paths.h"
 #include "server/gateway/camera/camera.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::gateway::camera {
 namespace {
@@ -163,7 +163,7 @@ bool FindCorners(const cv::Mat& grey, const cv::Size& board, std::vector<cv::Poi
 }
 
 TEST(Rectify, StraightensTheRowsOfARealChessboard) {
-  const std::string folder = std::string(TOUCHSTONE_SHARED_DATA) + "/camera/opencv_chessboard";
+  const std::string folder = SharedData() + "/camera/opencv_chessboard";
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << folder << " is missing";
   const cv::Size board(9, 6);
   std::vector<cv::Point3f> flat;

@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "server/base/test_paths.h"
 #include "tests/hidden_effects/score/trial.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 
 inline const TestObjects& SharedTestObjects() {
-  static const auto* objects = new TestObjects(LoadTestObjects(TOUCHSTONE_SHARED_DATA "/measurements"));
+  static const auto* objects = new TestObjects(LoadTestObjects(SharedData() + "/measurements"));
   return *objects;
 }
 

@@ -9,13 +9,13 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "server/base/test_paths.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "tests/hidden_effects/generator/rig.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/outside_strengths.h"
 #include "tests/hidden_effects/score/strengths.h"
 #include "tests/hidden_effects/score/table.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 namespace {
@@ -71,7 +71,7 @@ Scenario Draw(const TestObjects& objects, int number, uint64_t seed) {
 TEST(FalseBlame, FilesWithoutAMistakeAreNotBlamed) {
   const char* const wanted = std::getenv("TOUCHSTONE_FALSE_BLAME_SETS");
   const int sets = wanted != nullptr ? std::atoi(wanted) : kSets;
-  const TestObjects objects = LoadTestObjects(std::string(TOUCHSTONE_SHARED_DATA) + "/measurements");
+  const TestObjects objects = LoadTestObjects(SharedData() + "/measurements");
   int blamed = 0;
   double sum_s = 0, slowest_s = 0;
   for (int number = 0; number < sets; ++number) {

@@ -6,15 +6,15 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/base/test_paths.h"
 #include "tests/hidden_effects/generator/set_files.h"
 #include "tests/hidden_effects/score/figures.h"
 #include "tests/hidden_effects/score/verify.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 namespace {
 
-constexpr char kMeasurements[] = TOUCHSTONE_SHARED_DATA "/measurements/";
+const std::string kMeasurements = SharedData() + "/measurements/";
 
 std::string FileText(const std::string& path) {
   std::ostringstream text;
@@ -73,7 +73,7 @@ std::vector<PublicSet> PublicOutsideSets() {
 class PublicOutside : public testing::TestWithParam<PublicSet> {};
 
 TEST_P(PublicOutside, IsAnsweredRightOrHonestly) {
-  const std::string file = std::string(kMeasurements) + "outside_" + GetParam().file + ".csv";
+  const std::string file = kMeasurements + "outside_" + GetParam().file + ".csv";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is missing";
   static const auto* objects = new TestObjects(LoadTestObjects(kMeasurements));
   Set set;

@@ -4,17 +4,17 @@
 
 #include <filesystem>
 
+#include "server/base/test_paths.h"
 #include "server/effects/all_effects.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/test_objects.h"
-#include "touchstone_test_paths.h"
 
 namespace touchstone::hidden {
 namespace {
 
 using testing::Contains;
 
-const char kFolder[] = TOUCHSTONE_SHARED_DATA "/measurements/";
+const std::string kFolder = SharedData() + "/measurements/";
 
 class PublicSets : public testing::Test {
  protected:
@@ -49,9 +49,8 @@ class PublicSets : public testing::Test {
 };
 TestObjects* PublicSets::objects_ = nullptr;
 
-#define SKIP_WITHOUT(file)                                     \
-  if (!std::filesystem::exists(std::string(kFolder) + (file))) \
-  GTEST_SKIP() << kFolder << (file) << " is missing"
+#define SKIP_WITHOUT(file) \
+  if (!std::filesystem::exists(kFolder + (file))) GTEST_SKIP() << kFolder << (file) << " is missing"
 
 TEST_F(PublicSets, NothingHiddenIsAdequate) {
   SKIP_WITHOUT("nothing_hidden.csv");
