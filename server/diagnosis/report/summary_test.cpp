@@ -178,16 +178,19 @@ TEST(DataWarnings, NameWhatLimitsTheSet) {
 
 TEST(SummarizeJointly, NamesVerdictsThatAgreeWithTheirWords) {
   JointDiagnosis d;
-  d.touches.verdict = d.photographs.verdict = Verdict::kAdequate;
-  d.touches.summary = "Nothing is missing that these data could show.";
-  d.photographs.summary = "Nothing is missing that these pictures could show.";
+  d.touches = ExampleDiagnosis(Verdict::kAdequate);
+  d.photographs.verdict = Verdict::kAdequate;
+  d.photographs.images = 20;
   EXPECT_THAT(SummarizeJointly(d),
-              HasSubstr("Photographs (ADEQUATE): Nothing is missing that these pictures"));
+              AllOf(HasSubstr("Nothing is missing that these data"), HasSubstr("Photographs (ADEQUATE): "),
+                    HasSubstr("Nothing is missing that these pictures")));
   joint::SharedStep step;
   step.effect = "object_pose", step.shown_by = "both";
   d.shared.steps.push_back(step);
   EXPECT_THAT(SummarizeJointly(d),
-              AllOf(HasSubstr("Photographs (ADEQUATE, with object_pose in place): Nothing else is missing"),
+              AllOf(HasSubstr("Photographs (ADEQUATE, with object_pose in place): "),
+                    HasSubstr("Nothing else is missing that these data"),
+                    HasSubstr("Nothing else is missing that these pictures"),
                     Not(HasSubstr("Nothing is missing")), Not(HasSubstr("MISSING_EFFECTS"))));
 }
 
