@@ -111,7 +111,6 @@ class JointDiagnoser {
     residuals::DescribePhotographs(expectation, input_.seed, context_.pool, &d_.photographs);
     for (std::string& warning : report::PhotographWarnings(d_.photographs, *input_.images))
       d_.photographs.warnings.push_back(std::move(warning));
-    d_.photographs.summary = report::Summarize(d_.photographs);
     return absl::OkStatus();
   }
 

@@ -83,9 +83,10 @@ Reach ReachOf(std::string_view place) {
 
 void ExpectMasks(const EmulatedPlace& place, bool with_background) {
   const auto renderer = *CreateCpuRenderer();
-  const Reach reach = ReachOf(place.name);
   constexpr int kViews = 16;
   const int view_step = kUnderSanitizers ? 16 : with_background ? 4 : 1;
+  // Every fourth view is a good one on any ground.
+  const Reach reach = view_step > 1 ? Reach() : ReachOf(place.name);
   double worst = 1, sum = 0;
   int count = 0, low = 0;
   std::string worst_words;
