@@ -164,12 +164,6 @@ absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
 
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context) {
-  // A proposal for the photographs alone would pass for one for both.
-  if (input.set != nullptr)
-    return absl::UnimplementedError(
-        absl::StrCat(input.images->origin,
-                     ": touches and photographs are diagnosed together, but nothing is proposed for both: "
-                     "propose for its touches.csv by itself, and for the folder without it"));
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, max_photographs, true, context, expectation);
   });

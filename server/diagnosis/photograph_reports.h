@@ -19,7 +19,8 @@ absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input, con
 absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
                                                  const DiagnosisContext& context);
 
-// UNIMPLEMENTED with touches beside the photographs. Diagnose, with at most `max_photographs` further pictures that would tell the explanations that are left apart.
+// Diagnose, with at most `max_photographs` further pictures that would tell the explanations apart that the photographs
+// alone leave: touches beside them must have been taken out.
 absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                 const DiagnosisContext& context);
 

@@ -12,6 +12,8 @@
 namespace touchstone::image {
 namespace {
 
+// Grey levels that the sensor's noise is cut off at: below 3 standard deviations of most cameras' noise.
+constexpr float kBlack = 10, kWhite = 245, kMaxHiddenNoise = 4;
 constexpr int kTerms = 10;
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 
@@ -156,14 +158,22 @@ Plane WithoutNoise(const Plane& grey, float noise) {
 
 float NoiseOf(const Plane& grey) {
   // The mask 1 -2 1 / -2 4 -2 / 1 -2 1 of white noise has 6 times its standard deviation.
-  std::vector<float> sizes;
+  std::vector<float> sizes, unclipped;
   sizes.reserve(grey.values.size());
   for (int y = 1; y + 1 < grey.height; ++y)
-    for (int x = 1; x + 1 < grey.width; ++x)
+    for (int x = 1; x + 1 < grey.width; ++x) {
       sizes.push_back(std::abs(grey.at(x - 1, y - 1) - 2 * grey.at(x, y - 1) + grey.at(x + 1, y - 1) -
                                2 * grey.at(x - 1, y) + 4 * grey.at(x, y) - 2 * grey.at(x + 1, y) +
                                grey.at(x - 1, y + 1) - 2 * grey.at(x, y + 1) + grey.at(x + 1, y + 1)));
-  return 1.4826f * MedianOf(&sizes) / 6;
+      if (grey.at(x, y) >= kBlack && grey.at(x, y) <= kWhite) unclipped.push_back(sizes.back());
+    }
+  const size_t pixels = sizes.size();
+  const auto noise_of = [](std::vector<float>* values) { return 1.4826f * MedianOf(values) / 6; };
+  const float noise = noise_of(&sizes);
+  // Black and white cut noise off: what most of a dark ground shows is less than the sensor's. Where enough of the picture
+  // is neither, that tells; but its texture is in it too, so that it is believed up to a limit.
+  if (unclipped.size() < pixels / 20 || unclipped.size() > pixels / 2) return noise;
+  return std::max(noise, std::min(noise_of(&unclipped), kMaxHiddenNoise));
 }
 
 Plane FitGround(const Plane& grey, float noise) {

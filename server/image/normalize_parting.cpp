@@ -15,8 +15,33 @@ constexpr float kSmoothPx = 0.6f;
 constexpr double kMaxEnclosedShare = 0.08;  // of the object's pixels
 constexpr double kMinShadowShare = 0.6;     // of a shadow's pixels, in its umbra
 constexpr size_t kMinUmbraPixels = 30;
+// JPEG leaves waves beside an edge, within its block of 8 x 8 pixels: at most this share of the edge's height. On a black
+// ground, where nothing else is, they would pass for object.
+constexpr float kRinging = 0.05f;
+constexpr int kRingingPx = 7;
+constexpr float kBlackGround = 10;  // grey levels
 constexpr float kShadowTint =
     0.06f;  // how far a shadow's colour may lie from the ground's: light from elsewhere
+
+// The largest value within `reach` pixels along rows and columns.
+Plane LargestAround(const Plane& plane, int reach) {
+  Plane rows(plane.width, plane.height), around(plane.width, plane.height);
+  for (int y = 0; y < plane.height; ++y)
+    for (int x = 0; x < plane.width; ++x) {
+      float most = plane.at(x, y);
+      for (int k = std::max(x - reach, 0); k <= std::min(x + reach, plane.width - 1); ++k)
+        most = std::max(most, plane.at(k, y));
+      rows.at(x, y) = most;
+    }
+  for (int y = 0; y < plane.height; ++y)
+    for (int x = 0; x < plane.width; ++x) {
+      float most = rows.at(x, y);
+      for (int k = std::max(y - reach, 0); k <= std::min(y + reach, plane.height - 1); ++k)
+        most = std::max(most, rows.at(x, k));
+      around.at(x, y) = most;
+    }
+  return around;
+}
 
 Plane SlopeOf(const Plane& plane) {
   Plane slope(plane.width, plane.height);
@@ -40,6 +65,7 @@ class LevelSearch {
     const float floor = std::max(8.0f, 4 * picture.noise), noise = kCalmNoise * picture.noise;
     std::vector<Plane> smooth;
     for (const Plane& calm : picture.calm) smooth.push_back(Blurred(calm, kSmoothPx));
+    const Plane brightest = LargestAround(smooth[0], kRingingPx);
     for (size_t k = 0; k < relative_.values.size(); ++k) {
       const auto mean = [&](const std::vector<Plane>& planes) {
         float sum = 0;
@@ -48,7 +74,10 @@ class LevelSearch {
       };
       const float ground = mean(picture.ground), grey = mean(smooth);
       relative_.values[k] = std::log((grey + floor) / (ground + floor));
-      const float tolerance = (3.2f * noise + 0.5f) / (ground + floor) + 0.02f;
+      float tolerance = (3.2f * noise + 0.5f) / (ground + floor) + 0.02f;
+      if (ground < kBlackGround)
+        tolerance = std::max(tolerance, std::log1p(kRinging * std::max(brightest.values[k] - ground, 0.0f) /
+                                                   (ground + floor)));
       tint_.values[k] = picture.channels() == 1 ? 0 : TintAt(smooth, picture.ground, k, floor);
       is_tinted_.inside[k] = tint_.values[k] > (3.2f * noise + 1.2f) / (grey + floor) + kShadowTint;
       is_ground_.inside[k] = !is_tinted_.inside[k] && std::abs(relative_.values[k]) < tolerance;

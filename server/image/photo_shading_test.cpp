@@ -140,9 +140,12 @@ TEST(PhotoShading, ShadowsFollowTheLight) {
   ExpectLight({{"light_position", {"offset_mm=300,-200,0"}}, {"cast_shadow", {"strength=1"}}}, reference);
 }
 
-TEST(PhotoShading, ABallThrowsNoShadowOnItsLitSide) {
-  const PhotoRequest request =
-      RequestOf(MakeSurface("ball", BallMesh(0.07, 60, 90)), CameraAt({0.1, -0.3, 0.12}));
+// Of an object without hollows.
+void ExpectNoShadowOnTheLitSide(geometry::TriangleMesh mesh, const Eigen::Vector3d& centre_m) {
+  for (Eigen::Vector3f& vertex_m : mesh.vertices_m) vertex_m += centre_m.cast<float>();
+  Camera camera = CameraAt({0.1, -0.3, 0.12});
+  camera.eye_m += centre_m, camera.at_m += centre_m;
+  const PhotoRequest request = RequestOf(MakeSurface("convex", mesh), camera);
   const Photo lit = MustPhotograph(EffectLines{}, request);
   const Photo shadowed = MustPhotograph({{"cast_shadow", {"strength=1"}}}, request);
   int object = 0, darker = 0;
@@ -153,6 +156,47 @@ TEST(PhotoShading, ABallThrowsNoShadowOnItsLitSide) {
   }
   EXPECT_GT(object, 1500);
   EXPECT_EQ(darker, 0);
+}
+
+TEST(PhotoShading, ABallThrowsNoShadowOnItsLitSide) {
+  ExpectNoShadowOnTheLitSide(BallMesh(0.07, 60, 90), {0, 0, 0});
+}
+
+TEST(PhotoShading, ABallFarFromItsOriginThrowsNoShadowOnItsLitSide) {
+  ExpectNoShadowOnTheLitSide(BallMesh(0.07, 60, 90), {3, -2, 1});
+}
+
+// Of large triangles single precision knows places least.
+TEST(PhotoShading, ABoardThrowsNoShadowOnItsLitSide) {
+  geometry::TriangleMesh mesh;
+  AddBox({-0.11, -0.015, -0.09}, {0.11, 0.015, 0.09}, &mesh);
+  const Eigen::AngleAxisf turn(0.4f, Eigen::Vector3f(0.3f, 0.5f, 0.8f).normalized());
+  for (Eigen::Vector3f& vertex_m : mesh.vertices_m) vertex_m = turn * vertex_m;
+  ExpectNoShadowOnTheLitSide(mesh, {0, 0, 0});
+}
+
+// A micrometre a pixel: a border that lies off by a fiftieth of an ordinary pixel reads as a lamp that stands elsewhere.
+TEST(PhotoShading, TheBorderOfAShadowLiesWhereTheLampPutsIt) {
+  constexpr double kHeightM = 0.02, kPixelM = 1e-6, kDistanceM = 0.2;
+  geometry::TriangleMesh mesh;
+  AddBox({-0.08, -0.08, -0.01}, {0.08, 0.08, 0}, &mesh);
+  AddBox({-0.04, 0.03, -0.001}, {0.06, 0.05, kHeightM}, &mesh);
+  const geometry::Bounds bounds = ComputeBounds(mesh);
+  // Seen from above, with +y up in the picture, "right" is +x and "towards the eye" +z.
+  const Eigen::Vector3d key_m = bounds.Centre() + 0.5 * bounds.DiagonalM() * Eigen::Vector3d(-3.5, 4, 4);
+  const double edge_y_m = 0.03;
+  const double border_y_m = edge_y_m - kHeightM * (key_m.y() - edge_y_m) / (key_m.z() - kHeightM);
+  Camera camera;
+  camera.at_m = {0.02, border_y_m, 0};
+  camera.eye_m = {0.02, border_y_m, kDistanceM};
+  camera.up = Eigen::Vector3d::UnitY();
+  PhotoRequest request = RequestOf(MakeSurface("wall", mesh), camera, 100, 100);
+  request.lens.fx_px = request.lens.fy_px = kDistanceM / kPixelM;
+  const Photo lit = MustPhotograph(EffectLines{}, request);
+  const Photo shadowed = MustPhotograph({{"cast_shadow", {"strength=1"}}}, request);
+  int darker = 0;
+  for (size_t i = 0; i < lit.grey.size(); ++i) darker += shadowed.grey[i] < 0.5f * lit.grey[i];
+  EXPECT_NEAR(darker / 100.0, 50, 3);
 }
 
 TEST(PhotoShading, AFlatTriangleTurnedAwayFromTheLampLiesInItsShadow) {

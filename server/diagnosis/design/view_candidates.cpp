@@ -61,10 +61,14 @@ double RadicalInverse(int number, int base) {
 
 // Numbers that a person can read off a plan: 0.01 mm, and 1e-4 of a direction.
 session::CameraPlacement Rounded(session::CameraPlacement camera) {
-  const auto round = [](Eigen::Vector3d* v, double unit) {
-    for (int axis = 0; axis < 3; ++axis) (*v)[axis] = std::round((*v)[axis] / unit) * unit + 0.0;
+  // Rounded as they are written, in millimetres, so that a file has "-31.33" and reads back the same camera.
+  const auto length = [](double metres) {
+    return ToSi(Unit::kMillimetre, std::round(FromSi(Unit::kMillimetre, metres) * 100) / 100 + 0.0);
   };
-  round(&camera.eye_m, 1e-5), round(&camera.at_m, 1e-5), round(&camera.up, 1e-4);
+  const auto direction = [](double part) { return std::round(part * 1e4) / 1e4 + 0.0; };
+  camera.eye_m = camera.eye_m.unaryExpr(length);
+  camera.at_m = camera.at_m.unaryExpr(length);
+  camera.up = camera.up.unaryExpr(direction);
   return camera;
 }
 

@@ -5,8 +5,8 @@
 
 The pictures are rendered by this benchmark's oracle, which shares no code with the product. They are no photographs.
 """
+import argparse
 import pathlib
-import sys
 
 import sets
 
@@ -14,7 +14,9 @@ HIDDEN = {"exposure": 0.25, "radial_distortion": (-0.15, 0.0)}  # stops; k1, k2
 
 
 def main():
-    folder = pathlib.Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path, help="is made if it is not there")
+    folder = parser.parse_args().folder
     scene = sets.make_scene(20, pictures=7, repeats=2)
     truth = sets.Truth("example", scene.seed, effects=HIDDEN)
     physics = sets.make_physics(HIDDEN)
