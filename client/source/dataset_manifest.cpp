@@ -137,7 +137,9 @@ Json MakeIdentity(const v1::DatasetSpec& spec, const v1::DatasetHeader& header, 
   return identity;
 }
 
-absl::StatusOr<v1::DatasetSpec> SpecOfManifest(const Json& manifest, const std::string& origin) {
+namespace {
+
+absl::StatusOr<v1::DatasetSpec> SpecOf(const Json& manifest, const std::string& origin) {
   if (!manifest.contains("specification") || !manifest.contains("model"))
     return absl::InvalidArgumentError(
         absl::StrCat(origin, ": has no 'specification' and 'model'; is it a dataset.json?"));
@@ -155,6 +157,16 @@ absl::StatusOr<v1::DatasetSpec> SpecOfManifest(const Json& manifest, const std::
   return spec;
 }
 
+}  // namespace
+
+absl::StatusOr<v1::DatasetSpec> SpecOfManifest(const Json& manifest, const std::string& origin) {
+  try {
+    return SpecOf(manifest, origin);
+  } catch (const Json::exception& error) {
+    return absl::InvalidArgumentError(absl::StrCat(origin, ": ", error.what()));
+  }
+}
+
 std::string FormatManifest(const DatasetManifest& manifest, bool complete) {
   Json json;
   json["touchstone"] = kManifestFormat;
@@ -170,26 +182,56 @@ std::string FormatManifest(const DatasetManifest& manifest, bool complete) {
   return json.dump(2) + "\n";
 }
 
-absl::StatusOr<DatasetManifest> ParseManifest(const std::string& text, const std::string& origin) {
-  Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object() || json.value("touchstone", "") != kManifestFormat ||
-      !json.contains("shards") || !json["shards"].is_array() || !json.contains("shard_size") ||
-      !json["shard_size"].is_number_unsigned() || json["shard_size"].get<uint64_t>() == 0)
-    return absl::InvalidArgumentError(absl::StrCat(origin, ": is no touchstone ", kManifestFormat, " file"));
+namespace {
+
+// nlohmann throws where a value has another type than the one that is asked for.
+absl::StatusOr<DatasetManifest> ReadFields(Json json) {
   DatasetManifest manifest;
-  const uint64_t shard_size = json["shard_size"];
+  const uint64_t shard_size = json["shard_size"], samples = json["samples"];
+  TOUCHSTONE_RETURN_IF_ERROR(ParseShardFormat(json["format"].get<std::string>()).status());
+  if (json.contains("renderer")) static_cast<void>(json["renderer"].get<std::string>());
+  if (shard_size == 0) return absl::InvalidArgumentError("'shard_size' is 0");
   for (const Json& item : json["shards"]) {
     FinishedShard shard;
-    shard.name = item.value("name", "");
-    shard.first_index = item.value("first_index", uint64_t{0});
-    shard.samples = item.value("samples", uint64_t{0});
-    shard.bytes = item.value("bytes", uint64_t{0});
-    shard.sha256 = item.value("sha256", "");
-    manifest.shards[shard.first_index / shard_size] = shard;
+    shard.name = item.at("name").get<std::string>();
+    shard.first_index = item.at("first_index");
+    shard.samples = item.at("samples");
+    shard.bytes = item.at("bytes");
+    shard.sha256 = item.at("sha256").get<std::string>();
+    if (shard.first_index >= samples || shard.first_index % shard_size != 0)
+      return absl::InvalidArgumentError(absl::StrCat("shard '", shard.name, "' begins at sample ",
+                                                     shard.first_index, ", where none of ", samples,
+                                                     " samples, ", shard_size, " a shard, begins"));
+    manifest.shards[shard.first_index / shard_size] = std::move(shard);
   }
   for (const char* key : {"touchstone", "state", "shards"}) json.erase(key);
   manifest.identity = std::move(json);
   return manifest;
+}
+
+}  // namespace
+
+absl::StatusOr<DatasetManifest> ParseManifest(const std::string& text, const std::string& origin) {
+  Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded() || !json.is_object() || !json.contains("touchstone") ||
+      json["touchstone"] != kManifestFormat)
+    return absl::InvalidArgumentError(absl::StrCat(origin, ": is no touchstone ", kManifestFormat, " file"));
+  for (const char* key : {"format", "samples", "shard_size", "shards"})
+    if (!json.contains(key)) return absl::InvalidArgumentError(absl::StrCat(origin, ": has no '", key, "'"));
+  for (const char* key : {"samples", "shard_size"})
+    if (!json[key].is_number_unsigned())
+      return absl::InvalidArgumentError(
+          absl::StrCat(origin, ": '", key, "' is ", Shown(json[key]), "; a whole number was expected"));
+  if (!json["shards"].is_array())
+    return absl::InvalidArgumentError(absl::StrCat(origin, ": 'shards' is no list"));
+  try {
+    absl::StatusOr<DatasetManifest> manifest = ReadFields(std::move(json));
+    if (!manifest.ok())
+      return absl::InvalidArgumentError(absl::StrCat(origin, ": ", manifest.status().message()));
+    return manifest;
+  } catch (const Json::exception& error) {
+    return absl::InvalidArgumentError(absl::StrCat(origin, ": ", error.what()));
+  }
 }
 
 std::vector<std::string> DiffIdentities(const Json& there, const Json& now) {

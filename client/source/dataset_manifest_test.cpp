@@ -76,10 +76,48 @@ TEST(DatasetManifest, DifferencesAreNamed) {
 }
 
 TEST(DatasetManifest, OtherFilesAreRefused) {
-  for (const char* text : {"", "{", "[]", "{}", R"({"touchstone":"dataset/2","shards":[],"shard_size":1})",
-                           R"({"touchstone":"dataset/1","shards":[],"shard_size":0})"})
+  for (const char* text : {"", "{", "[]", "{}", R"({"touchstone":"dataset/2","shards":[],"shard_size":1})"})
     EXPECT_THAT(std::string(ParseManifest(text, "x.json").status().message()), StartsWith("x.json: is no"))
         << text;
+  EXPECT_THAT(
+      std::string(
+          ParseManifest(
+              R"({"touchstone":"dataset/1","format":"folder","samples":5,"shards":[],"shard_size":0})",
+              "x.json")
+              .status()
+              .message()),
+      HasSubstr("'shard_size' is 0"));
+}
+
+// A file that somebody edited is an error with the file's name, whatever stands where.
+TEST(DatasetManifest, AValueOfAnotherTypeIsAnError) {
+  const Example example;
+  const auto whole = nlohmann::ordered_json::parse(FormatManifest(example.Manifest(), false));
+  std::vector<std::string> places = {"/shards",  "/shards/0",      "/model",   "/objects",
+                                     "/columns", "/specification", "/versions"};
+  const nlohmann::ordered_json flat = whole.flatten();
+  for (const auto& [path, value] : flat.items()) places.push_back(path);
+  const std::vector<nlohmann::ordered_json> strange = {nullptr,
+                                                       true,
+                                                       -1,
+                                                       1e300,
+                                                       "text",
+                                                       nlohmann::ordered_json::array({1}),
+                                                       nlohmann::ordered_json::object({{"a", 1}})};
+  int refused = 0;
+  for (const std::string& place : places)
+    for (const auto& value : strange) {
+      nlohmann::ordered_json changed = whole;
+      changed[nlohmann::ordered_json::json_pointer(place)] = value;
+      const auto manifest = ParseManifest(changed.dump(), "there/dataset.json");
+      const absl::Status status = manifest.ok()
+                                      ? SpecOfManifest(manifest->identity, "there/dataset.json").status()
+                                      : manifest.status();
+      if (status.ok()) continue;
+      ++refused;
+      EXPECT_THAT(std::string(status.message()), HasSubstr("there/dataset.json")) << place;
+    }
+  EXPECT_GT(refused, 100);
 }
 
 }  // namespace

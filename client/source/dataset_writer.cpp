@@ -11,6 +11,7 @@
 #include <chrono>
 #include <filesystem>
 
+#include "client/source/dataset_folder.h"
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -20,38 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxManifestBytes = uint64_t{1} << 30;
 constexpr double kManifestIntervalS = 1;
 constexpr char kHowToGoOn[] = "Use another folder, or --restart to delete what is there";
-
-// "shard-000012.tar", "shard-000012", "shard-000012.h5" and their .part; nothing else in a folder is ours.
-bool IsShardName(const std::string& name) {
-  const std::string prefix = "shard-";
-  if (name.rfind(prefix, 0) != 0) return false;
-  const size_t end = name.find_first_not_of("0123456789", prefix.size());
-  const std::string rest = end == std::string::npos ? "" : name.substr(end);
-  return end != prefix.size() && (rest.empty() || rest == ".tar" || rest == ".h5" || rest == ".part" ||
-                                  rest == ".tar.part" || rest == ".h5.part");
-}
-
-// "dataset.json" and the jobs' "dataset.job-1-of-4.json".
-bool IsManifestName(const std::string& name) {
-  return name == kManifestName || name == absl::StrCat(kManifestName, kPartSuffix) ||
-         (name.rfind("dataset.job-", 0) == 0 && name.find(".json") != std::string::npos);
-}
-
-std::vector<fs::path> ListFolder(const std::string& folder) {
-  std::vector<fs::path> paths;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
-    paths.push_back(entry->path());
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-bool IsWholeManifest(const fs::path& path) {
-  return IsManifestName(path.filename().string()) && path.extension() == ".json";
-}
 
 }  // namespace
 
@@ -182,8 +153,7 @@ absl::Status DatasetWriter::Resolve() {
   if (request_spec_.image().renderer() == v1::RENDERER_KIND_UNSPECIFIED && request_spec_.has_image()) {
     for (const fs::path& path : ListFolder(job_.folder)) {
       if (!IsWholeManifest(path)) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path.string(), kMaxManifestBytes));
-      TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ParseManifest(text, path.string()));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ReadManifest(path));
       request_spec_.mutable_image()->set_renderer(RendererOfName(before.identity.value("renderer", "")));
       break;
     }
@@ -216,17 +186,16 @@ absl::Status DatasetWriter::FindFinishedShards() {
   std::map<uint64_t, FinishedShard> listed;
   for (const fs::path& path : ListFolder(job_.folder)) {
     if (!IsWholeManifest(path)) continue;
-    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMaxManifestBytes);
-    if (absl::IsNotFound(text.status()) && job_.job_count > 1)
+    const absl::StatusOr<DatasetManifest> before = ReadManifest(path);
+    if (absl::IsNotFound(before.status()) && job_.job_count > 1)
       continue;  // another job has just completed the dataset
-    TOUCHSTONE_RETURN_IF_ERROR(text.status());
-    TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest before, ParseManifest(*text, path.string()));
-    const std::vector<std::string> differences = DiffIdentities(before.identity, manifest_.identity);
+    TOUCHSTONE_RETURN_IF_ERROR(before.status());
+    const std::vector<std::string> differences = DiffIdentities(before->identity, manifest_.identity);
     if (!differences.empty())
       return absl::InvalidArgumentError(absl::StrCat(
           path.string(), " is another dataset: ", absl::StrJoin(differences, "; "), ". ", kHowToGoOn));
     any_manifest = true;
-    listed.insert(before.shards.begin(), before.shards.end());
+    listed.insert(before->shards.begin(), before->shards.end());
   }
   if (!any_manifest)
     for (const fs::path& path : ListFolder(job_.folder))
@@ -234,30 +203,36 @@ absl::Status DatasetWriter::FindFinishedShards() {
         return absl::InvalidArgumentError(absl::StrCat(path.string(), " stands there, but no ", kManifestName,
                                                        " says of what dataset. ", kHowToGoOn));
 
-  // What stands under a shard's own name is whole. One that the manifest does not list yet is hashed now.
   for (uint64_t shard = 0; shard < layout_.ShardCount(); ++shard) {
     if (!Mine(shard)) continue;
     progress_.samples_in_job += layout_.SamplesIn(shard);
-    const std::string path = absl::StrCat(job_.folder, "/", layout_.ShardName(shard));
-    std::error_code error;
-    if (!fs::exists(path, error)) continue;
-    const auto known = listed.find(shard);
-    const bool same_size = known != listed.end() && (layout_.format == ShardFormat::kFolder ||
-                                                     fs::file_size(path, error) == known->second.bytes);
-    if (known != listed.end() && !same_size)
-      return absl::InvalidArgumentError(
-          absl::StrCat(path, " has ", fs::file_size(path, error), " bytes, but ", kManifestName, " says ",
-                       known->second.bytes, ": it was changed. Delete it, and it will be made again"));
-    if (same_size) {
-      manifest_.shards[shard] = known->second;
-    } else {
-      TOUCHSTONE_ASSIGN_OR_RETURN(manifest_.shards[shard], ReadFinishedShard(layout_, shard));
-    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool whole, IsWhole(shard, listed));
+    if (!whole) continue;
+    manifest_.shards[shard] = listed.at(shard);
     progress_.samples_done += layout_.SamplesIn(shard);
     ++result_.shards_found;
   }
   result_.samples_in_dataset = layout_.samples;
   return absl::OkStatus();
+}
+
+// A shard counts when its bytes are those that were written: every one is read. One of which no manifest says anything was
+// finished just before a run was killed, or is anybody's: it is made again.
+absl::StatusOr<bool> DatasetWriter::IsWhole(uint64_t shard, const std::map<uint64_t, FinishedShard>& listed) {
+  const fs::path path = fs::path(job_.folder) / layout_.ShardName(shard);
+  std::error_code error;
+  if (!fs::exists(path, error)) return false;
+  const auto known = listed.find(shard);
+  if (known == listed.end()) {
+    fs::remove_all(path, error);
+    if (error) return FileError(error.value(), path.string(), "cannot be deleted");
+    return false;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const FinishedShard found, ReadFinishedShard(layout_, shard));
+  const std::string difference = DifferenceOf(found, known->second);
+  if (difference.empty()) return true;
+  return absl::InvalidArgumentError(
+      absl::StrCat(path.string(), " ", difference, ": it was changed. Delete it, and it will be made again"));
 }
 
 absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shard) {
@@ -307,6 +282,7 @@ absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shar
       }
     }
     result_.samples_written += batch.rows();
+    result_.draws += batch.message().draws();
     progress_.samples_done += batch.rows();
     progress_.samples_this_run += batch.rows();
     if (on_progress) on_progress(progress_);
@@ -323,13 +299,8 @@ absl::Status DatasetWriter::CompleteTogether() {
   // The merged manifest is a pure function of the shards, so that two jobs that end at the same time write
   // the same file; the jobs' own files go once it stands.
   DatasetManifest merged = manifest_;
-  for (const fs::path& path : ListFolder(job_.folder)) {
-    if (!IsWholeManifest(path)) continue;
-    const absl::StatusOr<std::string> text = ReadFile(path.string(), kMaxManifestBytes);
-    if (!text.ok()) continue;  // removed by a job that has completed the dataset
-    TOUCHSTONE_ASSIGN_OR_RETURN(const DatasetManifest other, ParseManifest(*text, path.string()));
-    merged.shards.insert(other.shards.begin(), other.shards.end());
-  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<DatasetManifest> others, ReadManifests(job_.folder));
+  for (const DatasetManifest& other : others) merged.shards.insert(other.shards.begin(), other.shards.end());
   if (merged.shards.size() < layout_.ShardCount()) return absl::OkStatus();
   TOUCHSTONE_RETURN_IF_ERROR(
       WriteFileAtomically(absl::StrCat(job_.folder, "/", kManifestName), FormatManifest(merged, true)));

@@ -42,6 +42,7 @@ struct DatasetProgress {
 struct DatasetResult {
   uint64_t samples_in_dataset = 0;
   uint64_t samples_written = 0;   // by this run
+  uint64_t draws = 0;             // that they took, rejected ones included; 0: the source does not say
   uint64_t shards_written = 0;    // by this run
   uint64_t shards_found = 0;      // of this job, whole already
   bool dataset_complete = false;  // all jobs' shards are there, dataset.json says "complete"
@@ -69,6 +70,7 @@ class DatasetWriter {
   absl::Status PrepareFolder();
   absl::Status Resolve();  // asks the source what the dataset is
   absl::Status FindFinishedShards();
+  absl::StatusOr<bool> IsWhole(uint64_t shard, const std::map<uint64_t, FinishedShard>& listed);
   absl::Status WriteShards(uint64_t first_shard, uint64_t stop_shard);
   absl::Status WriteManifest();
   absl::Status CompleteTogether();   // parallel jobs: dataset.json once all shards are there

@@ -95,7 +95,7 @@ BatchColumns::Writer::Writer(absl::Span<DatasetBatch> batches, size_t column, si
 
 BatchColumns::BatchColumns(const std::vector<ColumnInfo>& columns, size_t objects,
                            absl::Span<DatasetBatch> batches)
-    : columns_(columns) {
+    : columns_(columns), batches_(batches) {
   for (DatasetBatch& batch : batches) {
     batch.data.resize(columns.size());
     batch.offsets.resize(columns.size());
@@ -109,7 +109,7 @@ BatchColumns::BatchColumns(const std::vector<ColumnInfo>& columns, size_t object
       uint32_t slot = 0;
       for (const DatasetBatch& batch : batches)
         for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
-          const uint64_t index = batch.start_index + row;
+          const uint64_t index = batch.IndexOf(row);
           if (is_index)
             writer.Put(slot, 0, index);
           else
@@ -125,6 +125,8 @@ BatchColumns::BatchColumns(const std::vector<ColumnInfo>& columns, size_t object
 
 void BatchColumns::PutTouches(const TouchSampler::Block& block) const {
   for (const auto& [writer, put] : puts_) put(writer, block);
+  for (size_t touch = 0; touch < block.slots.size(); ++touch)
+    if (block.accepted[touch]) batches_[block.slots[touch] / batches_[0].rows].draws += block.attempt + 1;
 }
 
 absl::Status BatchColumns::AppendPicture(image::Image taken, const DatasetImage& image,

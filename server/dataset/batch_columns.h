@@ -15,12 +15,17 @@
 
 namespace touchstone::dataset {
 
-// One batch: samples start_index .. start_index + rows - 1.
+// One batch: samples start_index .. start_index + rows - 1, or those of a list.
 struct DatasetBatch {
   uint64_t start_index = 0;
   uint32_t rows = 0;
+  std::vector<uint64_t>
+      indices;         // one per row, if they come from a list; start_index is then the place there
+  uint64_t draws = 0;  // that its samples took, those that were rejected included
   std::vector<std::string> data;               // one per column, as ColumnsOf describes them
   std::vector<std::vector<uint64_t>> offsets;  // one per column: rows + 1 entries for kBytes, else empty
+
+  uint64_t IndexOf(uint32_t row) const { return indices.empty() ? start_index + row : indices[row]; }
 };
 
 class BatchColumns {
@@ -30,6 +35,7 @@ class BatchColumns {
   BatchColumns(const std::vector<ColumnInfo>& columns, size_t objects, absl::Span<DatasetBatch> batches);
 
   // The accepted touches of a block, whose slots count the samples from the first batch on.
+  // Their draws are added to the batches'.
   void PutTouches(const TouchSampler::Block& block) const;
 
   // What a picture gives to the columns of images: called sample after sample.
@@ -62,6 +68,7 @@ class BatchColumns {
 
  private:
   const std::vector<ColumnInfo>& columns_;
+  const absl::Span<DatasetBatch> batches_;
   std::vector<std::pair<Writer, PutColumn>> puts_;
 };
 

@@ -15,7 +15,7 @@ absl::Status BatchMaker::Make(absl::Span<DatasetBatch> batches, const std::atomi
   std::vector<uint64_t> indices;
   indices.reserve(batches.size() * batches[0].rows);
   for (const DatasetBatch& batch : batches)
-    for (uint32_t row = 0; row < batch.rows; ++row) indices.push_back(batch.start_index + row);
+    for (uint32_t row = 0; row < batch.rows; ++row) indices.push_back(batch.IndexOf(row));
 
   const BatchColumns columns(columns_, specification_->objects.size(), batches);
   std::vector<touch::TouchPose> poses(specification_->columns.image ? indices.size() : 0);
@@ -44,9 +44,9 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
       image::Camera camera =
           image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);
       camera.vertical_fov_rad = image.vertical_fov_rad;
-      const auto& object =
-          specification_->objects[(batch.start_index + row) % specification_->objects.size()];
-      const image::PhotoNumber number{specification_->seed, batch.start_index + row};
+      const uint64_t index = batch.IndexOf(row);
+      const auto& object = specification_->objects[index % specification_->objects.size()];
+      const image::PhotoNumber number{specification_->seed, index};
       TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
                                   photographs ? image::TakePhotograph(specification_->model, object, camera,
                                                                       image.options, number, &workspace)

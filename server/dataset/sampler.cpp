@@ -7,9 +7,8 @@
 #include <numeric>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/units.h"
 #include "server/touch/batch_row.h"
+#include "server/touch/plan_drawer.h"
 
 namespace touchstone::dataset {
 namespace {
@@ -22,9 +21,9 @@ constexpr uint32_t kProbeAfter = 16;
 }  // namespace
 
 TouchSampler::TouchSampler(const DatasetSpecification& specification)
-    : specification_(specification), simulator_(specification.model) {
+    : specification_(specification), simulator_(specification.model), check_(specification.plan) {
   for (const auto& object : specification.objects)
-    generators_.push_back(touch::MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+    generators_.push_back(touch::MakePoseGenerator(specification.plan, *object, specification.seed));
   plan_ends_ = generators_[0]->Count() != 0;
   const std::vector<touch::CommandedTouch>& list = specification.plan.list;
   if (specification.plan.kind == touch::Plan::Kind::kList)
@@ -88,9 +87,12 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
   for (uint32_t attempt = 0; !workspace->slots.empty(); ++attempt) {
     const std::vector<uint32_t>& slots = workspace->slots;
     const size_t pending = slots.size();
-    if (attempt == specification_.max_draws) return Hopeless(object, indices[slots[0]]);
-    if (attempt == kProbeAfter)
-      TOUCHSTONE_RETURN_IF_ERROR(ProbeDraws(object, indices[slots[0]], attempt, workspace));
+    if (attempt == kProbeAfter || attempt == specification_.max_draws)
+      TOUCHSTONE_RETURN_IF_ERROR(FollowToTheEnd(object, indices[slots[0]]));
+    // What the index's own number or time changes (a formula) shows only here.
+    if (attempt == specification_.max_draws)
+      return absl::FailedPreconditionError(absl::StrCat("sample ", indices[slots[0]], ": none of ", attempt,
+                                                        " draws is a touch of the plan; raise max_draws"));
 
     // Draw all to find the order that keeps neighbours together. Drawing a pose again is cheaper than
     // fetching it from a large array in that order.
@@ -115,7 +117,7 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
         for (const uint32_t place : places) block.push_back(slots[place]);
       DrawBlock(object, indices, attempt, workspace);
       TOUCHSTONE_RETURN_IF_ERROR(RunBlock(object, indices, until, previous_press_m, workspace));
-      sink({workspace->batch, block, workspace->accepted, workspace->poses});
+      sink({workspace->batch, block, workspace->accepted, workspace->poses, attempt});
       for (size_t k = 0; k < block.size(); ++k)
         if (!workspace->accepted[k]) workspace->missed.push_back(block[k]);
     }
@@ -141,11 +143,10 @@ absl::Status TouchSampler::RunBlock(size_t object, absl::Span<const uint64_t> in
   FillBatch(object, indices, previous_press_m, workspace);
   effects::TouchBatch& batch = workspace->batch;
   TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &workspace->touch));
-  workspace->accepted.assign(batch.size(), 1);
-  if (!generators_[object]->Accepts(false))
-    for (int finger = 0; finger < batch.fingers(); ++finger)
-      for (int touch = 0; touch < batch.size(); ++touch)
-        workspace->accepted[touch] &= !std::isnan(batch.travel_m[batch.At(finger, touch)]);
+  check_.Check(batch, workspace->poses, &workspace->check, &workspace->flaws);
+  workspace->accepted.resize(batch.size());
+  for (int touch = 0; touch < batch.size(); ++touch)
+    workspace->accepted[touch] = workspace->flaws[touch] == touch::DrawFlaw::kNone;
   if (until == Until::kMotion) return absl::OkStatus();
   return simulator_.RunSensor(&batch, &workspace->touch);
 }
@@ -190,37 +191,15 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
         batch.previous_press_m[batch.At(finger, k)] = previous_press_m[block[k] * batch.fingers() + finger];
 }
 
-absl::Status TouchSampler::Hopeless(size_t object, uint64_t index) const {
-  const geometry::Surface& surface = *specification_.objects[object];
-  const Eigen::Vector3d size_mm = (surface.bounds().max_m - surface.bounds().min_m) / kMetresPerMillimetre;
-  const model::Model& model = *specification_.model;
-  return absl::FailedPreconditionError(absl::StrCat(
-      "object '", surface.name(), "', sample ", index, ": in ", specification_.max_draws,
-      " draws no touch met it with all ", model.fingers, " fingers; they span ",
-      ShortestNumber((model.fingers - 1) * model.spacing_m / kMetresPerMillimetre),
-      " mm and the object measures ", static_cast<int>(size_mm.x()), " x ", static_cast<int>(size_mm.y()),
-      " x ", static_cast<int>(size_mm.z()),
-      " mm: use a larger object (scale at import), a narrower end effector, or a higher max_draws"));
-}
-
-// All further draws of one index at once.
-absl::Status TouchSampler::ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt,
-                                      Workspace* workspace) const {
-  effects::TouchBatch batch;
-  touch::TouchWorkspace touch_workspace;
-  const uint64_t number = NumberOf(index);
-  for (uint32_t attempt = first_attempt; attempt < specification_.max_draws; ++attempt) {
-    touch::TouchPose pose;
-    generators_[object]->Draw({&number, 1}, attempt, &pose);
-    simulator_.Prepare(1, &batch);
-    batch.surface = specification_.objects[object];
-    touch::SetTouch(pose, specification_.plan.speed_m_s, 0, 0, 0, &batch);
-    TOUCHSTONE_RETURN_IF_ERROR(simulator_.RunToMotion(&batch, &touch_workspace));
-    bool complete = true;
-    for (double travel_m : batch.travel_m) complete &= !std::isnan(travel_m);
-    if (generators_[object]->Accepts(complete)) return absl::OkStatus();
-  }
-  return Hopeless(object, index);
+// All draws of one index at once: the error of an index that none of them can serve.
+absl::Status TouchSampler::FollowToTheEnd(size_t object, uint64_t index) const {
+  touch::PlanDrawer drawer(specification_.plan, specification_.objects[object], specification_.model,
+                           specification_.seed, specification_.max_draws);
+  touch::DrawCounts counts;
+  const absl::Status status = drawer.Draw(NumberOf(index), 0, &counts).status();
+  if (status.ok()) return status;
+  return absl::Status(status.code(), absl::StrCat("object '", specification_.objects[object]->name(),
+                                                  "', sample ", index, ": ", status.message()));
 }
 
 }  // namespace touchstone::dataset

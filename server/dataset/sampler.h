@@ -13,6 +13,7 @@
 
 #include "server/dataset/coherence.h"
 #include "server/dataset/specification.h"
+#include "server/touch/draw_check.h"
 #include "server/touch/simulate.h"
 
 namespace touchstone::dataset {
@@ -35,15 +36,18 @@ class TouchSampler {
     CoherentOrder order;
     effects::TouchBatch batch;
     touch::TouchWorkspace touch;
+    touch::DrawCheck::Workspace check;
+    std::vector<touch::DrawFlaw> flaws;
   };
 
-  // A simulated block. Touch t of the batch is sample indices[slots[t]] if accepted[t]; else it missed and is
-  // drawn again. Pose(t) is as commanded; effects may have changed the batch's own vectors.
+  // A simulated block. Touch t of the batch is sample indices[slots[t]] if accepted[t]; else it is no touch of the
+  // plan (touch/draw_check.h) and is drawn again. All are draw number `attempt` of their samples, from 0. Pose(t) is as commanded; effects may have changed the batch's own vectors.
   struct Block {
     const effects::TouchBatch& batch;
     absl::Span<const uint32_t> slots;
     absl::Span<const uint8_t> accepted;
     absl::Span<const touch::TouchPose> poses;
+    uint32_t attempt = 0;
     const touch::TouchPose& Pose(int touch) const { return poses[touch]; }
   };
   // Called for every block, in no particular order.
@@ -67,12 +71,12 @@ class TouchSampler {
   double PauseBefore(const touch::Plan& plan, uint64_t index) const;
   void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const double> previous_press_m,
                  Workspace* workspace) const;
-  absl::Status Hopeless(size_t object, uint64_t index) const;
-  absl::Status ProbeDraws(size_t object, uint64_t index, uint32_t first_attempt, Workspace* workspace) const;
+  absl::Status FollowToTheEnd(size_t object, uint64_t index) const;
   uint64_t NumberOf(uint64_t index) const;
 
   const DatasetSpecification& specification_;
   const touch::TouchSimulator simulator_;
+  const touch::DrawCheck check_;
   std::vector<std::unique_ptr<touch::PoseGenerator>> generators_;  // one per object
   bool plan_ends_ = false;
   std::vector<std::string> list_covariates_;  // that the model needs and every touch of a list carries

@@ -76,6 +76,11 @@ absl::StatusOr<ColumnChoice> ColumnChoice::FromNames(const std::vector<std::stri
   return choice;
 }
 
+absl::Status CheckMaxDraws(uint32_t max_draws) {
+  if (max_draws >= 1 && max_draws <= 1'000'000) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("max_draws = ", max_draws, ": must be from 1 to 1000000"));
+}
+
 absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin images) {
   if (specification->objects.empty())
     return absl::InvalidArgumentError(
@@ -88,9 +93,7 @@ absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin im
   if (specification->columns.image && images == ImageOrigin::kRendered && specification->model != nullptr)
     TOUCHSTONE_RETURN_IF_ERROR(
         image::CheckPhotographStyle(*specification->model, specification->image.options));
-  if (specification->max_draws < 1 || specification->max_draws > 1'000'000)
-    return absl::InvalidArgumentError(
-        absl::StrCat("max_draws = ", specification->max_draws, ": must be from 1 to 1000000"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMaxDraws(specification->max_draws));
 
   const auto generator =
       touch::MakePoseGenerator(specification->plan, specification->objects[0]->bounds(), specification->seed);

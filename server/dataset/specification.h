@@ -62,6 +62,9 @@ enum class ImageOrigin { kRendered, kPhotographed };
 absl::Status ValidateDataset(DatasetSpecification* specification,
                              ImageOrigin images = ImageOrigin::kRendered);
 
+// From 1 to a million.
+absl::Status CheckMaxDraws(uint32_t max_draws);
+
 // Which touch of the plan sample `index` is: a plan that ends goes through its touches for each object in turn; a
 // random one numbers its draws by the sample.
 inline uint64_t PlanNumber(uint64_t index, size_t objects, bool plan_ends) {

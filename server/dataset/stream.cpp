@@ -20,6 +20,31 @@ constexpr uint64_t kMaxBatchBytes = 192 << 20;
 
 }  // namespace
 
+absl::StatusOr<DatasetPart> DatasetPart::Resolved(uint64_t samples, uint32_t default_batch_size) const {
+  for (size_t k = 0; k < indices.size(); ++k)
+    if (indices[k] >= samples)
+      return absl::OutOfRangeError(absl::StrCat("indices[", k, "] = ", indices[k], ": the dataset has ",
+                                                samples, " samples, from 0 on"));
+  const uint64_t end = indices.empty() ? samples : indices.size();
+  DatasetPart resolved = *this;
+  if (resolved.stop_index == 0) resolved.stop_index = end;
+  if (resolved.stop_index > end)
+    return absl::OutOfRangeError(absl::StrCat("stop_index = ", stop_index, ": ",
+                                              indices.empty() ? "the dataset has " : "the list has ", end,
+                                              indices.empty() ? " samples" : " indices"));
+  if (resolved.batch_size == 0) resolved.batch_size = default_batch_size;
+  if (resolved.batch_stride == 0) resolved.batch_stride = 1;
+  return resolved;
+}
+
+DatasetBatch DatasetPart::BatchAt(uint64_t start) const {
+  DatasetBatch batch;
+  batch.start_index = start;
+  batch.rows = static_cast<uint32_t>(std::min<uint64_t>(batch_size, stop_index - start));
+  if (!indices.empty()) batch.indices.assign(indices.begin() + start, indices.begin() + start + batch.rows);
+  return batch;
+}
+
 struct DatasetStream::Shared {
   explicit Shared(std::shared_ptr<const DatasetSpecification> specification)
       : maker(std::move(specification)) {}
@@ -51,16 +76,10 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
                  : column.BytesPerSample();
   const uint64_t max_rows = std::max<uint64_t>(1, kMaxBatchBytes / bytes);
 
-  DatasetPart& resolved = stream->part_;
-  resolved = part;
-  if (resolved.stop_index == 0) resolved.stop_index = specification->samples;
-  if (resolved.batch_size == 0)
-    resolved.batch_size = std::min<uint64_t>(specification->columns.image ? 64 : 4096, max_rows);
-  if (resolved.batch_stride == 0) resolved.batch_stride = 1;
-  if (resolved.stop_index > specification->samples)
-    return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
-                                              specification->samples, " samples"));
-  if (resolved.batch_size > max_rows)
+  const auto default_rows =
+      static_cast<uint32_t>(std::min<uint64_t>(specification->columns.image ? 64 : 4096, max_rows));
+  TOUCHSTONE_ASSIGN_OR_RETURN(stream->part_, part.Resolved(specification->samples, default_rows));
+  if (stream->part_.batch_size > max_rows)
     return absl::InvalidArgumentError(absl::StrCat("batch_size = ", part.batch_size,
                                                    ": a sample of these columns has ", bytes,
                                                    " bytes, so at most ", max_rows, " go into a batch"));
@@ -85,9 +104,7 @@ std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
   auto chunk = std::make_shared<Chunk>();
   uint64_t samples = 0;
   while (next_index_ < part_.stop_index && (samples == 0 || samples + part_.batch_size <= chunk_samples_)) {
-    DatasetBatch batch;
-    batch.start_index = next_index_;
-    batch.rows = static_cast<uint32_t>(std::min<uint64_t>(part_.batch_size, part_.stop_index - next_index_));
+    DatasetBatch batch = part_.BatchAt(next_index_);
     samples += batch.rows;
     chunk->batches.push_back(std::move(batch));
     const uint64_t step = uint64_t{part_.batch_size} * part_.batch_stride;

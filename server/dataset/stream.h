@@ -26,9 +26,16 @@ struct DatasetPart {
   uint64_t stop_index = 0;    // exclusive; 0: to the end
   uint32_t batch_size = 0;    // 0: 4096, or 64 with images
   uint32_t batch_stride = 1;  // after each batch, stride - 1 batches are left out
+  // Instead of the dataset in its order these samples, in this order; the indices above then count places in this list.
+  std::vector<uint64_t> indices;
+
+  // The part with its defaults filled in, of a dataset with so many samples. OUT_OF_RANGE: beyond its end.
+  absl::StatusOr<DatasetPart> Resolved(uint64_t samples, uint32_t default_batch_size) const;
+  // The batch that begins at this index or place, below stop_index, without data.
+  DatasetBatch BatchAt(uint64_t start) const;
 };
 
-// Fills one contiguous run of batches, by the calling thread alone. Sample i is the same in whatever run.
+// Fills a run of batches, by the calling thread alone. Sample i is the same in whatever run.
 class BatchMaker {
  public:
   explicit BatchMaker(std::shared_ptr<const DatasetSpecification> specification);

@@ -47,6 +47,47 @@ TEST(DatasetStream, APartIsTheSamePartOfTheWhole) {
   }
 }
 
+TEST(DatasetStream, SamplesOfAListAreThoseOfTheWhole) {
+  const std::vector<ColumnInfo> infos = ColumnsOf(SmallDataset(kSamples));
+  DatasetPart part;
+  part.indices = {29999, 0, 17, 17, 12345, 3, 29998, 17};
+  for (const uint32_t batch_size : {1u, 3u, 8u, 100u}) {
+    part.batch_size = batch_size;
+    const std::vector<std::string> columns = Columns(SmallDataset(kSamples), part, 2);
+    for (size_t k = 0; k < columns.size(); ++k) {
+      std::string expected;
+      for (const uint64_t index : part.indices)
+        expected += Whole()[k].substr(index * infos[k].BytesPerSample(), infos[k].BytesPerSample());
+      EXPECT_EQ(columns[k], expected) << infos[k].name << ", batches of " << batch_size;
+    }
+  }
+}
+
+TEST(DatasetStream, AStreamOfAListGoesOnAtAPlaceInIt) {
+  DatasetPart part;
+  part.indices = {5, 900, 2, 77, 4};
+  part.start_index = 1, part.stop_index = 4, part.batch_size = 2;
+  const std::vector<std::string> tail = Columns(SmallDataset(kSamples), part, 1);
+  part = DatasetPart();
+  part.indices = {900, 2, 77};
+  EXPECT_EQ(tail, Columns(SmallDataset(kSamples), part, 1));
+}
+
+TEST(DatasetStream, AListBeyondTheDatasetIsRefused) {
+  ThreadPool pool(1);
+  auto specification = std::make_shared<DatasetSpecification>(SmallDataset(100));
+  ASSERT_TRUE(ValidateDataset(specification.get()).ok());
+  DatasetPart part;
+  part.indices = {0, 99, 100};
+  const auto stream = DatasetStream::Create(specification, part, &pool);
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_THAT(stream.status().message(), testing::HasSubstr("indices[2] = 100: the dataset has 100 samples"));
+  part.indices = {0, 99};
+  part.stop_index = 3;
+  EXPECT_THAT(DatasetStream::Create(specification, part, &pool).status().message(),
+              testing::HasSubstr("the list has 2 indices"));
+}
+
 TEST(DatasetStream, StridedWorkersTogetherGiveTheWholeInOrder) {
   constexpr uint32_t kWorkers = 3, kBatch = 1000;
   std::vector<std::unique_ptr<DatasetStream>> workers;

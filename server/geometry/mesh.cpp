@@ -6,7 +6,9 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "server/base/check.h"
 #include "server/base/text.h"
@@ -148,6 +150,22 @@ Bounds ComputeBounds(const TriangleMesh& mesh) {
   bounds.min_m = lower.cast<double>();
   bounds.max_m = upper.cast<double>();
   return bounds;
+}
+
+double DistanceToLeave(const Bounds& bounds, const Eigen::Vector3d& point_m,
+                       const Eigen::Vector3d& direction) {
+  double enters_m = 0, leaves_m = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low_m = bounds.min_m[axis] - point_m[axis], high_m = bounds.max_m[axis] - point_m[axis];
+    if (direction[axis] == 0) {
+      if (low_m > 0 || high_m < 0) return 0;
+      continue;
+    }
+    const double first_m = low_m / direction[axis], second_m = high_m / direction[axis];
+    enters_m = std::max(enters_m, std::min(first_m, second_m));
+    leaves_m = std::min(leaves_m, std::max(first_m, second_m));
+  }
+  return leaves_m >= enters_m && std::isfinite(leaves_m) ? leaves_m : 0;
 }
 
 MeshReport InspectMesh(const TriangleMesh& mesh) {

@@ -33,6 +33,10 @@ struct Bounds {
 
 Bounds ComputeBounds(const TriangleMesh& mesh);
 
+// How far it is from a point along a unit vector to where that ray leaves the box for good; 0: it does not meet the box.
+double DistanceToLeave(const Bounds& bounds, const Eigen::Vector3d& point_m,
+                       const Eigen::Vector3d& direction);
+
 // What a mesh is like, for `mesh info` and for refusing what cannot be touched. Edges, duplicates and
 // degeneracy are judged by position: vertices at exactly the same place are one, so that a seam of textures
 // or a triangle soup does not read as a hole. A triangle with two corners at one place has no edges.

@@ -62,9 +62,7 @@ std::string Extension(const std::string& path) {
 }
 
 absl::Status CheckImport(const MeshImport& import) {
-  if (FindNamed(kUnits, import.unit) == nullptr)
-    return absl::InvalidArgumentError(
-        absl::StrCat("unknown mesh unit '", import.unit, "'", DidYouMean(import.unit, MeshUnitNames())));
+  TOUCHSTONE_RETURN_IF_ERROR(MetresPerMeshUnit(import.unit).status());
   if (FindNamed(kUpAxes, import.up) == nullptr)
     return absl::InvalidArgumentError(
         absl::StrCat("unknown up axis '", import.up, "'", DidYouMean(import.up, MeshUpAxisNames())));
@@ -147,6 +145,12 @@ absl::StatusOr<TriangleMesh> Finish(const MeshReading& reading, const MeshImport
 
 std::vector<std::string> MeshUnitNames() {
   return Names(kUnits);
+}
+
+absl::StatusOr<double> MetresPerMeshUnit(const std::string& unit) {
+  if (const MeshUnit* found = FindNamed(kUnits, unit)) return found->metres;
+  return absl::InvalidArgumentError(
+      absl::StrCat("unknown mesh unit '", unit, "'", DidYouMean(unit, MeshUnitNames())));
 }
 std::vector<std::string> MeshUpAxisNames() {
   return Names(kUpAxes);

@@ -31,7 +31,9 @@ struct MeshImport {
   uint64_t max_triangles = 4'000'000;
 };
 
-std::vector<std::string> MeshUnitNames();    // mm, cm, m, inch
+std::vector<std::string> MeshUnitNames();  // mm, cm, m, inch
+absl::StatusOr<double> MetresPerMeshUnit(
+    const std::string& unit);                // INVALID_ARGUMENT names the nearest known one
 std::vector<std::string> MeshUpAxisNames();  // z, y (turned by 90 deg about x), x (by -90 deg about y)
 std::vector<std::string> MeshFormatNames();  // what ReadMeshFile reads: off, obj, stl, ply
 std::vector<std::string> WritableMeshFormatNames();  // what WriteMeshFile writes: off, obj

@@ -9,6 +9,7 @@
 #include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
+#include "server/source/physical_source.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::source {
@@ -45,23 +46,18 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSamples::Create(const Samp
         "be right");
   TOUCHSTONE_ASSIGN_OR_RETURN(samples->request_.session, SessionName(request.session));
   TOUCHSTONE_RETURN_IF_ERROR(dataset::ValidateDataset(&specification, dataset::ImageOrigin::kPhotographed));
-  if (part.stop_index > specification.samples)
-    return absl::OutOfRangeError(absl::StrCat("stop_index = ", part.stop_index, ": the dataset has ",
-                                              specification.samples, " samples"));
+  // A touch takes seconds: whoever waits for a batch should not wait for hours.
+  TOUCHSTONE_ASSIGN_OR_RETURN(part, request.part.Resolved(specification.samples, /*default_batch_size=*/1));
   if (specification.columns.image) {
     if (!device->has_camera())
       return absl::InvalidArgumentError("spec.columns has 'image': this source has no camera");
     TOUCHSTONE_RETURN_IF_ERROR(CheckPhotograph(specification.image));
   }
-  if (part.stop_index == 0) part.stop_index = specification.samples;
-  // A touch takes seconds: whoever waits for a batch should not wait for hours.
-  if (part.batch_size == 0) part.batch_size = 1;
-  if (part.batch_stride == 0) part.batch_stride = 1;
 
   samples->header_ = HeaderOf(specification, device->fingers(), device->spacing_m());
   for (const auto& object : specification.objects)
-    samples->generators_.push_back(
-        touch::MakePoseGenerator(specification.plan, object->bounds(), specification.seed));
+    samples->drawers_.push_back(std::make_unique<touch::PlanDrawer>(
+        specification.plan, object, NominalModelOf(*device), specification.seed, specification.max_draws));
   samples->device_ = device;
   samples->rectify_ = std::move(rectify);
   samples->next_index_ = part.start_index;
@@ -71,9 +67,7 @@ absl::StatusOr<std::unique_ptr<SampleStream>> PhysicalSamples::Create(const Samp
 absl::StatusOr<std::optional<dataset::DatasetBatch>> PhysicalSamples::Next(const MotionGuard& guard) {
   const dataset::DatasetPart& part = request_.part;
   if (next_index_ >= part.stop_index) return std::optional<dataset::DatasetBatch>();
-  dataset::DatasetBatch batch;
-  batch.start_index = next_index_;
-  batch.rows = static_cast<uint32_t>(std::min<uint64_t>(part.batch_size, part.stop_index - next_index_));
+  dataset::DatasetBatch batch = part.BatchAt(next_index_);
   const dataset::BatchColumns columns(header_.columns, request_.objects.size(), absl::MakeSpan(&batch, 1));
   for (uint32_t row = 0; row < batch.rows; ++row) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
@@ -84,10 +78,11 @@ absl::StatusOr<std::optional<dataset::DatasetBatch>> PhysicalSamples::Next(const
 }
 
 absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> PhysicalSamples::MakeTouch(
-    uint64_t index, const MotionGuard& guard) const {
+    uint64_t index, const MotionGuard& guard, uint32_t* attempt) const {
   const dataset::DatasetSpecification& specification = request_.specification;
   const size_t which = index % request_.objects.size();
-  const touch::PoseGenerator& generator = *generators_[which];
+  touch::PlanDrawer& drawer = *drawers_[which];
+  const touch::PoseGenerator& generator = drawer.generator();
   const uint64_t number = dataset::PlanNumber(index, request_.objects.size(), generator.Count() != 0);
   TouchCommand command;
   command.session = request_.session;
@@ -95,9 +90,15 @@ absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> PhysicalSamples::
   command.bounds = specification.objects[which]->bounds();
   if (specification.plan.kind == touch::Plan::Kind::kFaces)
     command.repeat = number / (6 * specification.plan.faces.samples_per_face);
-  for (uint32_t attempt = 0; attempt < specification.max_draws; ++attempt) {
-    command.id = absl::StrCat("dataset-", request_.key, "-", index, "-", attempt);
-    command.touch = touch::TouchOfPlan(specification.plan, generator, number, attempt);
+  touch::DrawCounts counts;
+  for (uint32_t first = 0; first < specification.max_draws; first = *attempt + 1) {
+    absl::StatusOr<touch::PlanDrawer::Drawn> drawn = drawer.Draw(number, first, &counts);
+    if (!drawn.ok())
+      return absl::Status(drawn.status().code(), absl::StrCat("object '", command.object, "', sample ", index,
+                                                              ": ", drawn.status().message()));
+    *attempt = drawn->attempt;
+    command.id = absl::StrCat("dataset-", request_.key, "-", index, "-", *attempt);
+    command.touch = std::move(drawn->touch);
     command.bytes = session::CommandBytes(command.touch);
     TOUCHSTONE_ASSIGN_OR_RETURN(session::JournalTouch touch, device_->Touch(command, guard));
     if (generator.Accepts(EveryFingerHit(touch))) return std::pair(command, std::move(touch));
@@ -110,12 +111,13 @@ absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> PhysicalSamples::
 absl::Status PhysicalSamples::MakeSample(uint32_t row, const MotionGuard& guard,
                                          const dataset::BatchColumns& columns,
                                          dataset::DatasetBatch* batch) const {
-  const uint64_t index = batch->start_index + row;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto made, MakeTouch(index, guard));
+  const uint64_t index = batch->IndexOf(row);
+  uint32_t attempt = 0;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto made, MakeTouch(index, guard, &attempt));
   const auto& [command, touch] = made;
   const uint8_t accepted = 1;
   const touch::TouchPose pose = command.touch;
-  columns.PutTouches({BatchOf(command, touch, index), {&row, 1}, {&accepted, 1}, {&pose, 1}});
+  columns.PutTouches({BatchOf(command, touch, index), {&row, 1}, {&accepted, 1}, {&pose, 1}, attempt});
   const dataset::DatasetSpecification& specification = request_.specification;
   if (!specification.columns.image) return absl::OkStatus();
   const image::Camera camera =

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/source/physical_source.h"
+#include "server/touch/plan_drawer.h"
 
 namespace touchstone::source {
 
@@ -21,10 +22,12 @@ class PhysicalSamples final : public SampleStream {
 
  private:
   PhysicalSamples() = default;
-  // The touch of a sample: drawn again, within bounds, while a finger misses.
+  // The touch of a sample: drawn again, within bounds, while a finger would miss, and touched again with a further draw
+  // while one does miss. Its attempt goes to `attempt`.
   absl::StatusOr<std::pair<TouchCommand, session::JournalTouch>> MakeTouch(uint64_t index,
-                                                                           const MotionGuard& guard) const;
-  // Fills the row of sample start_index + row.
+                                                                           const MotionGuard& guard,
+                                                                           uint32_t* attempt) const;
+  // Fills one row.
   absl::Status MakeSample(uint32_t row, const MotionGuard& guard, const dataset::BatchColumns& columns,
                           dataset::DatasetBatch* batch) const;
 
@@ -32,7 +35,7 @@ class PhysicalSamples final : public SampleStream {
   RigDevice* device_ = nullptr;
   Rectifier rectify_;
   SampleHeader header_;
-  std::vector<std::unique_ptr<touch::PoseGenerator>> generators_;  // one per object
+  std::vector<std::unique_ptr<touch::PlanDrawer>> drawers_;  // one per object
   uint64_t next_index_ = 0;
 };
 

@@ -69,6 +69,10 @@ Eigen::Isometry3d ObjectFromCamera(const image::Camera& camera) {
   return pose;
 }
 
+std::shared_ptr<const model::Model> NominalModelOf(const RigDevice& device) {
+  return std::make_shared<const model::Model>(model::NominalModel(device.fingers(), device.spacing_m()));
+}
+
 SourceInfo PhysicalSource::Describe() const {
   const SourceStatus status = device_->Status();
   SourceInfo info;

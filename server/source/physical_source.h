@@ -15,6 +15,9 @@ using Rectifier =
     std::function<std::vector<uint8_t>(const image::Frame& frame, const image::Intrinsics& intrinsics,
                                        int width, int height, double vertical_fov_rad, bool grey)>;
 
+// The nominal model of a rig's end effector: what decides before a touch whether its fingers will hit.
+std::shared_ptr<const model::Model> NominalModelOf(const RigDevice& device);
+
 class PhysicalSource final : public Source {
  public:
   // `objects` must outlive the source.
@@ -26,6 +29,7 @@ class PhysicalSource final : public Source {
   RigDevice& device() const { return *device_; }
 
  protected:
+  std::shared_ptr<const model::Model> OwnModel() const override { return NominalModelOf(*device_); }
   // Every touch is checked before the first one moves anything.
   absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                            const MotionGuard& guard) override;

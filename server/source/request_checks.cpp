@@ -69,4 +69,10 @@ absl::Status CheckBatchSize(uint32_t batch_size, const SourceLimits& limits) {
       absl::StrCat("batch_size = ", batch_size, ": at most ", limits.max_batch_size));
 }
 
+absl::Status CheckIndices(size_t indices, const SourceLimits& limits) {
+  if (indices <= static_cast<size_t>(limits.max_indices_per_request)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(indices, " indices: at most ", limits.max_indices_per_request, " a request"));
+}
+
 }  // namespace touchstone::source

@@ -17,6 +17,7 @@ struct SourceLimits {
   int max_touches_per_request = 100000;
   int max_images_per_request = 1000;
   int max_batch_size = 65536;
+  int max_indices_per_request = 100000;
 };
 
 // 1 to 64 letters, digits, '_', '-' or '.', not '.' first.
@@ -35,5 +36,8 @@ absl::Status CheckTouchIds(const std::vector<std::string>& ids, size_t touches);
 absl::Status CheckViews(size_t views, const dataset::DatasetImage& image, const SourceLimits& limits);
 
 absl::Status CheckBatchSize(uint32_t batch_size, const SourceLimits& limits);
+
+// Samples that are asked for one by one.
+absl::Status CheckIndices(size_t indices, const SourceLimits& limits);
 
 }  // namespace touchstone::source

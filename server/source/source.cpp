@@ -5,32 +5,61 @@
 #include <algorithm>
 
 #include "server/base/status.h"
+#include "server/touch/plan_drawer.h"
+#include "server/touch/touch_notes.h"
 
 namespace touchstone::source {
 
-absl::StatusOr<std::vector<touch::CommandedTouch>> Source::ExpandPlan(const PlanRequest& request) const {
-  geometry::Bounds bounds;
-  if (request.plan.kind != touch::Plan::Kind::kList) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, objects_.Find(request.object, "object"));
-    bounds = object->surface->bounds();
-  }
-  const auto generator = touch::MakePoseGenerator(request.plan, bounds, request.seed);
+namespace {
+
+// How many touches a request asks for, of a plan with so many (0: no end).
+absl::StatusOr<uint64_t> CountOf(const PlanRequest& request, uint64_t available, uint64_t limit) {
   uint64_t count = request.count;
-  if (generator->Count() != 0) {
-    if (request.first_index > generator->Count())
-      return absl::OutOfRangeError(absl::StrCat("first_index = ", request.first_index, ": the plan has ",
-                                                generator->Count(), " touches"));
-    const uint64_t left = generator->Count() - request.first_index;
+  if (available != 0) {
+    if (request.first_index > available)
+      return absl::OutOfRangeError(
+          absl::StrCat("first_index = ", request.first_index, ": the plan has ", available, " touches"));
+    const uint64_t left = available - request.first_index;
     count = count == 0 ? left : std::min(count, left);
   }
-  const uint64_t limit = limits_.max_touches_per_request;
   if (count > limit)
     return absl::InvalidArgumentError(absl::StrCat("count = ", count, ": at most ", limit,
                                                    " touches per request; ask in parts by first_index"));
-  std::vector<touch::CommandedTouch> touches;
-  for (uint64_t k = 0; k < count; ++k)
-    touches.push_back(touch::TouchOfPlan(request.plan, *generator, request.first_index + k, 0));
-  return touches;
+  return count;
+}
+
+}  // namespace
+
+absl::StatusOr<ExpandedPlan> Source::ExpandPlan(const PlanRequest& request, const MotionGuard& guard) const {
+  const uint64_t limit = limits_.max_touches_per_request;
+  const std::shared_ptr<const model::Model> model = request.model != nullptr ? request.model : OwnModel();
+  ExpandedPlan plan;
+  std::shared_ptr<const geometry::Surface> surface;  // of a list, which may do without, null
+  if (request.plan.kind == touch::Plan::Kind::kList) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t count, CountOf(request, request.plan.list.size(), limit));
+    const auto first = request.plan.list.begin() + request.first_index;
+    plan.touches.assign(first, first + count);
+    if (const absl::StatusOr<const ServedObject*> object = objects_.Find(request.object, "object");
+        object.ok())
+      surface = (*object)->surface;
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, objects_.Find(request.object, "object"));
+    surface = object->surface;
+    touch::PlanDrawer drawer(request.plan, surface, model, request.seed, request.max_draws);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t count, CountOf(request, drawer.generator().Count(), limit));
+    for (uint64_t k = 0; k < count; ++k) {
+      TOUCHSTONE_RETURN_IF_ERROR(guard());
+      const uint64_t number = request.first_index + k;
+      absl::StatusOr<touch::PlanDrawer::Drawn> drawn = drawer.Draw(number, 0, &plan.draws);
+      if (!drawn.ok())
+        return absl::Status(drawn.status().code(), absl::StrCat("object '", request.object, "', touch ",
+                                                                number, ": ", drawn.status().message()));
+      plan.touches.push_back(std::move(drawn->touch));
+    }
+  }
+  if (surface != nullptr)
+    plan.notes = touch::NotesOnTouches(*surface, *model, plan.touches, request.first_index);
+  return plan;
 }
 
 absl::StatusOr<TouchResults> Source::Touch(const TouchRequest& request, const MotionGuard& guard) {
@@ -38,7 +67,10 @@ absl::StatusOr<TouchResults> Source::Touch(const TouchRequest& request, const Mo
   TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* object, objects_.Find(request.object, "object"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckTouchCount(request.touches.size(), limits_));
   TOUCHSTONE_RETURN_IF_ERROR(CheckTouchIds(request.ids, request.touches.size()));
-  return MakeTouches(request, *object, guard);
+  TOUCHSTONE_ASSIGN_OR_RETURN(TouchResults results, MakeTouches(request, *object, guard));
+  const std::shared_ptr<const model::Model> model = request.model != nullptr ? request.model : OwnModel();
+  results.notes = touch::NotesOnTouches(*object->surface, *model, request.touches, request.first_index);
+  return results;
 }
 
 absl::StatusOr<CaptureResults> Source::Capture(const CaptureRequest& request, const MotionGuard& guard) {
@@ -80,6 +112,7 @@ SampleHeader HeaderOf(const dataset::DatasetSpecification& specification, int fi
 
 absl::StatusOr<std::unique_ptr<SampleStream>> Source::Stream(const SampleRequest& request) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckBatchSize(request.part.batch_size, limits_));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckIndices(request.part.indices.size(), limits_));
   SampleRequest resolved = request;
   resolved.specification.objects.clear();
   for (size_t k = 0; k < request.objects.size(); ++k) {

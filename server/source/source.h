@@ -23,6 +23,7 @@
 #include "server/source/object_store.h"
 #include "server/source/request_checks.h"
 #include "server/touch/commanded_touch.h"
+#include "server/touch/draw_check.h"
 #include "server/touch/plan.h"
 
 namespace touchstone::source {
@@ -49,6 +50,15 @@ struct PlanRequest {
   std::string object;  // not needed by a list
   uint64_t seed = 0;
   uint64_t first_index = 0, count = 0;  // count 0: to the plan's end
+  // Whose fingers must all hit, with its effects; null: the source's own.
+  std::shared_ptr<const model::Model> model;
+  uint32_t max_draws = 1000;  // of one touch, before the plan is refused
+};
+
+struct ExpandedPlan {
+  std::vector<touch::CommandedTouch> touches;
+  touch::DrawCounts draws;         // that they took; none for a list
+  std::vector<std::string> notes;  // what is odd about them (touch/touch_notes.h)
 };
 
 struct TouchRequest {
@@ -70,6 +80,7 @@ struct TouchResults {
   std::vector<double> travel_m;
   std::vector<Eigen::Vector3d> contact_m, normal;
   std::shared_ptr<const model::Model> model;  // that simulated
+  std::vector<std::string> notes;             // what is odd about the commands (touch/touch_notes.h)
   // Of a physical source: how each was made. Empty at a virtual one.
   std::string session;
   std::vector<session::JournalTouch> journalled;
@@ -146,7 +157,9 @@ class Source {
   const ObjectStore& objects() const { return objects_; }
   const SourceLimits& limits() const { return limits_; }
   virtual SourceInfo Describe() const = 0;
-  absl::StatusOr<std::vector<touch::CommandedTouch>> ExpandPlan(const PlanRequest& request) const;
+  // Every touch of a generator is drawn until all fingers complete it (touch/draw_check.h). FAILED_PRECONDITION: no
+  // draw does; says which condition failed how often. The guard is asked once per touch.
+  absl::StatusOr<ExpandedPlan> ExpandPlan(const PlanRequest& request, const MotionGuard& guard) const;
 
   // Each checks its request against the limits and the objects before anything is computed or moved: INVALID_ARGUMENT
   // or NOT_FOUND names the field. Beside that, errors are those of the guard and of the source.
@@ -156,6 +169,8 @@ class Source {
   absl::StatusOr<std::unique_ptr<SampleStream>> Stream(const SampleRequest& request);
 
  protected:
+  // The nominal rig behind plans: its fingers, and the effects of a source that simulates. Never null.
+  virtual std::shared_ptr<const model::Model> OwnModel() const = 0;
   // With requests that are checked.
   virtual absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                                    const MotionGuard& guard) = 0;

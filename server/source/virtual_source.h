@@ -24,6 +24,7 @@ class VirtualSource final : public Source {
   SourceInfo Describe() const override;
 
  protected:
+  std::shared_ptr<const model::Model> OwnModel() const override { return default_model_; }
   absl::StatusOr<TouchResults> MakeTouches(const TouchRequest& request, const ServedObject& object,
                                            const MotionGuard& guard) override;
   absl::Status MakePictures(const CaptureRequest& request, const ServedObject& object,

@@ -213,12 +213,12 @@ TEST_F(VirtualSourceTest, ExpandsPlansInParts) {
   request.plan.faces.samples_per_face = 2;
   request.plan.faces.rounds = 2;
   request.object = "lat00";
-  EXPECT_EQ(source_.ExpandPlan(request)->size(), 24u);
+  EXPECT_EQ(source_.ExpandPlan(request, NoObjection)->touches.size(), 24u);
   request.first_index = 20;
   request.count = 10;
-  EXPECT_EQ(source_.ExpandPlan(request)->size(), 4u);
+  EXPECT_EQ(source_.ExpandPlan(request, NoObjection)->touches.size(), 4u);
   request.first_index = 25;
-  EXPECT_EQ(source_.ExpandPlan(request).status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(source_.ExpandPlan(request, NoObjection).status().code(), absl::StatusCode::kOutOfRange);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ struct TouchPose {
   Eigen::Vector3d approach = -Eigen::Vector3d::UnitZ();  // a: unit, direction of motion
   Eigen::Vector3d lateral = Eigen::Vector3d::UnitX();    // s: unit, perpendicular to a, first finger to last
   double standoff_m = 0.06;                              // from the start to T along a
+  bool meets_surface = true;  // of a plan that puts T on the surface: false where nothing stands on its line
 };
 
 inline constexpr double kNoStrokeLimitM = 1e3;

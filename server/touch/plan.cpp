@@ -12,6 +12,11 @@
 namespace touchstone::touch {
 namespace {
 
+// A plan that asks for less has next to no touch.
+constexpr double kMinIncidenceRad = 0.1 * kRadiansPerDegree;
+// A right angle, however it was rounded.
+constexpr double kMaxIncidenceRad = kPi / 2 + 1e-9;
+
 // A word of random bits to 0 .. bound - 1.
 uint64_t Below(uint64_t word, uint64_t bound) {
   return static_cast<uint64_t>((static_cast<unsigned __int128>(word) * bound) >> 64);
@@ -93,8 +98,10 @@ class SphereGenerator : public PoseGenerator {
 
 class FacesGenerator : public PoseGenerator {
  public:
-  FacesGenerator(const FacesPlan& plan, const geometry::Bounds& bounds, uint64_t seed)
-      : plan_(plan), bounds_(bounds), seed_(seed) {}
+  // `surface` null: targets stay on the faces of the box.
+  FacesGenerator(const FacesPlan& plan, const geometry::Bounds& bounds, const geometry::Surface* surface,
+                 uint64_t seed)
+      : plan_(plan), bounds_(bounds), surface_(surface), seed_(seed) {}
 
   void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
     const uint64_t poses_a_round = 6ull * plan_.samples_per_face;
@@ -128,14 +135,33 @@ class FacesGenerator : public PoseGenerator {
       poses[k].approach = approach;
       poses[k].lateral = std::cos(roll) * p + std::sin(roll) * approach.cross(p);
       poses[k].standoff_m = plan_.standoff_m;
+      poses[k].meets_surface = true;
     }
+    if (surface_ != nullptr) PutTargetsOnSurface(absl::MakeSpan(poses, numbers.size()));
   }
   uint64_t Count() const override { return 6ull * plan_.samples_per_face * plan_.rounds; }
   bool CanRedraw() const override { return true; }
 
  private:
+  // Each to where its line first meets the object from outside of the box.
+  void PutTargetsOnSurface(absl::Span<TouchPose> poses) const {
+    const double outside_m = 0.1 * bounds_.DiagonalM();
+    std::vector<Eigen::Vector3d> origins_m, directions;
+    for (const TouchPose& pose : poses) {
+      origins_m.push_back(pose.target_m - outside_m * pose.approach);
+      directions.push_back(pose.approach);
+    }
+    geometry::Contacts contacts;
+    surface_->CastLines(origins_m, directions, kNoStrokeLimitM, &contacts);
+    for (size_t k = 0; k < poses.size(); ++k) {
+      poses[k].meets_surface = !std::isnan(contacts.travel_m[k]);
+      if (poses[k].meets_surface) poses[k].target_m = origins_m[k] + contacts.travel_m[k] * directions[k];
+    }
+  }
+
   const FacesPlan plan_;
   const geometry::Bounds bounds_;
+  const geometry::Surface* const surface_;
   const uint64_t seed_;
 };
 
@@ -177,6 +203,8 @@ absl::Status ValidatePlan(Plan* plan) {
     TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(sphere.step_angle_rad, 1e-5, kPi / 2, "sphere.step_angle_rad"));
     if (sphere.roll_step_rad != 0)
       TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(sphere.roll_step_rad, 1e-5, 2 * kPi, "sphere.roll_step_rad"));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(sphere.max_incidence_rad, kMinIncidenceRad, kMaxIncidenceRad,
+                                            "sphere.max_incidence_rad"));
     return CheckBetween(sphere.radius_ratio, 1, 100, "sphere.radius_ratio");
   }
   const FacesPlan& faces = plan->faces;
@@ -184,20 +212,39 @@ absl::Status ValidatePlan(Plan* plan) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.rounds, 1, 1e6, "faces.rounds"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.max_tilt_rad, 0, kPi / 3, "faces.max_tilt_rad"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckBetween(faces.spread, 0, 1, "faces.spread"));
-  return CheckBetween(faces.standoff_m, 1e-6, 10, "faces.standoff_m");
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween(faces.max_incidence_rad, kMinIncidenceRad, kMaxIncidenceRad, "faces.max_incidence_rad"));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckBetween(faces.stroke_beyond_target_m, 1e-4, kMaxStandoffM, "faces.stroke_beyond_target_m"));
+  return CheckBetween(faces.standoff_m, 1e-6, kMaxStandoffM, "faces.standoff_m");
 }
 
-std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
-                                                 uint64_t seed) {
+namespace {
+
+// `surface` null: only the box is known.
+std::unique_ptr<PoseGenerator> MakeGenerator(const Plan& plan, const geometry::Bounds& bounds,
+                                             const geometry::Surface* surface, uint64_t seed) {
   switch (plan.kind) {
     case Plan::Kind::kFaces:
-      return std::make_unique<FacesGenerator>(plan.faces, bounds, seed);
+      return std::make_unique<FacesGenerator>(plan.faces, bounds, surface, seed);
     case Plan::Kind::kList:
       return std::make_unique<ListGenerator>(plan.list);
     case Plan::Kind::kSphere:
       break;
   }
   return std::make_unique<SphereGenerator>(plan.sphere, bounds, seed);
+}
+
+}  // namespace
+
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Surface& surface,
+                                                 uint64_t seed) {
+  return MakeGenerator(plan, surface.bounds(), &surface, seed);
+}
+
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
+                                                 uint64_t seed) {
+  return MakeGenerator(plan, bounds, nullptr, seed);
 }
 
 CommandedTouch TouchOfPlan(const Plan& plan, const PoseGenerator& generator, uint64_t number,

@@ -8,7 +8,9 @@
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
 
+#include "server/base/touch_limits.h"
 #include "server/geometry/mesh.h"
+#include "server/geometry/surface.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone::touch {
@@ -20,17 +22,27 @@ struct SpherePlan {
   double step_angle_rad = kDefaultStepAngleRad;
   double roll_step_rad = 0;    // 0: no roll
   double radius_ratio = 1.05;  // radius of the start sphere over half the box's diagonal
+  // Largest incidence at any finger's contact; a quarter turn: any.
+  double max_incidence_rad = 3.14159265358979323846 / 2;
   static constexpr double kDefaultStepAngleRad = 3.14159265358979323846 / 180;
 };
 
 // The seed's real protocol: rounds x samples a face x 6 faces of the bounding box (+x -x +y -y +z -z). Touch
 // number n: round n / (6 samples), face (n / samples) mod 6. Every round repeats the same poses.
+// A point is drawn on the face of the box and an approach within the cone around its inward normal; the target is where
+// that line first meets the object's surface from outside. A draw is rejected, and the touch drawn again within its
+// number, where the line meets nothing, where a finger starts inside of the object or behind a part of it, where a
+// finger meets nothing within the stroke, or meets the surface at too large an incidence (draw_check.h).
 struct FacesPlan {
   int samples_per_face = 8;
   int rounds = 4;
   double max_tilt_rad = 20 * 3.14159265358979323846 / 180;  // between approach and the inward face normal
   double spread = 0.6;  // targets lie within this share of the face's half sides
   double standoff_m = 0.06;
+  // Largest angle at any finger's contact between the approach and the inward surface normal; a quarter turn: any.
+  double max_incidence_rad = 60 * 3.14159265358979323846 / 180;
+  // A finger must have met the object when it stands so far behind the target, as a rig's approach ends there.
+  double stroke_beyond_target_m = kDefaultStrokeBeyondTargetM;
 };
 
 struct Plan {
@@ -50,7 +62,7 @@ absl::Status ValidatePlan(Plan* plan);
 class PoseGenerator {
  public:
   virtual ~PoseGenerator() = default;
-  // The pose of touch `number`; `attempt` counts the draws that missed before. poses[k] is for numbers[k].
+  // The pose of touch `number`; `attempt` counts the draws that were rejected before. poses[k] is for numbers[k].
   virtual void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const = 0;
   // How many touches the plan has; 0: no end.
   virtual uint64_t Count() const = 0;
@@ -60,7 +72,10 @@ class PoseGenerator {
   bool Accepts(bool every_finger_hit) const { return every_finger_hit || !CanRedraw(); }
 };
 
-// `bounds` of the object that is touched; `plan` must be valid and outlive the generator.
+// Around the object that is touched; `plan` must be valid and outlive the generator, and so must the surface.
+std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Surface& surface,
+                                                 uint64_t seed);
+// The same where only the box is known: targets of a faces plan then lie on the box's faces, on the same lines.
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
                                                  uint64_t seed);
 

@@ -63,6 +63,25 @@ TEST_F(StreamConformance, APartIsThatPartOfTheWhole) {
   }
 }
 
+TEST_F(StreamConformance, SamplesOfAListAreThoseOfTheWholeInItsOrder) {
+  const Streamed whole = Stream(Request(9, 4));
+  v1::StreamDatasetRequest request = Request(9, 2);
+  const std::vector<uint64_t> indices = {8, 0, 3, 3, 5};
+  request.mutable_indices()->Assign(indices.begin(), indices.end());
+  const Streamed listed = Stream(request);
+  ASSERT_TRUE(listed.status.ok()) << listed.status.error_message();
+  ASSERT_EQ(listed.batches.size(), 3u);
+  EXPECT_EQ(listed.batches[2].start_index(), 4u);
+  for (const std::string column : {"index", "approach", "descriptor_s"}) {
+    // A rig touches sample 3 once: the journal answers for the second.
+    const std::string all = ColumnBytes(whole.batches, column), some = ColumnBytes(listed.batches, column);
+    const size_t bytes = all.size() / 9;
+    std::string expected;
+    for (const uint64_t index : indices) expected += all.substr(index * bytes, bytes);
+    EXPECT_EQ(some, expected) << column;
+  }
+}
+
 TEST_F(StreamConformance, ResumingAtTheEndGivesNothingAndNoError) {
   v1::StreamDatasetRequest request = Request(4, 2);
   request.set_start_index(4);
@@ -105,18 +124,24 @@ TEST_F(StreamConformance, ACancelledStreamEndsSoonAndTheSourceGoesOn) {
 
 TEST_F(StreamConformance, MistakesAreRefusedBeforeAnyBatch) {
   v1::StreamDatasetRequest unknown_object = Request(5, 1), unknown_column = Request(5, 1),
-                           no_plan = Request(5, 1), beyond = Request(5, 1), huge_batch = Request(5, 1);
+                           no_plan = Request(5, 1), beyond = Request(5, 1), huge_batch = Request(5, 1),
+                           no_such_index = Request(5, 1), many_indices = Request(5, 1);
   unknown_object.mutable_spec()->set_objects(0, "lat99");
   unknown_column.mutable_spec()->add_columns("descripter");
   no_plan.mutable_spec()->clear_plan();
   beyond.set_stop_index(6);
   huge_batch.set_batch_size(description_.max_batch_size() + 1);
+  no_such_index.add_indices(4);
+  no_such_index.add_indices(5);
+  many_indices.mutable_indices()->Resize(description_.max_indices_per_request() + 1, 0);
   const std::vector<std::tuple<v1::StreamDatasetRequest, grpc::StatusCode, std::string>> mistakes = {
       {unknown_object, grpc::NOT_FOUND, "lat99"},
       {unknown_column, grpc::INVALID_ARGUMENT, "did you mean 'descriptor'"},
       {no_plan, grpc::INVALID_ARGUMENT, "plan"},
       {beyond, grpc::OUT_OF_RANGE, "5 samples"},
       {huge_batch, grpc::INVALID_ARGUMENT, "batch_size"},
+      {no_such_index, grpc::OUT_OF_RANGE, "indices[1] = 5: the dataset has 5 samples"},
+      {many_indices, grpc::INVALID_ARGUMENT, "a request"},
   };
   for (const auto& [request, code, hint] : mistakes) {
     const Streamed streamed = Stream(request);
