@@ -16,6 +16,7 @@
 #include <fstream>
 #include <memory>
 
+#include "server/base/new_file.h"
 #include "server/base/status.h"
 
 namespace touchstone {
@@ -60,6 +61,9 @@ std::string Finish(const Digest& digest) {
 
 std::string DidYouMean(absl::string_view word, const std::vector<std::string>& known) {
   if (known.empty()) return "";
+  // No name is so long, and the time grows with the square of it.
+  constexpr size_t kLongestWord = 256;
+  if (word.size() > kLongestWord) word = word.substr(0, kLongestWord);
   const std::string* best = nullptr;
   size_t best_distance = std::max<size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : known) {
@@ -160,7 +164,7 @@ absl::Status WriteFileAtomically(const std::string& path, absl::string_view data
   }
   ::close(file);
   if (::rename(part.c_str(), path.c_str()) != 0) return failed("renaming");
-  return absl::OkStatus();
+  return SyncFolderOf(path);
 }
 
 }  // namespace touchstone

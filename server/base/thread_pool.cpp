@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <memory>
 
 namespace touchstone {
@@ -48,9 +49,11 @@ void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int,
   // Shared with tasks that may start only after all work is done and this call has returned.
   struct Shared {
     std::atomic<int> next{0};
+    std::atomic<bool> failed{false};
     std::mutex mutex;
     std::condition_variable done;
     int finished = 0;
+    std::exception_ptr error;  // the first; pieces that begin after it are not called
   };
   auto shared = std::make_shared<Shared>();
   const std::function<void(int, int)>* call =
@@ -59,8 +62,15 @@ void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int,
     for (;;) {
       const int piece = shared->next++;
       if (piece >= pieces) return;
-      (*call)(piece * grain, std::min(count, (piece + 1) * grain));
+      std::exception_ptr error;
+      try {
+        if (!shared->failed) (*call)(piece * grain, std::min(count, (piece + 1) * grain));
+      } catch (...) {
+        error = std::current_exception();
+        shared->failed = true;
+      }
       std::lock_guard<std::mutex> lock(shared->mutex);
+      if (error && !shared->error) shared->error = error;
       if (++shared->finished == pieces) shared->done.notify_all();
     }
   };
@@ -68,6 +78,7 @@ void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int,
   work();
   std::unique_lock<std::mutex> lock(shared->mutex);
   shared->done.wait(lock, [&] { return shared->finished == pieces; });
+  if (shared->error) std::rethrow_exception(shared->error);
 }
 
 void ParallelFor(ThreadPool* pool, int count, int grain,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <new>
 
 namespace touchstone {
 namespace {
@@ -36,6 +37,21 @@ TEST(ThreadPool, ParallelForDoesNotWaitForABusyPool) {
   pool.ParallelFor(10, 1, [&](int begin, int) { sum += begin; });  // this thread does it all
   EXPECT_EQ(sum, 45);
   gate.unlock();
+}
+
+// An exception in a thread of the pool would end the process.
+TEST(ThreadPool, ParallelForThrowsInTheCallerWhatAPieceThrew) {
+  ThreadPool pool(3);
+  for (int bad : {0, 57, 99}) {
+    EXPECT_THROW(pool.ParallelFor(100, 1,
+                                  [bad](int begin, int) {
+                                    if (begin == bad) throw std::bad_alloc();
+                                  }),
+                 std::bad_alloc);
+  }
+  std::atomic<int> done{0};
+  pool.ParallelFor(100, 1, [&](int, int) { ++done; });
+  EXPECT_EQ(done, 100) << "the pool works on";
 }
 
 }  // namespace

@@ -5,8 +5,10 @@
 
 namespace touchstone {
 
-inline constexpr double kMaxTargetM = 100;       // every coordinate of the target
-inline constexpr double kMaxStandoffM = 10;      // from 0
+inline constexpr double kMaxTargetM = 100;   // every coordinate of the target
+inline constexpr double kMaxStandoffM = 10;  // from 0
+// Where no stroke is given, an approach on a rig ends so far behind its target, unless the rig is set otherwise.
+inline constexpr double kDefaultStrokeBeyondTargetM = 0.03;
 inline constexpr double kMaxSpeedMS = 10;        // above 0
 inline constexpr double kMaxSessionTimeS = 1e9;  // from 0
 

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/service/convert.h"
 
@@ -32,20 +33,27 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
                                   v1::StopResponse* response) {
   const uint32_t running = resources_->running_requests;
   ++resources_->stop_count;
-  spdlog::warn("stop from {} at {}: {}; {} requests under way end",
-               request->holder().empty() ? "somebody" : request->holder(), context->peer(),
-               request->reason().empty() ? "no reason given" : request->reason(), running);
+  // A stop is never refused, so what is too long or no text is mended.
+  spdlog::warn(
+      "stop from {} at {}: {}; {} requests under way end",
+      request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes), context->peer(),
+      request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxReasonBytes), running);
   response->set_aborted_touches(running);
   return grpc::Status::OK;
 }
 
 absl::Status CheckReset(const v1::ResetRequest& request) {
-  if (request.holder().empty() || request.holder().size() > 256)
-    return absl::InvalidArgumentError(
-        "holder: say who releases the stop, in 1 to 256 characters, for instance 'ana@bench2'");
-  if (request.reason().empty() || request.reason().size() > 1000)
-    return absl::InvalidArgumentError(
-        "reason: say why the source may move again, in 1 to 1000 characters, for instance 'cable freed'");
+  const auto fits = [](const std::string& text, size_t max_bytes) {
+    return !text.empty() && text.size() <= max_bytes && IsPrintableLine(text);
+  };
+  if (!fits(request.holder(), kMaxHolderBytes))
+    return absl::InvalidArgumentError(absl::StrCat("holder: say who releases the stop, in 1 to ",
+                                                   kMaxHolderBytes,
+                                                   " printable bytes, for instance 'ana@bench2'"));
+  if (!fits(request.reason(), kMaxReasonBytes))
+    return absl::InvalidArgumentError(absl::StrCat("reason: say why the source may move again, in 1 to ",
+                                                   kMaxReasonBytes,
+                                                   " printable bytes, for instance 'cable freed'"));
   return absl::OkStatus();
 }
 

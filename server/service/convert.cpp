@@ -2,15 +2,20 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/effects/all_effects.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::service {
 
+constexpr size_t kMaxMessageBytes = 2048;
+
 grpc::Status ToGrpc(const absl::Status& status) {
-  // The two enumerations share their numbers.
-  return grpc::Status(static_cast<grpc::StatusCode>(status.code()), std::string(status.message()));
+  // The two enumerations share their numbers. A message that repeats what a client sent may not be longer than what
+  // clients take as metadata (8 KB by default, with everything escaped), or they would see another error instead of it.
+  return grpc::Status(static_cast<grpc::StatusCode>(status.code()),
+                      Printable(status.message(), kMaxMessageBytes, /*keep_lines=*/true));
 }
 
 v1::Vector3 ToProto(const Eigen::Vector3d& v) {

@@ -32,6 +32,19 @@ absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diag
 constexpr std::chrono::milliseconds kProgressInterval{250};
 constexpr int kDefaultProposedTouches = 24, kDefaultProposedPhotographs = 12;
 
+// Nothing catches what leaves a thread: the process would end, and with it what other clients do.
+absl::StatusOr<v1::Report> WithoutExceptions(
+    const std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisContext&)>& work,
+    const diagnosis::DiagnosisContext& context) {
+  try {
+    return work(context);
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("there is not enough memory for this set at this server");
+  } catch (const std::exception& error) {
+    return absl::InternalError(absl::StrCat("the diagnosis ended with an unexpected error: ", error.what()));
+  }
+}
+
 // The work runs in a thread of its own and only leaves notes here, so that progress is sent in time whatever
 // the work is at, and a client that reads slowly does not hold it up.
 class Worker {
@@ -42,7 +55,7 @@ class Worker {
           diagnosis::DiagnosisContext context;
           context.pool = pool;
           context.progress = [this](const std::string& stage, double done) { return Note(stage, done); };
-          absl::StatusOr<v1::Report> report = work(context);
+          absl::StatusOr<v1::Report> report = WithoutExceptions(work, context);
           std::lock_guard<std::mutex> lock(mutex_);
           report_ = std::move(report);
           finished_ = true;
@@ -224,11 +237,28 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
         absl::StrCat("photographs = ", request->photographs(), ": at most ", most)));
   const int photographs =
       request->photographs() == 0 ? kDefaultProposedPhotographs : static_cast<int>(request->photographs());
-  const Work work = [touches, photographs](
-                        const diagnosis::DiagnosisInput& input,
+  const bool touches_asked = request->touches() > 0, photographs_asked = request->photographs() > 0;
+  const Work work = [=](const diagnosis::DiagnosisInput& input,
                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
-    if (input.images != nullptr) return touchstone::diagnosis::ProposePhotographSet(input, photographs, how);
-    return AsReport(touchstone::diagnosis::Propose(input, touches, how));
+    const bool both = input.set != nullptr && input.images != nullptr;
+    if (both && touches_asked && photographs_asked)
+      return absl::InvalidArgumentError(
+          "touches and photographs are both asked for, but a plan is of one kind: ask for one, then for the "
+          "other");
+    const bool of_touches = input.images == nullptr || (both && touches_asked);
+    diagnosis::DiagnosisInput alone = input;
+    if (of_touches)
+      alone.images = nullptr;
+    else
+      alone.set = nullptr;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        v1::Report report, of_touches ? AsReport(touchstone::diagnosis::Propose(alone, touches, how))
+                                      : touchstone::diagnosis::ProposePhotographSet(alone, photographs, how));
+    if (both)
+      report.add_warnings(of_touches
+                              ? "proposed from the touches alone: the photographs of the set took no part"
+                              : "proposed from the photographs alone: the touches of the set took no part");
+    return report;
   };
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));

@@ -119,6 +119,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"max_batch_size", "Limit: samples a batch", &o.common.max_batch_size},
       {"max_touches_per_request", "Limit: explicit touches per request", &o.common.max_touches_per_request},
       {"max_images_per_request", "Limit: photographs a request", &o.common.max_images_per_request},
+      {"max_indices_per_request", "Limit: samples asked for one by one, a request",
+       &o.common.max_indices_per_request},
       {"max_streams", "Limit: dataset streams at once", &o.common.max_streams},
       {"max_message_mib", "Limit: size of one message, MiB", &o.common.max_message_mib},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.common.lease_window_s},

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <openssl/rand.h>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 
 namespace touchstone::service {
@@ -33,9 +34,9 @@ v1::Lease LeaseBook::Describe() const {
 }
 
 absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, Clock::time_point now) {
-  if (holder.empty() || holder.size() > 256)
-    return absl::InvalidArgumentError(
-        "holder: say who asks, in 1 to 256 characters, for instance 'ana@bench2'");
+  if (holder.empty() || holder.size() > kMaxHolderBytes || !IsPrintableLine(holder))
+    return absl::InvalidArgumentError(absl::StrCat("holder: say who asks, in 1 to ", kMaxHolderBytes,
+                                                   " printable bytes, for instance 'ana@bench2'"));
   std::lock_guard<std::mutex> lock(mutex_);
   if (Held(now) && !take)
     return absl::FailedPreconditionError(

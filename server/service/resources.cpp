@@ -2,15 +2,47 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
 
 #include <filesystem>
 
+#include "server/base/new_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/source/request_checks.h"
 
 namespace touchstone::service {
+namespace {
+
+constexpr uint64_t kMaxModelBytes = 1 << 20;
+// Nobody writes a file for so long.
+constexpr std::chrono::hours kOldDraft{1};
+
+// The model in a file, by the name of the file.
+absl::StatusOr<model::Model> ReadModel(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxModelBytes));
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
+                              model::ParseModel(text, path, effects::Catalogue(), model::FilesBeside(path)));
+  model.name = std::filesystem::path(path).stem().string();
+  return model;
+}
+
+// A model that was acknowledged must be there after the next start: its file is read before it is one.
+absl::Status CheckReadBack(const std::string& text, const model::Model& model) {
+  const auto refuse = [&](absl::string_view why) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "model '", model.name, "' cannot be kept, since its file could not be read again: ", why));
+  };
+  if (text.size() > kMaxModelBytes)
+    return refuse(absl::StrCat("it has ", text.size(), " bytes, and at most ", kMaxModelBytes, " are read"));
+  const auto again = model::ParseModel(text, model.name, effects::Catalogue());
+  if (!again.ok()) return refuse(again.status().message());
+  if (again->Hash() != model.Hash()) return refuse("it would be another model");
+  return absl::OkStatus();
+}
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& folder) {
   auto store = std::make_unique<ModelStore>();
@@ -22,31 +54,27 @@ absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::Open(const std::string& 
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return absl::InvalidArgumentError(absl::StrCat("models_dir: ", folder, ": ", error.message()));
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() != ".yaml") continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(entry.path().string(), 1 << 20));
-    TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
-                                model::ParseModel(text, entry.path().string(), effects::Catalogue(),
-                                                  model::FilesBeside(entry.path().string())));
-    model.name = entry.path().stem().string();
-    store->models_[model.name] = std::make_shared<const model::Model>(std::move(model));
-  }
+  RemoveOldDrafts(folder, kOldDraft);
+  store->Refresh();
   return store;
 }
 
-// Files that another replica wrote; one that does not parse is left to the replica that starts next.
+// Also files that another replica wrote. One that could not be read is tried again when it has changed.
 void ModelStore::Refresh() const {
   if (folder_.empty()) return;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder_, error)) {
-    const std::string name = entry.path().stem().string();
+    const std::string path = entry.path().string(), name = entry.path().stem().string();
     if (entry.path().extension() != ".yaml" || models_.count(name)) continue;
-    const auto text = ReadFile(entry.path().string(), 1 << 20);
-    if (!text.ok()) continue;
-    auto model = model::ParseModel(*text, entry.path().string(), effects::Catalogue(),
-                                   model::FilesBeside(entry.path().string()));
-    if (!model.ok()) continue;
-    model->name = name;
+    const auto changed = std::filesystem::last_write_time(path, error);
+    const auto refused = refused_.find(path);
+    if (refused != refused_.end() && refused->second == changed) continue;
+    absl::StatusOr<model::Model> model = ReadModel(path);
+    if (!model.ok()) {
+      spdlog::warn("{} is not served: {}", path, std::string(model.status().message()));
+      refused_[path] = changed;
+      continue;
+    }
     models_[name] = std::make_shared<const model::Model>(*std::move(model));
   }
 }
@@ -86,19 +114,34 @@ absl::Status ModelStore::Create(const model::Model& model) {
   std::lock_guard<std::mutex> lock(mutex_);
   Refresh();
   const auto found = models_.find(model.name);
-  if (found != models_.end()) {
-    if (found->second->Hash() == model.Hash()) return absl::OkStatus();
-    return absl::AlreadyExistsError(
-        absl::StrCat("model '", model.name, "' stands for the hash ", found->second->Hash().substr(0, 8),
-                     " and a model never changes: give ", model.Hash().substr(0, 8), " another name"));
-  }
+  if (found != models_.end()) return CheckSame(*found->second, model);
   if (models_.size() >= 10000)
     return absl::ResourceExhaustedError("the store holds 10000 models; remove some from models_dir");
-  if (!folder_.empty())
-    TOUCHSTONE_RETURN_IF_ERROR(
-        WriteFileAtomically(absl::StrCat(folder_, "/", model.name, ".yaml"), model::FormatModel(model)));
+  const std::string text = model::FormatModel(model);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckReadBack(text, model));
+  if (!folder_.empty()) {
+    const std::string path = absl::StrCat(folder_, "/", model.name, ".yaml");
+    const absl::Status written = WriteNewFile(path, text);
+    if (absl::IsAlreadyExists(written)) {
+      // Another replica was given the name at the same moment, or a file is in the way that is no model.
+      const absl::StatusOr<model::Model> kept = ReadModel(path);
+      if (!kept.ok())
+        return absl::FailedPreconditionError(absl::StrCat(
+            path, " is in the way and no model: ", kept.status().message(), ". Move it away first"));
+      TOUCHSTONE_RETURN_IF_ERROR(CheckSame(*kept, model));
+    } else if (!written.ok()) {
+      return written;
+    }
+  }
   models_[model.name] = std::make_shared<const model::Model>(model);
   return absl::OkStatus();
+}
+
+absl::Status ModelStore::CheckSame(const model::Model& kept, const model::Model& model) const {
+  if (kept.Hash() == model.Hash()) return absl::OkStatus();
+  return absl::AlreadyExistsError(absl::StrCat("model '", model.name, "' stands for the hash ",
+                                               kept.Hash().substr(0, 8), " and a model never changes: give ",
+                                               model.Hash().substr(0, 8), " another name"));
 }
 
 std::vector<std::shared_ptr<const model::Model>> ModelStore::All() const {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -21,24 +22,31 @@
 namespace touchstone::service {
 
 // Models by name and by hash. A name never changes its meaning. With a folder, models are files there, so
-// that replicas that share it serve the same ones.
+// that replicas that share it serve the same ones. A file there that is no model is left where it is, with a warning: what
+// is wrong with one model must not keep the others from being served.
 class ModelStore {
  public:
+  // INVALID_ARGUMENT if the folder cannot be made.
   static absl::StatusOr<std::unique_ptr<ModelStore>> Open(const std::string& folder);
 
   absl::StatusOr<std::shared_ptr<const model::Model>> FindByName(const std::string& name) const;
   absl::StatusOr<std::shared_ptr<const model::Model>> FindByHash(const std::string& prefix) const;
   // 1 to 64 letters, digits, '_', '-' or '.', not '.' first.
   static absl::Status CheckName(const std::string& name);
+  // Once this is OK the model is kept: it is on the disk and was read back. ALREADY_EXISTS if the name stands for another
+  // one, INVALID_ARGUMENT if its file could not be read again.
   absl::Status Create(const model::Model& model);
   std::vector<std::shared_ptr<const model::Model>> All() const;
 
  private:
   void Refresh() const;  // reads files that appeared
+  absl::Status CheckSame(const model::Model& kept, const model::Model& model) const;
 
   std::string folder_;
   mutable std::mutex mutex_;
   mutable std::map<std::string, std::shared_ptr<const model::Model>> models_;
+  mutable std::map<std::string, std::filesystem::file_time_type>
+      refused_;  // files that are no models, as of then
 };
 
 struct Resources {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
@@ -15,7 +16,7 @@
 namespace touchstone::service {
 namespace {
 
-constexpr size_t kMaxHolderBytes = 256, kMaxReasonBytes = 500;  // of a stop
+constexpr size_t kMaxStopReasonBytes = 500;  // several are joined
 
 v1::BasePose PoseToProto(const Eigen::Isometry3d& pose) {
   return session::BasePoseMessage(geometry::PoseVectorOf(pose));
@@ -137,11 +138,11 @@ grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::Sto
                                      v1::StopResponse* response) {
   // The arm first, then words. A stop is never refused, so what is too long is cut.
   const std::string reason =
-      request->reason().empty() ? "no reason given" : request->reason().substr(0, kMaxReasonBytes);
+      request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxStopReasonBytes);
   const std::string who =
       request->holder().empty()
           ? context->peer()
-          : absl::StrCat(request->holder().substr(0, kMaxHolderBytes), " at ", context->peer());
+          : absl::StrCat(Printable(request->holder(), kMaxHolderBytes), " at ", context->peer());
   response->set_aborted_touches(rig_->Stop(reason, who));
   spdlog::warn("stop from {}: {}", who, reason);
   return grpc::Status::OK;

@@ -43,6 +43,8 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"max_batch_size", "Limit: samples a batch", &o.max_batch_size},
       {"max_touches_per_request", "Limit: explicit touches per request", &o.max_touches_per_request},
       {"max_images_per_request", "Limit: photographs a request", &o.max_images_per_request},
+      {"max_indices_per_request", "Limit: samples asked for one by one, a request",
+       &o.max_indices_per_request},
       {"max_streams", "Limit: dataset streams at once", &o.max_streams},
       {"max_message_mib", "Limit: size of one message, MiB", &o.max_message_mib},
       {"max_session_mib", "Limit: size of one stored session, MiB", &o.max_session_mib},

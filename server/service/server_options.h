@@ -33,7 +33,8 @@ struct ServerOptions {
   int max_batch_size = 65536;
   int max_touches_per_request = 100000;
   int max_images_per_request = 1000;
-  int max_streams = 64;  // dataset streams at once; one more is RESOURCE_EXHAUSTED
+  int max_indices_per_request = 100000;  // samples asked for one by one
+  int max_streams = 64;                  // dataset streams at once; one more is RESOURCE_EXHAUSTED
   int max_message_mib = 256;
   int max_session_mib = 1024;   // one stored session
   int max_sessions_mib = 4096;  // all stored sessions together, and all that are being sent at once
@@ -43,7 +44,7 @@ struct ServerOptions {
   double drain_s = 10;  // what running calls get after SIGTERM
 
   source::SourceLimits Limits() const {
-    return {max_touches_per_request, max_images_per_request, max_batch_size};
+    return {max_touches_per_request, max_images_per_request, max_batch_size, max_indices_per_request};
   }
 };
 

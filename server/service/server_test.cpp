@@ -5,11 +5,16 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/models.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
@@ -168,6 +173,91 @@ TEST(Server, KeepsModelsInItsFolderAndNeverChangesOne) {
   EXPECT_EQ(model.name(), "mine");
 }
 
+// The next start serves every model that was acknowledged, whatever else lies in the folder.
+TEST(Server, StartsBesideFilesThatAreNoModels) {
+  const TestFolder folder;
+  ServerOptions options = SmallServer();
+  options.models_dir = folder.path();
+  v1::CreateModelRequest request;
+  request.set_yaml("touchstone: model/1\nname: mine\neffects: []\n");
+  v1::Model model;
+  {
+    const auto server = StartServer(options);
+    grpc::ClientContext context;
+    ASSERT_TRUE(v1::Models::NewStub(ChannelTo(*server))->CreateModel(&context, request, &model).ok());
+  }
+  std::ofstream(folder.Path("torn.yaml")) << "touchstone: model/1\nname: torn\neffects: [{tip_radius: {rad";
+  std::ofstream(folder.Path("binary.yaml")) << std::string(1000, '\0');
+  std::ofstream(folder.Path("huge.yaml")) << std::string(2 << 20, '#');
+  std::filesystem::create_directories(folder.Path("folder.yaml"));
+  const auto server = StartServer(options);
+  const auto stub = v1::Models::NewStub(ChannelTo(*server));
+  v1::GetModelRequest get;
+  get.mutable_model()->set_name("mine");
+  grpc::ClientContext found, in_the_way;
+  EXPECT_TRUE(stub->GetModel(&found, get, &model).ok());
+  // A name whose file is no model is not written over.
+  request.set_yaml("touchstone: model/1\nname: torn\neffects: []\n");
+  const grpc::Status status = stub->CreateModel(&in_the_way, request, &model);
+  EXPECT_EQ(status.error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), HasSubstr("torn.yaml"));
+}
+
+TEST(Server, RefusesAModelThatItCouldNotReadAgain) {
+  std::string objects;
+  for (int k = 0; k < 9000; ++k) objects += "lat" + std::to_string(k) + ": {translation_mm: [1, 2, 3]}, ";
+  const std::string yaml =
+      "touchstone: model/1\nname: many\neffects: [{object_pose: {scope: object, objects: {" + objects +
+      "}}}]\n";
+  const TestFolder folder;
+  ServerOptions options = SmallServer();
+  options.models_dir = folder.path();
+  {
+    const auto server = StartServer(options);
+    v1::CreateModelRequest request;
+    request.set_yaml(yaml);
+    v1::Model model;
+    grpc::ClientContext context;
+    const grpc::Status status =
+        v1::Models::NewStub(ChannelTo(*server))->CreateModel(&context, request, &model);
+    EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT);
+    EXPECT_THAT(status.error_message(), HasSubstr("could not be read again"));
+  }
+  EXPECT_TRUE(Server::Start(options).ok());
+}
+
+TEST(Server, OfTwoReplicasGivenTwoModelsOfOneNameOneKeepsItsOwn) {
+  const TestFolder folder;
+  ServerOptions options = SmallServer();
+  options.models_dir = folder.path();
+  const auto one = StartServer(options), other = StartServer(options);
+  for (int round = 0; round < 20; ++round) {
+    const std::string name = "model" + std::to_string(round);
+    std::string hashes[2];
+    const auto create = [&](const Server& server, int which) {
+      v1::CreateModelRequest request;
+      request.set_yaml("touchstone: model/1\nname: " + name + "\neffects:\n  - tip_radius: {radius_mm: 1." +
+                       std::to_string(which + 1) + "}\n");
+      v1::Model model;
+      grpc::ClientContext context;
+      if (v1::Models::NewStub(ChannelTo(server))->CreateModel(&context, request, &model).ok())
+        hashes[which] = model.hash();
+    };
+    std::thread beside([&] { create(*one, 0); });
+    create(*other, 1);
+    beside.join();
+    EXPECT_NE(hashes[0].empty(), hashes[1].empty()) << "both or neither of two models were acknowledged";
+    for (const Server* server : {one.get(), other.get()}) {
+      v1::GetModelRequest get;
+      get.mutable_model()->set_name(name);
+      v1::Model model;
+      grpc::ClientContext context;
+      ASSERT_TRUE(v1::Models::NewStub(ChannelTo(*server))->GetModel(&context, get, &model).ok());
+      EXPECT_EQ(model.hash(), hashes[0] + hashes[1]);
+    }
+  }
+}
+
 TEST(Server, AnInlineModelNeedsNoStore) {
   const auto server = StartServer(SmallServer());
   v1::StreamDatasetRequest with = Request(1000, 1000);
@@ -190,6 +280,47 @@ TEST(Server, RefusesToStartOnWhatItCannotServe) {
   const auto server = StartServer(SmallServer());
   taken.listen = "127.0.0.1:" + std::to_string(server->port());
   EXPECT_THAT(std::string(Server::Start(taken).status().message()), HasSubstr("listen = '127.0.0.1:"));
+}
+
+TEST(Server, AMessageAboutAVeryLongNameArrives) {
+  const auto server = StartServer(SmallServer());
+  const auto stub = v1::Models::NewStub(ChannelTo(*server));
+  for (const std::string& name :
+       {std::string(9000, 'n'), std::string(3000, '\n'), std::string(4 << 20, 'm')}) {
+    v1::GetModelRequest get;
+    get.mutable_model()->set_name(name);
+    v1::Model model;
+    grpc::ClientContext context;
+    const grpc::Status status = stub->GetModel(&context, get, &model);
+    EXPECT_EQ(status.error_code(), grpc::NOT_FOUND) << status.error_message().substr(0, 300);
+    EXPECT_LE(status.error_message().size(), 2200u);
+    EXPECT_THAT(status.error_message(), HasSubstr("no model is named"));
+  }
+}
+
+TEST(Server, WhoAsksMayNotForgeALineOfTheLog) {
+  const auto server = StartServer(SmallServer());
+  const auto stub = v1::Control::NewStub(ChannelTo(*server));
+  v1::AcquireLeaseRequest request;
+  request.set_holder("eve\n2026-11-24 10:00:00.000 info ana released the stop");
+  v1::Lease lease;
+  grpc::ClientContext asking, stopping;
+  const grpc::Status status = stub->AcquireLease(&asking, request, &lease);
+  EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("printable"));
+  // A stop is never refused.
+  v1::StopRequest stop;
+  stop.set_reason("smoke\n2026-11-24 10:00:00.000 info all is well");
+  v1::StopResponse stopped;
+  std::ostringstream logged;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(logged, /*force_flush=*/true)));
+  EXPECT_TRUE(stub->Stop(&stopping, stop, &stopped).ok());
+  spdlog::set_default_logger(before);
+  const std::string text = logged.str();
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+  EXPECT_THAT(text, HasSubstr("smoke"));
 }
 
 }  // namespace

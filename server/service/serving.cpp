@@ -31,6 +31,8 @@ absl::Status CheckServing(const ServerOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.max_touches_per_request, 1, 10'000'000, "max_touches_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(
+      CheckRange(options.max_indices_per_request, 1, 10'000'000, "max_indices_per_request"));
+  TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.max_images_per_request, 1, 1'000'000, "max_images_per_request"));
   TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));

@@ -6,11 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
+#include "server/base/new_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/source/request_checks.h"
@@ -22,6 +22,8 @@ namespace {
 constexpr char kCsvExtension[] = ".csv", kImagesExtension[] = ".images";
 constexpr size_t kPiece = 1 << 20;
 constexpr size_t kMaxSessions = 10000;
+// Nobody writes a file for so long.
+constexpr std::chrono::hours kOldDraft{1};
 
 uint64_t Mebibytes(int count) {
   return static_cast<uint64_t>(count) << 20;
@@ -40,6 +42,7 @@ absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOpt
   if (error)
     return absl::InvalidArgumentError(
         absl::StrCat("sessions_dir: ", store->folder_, ": ", error.message(), "; a folder was expected"));
+  RemoveOldDrafts(store->folder_, kOldDraft);
   return store;
 }
 
@@ -150,25 +153,15 @@ std::vector<v1::Session> SessionStore::All() {
   return all;
 }
 
-// Whole or not at all, and never over another one: two replicas may be given the same name at once.
+// Never over another one: two replicas may be given the same name at once.
 absl::Status SessionStore::WriteNew(const std::string& name, const std::string& bytes) const {
-  static std::atomic<uint64_t> counter{0};
   const bool images = HoldsImages(bytes);
   const std::string path = PathOf(name, images), other = PathOf(name, !images);
-  const std::string draft = absl::StrCat(folder_, "/.", name, ".", ::getpid(), ".", counter++);
-  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(draft, bytes));
-  const int failed = ::link(draft.c_str(), path.c_str()) == 0 ? 0 : errno;
-  ::unlink(draft.c_str());
-  if (failed == 0) {
-    // A session of the other kind came at the same moment: neither writes over the other, and this one steps back.
-    if (::access(other.c_str(), F_OK) != 0) return absl::OkStatus();
-    ::unlink(path.c_str());
-    return absl::AlreadyExistsError(other);
-  }
-  if (failed == EEXIST) return absl::AlreadyExistsError(path);
-  // A file system without links: the race is lost to the last writer there.
-  if (failed == EPERM || failed == EOPNOTSUPP || failed == ENOSYS) return WriteFileAtomically(path, bytes);
-  return absl::InternalError(absl::StrCat(path, ": ", std::strerror(failed)));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteNewFile(path, bytes));
+  // A session of the other kind came at the same moment: neither writes over the other, and this one steps back.
+  if (::access(other.c_str(), F_OK) != 0) return absl::OkStatus();
+  ::unlink(path.c_str());
+  return absl::AlreadyExistsError(other);
 }
 
 absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::string bytes) {

@@ -86,6 +86,7 @@ v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::Sourc
   message.set_max_images_per_request(info.makes_images ? limits.max_images_per_request : 0);
   message.set_max_image_side(info.makes_images ? image::kMaxImageSide : 0);
   message.set_max_batch_size(limits.max_batch_size);
+  message.set_max_indices_per_request(limits.max_indices_per_request);
   message.set_max_fingers(info.max_fingers);
   message.set_lease_required(info.moves);
   message.set_touch_duration_s(info.touch_duration_s);
@@ -109,8 +110,24 @@ v1::ListObjectsResponse ToProto(const source::ObjectStore& objects) {
   return message;
 }
 
+v1::ExpandPlanResponse ToProto(const source::ExpandedPlan& plan) {
+  v1::ExpandPlanResponse message;
+  for (const touch::CommandedTouch& touch : plan.touches) *message.add_touches() = ToProto(touch);
+  for (const std::string& note : plan.notes) message.add_notes(note);
+  if (plan.draws.Draws() == 0) return message;
+  v1::PlanDraws* draws = message.mutable_draws();
+  draws->set_draws(plan.draws.Draws());
+  draws->set_no_surface(plan.draws.Of(touch::DrawFlaw::kNoSurface));
+  draws->set_start_blocked(plan.draws.Of(touch::DrawFlaw::kStartBlocked));
+  draws->set_finger_missed(plan.draws.Of(touch::DrawFlaw::kFingerMissed));
+  draws->set_beyond_stroke(plan.draws.Of(touch::DrawFlaw::kBeyondStroke));
+  draws->set_steep_incidence(plan.draws.Of(touch::DrawFlaw::kSteepIncidence));
+  return message;
+}
+
 v1::TouchResponse ToProto(const source::TouchResults& results) {
   v1::TouchResponse message;
+  for (const std::string& note : results.notes) message.add_notes(note);
   if (results.model != nullptr) message.set_model_hash(results.model->Hash());
   for (size_t touch = 0; touch < results.size(); ++touch) {
     v1::TouchResult* result = message.add_results();
@@ -173,6 +190,7 @@ v1::Batch ToProto(dataset::DatasetBatch batch, const std::vector<dataset::Column
   v1::Batch message;
   message.set_start_index(batch.start_index);
   message.set_rows(batch.rows);
+  message.set_draws(batch.draws);
   for (size_t k = 0; k < columns.size(); ++k) {
     v1::Column* column = message.add_columns();
     *column = ColumnToProto(columns[k]);

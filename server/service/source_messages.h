@@ -15,7 +15,8 @@ absl::StatusOr<image::Camera> FromProto(const v1::View& message, const std::stri
 absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message);
 absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message);  // with its defaults
 
-absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message);
+absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message,
+                                              const Resources& resources);
 absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, const Resources& resources);
 absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& message,
                                                  const Resources& resources);
@@ -24,6 +25,7 @@ absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& 
 
 v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::SourceLimits& limits);
 v1::ListObjectsResponse ToProto(const source::ObjectStore& objects);
+v1::ExpandPlanResponse ToProto(const source::ExpandedPlan& plan);
 v1::TouchResponse ToProto(const source::TouchResults& results);
 v1::CaptureResponse ToProto(source::CaptureResults results);
 v1::DatasetHeader ToProto(const source::SampleHeader& header);

@@ -45,6 +45,7 @@ absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
       if (sphere.step_angle_rad() != 0) plan.sphere.step_angle_rad = sphere.step_angle_rad();
       plan.sphere.roll_step_rad = sphere.roll_step_rad();
       if (sphere.radius_ratio() != 0) plan.sphere.radius_ratio = sphere.radius_ratio();
+      if (sphere.has_max_incidence_rad()) plan.sphere.max_incidence_rad = sphere.max_incidence_rad();
       break;
     }
     case v1::Plan::kFaces: {
@@ -58,6 +59,9 @@ absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
       if (faces.has_max_tilt_rad()) plan.faces.max_tilt_rad = faces.max_tilt_rad();
       if (faces.has_spread()) plan.faces.spread = faces.spread();
       if (faces.standoff_m() != 0) plan.faces.standoff_m = faces.standoff_m();
+      if (faces.has_max_incidence_rad()) plan.faces.max_incidence_rad = faces.max_incidence_rad();
+      if (faces.stroke_beyond_target_m() != 0)
+        plan.faces.stroke_beyond_target_m = faces.stroke_beyond_target_m();
       break;
     }
     case v1::Plan::kList: {
@@ -140,13 +144,21 @@ std::string DatasetKey(const v1::DatasetSpec& spec) {
 
 }  // namespace
 
-absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message) {
+absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& message,
+                                              const Resources& resources) {
   source::PlanRequest request;
   TOUCHSTONE_ASSIGN_OR_RETURN(request.plan, FromProto(message.plan()));
   request.object = message.object();
   request.seed = message.seed();
   request.first_index = message.first_index();
   request.count = message.count();
+  if (message.max_draws() != 0) request.max_draws = message.max_draws();
+  TOUCHSTONE_RETURN_IF_ERROR(dataset::CheckMaxDraws(request.max_draws));
+  if (!message.has_model() || message.model().ref_case() == v1::ModelRef::REF_NOT_SET) return request;
+  // A rig keeps no models, but where its fingers would be can be asked of a whole file.
+  if (!Simulates(resources) && !message.model().has_yaml())
+    return absl::InvalidArgumentError("model: this source keeps no models; give the model's file");
+  TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
   return request;
 }
 
@@ -156,6 +168,8 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
   if (message.has_model() && Simulates(resources)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
   }
+  // Counted before they are taken apart: what is too much must cost nothing.
+  TOUCHSTONE_RETURN_IF_ERROR(source::CheckTouchCount(message.touches_size(), resources.options.Limits()));
   for (int k = 0; k < message.touches_size(); ++k) {
     TOUCHSTONE_ASSIGN_OR_RETURN(touch::CommandedTouch touch,
                                 FromProto(message.touches(k), absl::StrCat("touches[", k, "]")));
@@ -206,7 +220,11 @@ absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& 
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.image, FromProto(spec.image()));
   }
   if (spec.max_draws() != 0) specification.max_draws = spec.max_draws();
-  request.part = {message.start_index(), message.stop_index(), message.batch_size(), message.batch_stride()};
+  request.part.start_index = message.start_index();
+  request.part.stop_index = message.stop_index();
+  request.part.batch_size = message.batch_size();
+  request.part.batch_stride = message.batch_stride();
+  request.part.indices.assign(message.indices().begin(), message.indices().end());
   request.session = message.session();
   request.key = DatasetKey(spec);
   return request;

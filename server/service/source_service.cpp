@@ -31,13 +31,18 @@ grpc::Status SourceService::ListObjects(grpc::ServerContext*, const v1::ListObje
   return grpc::Status::OK;
 }
 
-grpc::Status SourceService::ExpandPlan(grpc::ServerContext*, const v1::ExpandPlanRequest* message,
+grpc::Status SourceService::ExpandPlan(grpc::ServerContext* context, const v1::ExpandPlanRequest* message,
                                        v1::ExpandPlanResponse* response) {
-  const absl::StatusOr<source::PlanRequest> request = FromProto(*message);
+  const absl::StatusOr<source::PlanRequest> request = FromProto(*message, *resources_);
   if (!request.ok()) return ToGrpc(request.status());
-  const absl::StatusOr<std::vector<touch::CommandedTouch>> touches = source_->ExpandPlan(*request);
-  if (!touches.ok()) return ToGrpc(touches.status());
-  for (const touch::CommandedTouch& touch : *touches) *response->add_touches() = ToProto(touch);
+  // Nothing moves, so nobody needs a lease; a client that is gone needs no answer.
+  const source::MotionGuard guard = [context]() -> absl::Status {
+    if (!context->IsCancelled()) return absl::OkStatus();
+    return absl::CancelledError("the client is gone, or the call's deadline has passed");
+  };
+  const absl::StatusOr<source::ExpandedPlan> plan = source_->ExpandPlan(*request, guard);
+  if (!plan.ok()) return ToGrpc(plan.status());
+  *response = ToProto(*plan);
   return grpc::Status::OK;
 }
 

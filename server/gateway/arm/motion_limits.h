@@ -7,6 +7,7 @@
 #include <absl/status/status.h>
 #include <Eigen/Core>
 
+#include "server/base/touch_limits.h"
 #include "server/gateway/arm/arm_model.h"
 
 namespace touchstone::gateway::arm {
@@ -20,9 +21,9 @@ struct MotionLimits {
   double acceleration_m_s2 = 1.2;  // of approaches and transits
   double max_standoff_m = 0.15;
   double stroke_beyond_target_m =
-      0.03;                      // an approach without a stroke of its own ends so far behind its target
-  double max_tilt_rad = 1.0472;  // of an approach from straight down, base frame
-  double clearance_m = 0.05;     // transits cross so far above the object's box and every start
+      kDefaultStrokeBeyondTargetM;  // an approach without a stroke of its own ends so far behind its target
+  double max_tilt_rad = 1.0472;     // of an approach from straight down, base frame
+  double clearance_m = 0.05;        // transits cross so far above the object's box and every start
   // The box, base frame, that every fingertip must stay in.
   Eigen::Vector3d box_min_m{-0.5, -0.5, 0.0}, box_max_m{0.5, 0.5, 0.7};
   // The one that elbow, wrist, flange and camera must stay in, farther from its sides than the margin: about the radius
