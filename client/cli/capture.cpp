@@ -1,14 +1,19 @@
 // touchstone capture: photographs as PNG or JPEG files.
+#include <cmath>
 #include <filesystem>
 
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
+#include "client/cli/touch_options.h"
 #include "client/source/batch.h"
 #include "client/source/lab_units.h"
 #include "client/source/npy.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/touch_limits.h"
+#include "server/base/units.h"
 #include "server/image/encode.h"
+#include "server/service/convert.h"
 
 namespace touchstone::cli {
 namespace {
@@ -26,14 +31,6 @@ struct CaptureOptions {
   std::string model;
   uint64_t seed = 0;
 };
-
-absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std::string& text) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Vector3 v, ParseVector(name, text));
-  v.set_x(ToSi(Unit::kMillimetre, v.x()));
-  v.set_y(ToSi(Unit::kMillimetre, v.y()));
-  v.set_z(ToSi(Unit::kMillimetre, v.z()));
-  return v;
-}
 
 absl::Status AddViews(const CaptureOptions& options, v1::CaptureRequest* request) {
   const int given = !options.plan.empty() + !options.eye_mm.empty() + !options.touch.approach.empty();
@@ -55,13 +52,54 @@ absl::Status AddViews(const CaptureOptions& options, v1::CaptureRequest* request
   if (!options.eye_mm.empty()) {
     v1::CameraPose* camera = request->add_views()->mutable_camera();
     TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_eye_m(), ParseMillimetres("--eye-mm", options.eye_mm));
-    TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_at_m(),
-                                ParseMillimetres("--at-mm", options.at_mm.empty() ? "0,0,0" : options.at_mm));
+    if (!options.at_mm.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_at_m(), ParseMillimetres("--at-mm", options.at_mm));
+    }
     TOUCHSTONE_ASSIGN_OR_RETURN(*camera->mutable_up(), ParseVector("--up", options.up));
     return absl::OkStatus();
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(*request->add_views()->mutable_touch(), MakeTouch(options.touch));
   return absl::OkStatus();
+}
+
+// From how far away a camera of `image` has a ball of this radius whole in view, metres.
+double DistanceToSee(double radius_m, const v1::ImageSpec& image) {
+  // The narrower of the two angles counts; the margin keeps the outline off the picture's edge.
+  constexpr double kMargin = 1.05;
+  const double vertical_tan = std::tan(image.vertical_fov_rad() / 2);
+  const double half_angle_rad =
+      std::atan(vertical_tan * std::min(1.0, double(image.width()) / image.height()));
+  return kMargin * radius_m / std::sin(half_angle_rad);
+}
+
+// What the options left open of the view, by where the object is and how large.
+absl::Status LookAtObject(const CaptureOptions& options, client::Connection* connection,
+                          v1::CaptureRequest* request) {
+  const bool whole_view = !options.touch.approach.empty() &&
+                          (options.touch.target_mm.empty() || !options.touch.standoff_mm.has_value());
+  const bool camera_without_aim = !options.eye_mm.empty() && options.at_mm.empty();
+  if (!whole_view && !camera_without_aim) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<geometry::Bounds> bounds,
+                              BoundsOfObject(connection, options.object));
+  if (!bounds.has_value()) return absl::OkStatus();
+  v1::View* view = request->mutable_views(0);
+  if (camera_without_aim) {
+    *view->mutable_camera()->mutable_at_m() = service::ToProto(bounds->Centre());
+    return absl::OkStatus();
+  }
+  const auto standoff = [&](const geometry::Bounds& box, const Eigen::Vector3d& target_m,
+                            const Eigen::Vector3d&) {
+    return DistanceToSee((target_m - box.Centre()).norm() + 0.5 * box.DiagonalM(), request->image());
+  };
+  AimAtObject(options.touch, *bounds, standoff, view->mutable_touch());
+  const double standoff_m = view->touch().standoff_m();
+  if (standoff_m <= kMaxStandoffM) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("--standoff-mm: '", options.object,
+                                                 "' is whole in view only from ",
+                                                 Rounded(FromSi(Unit::kMillimetre, standoff_m)),
+                                                 " mm off, and ", FromSi(Unit::kMillimetre, kMaxStandoffM),
+                                                 " is the limit; give --standoff-mm or --eye-mm, or check "
+                                                 "the mesh's unit (touchstone objects shows sizes)"));
 }
 
 // "top.png" for the first of one; "top-0003.png" for one of several.
@@ -129,15 +167,17 @@ absl::Status RunCapture(const Cli& cli, const CaptureOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
   if (!options.model.empty()) *request.mutable_model() = model;
   request.set_seed(options.seed);
-  const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
+  const int view_count = request.views_size();
   if (IsStandardOutput(options.output)) {
-    if (views.size() != 1 || request.image().depth() || request.image().mask())
+    if (view_count != 1 || request.image().depth() || request.image().mask())
       return absl::InvalidArgumentError(
           "-o: standard output takes one photograph; several files need a name, for instance view.png");
   } else {
-    TOUCHSTONE_RETURN_IF_ERROR(cli.CheckOutputs(FilesOf(output, views.size(), request.image())));
+    TOUCHSTONE_RETURN_IF_ERROR(cli.CheckOutputs(FilesOf(output, view_count, request.image())));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_RETURN_IF_ERROR(LookAtObject(options, connection.get(), &request));
+  const google::protobuf::RepeatedPtrField<v1::View> views = request.views();
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), options.motion));
   const StopOnInterrupt stop_on_interrupt(source.get());
 
@@ -193,7 +233,7 @@ void AddCapture(Cli* cli) {
     command->add_option(name, value, text)->type_name("X,Y,Z")->group("Camera");
   };
   camera("--eye-mm", options->eye_mm, "Where the camera stands, in the object's frame");
-  camera("--at-mm", options->at_mm, "What it looks at. Default: 0,0,0");
+  camera("--at-mm", options->at_mm, "What it looks at. Default: the centre of the object's bounding box");
   camera("--up", options->up, "What is up in the picture. Default: 0,0,1");
   cli->AddInput(command,
                 command
@@ -209,7 +249,7 @@ void AddCapture(Cli* cli) {
                                  "style, virtual sources). Default: the source's own")
                     ->type_name("MODEL"));
   command->add_option("--seed", options->seed, "Seed of the pixels' noise. Default: 0")->type_name("N");
-  AddTouchOptions(command, &options->touch);
+  AddTouchOptions(command, "so far that the whole object is in view", &options->touch);
   AddImageOptions(command, &options->image);
   AddMotionOptions(command, &options->motion, false);
   cli->AddSourceOptions(command);

@@ -12,6 +12,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -60,6 +61,14 @@ absl::StatusOr<v1::Vector3> ParseVector(const std::string& name, const std::stri
   vector.set_y(values[1]);
   vector.set_z(values[2]);
   return vector;
+}
+
+absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std::string& text) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Vector3 v, ParseVector(name, text));
+  v.set_x(ToSi(Unit::kMillimetre, v.x()));
+  v.set_y(ToSi(Unit::kMillimetre, v.y()));
+  v.set_z(ToSi(Unit::kMillimetre, v.z()));
+  return v;
 }
 
 absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {

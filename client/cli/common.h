@@ -127,6 +127,8 @@ class Cli {
 
 // Three numbers, "0,0,-1"; `name` stands in errors.
 absl::StatusOr<v1::Vector3> ParseVector(const std::string& name, const std::string& text);
+// The same in millimetres, as metres.
+absl::StatusOr<v1::Vector3> ParseMillimetres(const std::string& name, const std::string& text);
 
 // A model as the user names it: a file (its text goes along), a hash of at least 8 digits, or a name that the
 // source knows. Empty: the source's default.
@@ -171,6 +173,7 @@ void AddPlan(Cli* cli);
 void AddTouch(Cli* cli);
 void AddCapture(Cli* cli);
 void AddStream(Cli* cli);
+void AddDataset(Cli* cli);
 void AddMesh(Cli* cli);
 void AddNormalize(Cli* cli);
 void AddCompare(Cli* cli);

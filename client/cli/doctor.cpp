@@ -189,6 +189,7 @@ class Doctor {
                        {"max_images_per_request", d.max_images_per_request()},
                        {"max_image_side_px", d.max_image_side()},
                        {"max_batch_size", d.max_batch_size()},
+                       {"max_indices_per_request", d.max_indices_per_request()},
                        {"max_fingers", d.max_fingers()},
                        {"lease_required", d.lease_required()},
                        {"touch_duration_s", d.touch_duration_s()},

@@ -117,5 +117,22 @@ TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
   EXPECT_EQ(report["improved_model_hash"], there["improved_model_hash"]);
 }
 
+TEST_F(JointCommand, ProposesOfASetOfBothTheKindThatIsAskedFor) {
+  WriteSession("session", Askew());
+  const auto propose = [this](const std::vector<std::string>& how) {
+    std::vector<std::string> command = {"propose",      "session",    "--model",
+                                        "nominal.yaml", "--mesh-dir", "meshes"};
+    command.insert(command.end(), how.begin(), how.end());
+    return Run(command);
+  };
+  const Outcome pictures = propose({"-o", "pictures.csv"});
+  EXPECT_THAT(pictures.err, HasSubstr("--touches N proposes touches"));
+  EXPECT_EQ(propose({"--touches", "8", "-o", "touches.csv"}).exit_code, 0);
+  EXPECT_THAT(Read("touches.csv"), HasSubstr("standoff_mm"));
+  const Outcome both = propose({"--touches", "8", "--photographs", "4", "-o", "both.csv"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("a plan is of one"));
+}
+
 }  // namespace
 }  // namespace touchstone::cli

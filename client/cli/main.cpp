@@ -16,6 +16,7 @@ void AddCommands(Cli* cli) {
   AddTouch(cli);
   AddCapture(cli);
   AddStream(cli);
+  AddDataset(cli);
   AddMesh(cli);
   AddNormalize(cli);
   AddCompare(cli);

@@ -8,7 +8,10 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/geometry/mesh_file.h"
+#include "server/geometry/plausible_size.h"
 #include "server/geometry/supershape.h"
+#include "server/model/model.h"
+#include "server/touch/touch_notes.h"
 
 namespace touchstone::cli {
 namespace {
@@ -36,9 +39,22 @@ Json ReportJson(const geometry::TriangleMesh& mesh, const geometry::MeshReport& 
           {"mesh_hash", geometry::MeshHash(mesh)}};
 }
 
+// What is odd about where the object is and how large, a sentence each. `unit` as the coordinates were read.
+std::vector<std::string> PlacementNotes(const geometry::TriangleMesh& mesh, const std::string& unit) {
+  const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
+  std::vector<std::string> notes;
+  const std::string size = geometry::SizeNote(bounds, touch::HandSpanM(model::NominalModel()), unit);
+  if (!size.empty()) notes.push_back(size);
+  if ((bounds.min_m.array() > 0).any() || (bounds.max_m.array() < 0).any())
+    notes.push_back(
+        "the origin lies outside of its box: a target or a camera's aim at 0,0,0 misses it. touchstone mesh "
+        "import --center moves it there");
+  return notes;
+}
+
 // What the numbers of a report mean for touching.
 std::string ReportInWords(const std::string& name, const geometry::TriangleMesh& mesh,
-                          const geometry::MeshReport& report) {
+                          const geometry::MeshReport& report, const std::string& unit) {
   const geometry::Bounds bounds = geometry::ComputeBounds(mesh);
   const Eigen::Vector3d size_m = bounds.max_m - bounds.min_m;
   const Eigen::Vector3d centre_m = bounds.Centre();
@@ -78,15 +94,22 @@ std::string ReportInWords(const std::string& name, const geometry::TriangleMesh&
     absl::StrAppend(&text, "  Note      ",
                     Counted(report.unused_vertices, "vertex belongs", "vertices belong"),
                     " to no triangle\n");
+  for (const std::string& note : PlacementNotes(mesh, unit))
+    absl::StrAppend(&text, "  Note      ", note, "\n");
   return text;
 }
 
-void Report(const Cli& cli, const std::string& name, const geometry::TriangleMesh& mesh) {
+// `unit` as the coordinates of the mesh's file were read.
+void Report(const Cli& cli, const std::string& name, const geometry::TriangleMesh& mesh,
+            const std::string& unit) {
   const geometry::MeshReport report = geometry::InspectMesh(mesh);
-  if (cli.output().json)
-    PrintJson(ReportJson(mesh, report));
-  else if (!cli.output().quiet)
-    cli.Print(ReportInWords(name, mesh, report)).IgnoreError();
+  if (cli.output().json) {
+    Json json = ReportJson(mesh, report);
+    json["notes"] = PlacementNotes(mesh, unit);
+    PrintJson(json);
+  } else if (!cli.output().quiet) {
+    cli.Print(ReportInWords(name, mesh, report, unit)).IgnoreError();
+  }
 }
 
 }  // namespace
@@ -117,20 +140,31 @@ absl::Status WriteMesh(const Cli& cli, const MeshOptions& options, const geometr
     return absl::Status(text.status().code(),
                         absl::StrCat("-o: ", options.output, ": ", text.status().message()));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, *text));
-  Report(cli, IsStandardOutput(options.output) ? "mesh" : options.output, mesh);
+  Report(cli, IsStandardOutput(options.output) ? "mesh" : options.output, mesh, options.unit);
   return absl::OkStatus();
 }
 
 namespace {
 
+// Moves the mesh so that the centre of its bounding box is the origin, and says by how much.
+void Center(const Cli& cli, geometry::TriangleMesh* mesh) {
+  const Eigen::Vector3d centre_m = geometry::ComputeBounds(*mesh).Centre();
+  for (Eigen::Vector3f& vertex_m : mesh->vertices_m)
+    vertex_m = (vertex_m.cast<double>() - centre_m).cast<float>();
+  const auto mm = [&](int axis) { return Rounded(FromSi(Unit::kMillimetre, 0.0 - centre_m[axis])); };
+  cli.Log(absl::StrCat("moved every vertex by ", mm(0), ", ", mm(1), ", ", mm(2),
+                       " mm: the centre of the bounding box is the origin now"));
+}
+
 absl::Status RunImport(const Cli& cli, const MeshOptions& options) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, ReadMesh(cli, options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(geometry::TriangleMesh mesh, ReadMesh(cli, options));
+  if (options.center) Center(cli, &mesh);
   return WriteMesh(cli, options, mesh);
 }
 
 absl::Status RunInfo(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::TriangleMesh mesh, ReadMesh(cli, options));
-  Report(cli, options.input, mesh);
+  Report(cli, options.input, mesh, options.unit);
   return absl::OkStatus();
 }
 
@@ -203,12 +237,16 @@ void AddMesh(Cli* cli) {
   CLI::App* import =
       cli->AddCommand(group, "import", "Converts a mesh (OFF, OBJ, STL, PLY) to millimetres, z up.",
                       "touchstone mesh import cup.stl --unit inch --up y -o cup.off\n"
-                      "touchstone mesh import scan.ply --fit-mm 150 -o scan.obj",
+                      "touchstone mesh import scan.ply --fit-mm 150 --center -o scan.obj",
                       [cli, options] { return RunImport(*cli, *options); });
   cli->AddInput(import,
                 import->add_option("FILE", options->input, "The mesh to read")->type_name("")->required());
   add_output(import);
   AddImportOptions(import, options.get());
+  import->add_flag(
+      "--center", options->center,
+      "Move the mesh so that the centre of its bounding box is the origin, about which object_scale and "
+      "object_pose scale and turn it");
 
   CLI::App* shape = cli->AddCommand(
       group, "supershape", "Writes a Gielis supershape: one of the five built-in ones, or one of your own.",

@@ -1,4 +1,6 @@
 // touchstone plan: the commanded touches of a plan, without touching anything.
+#include <algorithm>
+
 #include "client/cli/plan_options.h"
 #include "client/source/lab_units.h"
 #include "client/source/measurement_csv.h"
@@ -13,26 +15,51 @@ struct PlanCommandOptions {
   uint64_t seed = 0;
   uint64_t first = 0;
   uint32_t count = 10;
+  uint32_t max_draws = 0;
+  std::string model;
   std::string output;
 };
 
 // Touches that one request asks for.
 constexpr uint32_t kTouchesPerRequest = 10000;
 
-absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool count_given) {
-  v1::ExpandPlanRequest request;
-  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_plan(), MakePlan(options.plan, nullptr));
-  request.set_seed(options.seed);
-  // A plan that ends is written whole unless a part was asked for.
-  uint64_t count = options.count;
-  if (!count_given && request.plan().has_faces())
-    count = uint64_t{6} * request.plan().faces().samples_per_face() * request.plan().faces().rounds();
-  if (!count_given && request.plan().has_list()) count = request.plan().list().touches_size();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
-
+// The touches of every object, in their order, with what the source said of them.
+struct PlannedTouches {
   std::vector<client::MeasuredTouch> touches;
+  // By object; none of a list's.
+  std::vector<std::pair<std::string, v1::PlanDraws>> draws;
+  std::vector<std::string> notes;  // each once
+};
+
+void Add(const v1::PlanDraws& more, v1::PlanDraws* draws) {
+  draws->set_draws(draws->draws() + more.draws());
+  draws->set_no_surface(draws->no_surface() + more.no_surface());
+  draws->set_start_blocked(draws->start_blocked() + more.start_blocked());
+  draws->set_finger_missed(draws->finger_missed() + more.finger_missed());
+  draws->set_beyond_stroke(draws->beyond_stroke() + more.beyond_stroke());
+  draws->set_steep_incidence(draws->steep_incidence() + more.steep_incidence());
+}
+
+// Why draws were rejected, by the names that JSON has, and in words.
+struct Rejection {
+  const char *name, *words;
+  uint64_t count;
+};
+std::vector<Rejection> RejectionsOf(const v1::PlanDraws& draws) {
+  return {{"no_surface", "the line met no surface", draws.no_surface()},
+          {"start_blocked", "a finger started inside of the object or behind a part of it",
+           draws.start_blocked()},
+          {"finger_missed", "a finger met nothing", draws.finger_missed()},
+          {"beyond_stroke", "a finger met the object only beyond the stroke", draws.beyond_stroke()},
+          {"steep_incidence", "a finger met the surface too obliquely", draws.steep_incidence()}};
+}
+
+absl::StatusOr<PlannedTouches> Expand(client::Connection* connection, const PlanCommandOptions& options,
+                                      uint64_t count, v1::ExpandPlanRequest request) {
+  PlannedTouches planned;
   for (const std::string& object : SplitCommas(options.objects)) {
     request.set_object(object);
+    v1::PlanDraws draws;
     for (uint64_t done = 0; done < count;) {
       const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
       request.set_first_index(options.first + done);
@@ -42,40 +69,92 @@ absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool cou
           client::Connection::Call(&v1::Source::Stub::ExpandPlan, connection->source(), request));
       for (const v1::CommandedTouch& touch : response.touches()) {
         client::MeasuredTouch row;
-        row.touch = options.first + touches.size();
+        row.touch = options.first + planned.touches.size();
         row.object = object;
         row.commanded = touch;
-        touches.push_back(std::move(row));
+        planned.touches.push_back(std::move(row));
       }
+      Add(response.draws(), &draws);
+      for (const std::string& note : response.notes())
+        if (std::find(planned.notes.begin(), planned.notes.end(), note) == planned.notes.end())
+          planned.notes.push_back(note);
       if (response.touches_size() == 0) break;  // the plan has ended
       done += step;
     }
+    if (draws.draws() > 0) planned.draws.emplace_back(object, draws);
   }
-  const std::string details = absl::StrCat(" (", Counted(touches.size(), "touch", "touches"), ")");
+  return planned;
+}
+
+// How many draws the touches took, and what is odd about them.
+void LogDraws(const Cli& cli, const PlannedTouches& planned) {
+  for (const std::string& note : planned.notes) cli.Log("note: " + note);
+  for (const auto& [object, draws] : planned.draws) {
+    uint64_t rejected = 0;
+    std::string why;
+    for (const Rejection& rejection : RejectionsOf(draws)) {
+      rejected += rejection.count;
+      if (rejection.count > 0)
+        absl::StrAppend(&why, why.empty() ? ": in " : ", in ", rejection.count, " ", rejection.words);
+    }
+    cli.Log(absl::StrCat(object, ": ", Counted(draws.draws() - rejected, "touch", "touches"), " took ",
+                         Counted(draws.draws(), "draw", "draws"), why));
+  }
+}
+
+Json DrawsJson(const PlannedTouches& planned) {
+  Json json = Json::object();
+  for (const auto& [object, draws] : planned.draws) {
+    Json& item = json[object] = {{"draws", draws.draws()}};
+    for (const Rejection& rejection : RejectionsOf(draws)) item[rejection.name] = rejection.count;
+  }
+  return json;
+}
+
+Json TouchJson(const client::MeasuredTouch& touch) {
+  const auto vector = [](const v1::Vector3& v, Unit unit) {
+    return Json{client::LabNumber(unit, v.x()), client::LabNumber(unit, v.y()),
+                client::LabNumber(unit, v.z())};
+  };
+  const v1::CommandedTouch& c = touch.commanded;
+  Json item = {{"touch", touch.touch},
+               {"object", touch.object},
+               {"speed_mm_s", client::LabNumber(Unit::kMillimetrePerSecond, c.speed_m_s())},
+               {"standoff_mm", client::LabNumber(Unit::kMillimetre, c.standoff_m())},
+               {"target_mm", vector(c.target_m(), Unit::kMillimetre)},
+               {"approach", vector(c.approach(), Unit::kNone)},
+               {"lateral", vector(c.lateral(), Unit::kNone)}};
+  if (c.has_session_time_s()) item["session_time_s"] = c.session_time_s();
+  return item;
+}
+
+absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool count_given) {
+  v1::ExpandPlanRequest request;
+  TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_plan(), MakePlan(options.plan, nullptr));
+  request.set_seed(options.seed);
+  request.set_max_draws(options.max_draws);
+  if (!options.model.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(*request.mutable_model(), ParseModelRef(options.model));
+  }
+  // A plan that ends is written whole unless a part was asked for.
+  uint64_t count = options.count;
+  if (!count_given && request.plan().has_faces())
+    count = uint64_t{6} * request.plan().faces().samples_per_face() * request.plan().faces().rounds();
+  if (!count_given && request.plan().has_list()) count = request.plan().list().touches_size();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PlannedTouches planned,
+                              Expand(connection.get(), options, count, std::move(request)));
+  LogDraws(cli, planned);
+  const std::string details = absl::StrCat(" (", Counted(planned.touches.size(), "touch", "touches"), ")");
   if (!cli.output().json) {
-    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, client::FormatMeasurements(touches)));
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, client::FormatMeasurements(planned.touches)));
     cli.LogWritten(options.output, details);
     return absl::OkStatus();
   }
-
   Json list = Json::array();
-  for (const client::MeasuredTouch& touch : touches) {
-    const auto vector = [](const v1::Vector3& v, Unit unit) {
-      return Json{client::LabNumber(unit, v.x()), client::LabNumber(unit, v.y()),
-                  client::LabNumber(unit, v.z())};
-    };
-    const v1::CommandedTouch& c = touch.commanded;
-    Json item = {{"touch", touch.touch},
-                 {"object", touch.object},
-                 {"speed_mm_s", client::LabNumber(Unit::kMillimetrePerSecond, c.speed_m_s())},
-                 {"standoff_mm", client::LabNumber(Unit::kMillimetre, c.standoff_m())},
-                 {"target_mm", vector(c.target_m(), Unit::kMillimetre)},
-                 {"approach", vector(c.approach(), Unit::kNone)},
-                 {"lateral", vector(c.lateral(), Unit::kNone)}};
-    if (c.has_session_time_s()) item["session_time_s"] = c.session_time_s();
-    list.push_back(std::move(item));
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, Json({{"touches", list}}).dump(2) + "\n"));
+  for (const client::MeasuredTouch& touch : planned.touches) list.push_back(TouchJson(touch));
+  Json json = {{"touches", list}, {"draws", DrawsJson(planned)}, {"notes", planned.notes}};
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, json.dump(2) + "\n"));
   cli.LogWritten(options.output, details);
   return absl::OkStatus();
 }
@@ -89,6 +168,8 @@ void AddPlan(Cli* cli) {
       nullptr, "plan", "Writes the commanded touches of a plan as CSV, a measurement file without times.",
       "touchstone plan lat20 --count 100 -o plan.csv\n"
       "touchstone plan lat00,lat10,lat20 --plan faces --samples-per-face 8 --rounds 4 -o plan.csv\n"
+      "touchstone plan arm --mesh arm=arm.stl --plan faces --model tips.yaml --max-incidence-deg 45 -o "
+      "plan.csv\n"
       "touchstone plan lat20 --step-angle-deg 5 --seed 7 --json",
       [cli, options, count] { return RunPlan(*cli, *options, (*count)->count() > 0); });
   command
@@ -101,6 +182,17 @@ void AddPlan(Cli* cli) {
   (*count)->type_name("N");
   command->add_option("--first", options->first, "Number of the first one. Default: 0")->type_name("N");
   command->add_option("--seed", options->seed, "Seed of the directions. Default: 0")->type_name("N");
+  cli->AddInput(
+      command,
+      command
+          ->add_option("--model", options->model,
+                       "What the real rig has: a model file, name or hash, whose fingers, with its effects, "
+                       "must all meet the object. Default: the source's own")
+          ->type_name("MODEL"));
+  command
+      ->add_option("--max-draws", options->max_draws,
+                   "Draws for one touch before the object is refused, with the reason. Default: 1000")
+      ->type_name("N");
   cli->AddFormattedOutput(command, "-o,--output", &options->output, "The file to write. Default: stdout");
   AddPlanOptions(cli, command, &options->plan);
   cli->AddSourceOptions(command);

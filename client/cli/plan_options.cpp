@@ -21,7 +21,6 @@ namespace {
 
 constexpr char kPlanGroup[] = "Plan";
 constexpr char kImageGroup[] = "Image";
-constexpr char kTouchGroup[] = "Touch";
 constexpr uint64_t kMaxPlanBytes = 1 << 30;
 
 // The generators' defaults (source.proto), in the units of files.
@@ -32,19 +31,10 @@ constexpr uint32_t kRounds = 4;
 constexpr double kMaxTiltDeg = 20;
 constexpr double kSpread = 0.6;
 constexpr double kStandoffMm = 60;
+constexpr double kStrokeBeyondTargetMm = kDefaultStrokeBeyondTargetM * kMillimetresPerMetre;
+constexpr double kSphereMaxIncidenceDeg = 90;
+constexpr double kFacesMaxIncidenceDeg = 60;
 constexpr double kSpeedMmS = 20;
-
-v1::Vector3 Cross(const v1::Vector3& a, const v1::Vector3& b) {
-  v1::Vector3 c;
-  c.set_x(a.y() * b.z() - a.z() * b.y());
-  c.set_y(a.z() * b.x() - a.x() * b.z());
-  c.set_z(a.x() * b.y() - a.y() * b.x());
-  return c;
-}
-
-double Norm(const v1::Vector3& v) {
-  return std::sqrt(v.x() * v.x() + v.y() * v.y() + v.z() * v.z());
-}
 
 }  // namespace
 
@@ -53,11 +43,12 @@ void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options) {
                        const std::string& text) {
     return command->add_option(name, value, text)->type_name(type)->group(kPlanGroup);
   };
-  cli->AddInput(command,
-                add("--plan", options->plan, "PLAN",
-                    "sphere: random directions round the object; faces: rounds of poses on the six "
-                    "faces of its box; or a CSV file of explicit touches (touchstone plan writes one). "
-                    "Default: sphere"));
+  cli->AddInput(
+      command, add("--plan", options->plan, "PLAN",
+                   "sphere: random directions round the object; faces: rounds of poses from the six faces of "
+                   "its box onto its surface; either draws a touch again until every finger meets the "
+                   "object; or a CSV file of explicit touches (touchstone plan writes one). "
+                   "Default: sphere"));
   add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20; a file has its own");
   add("--touch-interval-s", options->touch_interval_s, "S", "Time between the starts of touches. Default: 0");
   add("--step-angle-deg", options->step_angle_deg, "DEG",
@@ -70,9 +61,15 @@ void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options) {
   add("--rounds", options->rounds, "N", "faces: repeats of all poses. Default: 4");
   add("--max-tilt-deg", options->max_tilt_deg, "DEG",
       "faces: largest angle to the face's normal. Default: 20");
-  add("--spread", options->spread, "RATIO", "faces: targets lie within this share of a face. Default: 0.6");
+  add("--spread", options->spread, "RATIO", "faces: lines go through this share of a face. Default: 0.6");
   add("--standoff-mm", options->standoff_mm, "MM",
       "faces: distance of the start from the target. Default: 60");
+  add("--stroke-beyond-target-mm", options->stroke_beyond_target_mm, "MM",
+      "faces: every finger meets the object before it is so far behind the target, where a rig's approach "
+      "ends. Default: 30");
+  add("--max-incidence-deg", options->max_incidence_deg, "DEG",
+      "sphere, faces: largest angle at which a finger meets the surface, 0 being square on; 90: any. "
+      "Default: 60 for faces, 90 for sphere");
 }
 
 absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>* objects) {
@@ -80,13 +77,17 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
   const std::pair<const char*, bool> sphere_only[] = {{"--step-angle-deg", o.step_angle_deg.has_value()},
                                                       {"--roll-step-deg", o.roll_step_deg.has_value()},
                                                       {"--radius-ratio", o.radius_ratio.has_value()}};
-  const std::pair<const char*, bool> faces_only[] = {{"--samples-per-face", o.samples_per_face.has_value()},
-                                                     {"--rounds", o.rounds.has_value()},
-                                                     {"--max-tilt-deg", o.max_tilt_deg.has_value()},
-                                                     {"--spread", o.spread.has_value()},
-                                                     {"--standoff-mm", o.standoff_mm.has_value()}};
-  const std::pair<const char*, bool> not_in_list[] = {{"--speed-mm-s", o.speed_mm_s.has_value()},
-                                                      {"--touch-interval-s", o.touch_interval_s.has_value()}};
+  const std::pair<const char*, bool> faces_only[] = {
+      {"--samples-per-face", o.samples_per_face.has_value()},
+      {"--rounds", o.rounds.has_value()},
+      {"--max-tilt-deg", o.max_tilt_deg.has_value()},
+      {"--spread", o.spread.has_value()},
+      {"--standoff-mm", o.standoff_mm.has_value()},
+      {"--stroke-beyond-target-mm", o.stroke_beyond_target_mm.has_value()}};
+  const std::pair<const char*, bool> not_in_list[] = {
+      {"--max-incidence-deg", o.max_incidence_deg.has_value()},
+      {"--speed-mm-s", o.speed_mm_s.has_value()},
+      {"--touch-interval-s", o.touch_interval_s.has_value()}};
   const auto misplaced = [&](const auto& options, const char* home) -> absl::Status {
     for (const auto& [name, given] : options)
       if (given)
@@ -109,6 +110,9 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
                            absl::StrCat(name, ": ", ShortestNumber(value), " is out of range; above 0"));
   };
   TOUCHSTONE_RETURN_IF_ERROR(positive("--speed-mm-s", o.speed_mm_s.value_or(kSpeedMmS)));
+  if (const double deg = o.max_incidence_deg.value_or(90); !(deg >= 0.1 && deg <= 90))
+    return absl::InvalidArgumentError(
+        absl::StrCat("--max-incidence-deg: ", ShortestNumber(deg), " is out of range; 0.1 to 90"));
   if (o.plan == "sphere") {
     TOUCHSTONE_RETURN_IF_ERROR(positive("--step-angle-deg", o.step_angle_deg.value_or(kStepAngleDeg)));
     TOUCHSTONE_RETURN_IF_ERROR(positive("--radius-ratio", o.radius_ratio.value_or(kRadiusRatio)));
@@ -116,18 +120,23 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
     sphere->set_step_angle_rad(ToSi(Unit::kDegree, o.step_angle_deg.value_or(kStepAngleDeg)));
     sphere->set_roll_step_rad(ToSi(Unit::kDegree, o.roll_step_deg.value_or(0)));
     sphere->set_radius_ratio(o.radius_ratio.value_or(kRadiusRatio));
+    sphere->set_max_incidence_rad(ToSi(Unit::kDegree, o.max_incidence_deg.value_or(kSphereMaxIncidenceDeg)));
     return plan;
   }
   if (o.plan == "faces") {
     TOUCHSTONE_RETURN_IF_ERROR(positive("--samples-per-face", o.samples_per_face.value_or(kSamplesPerFace)));
     TOUCHSTONE_RETURN_IF_ERROR(positive("--rounds", o.rounds.value_or(kRounds)));
     TOUCHSTONE_RETURN_IF_ERROR(positive("--standoff-mm", o.standoff_mm.value_or(kStandoffMm)));
+    const double beyond_mm = o.stroke_beyond_target_mm.value_or(kStrokeBeyondTargetMm);
+    TOUCHSTONE_RETURN_IF_ERROR(positive("--stroke-beyond-target-mm", beyond_mm));
     v1::FacesPlan* faces = plan.mutable_faces();
     faces->set_samples_per_face(o.samples_per_face.value_or(kSamplesPerFace));
     faces->set_rounds(o.rounds.value_or(kRounds));
     faces->set_max_tilt_rad(ToSi(Unit::kDegree, o.max_tilt_deg.value_or(kMaxTiltDeg)));
     faces->set_spread(o.spread.value_or(kSpread));
     faces->set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm.value_or(kStandoffMm)));
+    faces->set_max_incidence_rad(ToSi(Unit::kDegree, o.max_incidence_deg.value_or(kFacesMaxIncidenceDeg)));
+    faces->set_stroke_beyond_target_m(ToSi(Unit::kMillimetre, beyond_mm));
     return plan;
   }
   TOUCHSTONE_RETURN_IF_ERROR(misplaced(not_in_list, "--plan sphere and faces"));
@@ -231,64 +240,6 @@ absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& o,
   if (renderer.kind == image::RendererKind::kEgl) spec.set_renderer(v1::RENDERER_KIND_EGL);
   if (renderer.kind == image::RendererKind::kCpu) spec.set_renderer(v1::RENDERER_KIND_CPU);
   return spec;
-}
-
-void AddTouchOptions(CLI::App* command, TouchFlags* options) {
-  const auto add = [&](const std::string& name, auto& value, const std::string& type,
-                       const std::string& text) {
-    command->add_option(name, value, text)->type_name(type)->group(kTouchGroup);
-  };
-  add("--approach", options->approach, "X,Y,Z",
-      "Unit vector along which the fingers move, for instance 0,0,-1");
-  add("--target-mm", options->target_mm, "X,Y,Z", "Point that the middle finger aims at. Default: 0,0,0");
-  add("--lateral", options->lateral, "X,Y,Z",
-      "Unit vector from the first finger towards the last, perpendicular to the approach. "
-      "Default: approach x z, or x for a vertical approach");
-  add("--standoff-mm", options->standoff_mm, "MM", "Distance of the start from the target. Default: 100");
-  add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20");
-}
-
-absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& o) {
-  v1::CommandedTouch touch;
-  if (o.approach.empty())
-    return absl::InvalidArgumentError(
-        "--approach is missing: the direction of the touch, for instance 0,0,-1");
-  TOUCHSTONE_ASSIGN_OR_RETURN(*touch.mutable_approach(), ParseVector("--approach", o.approach));
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Vector3 target, ParseVector("--target-mm", o.target_mm));
-  touch.mutable_target_m()->set_x(ToSi(Unit::kMillimetre, target.x()));
-  touch.mutable_target_m()->set_y(ToSi(Unit::kMillimetre, target.y()));
-  touch.mutable_target_m()->set_z(ToSi(Unit::kMillimetre, target.z()));
-  if (!o.lateral.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(*touch.mutable_lateral(), ParseVector("--lateral", o.lateral));
-  } else {
-    v1::Vector3 z;
-    z.set_z(1);
-    v1::Vector3 lateral = Cross(touch.approach(), z);
-    const double length = Norm(lateral);
-    // A vertical approach has no horizontal "right"; x is as good as any.
-    constexpr double kVertical = 1e-9;
-    if (length > kVertical) {
-      lateral.set_x(lateral.x() / length);
-      lateral.set_y(lateral.y() / length);
-      lateral.set_z(0);
-    } else {
-      lateral = v1::Vector3();
-      lateral.set_x(1);
-    }
-    *touch.mutable_lateral() = lateral;
-  }
-  // In the units that the user typed; the source would answer in its own.
-  constexpr double kMaxSpeedMmS = kMaxSpeedMS * kMillimetresPerMetre;
-  constexpr double kMaxStandoffMm = kMaxStandoffM * kMillimetresPerMetre;
-  if (!(o.speed_mm_s > 0) || o.speed_mm_s > kMaxSpeedMmS)
-    return absl::InvalidArgumentError(absl::StrCat("--speed-mm-s: ", ShortestNumber(o.speed_mm_s),
-                                                   " is out of range; above 0 and at most ", kMaxSpeedMmS));
-  if (!(o.standoff_mm >= 0) || o.standoff_mm > kMaxStandoffMm)
-    return absl::InvalidArgumentError(absl::StrCat("--standoff-mm: ", ShortestNumber(o.standoff_mm),
-                                                   " is out of range; from 0 to ", kMaxStandoffMm));
-  touch.set_standoff_m(ToSi(Unit::kMillimetre, o.standoff_mm));
-  touch.set_speed_m_s(ToSi(Unit::kMillimetrePerSecond, o.speed_mm_s));
-  return touch;
 }
 
 }  // namespace touchstone::cli

@@ -1,4 +1,4 @@
-// Options that several commands share: the plan, the image, explicit touches.
+// Options that several commands share: the plan and the image; plans in files.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,8 @@ struct PlanOptions {
   std::string plan = "sphere";  // sphere, faces or a CSV file
   std::optional<double> step_angle_deg, roll_step_deg, radius_ratio;
   std::optional<uint32_t> samples_per_face, rounds;
-  std::optional<double> max_tilt_deg, spread, standoff_mm;
+  std::optional<double> max_tilt_deg, spread, standoff_mm, stroke_beyond_target_mm;
+  std::optional<double> max_incidence_deg;
   std::optional<double> speed_mm_s, touch_interval_s;
 };
 void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options);
@@ -38,17 +39,6 @@ struct ImageFlags {
 void AddImageOptions(CLI::App* command, ImageFlags* options);
 absl::StatusOr<v1::ImageSpec> MakeImageSpec(const Cli& cli, const ImageFlags& options,
                                             const std::string& encoding);
-
-// One touch given by options: --approach and so on.
-struct TouchFlags {
-  std::string target_mm = "0,0,0";
-  std::string approach;
-  std::string lateral;
-  double standoff_mm = 100;
-  double speed_mm_s = 20;
-};
-void AddTouchOptions(CLI::App* command, TouchFlags* options);
-absl::StatusOr<v1::CommandedTouch> MakeTouch(const TouchFlags& options);
 
 // One row of a plan of photographs: a file with the columns of images.csv.
 struct PlannedPicture {

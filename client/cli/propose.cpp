@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "client/cli/comparison.h"
 #include "client/source/measurement_csv.h"
@@ -15,7 +16,8 @@ namespace touchstone::cli {
 namespace {
 
 struct ProposeOptions : ComparisonOptions {
-  uint32_t touches = 24, photographs = 12;
+  // Not given: as many as the source proposes by itself, of the kind that the set has.
+  std::optional<uint32_t> touches, photographs;
   std::string output;
 };
 
@@ -71,21 +73,27 @@ absl::Status WritePlanOfPhotographs(const Cli& cli, const ProposeOptions& option
 }
 
 absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
-  if (options.touches < 1)
+  if (options.touches == 0u)
     return absl::InvalidArgumentError("--touches: 0 is out of range; 1 or more was expected");
-  if (options.photographs < 1)
+  if (options.photographs == 0u)
     return absl::InvalidArgumentError("--photographs: 0 is out of range; 1 or more was expected");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::ProposeRequest request;
   *request.mutable_evidence() = comparison->evidence();
-  request.set_touches(options.touches);
-  request.set_photographs(options.photographs);
+  request.set_touches(options.touches.value_or(0));
+  request.set_photographs(options.photographs.value_or(0));
+  const bool both = request.evidence().has_images() &&
+                    request.evidence().measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET;
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
                                 return comparison->connection().diagnosis().Propose(context, request);
                               }));
 
+  if (both)
+    cli.Log(report.images() > 0
+                ? "from the photographs alone, without the touches beside them (--touches N proposes touches)"
+                : "from the touches alone, without the photographs beside them");
   if (report.images() > 0) return WritePlanOfPhotographs(cli, options, report);
   std::vector<client::MeasuredTouch> plan;
   std::map<std::string, int> purposes;
@@ -131,11 +139,13 @@ void AddPropose(Cli* cli) {
       "touchstone rig photos lat20 --plan next.csv -o photos --server 127.0.0.1:50052",
       [cli, options] { return RunPropose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
-  command->add_option("--touches", options->touches, "How many touches to propose. Default: 24")
+  command
+      ->add_option("--touches", options->touches,
+                   "How many touches to propose, also of a folder of both. Default: 24")
       ->type_name("N");
   command
       ->add_option("--photographs", options->photographs,
-                   "Of a folder of photographs: how many pictures to propose. Default: 12")
+                   "Of a folder of photographs (or of both): how many pictures to propose. Default: 12")
       ->type_name("N");
   cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) to write. Default: stdout");
 }

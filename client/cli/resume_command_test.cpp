@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -125,6 +126,60 @@ TEST_P(ResumeTest, AServerGivesTheSameBytesAsThisProcess) {
   const Outcome remote = Run(Stream("remote", {"--server", servers, "--batch-size", "77"}));
   ASSERT_EQ(remote.exit_code, 0) << remote.err;
   EXPECT_EQ(Snapshot("remote"), Snapshot("embedded"));
+}
+
+// The files of a shard: itself, or those in its folder.
+std::vector<fs::path> FilesOf(const fs::path& shard) {
+  if (!fs::is_directory(shard)) return {shard};
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(shard)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+TEST_P(ResumeTest, AByteThatWasChangedIsFound) {
+  ASSERT_EQ(Run(Stream("d")).exit_code, 0);
+  const auto expected = Snapshot("d");
+  EXPECT_THAT(Run({"dataset", "verify", "d"}).err, HasSubstr("6000 samples in 24 shards, every byte"));
+  std::vector<fs::path> shards;
+  for (const auto& entry : fs::directory_iterator(Path("d")))
+    if (entry.path().filename() != "dataset.json") shards.push_back(entry.path());
+  std::sort(shards.begin(), shards.end());
+  ASSERT_EQ(shards.size(), 24u);
+  const fs::path file = FilesOf(shards[7]).back();
+  std::string bytes = *ReadFile(file.string());
+  bytes[bytes.size() / 2] ^= 1;
+  ASSERT_TRUE(WriteFileAtomically(file.string(), bytes).ok());
+
+  const std::string name = shards[7].filename().string();
+  const Outcome verified = Run({"dataset", "verify", "d", "--json"});
+  EXPECT_EQ(verified.exit_code, 4) << verified.err;
+  EXPECT_THAT(verified.err, AllOf(HasSubstr("23 of 24"), HasSubstr(name + " has the SHA-256")));
+  EXPECT_EQ(nlohmann::json::parse(verified.out)["shards_whole"], 23);
+  // It does not count as done either, and what is deleted is made again.
+  const Outcome resumed = Run(Stream("d"));
+  EXPECT_EQ(resumed.exit_code, 2);
+  EXPECT_THAT(resumed.err, AllOf(HasSubstr(name), HasSubstr("was changed")));
+  fs::remove_all(shards[7]);
+  EXPECT_THAT(Run({"dataset", "verify", "d"}).err, HasSubstr("1 shard is missing: " + name));
+  EXPECT_EQ(Run(Stream("d")).exit_code, 0);
+  EXPECT_EQ(Snapshot("d"), expected);
+}
+
+TEST_P(ResumeTest, AShardOfWhichNothingIsKnownIsMadeAgain) {
+  ASSERT_EQ(Run(Stream("d")).exit_code, 0);
+  const auto expected = Snapshot("d");
+  // As after a kill between a shard and the manifest, and a disk that lost the shard's end.
+  nlohmann::ordered_json manifest = nlohmann::ordered_json::parse(*ReadFile(Path("d/dataset.json")));
+  const fs::path shard = Path("d/" + manifest["shards"][5]["name"].get<std::string>());
+  manifest["shards"].erase(5);
+  manifest["state"] = "partial";
+  ASSERT_TRUE(WriteFileAtomically(Path("d/dataset.json"), manifest.dump()).ok());
+  const fs::path file = FilesOf(shard).back();
+  fs::resize_file(file, fs::file_size(file) / 2);
+  EXPECT_THAT(Run({"dataset", "verify", "d"}).err, HasSubstr("no dataset.json says"));
+  EXPECT_EQ(Run(Stream("d")).exit_code, 0);
+  EXPECT_EQ(Snapshot("d"), expected);
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, ResumeTest, ::testing::Values("webdataset", "folder", "hdf5"),

@@ -10,6 +10,7 @@
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
+#include "client/source/dataset_folder.h"
 #include "client/source/dataset_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -38,7 +39,6 @@ struct StreamOptions {
 };
 
 constexpr uint64_t kDefaultSamples = 1000;
-constexpr uint64_t kMaxManifestBytes = uint64_t{1} << 30;
 
 // The objects of the source, for "all".
 absl::StatusOr<std::vector<std::string>> AllObjects(client::Connection* connection) {
@@ -117,8 +117,7 @@ absl::Status ParseShards(const std::string& text, client::DatasetJob* job) {
 
 // What another dataset was made of, so that it is made again.
 absl::Status RepeatManifest(const StreamOptions& o, client::DatasetJob* job, bool shard_size_given) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(o.like, kMaxManifestBytes));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const client::DatasetManifest manifest, client::ParseManifest(text, o.like));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const client::DatasetManifest manifest, client::ReadManifest(o.like));
   TOUCHSTONE_ASSIGN_OR_RETURN(job->spec, client::SpecOfManifest(manifest.identity, o.like));
   TOUCHSTONE_ASSIGN_OR_RETURN(job->format, client::ParseShardFormat(manifest.identity.value("format", "")));
   if (!shard_size_given) job->shard_size = manifest.identity.value("shard_size", job->shard_size);
@@ -130,6 +129,7 @@ Json ResultJson(const client::DatasetJob& job, const client::DatasetResult& resu
           {"complete", result.dataset_complete},
           {"samples", result.samples_in_dataset},
           {"samples_written", result.samples_written},
+          {"draws", result.draws},
           {"shards_written", result.shards_written},
           {"shards_found", result.shards_found},
           {"elapsed_s", elapsed_s},
@@ -145,7 +145,8 @@ void Summarise(const Cli& cli, const client::DatasetJob& job, const client::Data
   else
     cli.Log(absl::StrCat("wrote ", Counted(result.samples_written, "sample", "samples"), " in ",
                          Counted(result.shards_written, "shard", "shards"),
-                         result.shards_found > 0 ? " (" + found + " stood already)" : "", " in ",
+                         result.shards_found > 0 ? " (" + found + " stood already)" : "",
+                         result.draws > 0 ? " by " + Counted(result.draws, "draw", "draws") : "", " in ",
                          Rounded(elapsed_s), " s, ", Rounded(result.samples_written / elapsed_s),
                          " samples/s"));
   cli.Log(result.dataset_complete ? absl::StrCat(place, ": ", result.samples_in_dataset, " samples, complete")

@@ -1,13 +1,17 @@
 // touchstone touch: explicit touches and their contact times.
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/touch_options.h"
 #include "client/source/lab_units.h"
 #include "client/source/measurement_csv.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
+#include "server/base/touch_limits.h"
 
 namespace touchstone::cli {
 namespace {
@@ -57,6 +61,24 @@ absl::StatusOr<std::vector<TouchRow>> CommandedRows(const TouchOptions& options)
   return rows;
 }
 
+// What the options left open of a touch, by where the object is and how large. The rows are repeats of one touch.
+absl::Status AimRows(const TouchOptions& options, client::Connection* connection,
+                     std::vector<TouchRow>* rows) {
+  if (!options.plan.empty() || (!options.touch.target_mm.empty() && options.touch.standoff_mm.has_value()))
+    return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<geometry::Bounds> bounds,
+                              BoundsOfObject(connection, options.object));
+  if (!bounds.has_value()) return absl::OkStatus();
+  const auto standoff = [](const geometry::Bounds& box, const Eigen::Vector3d& target_m,
+                           const Eigen::Vector3d& approach) {
+    constexpr double kStandoffM = 0.1, kClearanceM = 0.02;
+    return std::clamp(geometry::DistanceToLeave(box, target_m, -approach) + kClearanceM, kStandoffM,
+                      kMaxStandoffM);
+  };
+  for (TouchRow& row : *rows) AimAtObject(options.touch, *bounds, standoff, &row.measured.commanded);
+  return absl::OkStatus();
+}
+
 // Rows of one object that follow each other are one session; the noise depends on the row's number alone. A
 // physical source gets one at a time, with ids: those of a plan's touches are always the same, so that a
 // repeated command resumes where it stopped.
@@ -64,6 +86,7 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
                       std::string* model_hash) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
+  TOUCHSTONE_RETURN_IF_ERROR(AimRows(options, connection.get(), rows));
   ProgressBar bar(!cli.output().quiet);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source,
                               OpenLeased(cli, connection.get(), options.motion, [&](const std::string& line) {
@@ -73,6 +96,7 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
   const StopOnInterrupt stop_on_interrupt(source.get());
   const std::string session = options.motion.session.empty() ? "default" : options.motion.session;
   const size_t max_touches = source->touches_per_request();
+  std::set<std::string> said;
   for (size_t first = 0; first < rows->size();) {
     v1::TouchRequest request;
     request.set_object((*rows)[first].measured.object);
@@ -107,6 +131,11 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
       (*rows)[row].result = std::move(result);
     }
     *model_hash = response->model_hash();
+    for (const std::string& note : response->notes()) {
+      if (!said.insert(note).second) continue;
+      bar.Clear();
+      cli.Log("note: " + note);
+    }
     first = stop;
   }
   return absl::OkStatus();
@@ -183,7 +212,7 @@ void AddTouch(Cli* cli) {
   command->add_option("--repeats", options->repeats, "How often all of it is touched. Default: 1")
       ->type_name("N");
   cli->AddFormattedOutput(command, "-o,--output", &options->output, "The file to write. Default: stdout");
-  AddTouchOptions(command, &options->touch);
+  AddTouchOptions(command, "100, or more where the object reaches farther from the target", &options->touch);
   AddMotionOptions(command, &options->motion, true);
   cli->AddSourceOptions(command);
 }
