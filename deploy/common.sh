@@ -38,18 +38,18 @@ build() {
   cmake --build "$directory" -j "$(jobs_that_fit)" "${targets[@]}"
 }
 
-# The Python package, built as the wheel that users install, in build/venv over Debian's NumPy and gRPC. Nothing
-# is done when the files of the package are those that were installed last.
+# The Python packages, built as the wheels that users install, in build/venv over Debian's NumPy and gRPC. Nothing
+# is done when the files of the packages are those that were installed last.
 install_python_package() {
   local sources stamp=$root/build/venv/touchstone.sha256
-  # What the wheel is made of; generated stubs and what setuptools leaves behind are not.
-  sources=$(find client/python proto -type f -not -path '*/tests/*' -not -path '*/build/*' -not -path '*/dist/*' \
+  # What the wheels are made of; generated stubs and what setuptools leaves behind are not.
+  sources=$(find client/python client/training proto -type f -not -path '*/tests/*' -not -path '*/build/*' -not -path '*/dist/*' \
     -not -path '*.egg-info/*' -not -name '*_pb2*' -not -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum)
   if [[ -x $python && -f $stamp && $(< "$stamp") == "$sources" ]]; then return; fi
   # Debian's own interpreter: another one in PATH would not see Debian's packages.
   [[ -x $python ]] || /usr/bin/python3 -m venv --system-site-packages build/venv || return
   rm -rf build/wheel
-  "$python" -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel client/python || return
+  "$python" -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel client/python client/training || return
   "$python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/*.whl || return
   printf '%s' "$sources" > "$stamp"
 }
@@ -74,12 +74,30 @@ install_other_clients() {
 install_python_test_packages() {
   local stamp=$root/build/venv/python-packages.txt
   cmp -s deploy/python-packages.txt "$stamp" && return
-  if "$python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 \
+  # Without what they depend on: they run on Debian's packages, whose versions pip would replace.
+  if "$python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 --no-deps \
     --requirement deploy/python-packages.txt; then
     cp deploy/python-packages.txt "$stamp"
   else
     echo "PyPI cannot be reached: tests that need $(grep -o '^[a-z0-9_-]*' deploy/python-packages.txt | paste -sd ' ') are skipped"
   fi
+}
+
+# An environment of its own with PyPI's current gRPC, protobuf and NumPy beside Grain and Ray, which need them: for
+# test_grain.py and test_ray.py of client/python/tests. Where PyPI cannot be reached those are skipped, and say so.
+install_current_python() {
+  local wanted='grain==0.2.18 ray[data]==2.60.0 grpcio==1.85.1 protobuf==7.36.2 numpy==2.4.6' into=$root/build/current_venv
+  if [[ ! -f $into/installed || $(< "$into/installed") != "$wanted" ]]; then
+    rm -rf "$into"
+    /usr/bin/python3 -m venv "$into" || return
+    # shellcheck disable=SC2086
+    if ! "$into/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 $wanted; then
+      echo "PyPI cannot be reached: the tests with Grain and Ray are skipped"
+      return 0
+    fi
+    printf '%s' "$wanted" > "$into/installed"
+  fi
+  "$into/bin/python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/touchstone-*.whl
 }
 
 # What runs in the background, "PID NAME" each; stop_programs ends it.

@@ -22,6 +22,7 @@ ONE = {"target_mm": (0, 0, 0), "approach": (0, 0, -1), "lateral": (1, 0, 0), "st
     (dict(objects=["a"], samples=1, speed_mm_s=0), "speed_mm_s is 0"),
     (dict(objects=["a"], samples=1, speed_mm_s=float("nan")), "speed_mm_s is nan"),
     (dict(objects=["a"], samples=1, plan=touchstone.sphere(step_angle_deg=0)), "step_angle_deg is 0"),
+    (dict(objects=["a"], plan=touchstone.faces(max_incidence_deg=0)), "max_incidence_deg is 0"),
     (dict(objects=["a"], plan=touchstone.touches([ONE]), speed_mm_s=10), "carry their own"),
     (dict(objects=["a"], samples=1, columns=["descriptor"], image=touchstone.image()), 'add "image"'),
     (dict(objects=["a"], samples=1, image=touchstone.image(encoding="pgn")), 'Did you mean "png"'),
@@ -33,10 +34,38 @@ def test_a_mistake_names_the_argument(arguments, says):
         specification(**arguments)
 
 
+@pytest.mark.parametrize("image", [(64, 48), [64, 48], touchstone.image(64, 48)])
+def test_an_image_may_be_given_by_its_size(image):
+    spec = specification(["a"], samples=1, image=image)
+    assert (spec.image.width, spec.image.height) == (64, 48)
+    assert list(spec.columns) == ["descriptor", "object", "image"]
+
+
+def test_one_number_is_a_square_image():
+    spec = specification(["a"], samples=1, image=32)
+    assert (spec.image.width, spec.image.height) == (32, 32)
+
+
+@pytest.mark.parametrize("image", ["64x64", (64,), (64, 64, 3), True, 1.5])
+def test_what_is_no_image_is_refused_with_what_would_be_right(image):
+    with pytest.raises(InvalidRequest, match=r"image is .*; give touchstone.image\(width=64, height=64\), or \(64, 64\)"):
+        specification(["a"], samples=1, image=image)
+
+
+def test_columns_may_be_asked_for_by_the_names_that_come_back():
+    spec = specification(["a"], samples=1, columns=["descriptor_us", "index", "contact_time_us", "target_mm", "approach",
+                                                    "contact_point_mm", "normal", "depth_mm", "mask"])
+    assert list(spec.columns) == ["descriptor", "index", "contact_time", "pose", "contact", "image"]
+    assert spec.image.depth and spec.image.mask
+    assert list(specification(["a"], samples=1, columns="descriptor_s").columns) == ["descriptor"]
+
+
 def test_units_go_to_the_wire_as_si():
     spec = specification(["a"], touchstone.faces(2, 3, max_tilt_deg=45, standoff_mm=60), speed_mm_s=20)
     assert spec.plan.speed_m_s == 0.02 and spec.plan.faces.standoff_m == 0.06
     assert spec.plan.faces.max_tilt_rad == pytest.approx(np.pi / 4)
+    assert spec.plan.faces.max_incidence_rad == pytest.approx(np.pi / 3)
+    assert spec.plan.faces.stroke_beyond_target_m == 0.03
     assert spec.samples == 6 * 2 * 3
 
 

@@ -66,6 +66,21 @@ def test_patience_is_bounded(new_server):
     assert 0.9 < time.monotonic() - begin < 10
 
 
+def test_a_lost_source_is_named_long_before_patience_is_over(new_server, caplog):
+    own = new_server()
+    dataset = touchstone.connect(own.target, retry_for_s=30).dataset(**OPTIONS, batch_size=500)
+    batches = iter(dataset)
+    next(batches)
+    own.kill()
+    back = threading.Timer(4.0, own.start_again)
+    back.start()
+    assert sum(batch.rows for batch in batches) == OPTIONS["samples"] - 500
+    back.join()
+    lost, again = [record.getMessage() for record in caplog.records if record.name == "touchstone"]
+    assert own.target in lost and "Start touchstone-server" in lost and "Trying again for" in lost
+    assert "answers again" in again
+
+
 def test_a_server_with_another_model_is_refused(new_server, tmp_path):
     # Both have a model called "rig", but not the same one.
     def model(radius_mm):

@@ -121,6 +121,26 @@ def test_a_list_of_touches_is_a_dataset(client):
     np.testing.assert_allclose(batch["target_mm"], touches.target_mm, atol=1e-4)
 
 
+def test_a_plan_meets_the_object_with_the_fingers_of_a_model(client):
+    wide = "touchstone: model/1\nname: wide\nend_effector: {fingers: 3, spacing_mm: 50}\n"
+    plan = touchstone.faces(samples_per_face=4, rounds=1, max_incidence_deg=40)
+    touches = client.plan(plan, "lat20", 24, model=wide)
+    assert touches.draws > 24  # some were rejected: 100 mm are nearly as wide as the object
+    result = client.touch("lat20", touches, model=wide)
+    assert result["complete"].all()
+    cosine = -np.einsum("tfk,tk->tf", result["normal"], touches.approach)
+    assert cosine.min() >= np.cos(np.radians(40)) - 1e-9
+    np.testing.assert_allclose(result["travel_mm"][:, 1], 60, atol=1e-6)  # targets are on the surface
+    with pytest.raises(touchstone.TouchstoneError, match="in 20 draws no touch met it"):
+        client.plan(touchstone.faces(max_incidence_deg=0.1), "lat20", 4, max_draws=20)
+
+
+def test_a_start_inside_of_the_object_is_warned_of(client):
+    inside = touchstone.touches(target_mm=(0, 0, 0), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=20)
+    with pytest.warns(UserWarning, match="starts inside of 'lat20': a standoff of 20 mm"):
+        client.touch("lat20", inside)
+
+
 def test_the_catalogue_and_the_store_are_readable(client, tmp_path):
     effects = {e.name: e for e in client.effects()}
     assert effects["tip_radius"].parameters[0].unit == "mm" and effects["tip_radius"].stage == "contact"
@@ -158,7 +178,7 @@ def test_the_sources_own_words_reach_the_caller(client, kind, change, says):
 
 def test_nobody_listening_is_said_at_once():
     begin = time.monotonic()
-    with pytest.raises(touchstone.SourceUnreachable, match="127.0.0.1:9"):
+    with pytest.raises(touchstone.SourceUnreachable, match="127.0.0.1:9: no source answers.*Start touchstone-server"):
         touchstone.connect("127.0.0.1:9", timeout_s=0.5)
     assert time.monotonic() - begin < 5
 

@@ -9,6 +9,11 @@
 `touchstone.torch` has the PyTorch dataset; it is imported on its own, since PyTorch is optional.
 """
 
+import pkgutil
+
+# touchstone.training is a distribution of its own, with libraries that streaming does not need.
+__path__ = pkgutil.extend_path(__path__, __name__)
+
 from .batch import Batch, EncodedImages
 from .client import Client, connect
 from .dataset import Dataset, Header
@@ -21,19 +26,23 @@ from .errors import (
     SourceUnreachable,
     TouchstoneError,
 )
+from .evidence import Mesh
 from .images import Camera, ImageOptions, image
 from .lease import Lease
 from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
+from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
+from .report import Report, Step, Value
 from .rig import Rig, TouchCheck
+from .samples import Samples
 from .session import Session, touch_id
 from .version import __version__
 
 __all__ = [
     "Batch", "Camera", "Client", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
-    "ImageOptions", "InvalidRequest", "Lease", "Model", "NotFound", "ObjectInfo", "Parameter", "Refused", "Rig", "Row",
-    "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "TouchCheck", "Touches",
-    "TouchstoneError", "__version__", "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches",
-    "write_measurements",
+    "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model", "NotFound", "ObjectInfo", "Parameter",
+    "Permutation", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
+    "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches", "TouchstoneError", "Value", "__version__",
+    "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches", "write_measurements",
 ]

@@ -40,6 +40,13 @@ class EncodedImages(Sequence):
         index %= count
         return bytes(self._data[self._offsets[index] : self._offsets[index + 1]])
 
+    @classmethod
+    def joined(cls, parts: Sequence[EncodedImages]) -> EncodedImages:
+        offsets = [0]
+        for part in parts:
+            offsets += [offsets[-1] + offset for offset in part._offsets[1:]]
+        return cls(b"".join(bytes(part._data[: part._offsets[-1]]) for part in parts), offsets)
+
     def __repr__(self) -> str:
         return f"EncodedImages({len(self)} images, {len(self._data)} bytes)"
 
@@ -70,7 +77,7 @@ def decode_column(column: types_pb2.Column, rows: int) -> Column:
 
 
 class Batch(Mapping[str, Any]):
-    """Samples start_index .. start_index + rows - 1; `batch["descriptor_us"]` is an array of `rows` entries.
+    """Samples start_index .. start_index + rows - 1, or those of a list; `batch["descriptor_us"]` is an array of `rows` entries.
 
     Columns that need no conversion are read-only views of the received bytes; the others are converted when
     they are first asked for. `batch["image"]` is uint8 (rows, height, width, channels), or EncodedImages.
@@ -78,11 +85,12 @@ class Batch(Mapping[str, Any]):
     Attributes:
       start_index: index of the first sample.
       rows: number of samples.
+      indices: of the samples, (rows,) int64.
       model_hash: of the model that made them; "" if unknown.
       measured: what a physical source measured of each touch of Client.touch(); empty otherwise.
     """
 
-    __slots__ = ("start_index", "rows", "model_hash", "measured", "_columns", "_wire_names")
+    __slots__ = ("start_index", "rows", "model_hash", "measured", "_indices", "_columns", "_wire_names")
 
     def __init__(self, start_index: int, rows: int, columns: Mapping[str, Column], *, model_hash: str = "",
                  si: bool = False):
@@ -90,6 +98,7 @@ class Batch(Mapping[str, Any]):
         self.rows = rows
         self.model_hash = model_hash
         self.measured: Sequence[types_pb2.Measured] = ()
+        self._indices: np.ndarray | None = None
         # Public name -> name on the wire, as long as the column is not converted yet.
         self._wire_names = {} if si else {units.lab_name(name): name for name in columns}
         self._columns = {name if si else units.lab_name(name): values for name, values in columns.items()}
@@ -97,6 +106,16 @@ class Batch(Mapping[str, Any]):
     @classmethod
     def from_columns(cls, start_index: int, rows: int, columns: Sequence[types_pb2.Column], **more) -> Batch:
         return cls(start_index, rows, {c.name: decode_column(c, rows) for c in columns}, **more)
+
+    @property
+    def indices(self) -> np.ndarray:
+        if self._indices is None:
+            self._indices = np.arange(self.start_index, self.start_index + self.rows, dtype=np.int64)
+        return self._indices
+
+    @indices.setter
+    def indices(self, values: np.ndarray) -> None:
+        self._indices = values
 
     def __getitem__(self, name: str) -> Any:
         try:

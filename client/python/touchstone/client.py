@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import warnings
 from typing import Any, Iterator, Sequence
 
 import numpy as np
@@ -12,12 +13,15 @@ from . import checks, models, units
 from .batch import Batch
 from .connection import Connection, Retry, Targets
 from .dataset import Dataset
+from .diagnosis import Diagnosis
 from .errors import InvalidRequest, TouchstoneError
-from .images import ImageOptions, Views, image as default_image, to_views
+from .images import ImageLike, Views, image as default_image, to_image, to_views
 from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
+from .own_server import OwnServer
 from .plans import PlanLike, Touches
 from .rig import Rig
+from .samples import Samples
 from .session import Session, check_name
 from .specification import specification
 from .v1 import control_pb2, control_pb2_grpc, models_pb2, models_pb2_grpc, source_pb2, source_pb2_grpc
@@ -27,28 +31,35 @@ _SOURCE = source_pb2_grpc.SourceStub
 _MODELS = models_pb2_grpc.ModelsStub
 
 
-def connect(targets: Targets = "127.0.0.1:50051", *, timeout_s: float = 3.0, retry_for_s: float = 60.0) -> Client:
+def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = 60.0) -> Client:
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
 
     Args:
+      targets: "host:port", several of them, or none: then a touchstone-server is started for this process, which ends
+        with client.close() or with the process.
       timeout_s: how long to wait for the first answer; SourceUnreachable after that.
       retry_for_s: how long a lost source is tried again, and the other targets with it, before
         SourceUnreachable is raised; counted from the last thing that arrived.
     """
-    client = Client(targets, retry_for_s=retry_for_s)
+    own = OwnServer() if targets is None else None
+    client = Client(own.target if own else targets, retry_for_s=retry_for_s)
+    client.own_server = own
     client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
     return client
 
 
-class Client:
+class Client(Diagnosis):
     """A source of touches and images. Usable as a context manager.
 
     The constructor does not connect; the first method that is called does.
+
+    Attributes:
+      own_server: that connect() started for it, or None; close() ends it.
     """
 
     def __init__(self, targets: Targets, *, retry_for_s: float = 60.0):
-        self._connection = Connection(targets, checks.number("retry_for_s", retry_for_s))
-
+        super().__init__(Connection(targets, checks.number("retry_for_s", retry_for_s)))
+        self.own_server: OwnServer | None = None
         self._description: Description | None = None
         self._leases: list[Lease] = []
         self.rig = Rig(self)
@@ -68,6 +79,8 @@ class Client:
 
     def close(self) -> None:
         self._connection.close()
+        if self.own_server is not None:
+            self.own_server.stop()
 
     def __enter__(self) -> Client:
         return self
@@ -158,16 +171,28 @@ class Client:
         return Model.from_proto(self._connection.call(_MODELS, "CreateModel", request))
 
     def plan(self, plan: PlanLike, object: str = "", count: int = 100, *, seed: int = 0, start: int = 0,
-             speed_mm_s: float = 20.0) -> Touches:
-        """The commanded touches `start` .. `start + count - 1` of a plan for one object; nothing is touched."""
+             speed_mm_s: float = 20.0, model: ModelLike = None, max_draws: int = 0) -> Touches:
+        """The commanded touches `start` .. `start + count - 1` of a plan for one object; nothing is touched.
+
+        A touch of sphere() or faces() is drawn again until every finger completes it; `draws` says how often. What is
+        odd about the touches or the object's size is a UserWarning.
+
+        Args:
+          model: what the real rig has: its fingers, with its effects, must all meet the object. None: the source's own.
+          max_draws: draws for one touch before the plan is refused, with the reason; 0: the source's own limit.
+        """
         message = plan.to_proto()
         if not isinstance(plan, Touches):
             message.speed_m_s = units.si_value("speed_m_s", checks.positive("speed_mm_s", speed_mm_s))
         request = source_pb2.ExpandPlanRequest(
             plan=message, object=object, seed=checks.uint64("seed", seed), first_index=checks.uint64("start", start),
-            count=checks.whole_number("count", count, 1, 2**32 - 1),
+            count=checks.whole_number("count", count, 1, 2**32 - 1), model=model_ref(model),
+            max_draws=checks.whole_number("max_draws", max_draws, 0, 2**32 - 1),
         )
-        return Touches.from_messages(self._connection.call(_SOURCE, "ExpandPlan", request).touches)
+        reply = self._connection.call(_SOURCE, "ExpandPlan", request)
+        for note in reply.notes:
+            warnings.warn(note, stacklevel=2)
+        return Touches.from_messages(reply.touches, reply.draws.draws)
 
     def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
               lease_token: str = "", session: str = "", ids: Sequence[str] | None = None,
@@ -187,7 +212,8 @@ class Client:
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
           (N, fingers, 3) `contact_point_mm` and `normal`; (N,) `complete`. Its attribute `measured` has what a physical
-          source measured, one message per touch (touchstone.v1.Measured).
+          source measured, one message per touch (touchstone.v1.Measured). A start inside of the object or an
+          implausible size of it is a UserWarning.
         """
         if ids is not None and len(ids) != len(touches):
             raise InvalidRequest(f"ids has {len(ids)} entries for {len(touches)} touches; give one each.")
@@ -200,6 +226,8 @@ class Client:
         )
         with contextlib.nullcontext() if lease_token else self._leased() as lease:
             reply = self._touch(request, lease)
+        for note in reply.notes:
+            warnings.warn(note, stacklevel=2)
         columns = {}
         for name, entry in (("descriptor_s", ()), ("contact_time_s", ()), ("travel_m", ()),
                             ("contact_point_m", (3,)), ("normal", (3,))):
@@ -245,7 +273,7 @@ class Client:
         with self.lease() as lease:
             yield lease
 
-    def capture(self, object: str, views: Views, *, image: ImageOptions | None = None, normalize: bool = False,
+    def capture(self, object: str, views: Views, *, image: ImageLike | None = None, normalize: bool = False,
                 model: ModelLike = None, seed: int = 0, start: int = 0, lease_token: str = "") -> Batch:
         """Photographs: one for each touch (its camera) or each touchstone.Camera.
 
@@ -258,7 +286,7 @@ class Client:
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
         """
-        options = image or default_image()
+        options = default_image() if image is None else to_image(image)
         if normalize:
             options = dataclasses.replace(options, normalize=True)
         with contextlib.ExitStack() as stack:
@@ -273,7 +301,7 @@ class Client:
     def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                image: ImageOptions | None = None, max_draws: int = 0, batch_size: int | None = None,
+                image: ImageLike | None = None, max_draws: int = 0, batch_size: int | None = None,
                 start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab",
                 session: str = "") -> Dataset:
         """A dataset to iterate over; sample i is the same bits whoever asks, however it is cut into batches.
@@ -286,9 +314,10 @@ class Client:
           model: a name, a hash, a path to a model file, its text, or a Model; default: the source's.
           speed_mm_s: commanded speed, default 20; explicit touches carry their own.
           touch_interval_s: time between the starts of neighbouring touches.
-          columns: "index", "object", "descriptor", "contact_time", "pose", "contact", "image"; default
-            ("descriptor", "object"), and "image" if `image` is given.
-          image: touchstone.image(...).
+          columns: "index", "object", "descriptor", "contact_time", "pose", "contact", "image", or names as they come
+            back ("descriptor_us"; "target_mm" brings its whole group, "pose"); default ("descriptor", "object"), and
+            "image" if `image` is given.
+          image: touchstone.image(...), or (width, height).
           max_draws: draws for one index before the stream fails; 0: the source's own limit.
           batch_size: samples a batch; default 4096, 64 with images.
           start, stop: a part of the dataset, samples start .. stop - 1.
@@ -306,6 +335,26 @@ class Client:
         return Dataset(
             self._connection.another(), spec, batch_size=batch_size, start=start, stop=stop, stride=stride, si=si,
             hold_lease=self.holding_lease, session=check_name(session) if session else "",
+        )
+
+
+    def samples(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
+                seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
+                touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                image: ImageLike | None = None, max_draws: int = 0, units: str = "lab",
+                session: str = "") -> Samples:
+        """A dataset by index, `samples[i]` or `samples[[3, 1, 7]]`: the same samples as those of dataset().
+
+        Arguments as in dataset(). A list costs one request, so ask for as many as are needed together.
+        """
+        si = bool(checks.choice("units", units, {"lab": 0, "si": 1}))
+        spec = specification(
+            objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
+            touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
+        )
+        return Samples(
+            self._connection.another(), spec, si=si, hold_lease=self.holding_lease,
+            session=check_name(session) if session else "",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import random
 import time
@@ -12,6 +13,10 @@ import grpc
 from . import errors
 
 Targets = Union[str, Sequence[str]]
+
+_log = logging.getLogger("touchstone")
+# A source that restarts or hands over is back before anyone needs to hear of it.
+_SILENT_FOR_S = 2.0
 
 _MIB = 1024 * 1024
 _OPTIONS = (
@@ -63,10 +68,14 @@ class Retry:
     def __init__(self, targets: int, retry_for_s: float):
         self._targets = targets
         self._retry_for_s = retry_for_s
+        self._told = False
         self.succeeded()
 
     def succeeded(self) -> None:
         """Something arrived: the time allowed for retries starts again."""
+        if self._told:
+            _log.warning("A source answers again after %.0f s.", time.monotonic() - self._since)
+        self._told = False
         self._losses = 0
         self._since: float | None = None
 
@@ -83,6 +92,9 @@ class Retry:
         left_s = self._since + self._retry_for_s - now
         if left_s <= 0:
             raise error from None
+        if not self._told and now - self._since >= _SILENT_FOR_S:
+            self._told = True
+            _log.warning("%s. Trying again for %.0f s more.", error, left_s)
         time.sleep(min(pause_s, left_s))
 
 

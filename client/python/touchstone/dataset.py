@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import warnings
-from typing import Callable, ContextManager, Iterator, Mapping
+from typing import Callable, ContextManager, Iterator, Mapping, Sequence
 
 import grpc
 
@@ -89,18 +89,26 @@ class Dataset:
     def __init__(self, connection: Connection, spec: source_pb2.DatasetSpec, *, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, stride: int = 1, si: bool = False,
                  hold_lease: Callable[[], ContextManager[str]] = lambda: contextlib.nullcontext(""),
-                 session: str = ""):
-        """`hold_lease`: a context that holds the lease while the source makes samples, and gives its token."""
+                 session: str = "", indices: Sequence[int] | None = None,
+                 known_header: source_pb2.DatasetHeader | None = None):
+        """
+        Args:
+          hold_lease: a context that holds the lease while the source makes samples, and gives its token.
+          indices: these samples in this order, instead of all in theirs; start and stop then count places in it.
+          known_header: what the source must still serve.
+        """
         self.spec = spec
         self.batch_size = resolve_batch_size(spec, batch_size)
-        self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
-        self.start = checks.whole_number("start", start, 0, spec.samples)
+        self._indices = indices
+        end = spec.samples if indices is None else len(indices)
+        self.stop = end if stop is None else checks.whole_number("stop", stop, 0, end)
+        self.start = checks.whole_number("start", start, 0, end)
         self.stride = checks.whole_number("stride", stride, 1, 2**32 - 1)
         self._connection = connection
         self._si = si
         self._hold_lease = hold_lease
         self._session = session
-        self._header: source_pb2.DatasetHeader | None = None
+        self._header = known_header
 
     def __len__(self) -> int:
         step = self.batch_size * self.stride
@@ -110,6 +118,11 @@ class Dataset:
     def header(self) -> Header:
         """What the source resolved the specification to; asked for when it is not known yet."""
         return Header.from_proto(self.raw_header, self.spec.objects, self._si)
+
+    @property
+    def known_header(self) -> source_pb2.DatasetHeader | None:
+        """The header as a message, if the source has sent one."""
+        return self._header
 
     @property
     def raw_header(self) -> source_pb2.DatasetHeader:
@@ -175,7 +188,7 @@ class Dataset:
     def _open(self, index: int, token: str):
         request = source_pb2.StreamDatasetRequest(
             spec=self.spec, start_index=index, stop_index=self.stop, batch_size=self.batch_size,
-            batch_stride=self.stride, lease_token=token, session=self._session,
+            batch_stride=self.stride, lease_token=token, session=self._session, indices=self._indices or (),
         )
         if self._header is not None:
             # The source's own choice of a renderer must not change in mid-stream.

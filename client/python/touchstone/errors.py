@@ -59,6 +59,14 @@ _CLASSES = {
 }
 
 
+# What a lost or silent source looks like: gRPC's own words name sockets, and neither what was lost nor what to do.
+_IN_WORDS = {
+    "UNAVAILABLE": "no source answers there. Start touchstone-server or touchstone-gateway at this address, or correct it",
+    "DEADLINE_EXCEEDED": "no answer in time. The source may be busy or its machine gone; ask again, or with more time",
+}
+_BROKEN = "the connection broke in the middle of an answer. Ask again; if it comes back, look at the source's log"
+
+
 # What gRPC itself answers where a service is not there comes without a word.
 _NOT_OFFERED = ("this source does not offer that; only a rig has an arm: a recorded session or a touchstone-server has "
                 "none")
@@ -70,7 +78,9 @@ def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
     details = error.details() or (_NOT_OFFERED if code == "UNIMPLEMENTED" else "no message")
     kind = _CLASSES.get(code, SourceFailed)
     if kind is SourceUnreachable:
-        details = f"{target}: {details}"
+        details = f"{target}: {_IN_WORDS[code]} (gRPC: {details})"
+    elif kind is SourceFailed and is_lost(error):
+        details = f"{target}: {_BROKEN} (gRPC: {details})"
     return kind(details, code, target)
 
 

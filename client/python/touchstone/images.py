@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 from typing import Any, Sequence, Union
 
 from . import checks, units
@@ -75,8 +76,8 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
       width, height: pixels, 1 to 2048.
       format: "grey" (1 channel) or "rgb" (3).
       encoding: "raw" gives arrays, "png" and "jpeg" give EncodedImages.
-      depth: also "depth_mm", float32 (rows, height, width, 1) along the viewing axis, 0 where no object is.
-      mask: also "mask", uint8 (rows, height, width, 1), 255 where the object is.
+      depth: also "depth_mm", float32 (rows, height, width) along the viewing axis, 0 where no object is.
+      mask: also "mask", uint8 (rows, height, width), 255 where the object is.
       shading_style: "shaded" (white lights, black background) or "dark_on_white".
       renderer: "egl", "cpu", or "auto": the source's choice. Two renderers may differ by 1/255.
       normalize: a dark object on white, without ground and shadows, whatever was photographed, in grey; "mask" is
@@ -84,6 +85,22 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
     """
     return ImageOptions(
         width, height, format, encoding, depth, mask, shading_style, renderer, jpeg_quality, vertical_fov_deg, normalize
+    )
+
+
+ImageLike = Union[ImageOptions, "tuple[int, int]", int]
+
+
+def to_image(options: ImageLike) -> ImageOptions:
+    """image(...) as it is; (width, height), or one number for both, stand for image(width, height)."""
+    if isinstance(options, ImageOptions):
+        return options
+    sides = (options, options) if isinstance(options, numbers.Integral) else options
+    if isinstance(sides, (tuple, list)) and len(sides) == 2 and not isinstance(options, bool):
+        return image(checks.whole_number("image width", sides[0], 1, 2048),
+                     checks.whole_number("image height", sides[1], 1, 2048))
+    raise InvalidRequest(
+        f"image is {options!r}; give touchstone.image(width=64, height=64), or (64, 64) for width and height."
     )
 
 

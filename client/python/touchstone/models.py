@@ -40,6 +40,7 @@ class Description:
     lease_required: bool
     touch_duration_s: float
     clock_uncertainty_us: float
+    max_indices_per_request: int
 
     @classmethod
     def from_proto(cls, m: source_pb2.DescribeResponse) -> Description:
@@ -48,6 +49,7 @@ class Description:
             images.renderer_name(m.renderer), m.renderer_description, m.max_touches_per_request,
             m.max_images_per_request, m.max_image_side, m.max_batch_size, m.max_fingers, m.lease_required,
             m.touch_duration_s, units.lab_value("clock_uncertainty_s", m.clock_uncertainty_s),
+            m.max_indices_per_request,
         )
 
 

@@ -19,6 +19,7 @@ class SpherePlan:
     step_angle_deg: float
     roll_step_deg: float
     radius_ratio: float
+    max_incidence_deg: float
 
     def to_proto(self) -> source_pb2.Plan:
         return source_pb2.Plan(
@@ -26,6 +27,7 @@ class SpherePlan:
                 step_angle_rad=units.si_value("step_angle_rad", checks.positive("step_angle_deg", self.step_angle_deg)),
                 roll_step_rad=units.si_value("roll_step_rad", checks.number("roll_step_deg", self.roll_step_deg)),
                 radius_ratio=checks.positive("radius_ratio", self.radius_ratio),
+                max_incidence_rad=_incidence_rad(self.max_incidence_deg),
             )
         )
 
@@ -43,6 +45,8 @@ class FacesPlan:
     max_tilt_deg: float
     spread: float
     standoff_mm: float
+    max_incidence_deg: float
+    stroke_beyond_target_mm: float
 
     def to_proto(self) -> source_pb2.Plan:
         return source_pb2.Plan(
@@ -52,6 +56,10 @@ class FacesPlan:
                 max_tilt_rad=units.si_value("max_tilt_rad", checks.number("max_tilt_deg", self.max_tilt_deg)),
                 spread=checks.number("spread", self.spread),
                 standoff_m=units.si_value("standoff_m", checks.positive("standoff_mm", self.standoff_mm)),
+                max_incidence_rad=_incidence_rad(self.max_incidence_deg),
+                stroke_beyond_target_m=units.si_value(
+                    "stroke_beyond_target_m", checks.positive("stroke_beyond_target_mm", self.stroke_beyond_target_mm)
+                ),
             )
         )
 
@@ -80,6 +88,7 @@ class Touches:
       stroke_mm: (N,) longest travel, or None: no limit.
       session_time_s: (N,) time since the session began, or None: 0.
       covariates: {"cov_NAME": (N,)} further measured conditions.
+      draws: how many draws a generator took for them, those that were rejected included; 0: explicit touches.
     """
 
     target_mm: np.ndarray
@@ -90,6 +99,7 @@ class Touches:
     stroke_mm: np.ndarray | None = None
     session_time_s: np.ndarray | None = None
     covariates: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    draws: int = 0
 
     def __len__(self) -> int:
         return len(self.target_mm)
@@ -129,7 +139,7 @@ class Touches:
         return messages
 
     @classmethod
-    def from_messages(cls, messages: Sequence[types_pb2.CommandedTouch]) -> Touches:
+    def from_messages(cls, messages: Sequence[types_pb2.CommandedTouch], draws: int = 0) -> Touches:
         vectors = lambda name: np.array(
             [(v.x, v.y, v.z) for v in (getattr(message, name) for message in messages)], float
         ).reshape(-1, 3)
@@ -143,35 +153,45 @@ class Touches:
             speed_mm_s=units.lab_array("speed_m_s", numbers("speed_m_s")),
             stroke_mm=units.lab_array("stroke_m", numbers("stroke_m")) if given("stroke_m") else None,
             session_time_s=numbers("session_time_s") if given("session_time_s") else None,
+            draws=draws,
         )
 
 
 PlanLike = Union[SpherePlan, FacesPlan, Touches]
 
 
-def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float = 1.05) -> SpherePlan:
-    """Random approaches from a sphere round the object towards its centre.
+def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float = 1.05,
+           max_incidence_deg: float = 90.0) -> SpherePlan:
+    """Random approaches from a sphere round the object towards its centre; drawn again until every finger hits.
 
     Args:
       step_angle_deg: both angles of the start are multiples of it; above 0, at most 90.
       roll_step_deg: the hand turns about the approach by a random multiple of it; 0: no turn.
       radius_ratio: radius of the sphere over half the diagonal of the bounding box, at least 1.
+      max_incidence_deg: largest angle at which a finger meets the surface, 0 being square on; 90: any.
     """
-    return SpherePlan(step_angle_deg, roll_step_deg, radius_ratio)
+    return SpherePlan(step_angle_deg, roll_step_deg, radius_ratio, max_incidence_deg)
 
 
 def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0, spread: float = 0.6,
-          standoff_mm: float = 60.0) -> FacesPlan:
-    """The same random poses on the six faces of the bounding box in every round, so that rounds are repeats.
+          standoff_mm: float = 60.0, max_incidence_deg: float = 60.0,
+          stroke_beyond_target_mm: float = 30.0) -> FacesPlan:
+    """The same random poses from the six faces of the bounding box in every round, so that rounds are repeats.
+
+    A line goes through a random point of the face; the target is where it first meets the object. A touch is drawn
+    again within its number until every finger starts outside of the object and meets it within the stroke.
 
     Args:
       samples_per_face: poses per face.
       rounds: repeats of all poses.
       max_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.
-      spread: targets lie within this share of a face's half width and height, 0 to 1.
+      spread: lines go through this share of a face's half width and height, 0 to 1.
       standoff_mm: distance of the start from the target.
+      max_incidence_deg: largest angle at which a finger meets the surface, 0 being square on; 90: any.
+      stroke_beyond_target_mm: every finger has met the object when it stands so far behind the target.
     """
-    return FacesPlan(samples_per_face, rounds, max_tilt_deg, spread, standoff_mm)
+    return FacesPlan(samples_per_face, rounds, max_tilt_deg, spread, standoff_mm, max_incidence_deg,
+                     stroke_beyond_target_mm)
 
 
 def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> Touches:
@@ -222,6 +242,10 @@ def _array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     if not np.isfinite(array).all():
         raise InvalidRequest(f"{name} is not finite in row {np.argwhere(~np.isfinite(array))[0][0]}.")
     return array
+
+
+def _incidence_rad(max_incidence_deg: float) -> float:
+    return units.si_value("max_incidence_rad", checks.positive("max_incidence_deg", max_incidence_deg))
 
 
 def _vector(values: np.ndarray) -> types_pb2.Vector3:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Sequence
 
 from . import checks, units
 from .errors import InvalidRequest
-from .images import ImageOptions, image as default_image
+from .images import ImageLike, image as default_image, to_image
 from .models import ModelLike, model_ref
 from .plans import PlanLike, SpherePlan, Touches, sphere
 from .v1 import source_pb2
@@ -16,10 +17,30 @@ DEFAULT_BATCH_SIZE = 4096
 DEFAULT_BATCH_SIZE_WITH_IMAGES = 64
 
 
+_DEPTH = ("depth_mm", "depth_m")
+# What is asked for by one name and comes as several columns, or as one whose name has its unit.
+_GROUPS = {
+    "descriptor": ("descriptor",),
+    "contact_time": ("contact_time",),
+    "pose": ("target", "approach", "lateral", "standoff", "speed"),
+    "contact": ("contact_point", "normal"),
+}
+_UNITS = ("_us", "_s", "_mm", "_m", "_mm_s", "_m_s")
+
+
+def requested_columns(names: Sequence[str]) -> list[str]:
+    """The names of a request for those of columns as they come back: "descriptor" for "descriptor_us", and so on."""
+    known = dict.fromkeys((*_DEPTH, "mask"), "image")
+    known.update((column + unit, group) for group, columns in _GROUPS.items() for column in columns
+                 for unit in ("", *_UNITS))
+    # The names in their order, each once. What is not known is the source's to judge: it may have more columns.
+    return list(dict.fromkeys(known.get(name, name) for name in names))
+
+
 def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                   seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                   touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                  image: ImageOptions | None = None, max_draws: int = 0) -> source_pb2.DatasetSpec:
+                  image: ImageLike | None = None, max_draws: int = 0) -> source_pb2.DatasetSpec:
     """The message; arguments as in Client.dataset(). samples is resolved, so that the size is known here."""
     objects = [objects] if isinstance(objects, str) else list(objects)
     if not objects or not checks.is_sequence_of_text(objects):
@@ -47,22 +68,25 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
         )
     message.touch_interval_s = checks.number("touch_interval_s", touch_interval_s)
     # The columns: an image's options without the image are a mistake.
-    if columns is None:
-        columns = ("descriptor", "object", *(("image",) if image is not None else ()))
-    columns = [columns] if isinstance(columns, str) else list(columns)
-    if image is not None and "image" not in columns:
-        raise InvalidRequest(f'image is given, but columns is {columns}; add "image" to it.')
+    options = default_image() if image is None else to_image(image)
+    asked = [] if columns is None else [columns] if isinstance(columns, str) else list(columns)
+    options = dataclasses.replace(
+        options, depth=options.depth or any(name in _DEPTH for name in asked), mask=options.mask or "mask" in asked
+    )
+    names = requested_columns(asked or ["descriptor", "object", *(["image"] if image is not None else [])])
+    if image is not None and "image" not in names:
+        raise InvalidRequest(f'image is given, but columns is {asked}; add "image" to it.')
     spec = source_pb2.DatasetSpec(
         objects=objects,
         plan=message,
         model=model_ref(model),
         seed=checks.uint64("seed", seed),
         samples=checks.whole_number("samples", samples, 1, 2**63 - 1),
-        columns=columns,
+        columns=names,
         max_draws=checks.whole_number("max_draws", max_draws, 0, 2**32 - 1),
     )
-    if "image" in columns:
-        spec.image.CopyFrom((image or default_image()).to_proto())
+    if "image" in names:
+        spec.image.CopyFrom(options.to_proto())
     return spec
 
 

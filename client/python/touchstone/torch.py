@@ -13,7 +13,11 @@ not depend on the number of workers, nothing is left out and nothing comes twice
 
 Resumption. `loader.state_dict()` counts the batches that were returned, not those prefetched, and stands for
 the rest of the epoch and all later ones. After the last batch of an epoch but before the loop has ended it
-stands for an empty rest; after that for the next epoch.
+stands for an empty rest; after that for the next epoch. torchdata's StatefulDataLoader(dataset, batch_size=None,
+num_workers=...) resumes as exactly, with as many workers as it was saved with.
+
+By index. TouchstoneSamples is a map-style dataset of the same samples: `dataset[i]`, any sampler, KeyedShuffle for an
+order that needs no list of all indices. A whole batch is one request to the source.
 
 Fork. gRPC does not survive a fork, so a TouchstoneDataset connects only where it is iterated. A process that has
 used gRPC itself (touchstone.connect()) must not fork workers: loader() then starts them by "forkserver", which
@@ -24,34 +28,30 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
-import os
 from typing import Any, Dict, Iterator, Sequence
 
-import numpy as np
 import torch
-from google.protobuf import json_format
 from torch.utils.data import IterableDataset, get_worker_info
 
 from . import checks
-from .batch import Batch, EncodedImages
 from .client import Client
 from .connection import Connection, Targets, parse_targets
 from .dataset import Dataset, fingerprint
 from .errors import InvalidRequest, Refused, SourceChanged
-from .images import ImageOptions
+from .images import ImageLike
 from .loader import TouchstoneLoader
 from .models import ModelLike
 from .plans import PlanLike
 from .shared_lease import LeaseSlot, SharedLease
 from .specification import resolve_batch_size, specification
+from .torch_samples import KeyedShuffle, TouchstoneSamples
+from .torch_support import digest, ranks_of_this_job, rows, tensors
 from .v1 import source_pb2, source_pb2_grpc
 
-__all__ = ["TouchstoneDataset", "TouchstoneLoader", "epoch_seed"]
+__all__ = ["KeyedShuffle", "TouchstoneDataset", "TouchstoneLoader", "TouchstoneSamples", "epoch_seed"]
 
 # Workers that compare what their sources serve; further ones share places.
 _FINGERPRINTS = 256
-_IMAGE_COLUMNS = ("image", "depth_mm", "mask")
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
@@ -80,7 +80,7 @@ class TouchstoneDataset(IterableDataset):
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                 image: ImageOptions | None = None, max_draws: int = 0, batch_size: int | None = None,
+                 image: ImageLike | None = None, max_draws: int = 0, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
                  ranks: int | None = None, whole_rounds: bool = False, new_samples_each_epoch: bool = False,
                  retry_for_s: float = 60.0):
@@ -105,26 +105,30 @@ class TouchstoneDataset(IterableDataset):
         )
         # Bytes travel to spawned workers whatever the protobuf version.
         self._spec = spec.SerializeToString()
-        self._spec_digest = _digest(spec)
+        self._spec_digest = digest(spec)
         self._seed = spec.seed
         self.batch_size = resolve_batch_size(spec, batch_size)
         self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
         self.start = checks.whole_number("start", start, 0, self.stop)
         self.batched = batched
-        default_rank, default_ranks = _ranks_of_this_job()
+        default_rank, default_ranks = ranks_of_this_job()
         self.ranks = default_ranks if ranks is None else checks.whole_number("ranks", ranks, 1, 2**20)
         self.rank = checks.whole_number("rank", default_rank if rank is None else rank, 0, self.ranks - 1)
         self.whole_rounds = whole_rounds
         self.new_samples_each_epoch = new_samples_each_epoch
         # Where an iteration begins: epoch, sample index of its first round, samples of its first batch to skip. In
         # shared memory, so that workers which live for several epochs see it move.
-        self._begin = torch.tensor([0, self.start, 0], dtype=torch.int64).share_memory_()
+        self._shared_begin = torch.tensor([0, self.start, 0], dtype=torch.int64).share_memory_()
+        # Of a worker that counts for itself, as StatefulDataLoader has them do; and whether a state put it there.
+        self._worker_begin: torch.Tensor | None = None
+        self._worker_loaded = False
         # What the sources serve, as digests: row 0 what a loaded state expects, then a row a worker.
         self._fingerprints = torch.zeros((1 + _FINGERPRINTS, 32), dtype=torch.uint8).share_memory_()
         self._lease_slot = LeaseSlot(target.held_token if isinstance(target, Client) else "")
         # Progress of the iteration in this process: batches that this rank was given, samples of the next one.
         self._delivered = 0
         self._skipped = 0
+        self._workers = 1  # that share the batches of this rank, as seen by this process
         self._loader_counts = False
 
     @property
@@ -147,26 +151,29 @@ class TouchstoneDataset(IterableDataset):
     def __iter__(self) -> Iterator[Dict[str, Any]]:
         info = get_worker_info()
         worker, workers = (info.id, info.num_workers) if info is not None else (0, 1)
-        if info is not None or self._loader_counts:
+        if self._loader_counts:
             for batch in self._batches(worker, workers):
-                yield from [batch] if self.batched else _samples(batch)
+                yield from [batch] if self.batched else rows(batch)
             return
-        # In the only process: count here, before the batch is returned.
-        if self._all_delivered():
+        # Nobody else counts: here, before a batch is returned, by every process for itself.
+        if info is not None:
+            self._begin_as_worker()
+        elif self._all_delivered():
             self._end_epoch()
-        self._delivered = self._skipped = 0
-        for batch in self._batches(0, 1):
+        self._delivered, self._skipped, self._workers = 0, 0, workers
+        for batch in self._batches(worker, workers):
             if self.batched:
                 self._delivered += 1
                 yield batch
                 continue
-            samples = list(_samples(batch))
+            samples = list(rows(batch))
             already = int(self._begin[2]) if self._delivered == 0 else 0
             for k, sample in enumerate(samples):
                 last = k + 1 == len(samples)
                 self._delivered, self._skipped = self._delivered + last, 0 if last else already + k + 1
                 yield sample
-        self._end_epoch()
+        if info is None:
+            self._end_epoch()
 
     def loader(self, num_workers: int = 0, **options: Any) -> TouchstoneLoader:
         """A DataLoader over this dataset that can be saved and resumed.
@@ -179,15 +186,20 @@ class TouchstoneDataset(IterableDataset):
         return TouchstoneLoader(self, num_workers, options)
 
     def state_dict(self) -> Dict[str, Any]:
-        """The position of the next batch; plain numbers and text. With workers, use the loader's."""
+        """The position of the next batch; plain numbers and text.
+
+        In a worker it is that of its own share: torchdata's StatefulDataLoader puts those together. With workers of
+        loader(), use the loader's.
+        """
         known = [row for row in self._fingerprints.numpy() if row.any()]
         return {
             "version": 1,
             "specification": self._spec_digest,
             "served": known[0].tobytes().hex() if known else "",
             "epoch": self.epoch,
-            "next_index": int(self._begin[1]) + self._delivered * self.ranks * self.batch_size,
+            "next_index": int(self._begin[1]) + self._delivered * self.ranks * self._workers * self.batch_size,
             "skip_samples": self._skipped if self._delivered or self._skipped else int(self._begin[2]),
+            "worker": _worker_in_words(),
         }
 
     def load_state_dict(self, state: Dict[str, Any]) -> None:
@@ -200,6 +212,17 @@ class TouchstoneDataset(IterableDataset):
                 "The state was saved with another specification (objects, plan, seed, model, columns, ...); make the "
                 "dataset with the same arguments."
             )
+        saved_by, here = state.get("worker", ""), _worker_in_words()
+        if saved_by != here:
+            raise InvalidRequest(
+                f"The state is of {saved_by or 'a process without workers'}, and this is {here or 'none'}; resume with as "
+                "many workers as it was saved with, or use TouchstoneDataset.loader(), whose states fit any number."
+            )
+        self._worker_loaded = bool(here)
+        if here:
+            self._worker_begin = self._shared_begin.clone()
+            self._begin_at(state["epoch"], state["next_index"], state["skip_samples"])
+            return
         self._fingerprints.zero_()
         if state["served"]:
             self._fingerprints[0] = torch.tensor(list(bytes.fromhex(state["served"])), dtype=torch.uint8)
@@ -208,6 +231,16 @@ class TouchstoneDataset(IterableDataset):
     def _begin_at(self, epoch: int, index: int, skip: int) -> None:
         self._begin.copy_(torch.tensor([epoch, index, skip], dtype=torch.int64))
         self._delivered = self._skipped = 0
+
+    @property
+    def _begin(self) -> torch.Tensor:
+        return self._shared_begin if self._worker_begin is None else self._worker_begin
+
+    def _begin_as_worker(self) -> None:
+        """Where the loaded state says, else where the process that started the workers says now."""
+        if not self._worker_loaded:
+            self._worker_begin = self._shared_begin.clone()
+        self._worker_loaded = False
 
     def _all_delivered(self) -> bool:
         """True if the last batch was returned but no further one was requested, as with zip() and islice()."""
@@ -229,7 +262,7 @@ class TouchstoneDataset(IterableDataset):
     def _batches(self, worker: int, workers: int) -> Iterator[Dict[str, Any]]:
         """The share of one worker, from where the iteration begins."""
         epoch, base, skip = self._begin.tolist()
-        if skip and workers > 1:
+        if skip and workers > 1 and self._worker_begin is None:
             raise Refused("The state was saved within a batch; resume with at most one worker.")
         stop = self._stop(base)
         start = base + (self.rank + self.ranks * worker) * self.batch_size
@@ -247,7 +280,7 @@ class TouchstoneDataset(IterableDataset):
             for k, batch in enumerate(dataset):
                 if k == 0:
                     self._compare(worker, bytes.fromhex(fingerprint(dataset.raw_header)), connection.target)
-                yield _tensors(batch, skip if k == 0 else 0)
+                yield tensors(batch, skip if k == 0 else 0)
         finally:
             connection.close()
 
@@ -271,37 +304,7 @@ class TouchstoneDataset(IterableDataset):
                 )
 
 
-def _tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
-    """The batch as tensors, without its first `skip` samples; images with the channels first."""
-    result: Dict[str, Any] = {}
-    for name, values in batch.items():
-        if isinstance(values, EncodedImages):
-            result[name] = values[skip:]
-            continue
-        if values.dtype == np.uint64:
-            values = values.astype(np.int64)
-        elif not values.flags.writeable:
-            # PyTorch has no read-only tensors.
-            values = values.copy()
-        tensor = torch.from_numpy(values)[skip:]
-        result[name] = tensor.permute(0, 3, 1, 2) if name in _IMAGE_COLUMNS and tensor.dim() == 4 else tensor
-    return result
-
-
-def _samples(batch: Dict[str, Any]) -> Iterator[Dict[str, Any]]:
-    for k in range(len(next(iter(batch.values())))):
-        yield {name: values[k] for name, values in batch.items()}
-
-
-def _digest(spec: source_pb2.DatasetSpec) -> str:
-    """Equal for equal specifications, whatever the version of protobuf."""
-    return hashlib.sha256(json.dumps(json_format.MessageToDict(spec), sort_keys=True).encode()).hexdigest()
-
-
-def _ranks_of_this_job() -> tuple[int, int]:
-    """(rank, ranks)."""
-    if torch.distributed.is_available() and torch.distributed.is_initialized():
-        return torch.distributed.get_rank(), torch.distributed.get_world_size()
-    if "RANK" in os.environ and "WORLD_SIZE" in os.environ:
-        return int(os.environ["RANK"]), int(os.environ["WORLD_SIZE"])
-    return 0, 1
+def _worker_in_words() -> str:
+    """"worker 1 of 4"; "" in a process that is no worker."""
+    info = get_worker_info()
+    return "" if info is None else f"worker {info.id} of {info.num_workers}"

@@ -1,0 +1,93 @@
+"""connect() without an address: a server of its own, which ends with the client, the process, and a process that is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import touchstone
+
+
+@pytest.fixture(autouse=True)
+def named(server_program, monkeypatch):
+    monkeypatch.setenv("TOUCHSTONE_SERVER", str(server_program))
+
+
+def answers(target):
+    try:
+        touchstone.connect(target, timeout_s=0.3).close()
+        return True
+    except touchstone.SourceUnreachable:
+        return False
+
+
+def expect_gone(target):
+    give_up = time.monotonic() + 30
+    while answers(target) and time.monotonic() < give_up:
+        time.sleep(0.1)
+    assert not answers(target)
+
+
+def test_it_serves_and_ends_with_the_client():
+    with touchstone.connect() as client:
+        target = client.target
+        assert client.describe().kind == "virtual"
+        assert client.samples(["lat20"], samples=10)[3]["descriptor_us"].shape == (3,)
+        assert answers(target)
+    assert not answers(target)
+
+
+def script(*lines):
+    """A process that prints the address of its server and then does what these lines say."""
+    package = os.path.dirname(os.path.dirname(touchstone.__file__))
+    text = "\n".join(["import sys, threading, time, touchstone", "client = touchstone.connect()",
+                      "print(client.target, flush=True)", *lines])
+    return subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True,
+                            env={**os.environ, "PYTHONPATH": package})
+
+
+@pytest.mark.parametrize("ending", ["pass", "sys.exit(3)", "raise SystemExit"])
+def test_it_ends_with_the_process(ending):
+    process = script(ending)
+    target = process.stdout.readline().strip()
+    process.wait(timeout=60)
+    expect_gone(target)
+
+
+def test_it_ends_with_a_process_that_is_killed():
+    process = script("time.sleep(600)")
+    target = process.stdout.readline().strip()
+    assert answers(target)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    expect_gone(target)
+
+
+def test_a_thread_that_ends_does_not_take_it_along():
+    process = script(
+        "clients = []",
+        "thread = threading.Thread(target=lambda: clients.append(touchstone.connect()))",
+        "thread.start(); thread.join(); time.sleep(0.5)",
+        "print(clients[0].describe().kind, flush=True)",
+    )
+    process.stdout.readline()
+    assert process.stdout.readline().strip() == "virtual"
+    assert process.wait(timeout=60) == 0
+
+
+def test_no_server_to_start_is_said_with_what_to_do(monkeypatch, tmp_path):
+    monkeypatch.setenv("TOUCHSTONE_SERVER", str(tmp_path / "nothing"))
+    with pytest.raises(touchstone.SourceUnreachable, match="TOUCHSTONE_SERVER is .*nothing"):
+        touchstone.connect()
+
+
+def test_a_server_that_does_not_start_is_quoted(monkeypatch, tmp_path):
+    program = tmp_path / "touchstone-server"
+    program.write_text("#!/bin/sh\necho no disk left >&2\nexit 4\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("TOUCHSTONE_SERVER", str(program))
+    with pytest.raises(touchstone.SourceUnreachable, match="ended with 4: no disk left"):
+        touchstone.connect()

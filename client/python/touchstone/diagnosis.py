@@ -1,0 +1,92 @@
+"""compare(), diagnose() and propose() of a Client."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from typing import Any, Callable, Sequence
+
+import grpc
+
+from . import checks, errors
+from .connection import Connection, Retry
+from .evidence import MeshesLike, evidence
+from .models import ModelLike
+from .report import Report
+from .v1 import diagnosis_pb2, diagnosis_pb2_grpc
+
+# stage ("fitting tip_radius"), and how much of the whole is done, 0 to 1.
+OnProgress = Callable[[str, float], None]
+
+
+class Diagnosis:
+    """The questions about measured touches and photographs: how wrong is a model, where, why, and what to add.
+
+    measurements: a measurement file (.csv), a folder of photographs (images.csv, camera.yaml; with its touches.csv a
+    joint diagnosis), or the name of a session that the server keeps. meshes: a folder with a file for each object, or
+    {object: file or touchstone.Mesh}; none for objects that the server has.
+    """
+
+    def __init__(self, connection: Connection):
+        self._connection = connection
+
+    def compare(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
+                on_progress: OnProgress | None = None) -> Report:
+        """How wrong the model is, and where; changes nothing."""
+        request = diagnosis_pb2.CompareRequest(evidence=evidence(measurements, model, meshes, (), 0))
+        return self._report("Compare", request, on_progress)
+
+    def diagnose(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
+                 also: Sequence[str | os.PathLike] = (), seed: int = 0, with_surface_map: bool = False,
+                 on_progress: OnProgress | None = None) -> Report:
+        """Also why, what to add, and what the error becomes. The same arguments give the same report.
+
+        Args:
+          model: a name, a hash, a path to a model file, its text, or a Model; default: the server's.
+          also: model files whose effects compete with the catalogue.
+          seed: of permutations and draws.
+          with_surface_map: put a map of the surfaces' departures into the improved model, where they are what is left.
+          on_progress: is told the stage and the share that is done.
+        """
+        request = diagnosis_pb2.DiagnoseRequest(
+            evidence=evidence(measurements, model, meshes, also, seed), with_surface_map=with_surface_map
+        )
+        return self._report("Diagnose", request, on_progress)
+
+    def propose(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
+                touches: int | None = None, photographs: int | None = None, seed: int = 0,
+                on_progress: OnProgress | None = None) -> Report:
+        """The touches (or photographs) to make next to tell the explanations that are left apart: report.next_touches.
+
+        touches: how many (24); photographs: how many (12), where there are photographs. Of a set of both kinds the one that
+        is given is proposed, photographs if neither is.
+        """
+        request = diagnosis_pb2.ProposeRequest(evidence=evidence(measurements, model, meshes, (), seed))
+        if touches is not None:
+            request.touches = checks.whole_number("touches", touches, 1, 2**32 - 1)
+        if photographs is not None:
+            request.photographs = checks.whole_number("photographs", photographs, 1, 2**32 - 1)
+        return self._report("Propose", request, on_progress)
+
+    def _report(self, method: str, request: Any, on_progress: OnProgress | None) -> Report:
+        """The last message of a stream; asked for again at the next source if one is lost."""
+        retry = Retry(len(self._connection.targets), self._connection.retry_for_s)
+        while True:
+            call = getattr(diagnosis_pb2_grpc.DiagnosisStub(self._connection.channel()), method)(request)
+            try:
+                for response in call:
+                    retry.succeeded()
+                    if response.HasField("report"):
+                        return Report(response.report)
+                    if on_progress is not None and response.HasField("progress"):
+                        on_progress(response.progress.stage, response.progress.done)
+                raise errors.SourceFailed("The source ended without a report.", target=self._connection.target)
+            except grpc.RpcError as error:
+                failure = errors.from_rpc(error, self._connection.target)
+                if not errors.is_lost(error):
+                    raise failure from None
+            finally:
+                with contextlib.suppress(Exception):
+                    call.cancel()
+            self._connection.move_on()
+            retry.lost(failure)

@@ -1,0 +1,175 @@
+"""What compare(), diagnose() and propose() answer."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from typing import Any, Sequence
+
+from google.protobuf import json_format
+
+from .errors import InvalidRequest
+from .measurements import Row
+from .plans import Touches
+from .v1 import diagnosis_pb2
+
+
+@dataclasses.dataclass(frozen=True)
+class Value:
+    """A parameter as it was fitted; the unit is in the name.
+
+    Attributes:
+      name: "radius_mm"; with its axis or finger ("offset_mm x") and object where it has them.
+      value, std_error: estimate and standard error.
+      interval: of 95 %.
+    """
+
+    name: str
+    value: float
+    std_error: float
+    interval: tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """An effect to add.
+
+    Attributes:
+      effect: its name.
+      equivalent: effects that these data cannot tell from it.
+      probability: of it, with its equivalents, among all that could take its place.
+      values: its parameters.
+      words: where it acts, if not everywhere, and what to doubt.
+      rmse_us, heldout_rmse_us: of touches with this step and all before; NaN without touches.
+      rmse_grey, heldout_rmse_grey: the same of photographs.
+    """
+
+    effect: str
+    equivalent: tuple[str, ...]
+    probability: float
+    values: tuple[Value, ...]
+    words: str
+    rmse_us: float
+    heldout_rmse_us: float
+    rmse_grey: float
+    heldout_rmse_grey: float
+
+
+class Report:
+    """How wrong a model is, and, of diagnose(), why and what to add. print(report) says it in a paragraph.
+
+    Attributes:
+      message: all of it, touchstone.v1.Report; to_dict() has it in plain types, as `touchstone diagnose --json` writes it.
+    """
+
+    def __init__(self, message: diagnosis_pb2.Report):
+        self.message = message
+
+    @property
+    def verdict(self) -> str:
+        """"adequate", "wrong_values", "missing_effects", "unexplained", "check_data", "too_little_data"; "" of compare()."""
+        name = diagnosis_pb2.Report.Verdict.Name(self.message.verdict).lower()
+        return "" if name == "verdict_unspecified" else name
+
+    @property
+    def summary(self) -> str:
+        return self.message.summary
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(self.message.warnings)
+
+    @property
+    def rmse_us(self) -> float:
+        """Of the given model on touches; NaN without touches."""
+        return self.message.initial.rmse_us if self.message.touches else math.nan
+
+    @property
+    def rmse_grey(self) -> float:
+        """Of the given model on photographs, grey levels of 255; NaN without photographs."""
+        return self.message.initial.rmse_grey if self.message.images else math.nan
+
+    @property
+    def final_rmse_us(self) -> float:
+        """Of the improved model on touches; NaN without touches."""
+        return self.message.final.rmse_us if self.message.touches else math.nan
+
+    @property
+    def final_rmse_grey(self) -> float:
+        """Of the improved model on photographs; NaN without photographs."""
+        return self.message.final.rmse_grey if self.message.images else math.nan
+
+    @property
+    def noise_floor_us(self) -> float:
+        """What no model of touches can go below; NaN without touches."""
+        return self.message.noise_floor_us if self.message.touches else math.nan
+
+    @property
+    def noise_floor_grey(self) -> float:
+        """What no model of photographs can go below; NaN without photographs."""
+        return self.message.noise_floor_grey if self.message.images else math.nan
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The effects to add, in this order."""
+        touches, images = bool(self.message.touches), bool(self.message.images)
+        return tuple(
+            Step(
+                step.effect, tuple(step.equivalent), step.probability, tuple(map(_value, step.parameters)), step.words,
+                step.rmse_us if touches else math.nan, step.heldout_rmse_us if touches else math.nan,
+                step.rmse_grey if images else math.nan, step.heldout_rmse_grey if images else math.nan,
+            )
+            for step in self.message.steps
+        )
+
+    @property
+    def improved_model(self) -> str:
+        """The model file with all steps and refitted values, to be given as `model=`; "" if nothing changed."""
+        return self.message.improved_model_yaml
+
+    @property
+    def next_touches(self) -> Sequence[Row]:
+        """The touches to make next, as read_plan() gives those of a file."""
+        return [
+            Row(number, proposed.object, Touches.from_messages([proposed.touch]))
+            for number, proposed in enumerate(self.message.next_touches)
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them."""
+        names = dict(preserving_proto_field_name=True)
+        try:
+            return json_format.MessageToDict(self.message, always_print_fields_with_no_presence=True, **names)
+        except TypeError:  # protobuf before 5
+            return json_format.MessageToDict(self.message, including_default_value_fields=True, **names)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Writes it as JSON."""
+        _write(path, json.dumps(self.to_dict(), indent=1) + "\n")
+
+    def save_model(self, path: str | os.PathLike) -> None:
+        """Writes the improved model as a model file."""
+        if not self.improved_model:
+            raise InvalidRequest("The report has no improved model: nothing is to be added or changed.")
+        _write(path, self.improved_model)
+
+    def __str__(self) -> str:
+        return self.summary
+
+    def __repr__(self) -> str:
+        effects = ", ".join(step.effect for step in self.message.steps)
+        return f"Report({self.verdict or 'compared'}{': ' + effects if effects else ''})"
+
+
+def _value(p: diagnosis_pb2.ParameterValue) -> Value:
+    name = " ".join(part for part in (p.name, p.finger, p.object) if part)
+    return Value(name, p.value, p.std_error, (p.lower, p.upper))
+
+
+def _write(path: str | os.PathLike, text: str) -> None:
+    part = os.fspath(path) + ".part"
+    with open(part, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(part, path)

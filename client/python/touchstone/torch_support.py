@@ -1,0 +1,53 @@
+"""What the PyTorch datasets share: tensors of a batch, digests of a specification, ranks of a job."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from typing import Any, Dict, Iterator
+
+import numpy as np
+import torch
+from google.protobuf import json_format
+
+from .batch import Batch, EncodedImages
+from .v1 import source_pb2
+
+_IMAGE_COLUMNS = ("image", "depth_mm", "mask")
+
+
+def tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
+    """The batch as tensors, without its first `skip` samples; images with the channels first."""
+    result: Dict[str, Any] = {}
+    for name, values in batch.items():
+        if isinstance(values, EncodedImages):
+            result[name] = values[skip:]
+            continue
+        if values.dtype == np.uint64:
+            values = values.astype(np.int64)
+        elif not values.flags.writeable:
+            # PyTorch has no read-only tensors.
+            values = values.copy()
+        tensor = torch.from_numpy(values)[skip:]
+        result[name] = tensor.permute(0, 3, 1, 2) if name in _IMAGE_COLUMNS and tensor.dim() == 4 else tensor
+    return result
+
+
+def rows(batch: Dict[str, Any]) -> Iterator[Dict[str, Any]]:
+    for k in range(len(next(iter(batch.values())))):
+        yield {name: values[k] for name, values in batch.items()}
+
+
+def digest(spec: source_pb2.DatasetSpec) -> str:
+    """Equal for equal specifications, whatever the version of protobuf."""
+    return hashlib.sha256(json.dumps(json_format.MessageToDict(spec), sort_keys=True).encode()).hexdigest()
+
+
+def ranks_of_this_job() -> tuple[int, int]:
+    """(rank, ranks)."""
+    if torch.distributed.is_available() and torch.distributed.is_initialized():
+        return torch.distributed.get_rank(), torch.distributed.get_world_size()
+    if "RANK" in os.environ and "WORLD_SIZE" in os.environ:
+        return int(os.environ["RANK"]), int(os.environ["WORLD_SIZE"])
+    return 0, 1
