@@ -4,8 +4,8 @@
     train_small.py --server 127.0.0.1:50051 --extra-object spot --out build/demo
 
 One example is a few random touches of one object, of which only the finger times are known, and the photograph
-along the first of them. One network gets the touches, one the photograph, one both. Every training example is
-new; the test set is drawn from another seed. Writes samples.png and training.png into the output folder.
+along the first of them. One network gets the touches, one the photograph, one both; each is trained several times, from
+other first weights. Every training example is new; the test set is drawn from another seed. Writes samples.png and training.png into the output folder.
 """
 
 from __future__ import annotations
@@ -115,16 +115,18 @@ class Examples:
 
 
 def evaluate(networks, batches, classes):
-    """For each network its confusion matrix (true object, recognised object)."""
-    result = {name: torch.zeros(classes, classes, dtype=torch.int64) for name in networks}
+    """For each kind of network the confusion matrix (true object, recognised object) of each of its trainings."""
+    def confusion(network):
+        network.eval()
+        counts = torch.zeros(classes, classes, dtype=torch.int64)
+        for touches, image, objects in batches:
+            found = network(touches, image).argmax(1)
+            counts += torch.bincount(objects * classes + found, minlength=classes**2).view(classes, classes)
+        network.train()
+        return counts
+
     with torch.no_grad():
-        for name, network in networks.items():
-            network.eval()
-            for touches, image, objects in batches:
-                found = network(touches, image).argmax(1)
-                result[name] += torch.bincount(objects * classes + found, minlength=classes**2).view(classes, classes)
-            network.train()
-    return result
+        return {name: [confusion(network) for network in trainings] for name, trainings in networks.items()}
 
 
 def accuracy(confusion):
@@ -132,26 +134,27 @@ def accuracy(confusion):
 
 
 def train(networks, examples, test, epochs, classes):
-    """Returns ([(examples seen, {network: accuracy})], last confusion matrices)."""
-    optimizers = {name: torch.optim.Adam(network.parameters(), 2e-3) for name, network in networks.items()}
+    """Returns ([(examples seen, {network: [accuracy of each training]})], last confusion matrices, all trainings together)."""
+    every = [network for trainings in networks.values() for network in trainings]
+    optimizers = [torch.optim.Adam(network.parameters(), 2e-3) for network in every]
     steps = epochs * (examples.examples // examples.batch)
-    schedules = [torch.optim.lr_scheduler.CosineAnnealingLR(o, steps) for o in optimizers.values()]
-    history, seen = [(0, {name: 1 / classes for name in networks})], 0
-    print(f"  {'examples':>8} {'touches':>9} {'images':>7}   " + "   ".join(f"{name:>12}" for name in networks))
+    schedules = [torch.optim.lr_scheduler.CosineAnnealingLR(o, steps) for o in optimizers]
+    history, seen = [(0, {name: [1 / classes] * len(trainings) for name, trainings in networks.items()})], 0
+    print(f"  {'examples':>8} {'touches':>9} {'images':>7}   " + "   ".join(f"{name:>22}" for name in networks))
     for _ in range(epochs):
         for touches, image, objects in examples:
-            for name, network in networks.items():
-                optimizers[name].zero_grad(set_to_none=True)
+            for network, optimizer in zip(every, optimizers):
+                optimizer.zero_grad(set_to_none=True)
                 network.loss(touches, image, objects).backward()
-                optimizers[name].step()
+                optimizer.step()
             for schedule in schedules:
                 schedule.step()
             seen += len(objects)
         confusion = evaluate(networks, test, classes)
-        history.append((seen, {name: accuracy(matrix) for name, matrix in confusion.items()}))
+        history.append((seen, {name: [accuracy(matrix) for matrix in each] for name, each in confusion.items()}))
         print(f"  {seen:8,} {seen * TOUCHES:9,} {seen:7,}   "
-              + "   ".join(f"{accuracy(matrix):12.1%}" for matrix in confusion.values()), flush=True)
-    return history, confusion
+              + "   ".join(f"{pictures.mean_and_range(each):>22}" for each in history[-1][1].values()), flush=True)
+    return history, {name: sum(each) for name, each in confusion.items()}
 
 
 def main():
@@ -159,11 +162,11 @@ def main():
     parser.add_argument("--server", default="127.0.0.1:50051", help="HOST:PORT of a touchstone-server")
     parser.add_argument("--extra-object", help="one more object of that server, besides the five supershapes")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("."), help="folder for the pictures")
+    parser.add_argument("--trainings", type=int, default=3, help="of each network, from other first weights (3)")
     parser.add_argument("--quick", action="store_true", help="a quarter of the training")
     arguments = parser.parse_args()
 
     begin = time.monotonic()
-    torch.manual_seed(0)
     client = touchstone.connect(arguments.server)
     source, known = client.describe(), {o.name for o in client.objects()}
     objects = SUPERSHAPES + ([arguments.extra_object] if arguments.extra_object else [])
@@ -183,14 +186,15 @@ def main():
     batch = 16 * classes
     training = Examples(arguments.server, objects, TRAINING_SEED, 16 * batch, batch, workers=1)
     test = list(Examples(arguments.server, objects, TEST_SEED, 16 * batch, batch, workers=0))
-    networks = {
-        "touch only": Classifier(classes, fingers, True, False),
-        "image only": Classifier(classes, fingers, False, True),
-        "both": Classifier(classes, fingers, True, True),
-    }
+    senses = {"touch only": (True, False), "image only": (False, True), "both": (True, True)}
+    networks = {name: [] for name in senses}
+    for first_weights in range(arguments.trainings):
+        torch.manual_seed(first_weights)
+        for name, (touch, image) in senses.items():
+            networks[name].append(Classifier(classes, fingers, touch, image))
     print(f"Which of {classes} objects is it? {TOUCHES} touches each, a {IMAGE_PX} x {IMAGE_PX} grey photograph, or "
           f"both. Chance: {1 / classes:.1%}.\nAccuracy on {16 * batch:,} held-out examples (seed {TEST_SEED}), after "
-          f"training on new ones (seed {TRAINING_SEED}):")
+          f"training on new ones (seed {TRAINING_SEED}); mean and range of {arguments.trainings} trainings each:")
     training_begin = time.monotonic()
     history, confusion = train(networks, training, test, epochs, classes)
     training_s = time.monotonic() - training_begin
@@ -198,8 +202,8 @@ def main():
     curves = pictures.training_picture(history, confusion, objects, arguments.out / "training.png")
     seen = history[-1][0]
     print(f"{seen * TOUCHES:,} touches and {seen:,} images streamed and learned from in {training_s:.1f} s: "
-          f"{seen * TOUCHES / training_s:,.0f} touches/s and {seen / training_s:,.0f} images/s into three networks at "
-          f"once; {time.monotonic() - begin:.1f} s in all.")
+          f"{seen * TOUCHES / training_s:,.0f} touches/s and {seen / training_s:,.0f} images/s into {3 * arguments.trainings} networks "
+          f"at once; {time.monotonic() - begin:.1f} s in all.")
     print(f"Pictures: {sheet}\n          {curves}")
 
 

@@ -1,0 +1,93 @@
+"""Fusion of touch and sight: the rules by hand, weights from validation data alone, and that two senses beat one."""
+
+import pathlib
+
+import numpy as np
+import pytest
+
+from touchstone.training import fusion_rules
+from touchstone.training.context import Context
+from touchstone.training.experiments import fusion
+from touchstone.training.settings import Settings
+from touchstone.training.touch_data import TouchData
+
+_SQUEEZENET = pathlib.Path(__file__).resolve().parents[4] / "shared/data/backbone/squeezenet1.0.onnx"
+
+
+def test_product_by_hand():
+    # 0.6 * 0.1, 0.3 * 0.5, 0.1 * 0.4 = 0.06, 0.15, 0.04, of 0.25
+    found = fusion_rules.product(np.array([[0.6, 0.3, 0.1]]), np.array([[0.1, 0.5, 0.4]]))
+    np.testing.assert_allclose(found, [[0.24, 0.6, 0.16]])
+    np.testing.assert_allclose(fusion_rules.product(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]])), [[0.5, 0.5]])
+
+
+def test_weighted_sum_by_hand():
+    touch, image = np.array([[0.6, 0.4]]), np.array([[0.1, 0.9]])
+    np.testing.assert_allclose(fusion_rules.weighted_sum(touch, image, 0.75), [[0.475, 0.525]])
+    assert np.array_equal(fusion_rules.weighted_sum(touch, image, 1.0), touch)
+    with pytest.raises(ValueError, match="1.5 is not from 0 to 1"):
+        fusion_rules.weighted_sum(touch, image, 1.5)
+
+
+def test_the_weight_goes_to_the_sense_that_knows():
+    right, wrong, objects = np.eye(2)[[0, 1]] * 0.8 + 0.1, np.eye(2)[[1, 0]] * 0.8 + 0.1, np.array([0, 1])
+    assert fusion_rules.choose_weight(right, wrong, objects) == 1
+    assert fusion_rules.choose_weight(wrong, right, objects) == 0
+    # Each is sure of one of two pairs and wrong by as much in the other: only the middle treats both the same.
+    first, second = np.array([[0.9, 0.1], [0.6, 0.4]]), np.array([[0.4, 0.6], [0.1, 0.9]])
+    assert fusion_rules.choose_weight(first, second, objects) == pytest.approx(0.5)
+
+
+def test_pairs_are_of_one_object_and_all_of_them():
+    touch, image = np.array([0, 0, 1]), np.array([1, 0, 0, 2])
+    rows, columns = fusion_rules.pairs(touch, image)
+    assert sorted(zip(rows.tolist(), columns.tolist())) == [(0, 1), (0, 2), (1, 1), (1, 2), (2, 0)]
+
+
+def test_the_weight_is_chosen_on_validation_data_alone():
+    right, wrong, objects = np.eye(5) * 0.8 + 0.04, np.roll(np.eye(5), 1, 1) * 0.8 + 0.04, np.arange(5)
+    # In validation touch knows and sight errs, in the test it is the other way round: the weight must not follow the test.
+    found = fusion.fused((wrong, objects), (right, objects), (right, objects), (wrong, objects))
+    assert (found["weight"], found["touch"], found["image"], found["weighted sum"]) == (1.0, 0.0, 1.0, 0.0)
+
+
+def _touches(count):
+    rng = np.random.default_rng(1)
+    vectors = rng.normal(size=(3, count, 3))
+    return TouchData(("lat00", "lat05", "lat10", "lat15", "lat20"), np.arange(count) % 5, rng.normal(size=(count, 3)), *vectors, None, 20.0, 30.0)
+
+
+def test_no_measured_touch_is_in_training_and_testing():
+    touches = _touches(200)
+    for seed in range(10):
+        training, testing = fusion.halves(touches, seed)
+        assert not set(training.target_mm[:, 0]) & set(testing.target_mm[:, 0])
+        assert len(training) + len(testing) == 200 and np.bincount(testing.object).tolist() == [20] * 5
+
+
+def test_repeats_of_a_pose_are_not_divided():
+    touches = _touches(100)[np.tile(np.arange(100), 4)]
+    training, testing = fusion.halves(touches, 1)
+    assert not set(training.target_mm[:, 0]) & set(testing.target_mm[:, 0])
+    assert (len(training), len(testing)) == (200, 200)
+
+
+def test_a_touch_recogniser_is_validated_on_the_last_source_and_not_trained_on_that():
+    rng = np.random.default_rng(1)
+    virtual = rng.normal(size=(50, 3)), np.arange(50) % 5
+    # The measured sets hold nothing but chance: whatever is recognised of them beyond it was seen in training.
+    measured = rng.normal(size=(400, 3)), rng.integers(0, 5, 400)
+    found = fusion.TouchRecogniser(1, virtual, measured)
+    probabilities, objects = found.validation
+    assert len(objects) == pytest.approx(80, abs=3)
+    assert np.mean(probabilities.argmax(1) == objects) < 0.4 < np.mean(found.probabilities(measured[0]).argmax(1) == measured[1])
+
+
+@pytest.mark.skipif(not _SQUEEZENET.exists(), reason=f"there is no backbone file {_SQUEEZENET}")
+def test_two_senses_beat_each_alone(tmp_path):
+    with Context(Settings(tmp_path, quick=True, backbone=_SQUEEZENET)) as context:
+        cache = fusion.FeatureCache(context)
+        runs = [fusion.all_virtual(context, cache, seed) for seed in range(1, 4)]
+    for alone in ("touch", "image"):
+        gained = [run["product"] - run[alone] for run in runs]
+        assert np.mean(gained) > 0, (alone, runs)

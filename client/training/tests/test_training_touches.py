@@ -1,0 +1,107 @@
+"""Recognition by touch: features, splits, and the seed's orderings on small data."""
+
+import os
+
+import numpy as np
+import pytest
+
+pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.training needs it.")
+
+from touchstone.training import features, measured_sets, plans, recognisers  # noqa: E402
+from touchstone.training.context import Context  # noqa: E402
+from touchstone.training.settings import Settings  # noqa: E402
+from touchstone.training.touch_data import TouchData  # noqa: E402
+
+
+def made_of(objects, times_us=None, targets=None, spacing_mm=30.0):
+    n = len(objects)
+    zeros = np.zeros((n, 3))
+    return TouchData(tuple(f"o{k}" for k in range(max(objects) + 1)), np.array(objects), zeros if times_us is None else times_us,
+                     zeros if targets is None else targets, zeros, zeros, None, 20.0, spacing_mm)
+
+
+def test_curvature_of_a_sphere():
+    """Fingers 30 mm apart touch a sphere of radius R beside its pole R - sqrt(R^2 - s^2) later: for a large R the curvature
+    speed (t_l - 2 t_m + t_r) / s^2 is 1/R."""
+    radius_mm, spacing_mm, speed = 5000.0, 30.0, 20.0
+    late_us = (radius_mm - np.sqrt(radius_mm**2 - spacing_mm**2)) / speed * 1e6
+    convex = made_of([0], np.array([[late_us, 0, late_us]]))
+    assert convex.curvature() == pytest.approx([1e3 / radius_mm], rel=1e-4)
+    concave = made_of([0], np.array([[0, late_us, 0]]))
+    assert concave.curvature() == pytest.approx([-1e3 / radius_mm], rel=1e-4)
+
+
+def test_a_touch_is_in_one_set_at_most_and_of_one_object():
+    data = made_of([0] * 23 + [1] * 40, np.arange(189.0).reshape(63, 3))
+    whole, objects = features.feature_sets(data, 5, np.random.default_rng(0), features=lambda curvature: curvature)
+    assert len(whole) == 4 + 8 and sorted(objects) == [0] * 4 + [1] * 8
+    with pytest.raises(ValueError, match="6 sets of 5 touches of o0 are wanted, there are 4"):
+        features.feature_sets(data, 5, np.random.default_rng(0), sets=12)
+
+
+def test_histograms_hold_every_touch_however_far_out():
+    curvature = np.array([[-1e9, -59.9, 0.1, 59.9, 1e9]])
+    counts = 5 * features.histogram(curvature)
+    assert counts.sum() == 5 and counts[0, 0] == 2 and counts[0, -1] == 2
+
+
+def test_rounds_of_a_pose_are_on_one_side_of_a_split():
+    rng = np.random.default_rng(4)
+    targets = np.tile(rng.normal(size=(20, 3)), (4, 1))  # 20 poses in 4 rounds
+    data = made_of([0, 1] * 40, targets=targets)
+    train, test = measured_sets.split(data, 0.4, rng)
+    pose = measured_sets.poses(data)
+    assert not set(pose[train]) & set(pose[test])
+    assert len(train) + len(test) == 80 and len(test) == 32
+    loose_train, loose_test = measured_sets.split(data, 0.4, rng, by_pose=False)
+    assert set(pose[loose_train]) & set(pose[loose_test]), "what is compared in the sensitivity table is another split"
+
+
+def test_drawn_sets_are_of_different_touches_of_one_object():
+    data = made_of([0] * 20 + [1] * 20, np.column_stack([np.arange(40.0) * 1e6] * 2 + [np.zeros(40)]))
+    seen, objects = measured_sets.drawn_sets(data, 15, 30, np.random.default_rng(5), features=lambda curvature: curvature)
+    for row, k in zip(seen, objects):
+        assert len(set(row)) == 15
+        assert set(row) <= set(data.curvature()[data.object == k])
+    with pytest.raises(ValueError, match="sets of 21 touches of o0"):
+        measured_sets.drawn_sets(data, 21, 2, np.random.default_rng(5))
+
+
+@pytest.fixture(scope="module")
+def pools(tmp_path_factory):
+    """(simulated without noise, with noise, emulated) touches: as the experiments have them, fewer."""
+    with Context(Settings(tmp_path_factory.mktemp("training"), quick=True, rig=os.environ.get("TOUCHSTONE_RIG", ""))) as context:
+        context.begin("test")
+        size = 300 * 20 + 500
+        yield (context.simulated(plans.SIMULATED, size, model=plans.IDEAL), context.simulated(plans.SIMULATED, size, model=plans.NOISY),
+               context.measured(plans.measured(context.settings), options=plans.RIG))
+
+
+def accuracies(pool, rig, touches, shuffle=False):
+    """Of XGBoost on 400 emulated sets, one for each of three seeds."""
+    found = []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        train = features.feature_sets(pool, touches, rng, sets=300)
+        if shuffle:
+            train = train[0], rng.permutation(train[1])
+        found.append(recognisers.accuracy(recognisers.SEEDS["XGBoost"](seed), train, measured_sets.drawn_sets(rig, touches, 400, rng)))
+    return np.array(found)
+
+
+def test_noise_in_training_helps_on_emulated_touches(pools):
+    ideal, noisy, rig = pools
+    gain = accuracies(noisy, rig, 15) - accuracies(ideal, rig, 15)
+    assert gain.min() > 0.05, gain
+
+
+def test_more_touches_help(pools):
+    _, noisy, rig = pools
+    gain = accuracies(noisy, rig, 20) - accuracies(noisy, rig, 3)
+    assert gain.min() > 0.05, gain
+
+
+def test_shuffled_labels_give_chance(pools):
+    _, noisy, rig = pools
+    # Twelve hundred sets of few touches are not independent: twice the spread of as many independent ones, at 4 sigma.
+    assert abs(accuracies(noisy, rig, 5, shuffle=True).mean() - 0.2) < 8 * np.sqrt(0.2 * 0.8 / 1200)

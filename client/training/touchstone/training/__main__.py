@@ -1,0 +1,117 @@
+"""python -m touchstone.training: runs experiments and writes their report."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import datetime
+import hashlib
+import pathlib
+import shlex
+import sys
+import time
+
+import touchstone
+
+from . import report
+from .backbone import Backbone, NoNetwork
+from .context import Context
+from .experiment import Experiment, experiments
+from .result import Result
+from .settings import Settings
+
+_DESCRIPTION = """Recognises objects by touches and photographs that are streamed from Touchstone: the seed's experiments,
+and what goes beyond them. Writes report.html, report.json and figures (SVG)."""
+
+
+def main() -> int:
+    known = experiments()
+    options = _parse(known)
+    settings = _settings(options)
+    wanted = [each for each in known if "all" in options.experiments or each.name in options.experiments]
+    settings.out.mkdir(parents=True, exist_ok=True)
+    done, left_out = [], []
+    with Context(settings) as context:
+        for number, each in enumerate(wanted):
+            if each.needs_backbone and settings.backbone is None:
+                left_out.append((each, "needs --backbone FILE.onnx"))
+                continue
+            left_s = sum(e.expected_s[0 if settings.quick else 1] for e in wanted[number:])
+            print(f"{number + 1}/{len(wanted)} {each.name}: {each.title} (about {left_s / 60:.0f} min for all that is left)",
+                  file=sys.stderr, flush=True)
+            done.append((each, _run(each, context, again=options.again)))
+    command = "python -m touchstone.training " + shlex.join(sys.argv[1:])
+    page = report.write(settings, done, left_out, command, datetime.date.today().isoformat())
+    for each, result in done:
+        print(f"{each.title}: {result.words[0]}")
+    for each, why in left_out:
+        print(f"{each.title}: left out, {why}")
+    print(f"Report: {page}")
+    return 0
+
+
+def _parse(known: list[Experiment]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m touchstone.training", description=_DESCRIPTION,
+                                     epilog="Experiments: " + "; ".join(f"{e.name}: {e.title}" for e in known))
+    parser.add_argument("experiments", nargs="+", metavar="EXPERIMENT", choices=["all", *(e.name for e in known)],
+                        help="all, or names of experiments")
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("training"), help="folder of the report (training)")
+    parser.add_argument("--quick", action="store_true", help="small sets and 3 seeds: minutes instead of hours")
+    parser.add_argument("--seeds", type=int, help="repetitions, over which the intervals are (10)")
+    parser.add_argument("--seed", type=int, default=1, help="the first seed (1)")
+    parser.add_argument("--server", default="", metavar="HOST:PORT", help="the simulator; without it one is started")
+    parser.add_argument("--rig", default="", metavar="HOST:PORT", help="a gateway; without it an emulated rig is started")
+    parser.add_argument("--rig-is-real", action="store_true", help="the gateway's arm is one of metal: call its data measured")
+    parser.add_argument("--backbone", type=pathlib.Path, metavar="FILE.onnx", help="image network, trained on others' pictures")
+    parser.add_argument("--everyday", type=pathlib.Path, metavar="FOLDER", help="the ten everyday meshes")
+    parser.add_argument("--again", action="store_true", help="also what is finished: without it a run goes on where it ended")
+    return parser.parse_args()
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    for name, path in (("--backbone", options.backbone), ("--everyday", options.everyday)):
+        if path is not None and not path.exists():
+            sys.exit(f"{name} {path}: no such {'file' if name == '--backbone' else 'folder'}")
+    if options.backbone is not None:
+        try:
+            Backbone(options.backbone, workers=1)  # a file that will not do is refused now, not an hour later
+        except NoNetwork as error:
+            sys.exit(str(error))
+    if options.rig_is_real and not options.rig:
+        sys.exit("--rig-is-real needs --rig HOST:PORT: the rig that is started otherwise is emulated")
+    if options.seeds is not None and options.seeds < 2:
+        sys.exit(f"--seeds {options.seeds}: at least 2 are needed for an interval")
+    return Settings(options.out, options.quick, options.seeds or (3 if options.quick else 10), options.seed, options.server,
+                    options.rig, options.rig_is_real, options.backbone, options.everyday)
+
+
+def _run(experiment: Experiment, context: Context, again: bool) -> Result:
+    """The experiment, or what it found before with the same code and settings."""
+    context.begin(experiment.name)
+    digest = _digest(context.settings)
+    path = context.settings.out / f"{experiment.name}.json"
+    found = None if again else Result.load(path, digest)
+    if found is not None and all((context.settings.out / figure.file).exists() for figure in found.figures):
+        print(f"  finished before ({path})", file=sys.stderr)
+        return found
+    begin = time.monotonic()
+    result = experiment.run(context)
+    result.name, result.title, result.seconds = experiment.name, experiment.title, round(time.monotonic() - begin, 1)
+    result.save(path, digest)
+    return result
+
+
+def _digest(settings: Settings) -> str:
+    """Of this package's code and of the settings, but for the folder."""
+    code = hashlib.sha256()
+    for path in sorted(pathlib.Path(__file__).parent.rglob("*.py")):
+        code.update(path.read_bytes())
+    code.update(repr(dataclasses.replace(settings, out=pathlib.Path())).encode())
+    return code.hexdigest()
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except touchstone.TouchstoneError as error:
+        sys.exit(f"touchstone.training: {error}")

@@ -1,0 +1,147 @@
+"""The models that a diagnosis of measured touches climbs through, and the rig that these touches come from.
+
+What the rig hides is told to the emulator alone. Every model here is what client.diagnose() made of measured touches.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import pathlib
+
+import numpy as np
+
+import touchstone
+
+from . import plans
+from .context import Context
+from .touch_data import TouchData
+
+# An emulated optical sensor's noise, so that what the model lacks is seen beside it (the seed's 48 ms would hide it).
+SIGMA_US = 5000.0
+# Fingers of unequal length, an object that gives way, round tips, and a lead screw that is in no catalogue of effects.
+HIDDEN = ("--hide", "finger_length.offset_mm=-0.3,0.4,-0.1", "--hide", "object_push.shift_mm=0.8", "--hide", "tip_radius.radius_mm=2",
+          "--unlisted", "lead_screw=0.5,5")
+RIG = ("--sigma-us", f"{SIGMA_US:.0f}", *HIDDEN)
+NOMINAL = ("touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
+           f"  - gaussian_noise: {{sigma_us: {SIGMA_US:.0f}}}\n")
+STANDOFF_MM = 60.0  # of plans.SIMULATED and of every faces plan
+# The objects whose touches are diagnosed; the models are tried on all five.
+DIAGNOSED = ("lat00", "lat20")
+
+
+@dataclasses.dataclass
+class Rung:
+    """A model of the ladder.
+
+    Attributes:
+      name: "nominal", "+ finger_length", ...
+      model: the model file.
+      rmse_us: of held-out measured touches, by client.compare().
+    """
+
+    name: str
+    model: str
+    rmse_us: float
+
+
+def measured(context: Context) -> tuple[TouchData, TouchData]:
+    """Touches that are diagnosed, of two objects, and others in other poses, of all objects: no model has seen these."""
+    per_face, rounds = context.settings.pick((12, 1), (24, 2))
+    plan = touchstone.faces(samples_per_face=per_face, rounds=rounds)
+    test = touchstone.faces(samples_per_face=context.settings.pick(4, 40), rounds=1)
+    return (context.measured(plan, objects=DIAGNOSED, options=RIG, seed=11), context.measured(test, options=RIG, seed=12))
+
+
+def climb(context: Context) -> list[Rung]:
+    """The ladder from the nominal model on: each effect of the report, then the curve of what is left, if it found one.
+
+    The effects have the values of the report's improved model, in which they were fitted together. Kept beside the
+    measured touches, since three experiments ask for it.
+    """
+    diagnosed, held_out = measured(context)
+    folder = context.settings.out / "measured"
+    digest = hashlib.sha256(diagnosed.times_us.tobytes() + held_out.times_us.tobytes() + NOMINAL.encode()).hexdigest()[:16]
+    path = folder / f"ladder-{digest}.json"
+    if path.exists():
+        return [Rung(**rung) for rung in json.loads(path.read_text())]
+    write_set(diagnosed, folder / "diagnosed.csv")
+    write_set(held_out, folder / "held_out.csv")
+    report = context.simulator.diagnose(folder / "diagnosed.csv", NOMINAL, seed=1)
+    rungs = [Rung(name, model, context.simulator.compare(folder / "held_out.csv", model).rmse_us)
+             for name, model in models(report)]
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps([dataclasses.asdict(rung) for rung in rungs], indent=1))
+    part.replace(path)
+    return rungs
+
+
+def models(report: touchstone.Report) -> list[tuple[str, str]]:
+    """(name, model file) of each rung of a report of NOMINAL."""
+    found = [("nominal", NOMINAL)]
+    head, blocks = _blocks(report.improved_model or NOMINAL)
+    named = {step.effect for step in report.steps}
+    # Refitted values of effects that the nominal model has already are part of every rung but the first.
+    kept = [block for block in blocks if _effect(block) not in named]
+    for step in report.steps:
+        kept += [block for block in blocks if _effect(block) == step.effect]
+        found.append((f"+ {step.effect}", head + "".join(kept)))
+    rest = report.message.unexplained.lookup_yaml
+    if rest:
+        found.append(("+ lookup", head + "".join(kept) + rest.rstrip("\n") + "\n"))
+    return found
+
+
+def _blocks(model: str) -> tuple[str, list[str]]:
+    """A model file up to its effects, and each effect with the lines that belong to it."""
+    head, _, effects = model.partition("effects:\n")
+    blocks: list[str] = []
+    for line in effects.splitlines(keepends=True):
+        if line.startswith("  - "):
+            blocks.append(line)
+        elif line.strip():
+            blocks[-1] += line
+    return head + "effects:\n", blocks
+
+
+def _effect(block: str) -> str:
+    return block.strip().removeprefix("- ").partition(":")[0]
+
+
+def with_noise(model: str, sigma_us: float) -> str:
+    """The model with this standard deviation of each finger's time, whatever it had; 0: none."""
+    head, blocks = _blocks(model)
+    noise = [f"  - gaussian_noise: {{sigma_us: {sigma_us:.0f}}}\n"] if sigma_us else []
+    found = head + "".join(noise + [block for block in blocks if _effect(block) != "gaussian_noise"])
+    return found if noise or len(blocks) > 1 else found.rstrip("\n") + " []\n"
+
+
+def commanded(data: TouchData, rows=slice(None)) -> touchstone.Touches:
+    """The touches that were commanded, to be simulated again."""
+    unit = lambda vectors: vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    approach = unit(data.approach[rows])
+    # They came as float32: lateral is made perpendicular to approach again, as the source wants it.
+    lateral = data.lateral[rows] - np.sum(data.lateral[rows] * approach, 1, keepdims=True) * approach
+    return touchstone.touches(target_mm=data.target_mm[rows], approach=approach, lateral=unit(lateral), standoff_mm=STANDOFF_MM,
+                              speed_mm_s=data.speed_mm_s)
+
+
+def write_set(data: TouchData, path: pathlib.Path) -> None:
+    """A measurement file of them."""
+    touches = commanded(data)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    touchstone.write_measurements(path, [
+        touchstone.Row(k, data.objects[data.object[k]], touches[k:k + 1], tuple(data.times_us[k])) for k in range(len(data))])
+
+
+def simulate_again(context: Context, data: TouchData, model: str, seed: int) -> np.ndarray:
+    """(N, fingers) contact times in microseconds, less the first finger's, of the same commanded touches by a model; NaN
+    where a finger meets nothing."""
+    times = np.empty_like(data.times_us)
+    for k, name in enumerate(data.objects):
+        rows = np.flatnonzero(data.object == k)
+        if len(rows):
+            times[rows] = context.simulator.touch(name, commanded(data, rows), model=model, seed=seed,
+                                                  start=k * 1_000_000)["descriptor_us"]
+    return times

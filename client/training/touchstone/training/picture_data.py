@@ -1,0 +1,174 @@
+"""Photographs of objects from both sources, chosen once for all experiments of images; what is done to them; their features.
+
+The camera sees the whole object. Simulated pictures are taken from all directions, as the seed's were; the rig's along the
+approaches of a plan of faces, `DISTANCE_MM` from where the finger would touch. The arm may not stand farther than `STANDOFF_MM`
+from a target, so the target lies in front of the object; nothing is touched.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import pathlib
+import time
+
+import cv2
+import numpy as np
+
+import touchstone
+
+from . import plans
+from .backbone import Backbone
+from .context import Context
+from .settings import SUPERSHAPES
+
+STANDOFF_MM, DISTANCE_MM = 150.0, 250.0
+SIDE_PX = 224
+VIRTUAL = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
+# Seeds of poses: of what the rig photographs, and far from it of what is simulated.
+_RIG_SEED, _VIRTUAL_SEED = 7, 1_000_000
+
+
+@dataclasses.dataclass
+class Pictures:
+    """Attributes:
+      image: (N, height, width, 1) uint8.
+      object: (N,) index into SUPERSHAPES.
+      kind: where they are from, for made_on.
+    """
+
+    image: np.ndarray
+    object: np.ndarray
+    kind: str
+
+    def __len__(self) -> int:
+        return len(self.object)
+
+    def __getitem__(self, rows) -> Pictures:
+        return Pictures(self.image[rows], self.object[rows], self.kind)
+
+
+def joined(*parts: Pictures) -> Pictures:
+    return Pictures(np.concatenate([p.image for p in parts]), np.concatenate([p.object for p in parts]),
+                    " + ".join(p.kind for p in parts))
+
+
+def rig_poses(client: touchstone.Client, name: str, count: int, seed: int) -> touchstone.Touches:
+    """Random approaches to the six faces in turn, none of them twice, from which the camera sees the whole object."""
+    plan = touchstone.faces(samples_per_face=1_000_000, rounds=1, standoff_mm=STANDOFF_MM, spread=0.1)
+    touches = client.plan(plan, name, count, seed=seed)
+    return dataclasses.replace(touches, target_mm=touches.target_mm - (DISTANCE_MM - STANDOFF_MM) * touches.approach)
+
+
+def virtual(context: Context, per_object: int, seed: int, normalize: bool = False) -> Pictures:
+    """Simulated ones of all objects from random directions, without noise; other poses for every seed."""
+    client = context.simulator
+    image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
+    found = [client.capture(name, client.plan(VIRTUAL, name, per_object, seed=_VIRTUAL_SEED + seed), image=image,
+                            model=plans.IDEAL)["image"] for name in SUPERSHAPES]
+    return Pictures(np.concatenate(found), np.repeat(np.arange(len(SUPERSHAPES)), per_object), "virtual")
+
+
+def measured(context: Context, per_object: int, normalize: bool = False) -> Pictures:
+    """By the rig's camera. Kept in the folder of the run: an arm takes its time."""
+    settings = context.settings
+    words = json.dumps([per_object, normalize, settings.rig, plans.RIG, DISTANCE_MM, SIDE_PX])
+    path = settings.out / "measured" / f"pictures-{hashlib.sha256(words.encode()).hexdigest()[:16]}.npz"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part.npz")
+        np.savez_compressed(part, image=_photograph(context, per_object, normalize))
+        context.stop_rigs()
+        part.replace(path)
+    with np.load(path) as found:
+        return Pictures(found["image"], np.repeat(np.arange(len(SUPERSHAPES)), per_object), settings.measured_kind)
+
+
+def _photograph(context, per_object, normalize):
+    """The first `per_object` poses of each object that the arm reaches, one at a time."""
+    client, found = context.rig(*plans.RIG), []
+    total = per_object * len(SUPERSHAPES)
+    image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
+    for name in SUPERSHAPES:
+        views, taken = rig_poses(client, name, 2 * per_object + 10, _RIG_SEED), 0
+        for k in range(len(views)):
+            if taken == per_object:
+                break
+            if len(found) % 25 == 0:
+                context.progress(0, f"photographed {len(found)} of {total} times with the rig")
+            try:
+                found.append(client.capture(name, views[k], image=image)["image"])
+                taken += 1
+            except touchstone.InvalidRequest:
+                continue  # out of reach; the next pose is another one
+        if taken < per_object:
+            raise touchstone.SourceFailed(f"the arm reaches {taken} of {len(views)} poses of {name}; {per_object} are needed")
+    return np.concatenate(found)
+
+
+def split(pictures: Pictures, test: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows for training and `test` rows for testing, of every object as many; no row is in both."""
+    rng, chosen = np.random.default_rng([seed, 75]), []
+    classes = len(SUPERSHAPES)
+    for k in range(classes):
+        chosen.append(rng.permutation(np.flatnonzero(pictures.object == k))[: test // classes + (k < test % classes)])
+    testing = np.sort(np.concatenate(chosen))
+    return np.setdiff1d(np.arange(len(pictures)), testing), testing
+
+
+def scaled(pictures: Pictures, copies: int, rng: np.random.Generator, reach: tuple[float, float] = (0.75, 1.3)) -> Pictures:
+    """`copies` of every picture, each larger or smaller about its centre by a random factor; what comes in at the edge
+    is like the edge."""
+    found = []
+    for picture in pictures.image:
+        height, width = picture.shape[:2]
+        for factor in np.exp(rng.uniform(*np.log(reach), copies)):
+            matrix = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), 0, factor)
+            found.append(cv2.warpAffine(picture, matrix, (width, height), flags=cv2.INTER_LINEAR,
+                                        borderMode=cv2.BORDER_REPLICATE)[:, :, None])
+    return Pictures(np.array(found), np.repeat(pictures.object, copies), pictures.kind)
+
+
+def binarised(pictures: Pictures) -> Pictures:
+    """White where a picture is brighter than its own threshold (Otsu's), black elsewhere."""
+    image = [cv2.threshold(p, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)[1] for p in pictures.image]
+    return dataclasses.replace(pictures, image=np.array(image).reshape(pictures.image.shape))
+
+
+def inverted(pictures: Pictures) -> Pictures:
+    return dataclasses.replace(pictures, image=255 - pictures.image)
+
+
+class FeatureCache:
+    """Features of pictures, each set computed once and kept in the folder of the run, named by what it was computed from.
+
+    Attributes:
+      pictures, seconds: what was computed, and how long it took; 0 if all was there.
+    """
+
+    def __init__(self, context: Context):
+        self.backbone = Backbone(context.settings.backbone)
+        self._folder: pathlib.Path = context.settings.out / "features"
+        self.pictures, self.seconds = 0, 0.0
+
+    def __call__(self, pictures: Pictures) -> np.ndarray:
+        """(N, F) float32."""
+        image = np.ascontiguousarray(pictures.image)
+        name = hashlib.sha256(self.backbone.digest.encode() + repr(image.shape).encode() + image.tobytes()).hexdigest()[:24]
+        path = self._folder / f"{name}.npy"
+        if not path.exists():
+            begin = time.monotonic()
+            found = self.backbone.features(image)
+            self.pictures, self.seconds = self.pictures + len(image), self.seconds + time.monotonic() - begin
+            self._folder.mkdir(parents=True, exist_ok=True)
+            part = path.with_suffix(".part.npy")
+            np.save(part, found)
+            part.replace(path)
+        return np.load(path)
+
+    def rate(self) -> str:
+        """How fast, in words."""
+        if not self.pictures:
+            return "Features were there from an earlier run."
+        return f"Features of {self.pictures:,} pictures took {self.seconds:.0f} s, {self.pictures / self.seconds:.1f} pictures a second."

@@ -1,0 +1,80 @@
+"""Touches of several objects as arrays, from whichever source: the simulator and the rig are asked in the same words."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from typing import Any, Sequence
+
+import numpy as np
+
+import touchstone
+
+
+@dataclasses.dataclass
+class TouchData:
+    """Attributes:
+      objects: names.
+      object: (N,) index into them.
+      times_us: (N, fingers) contact times less the first finger's, microseconds; the seed's array.
+      target_mm, approach, lateral: (N, 3) of the commanded touch, object frame.
+      image: (N, height, width, channels) uint8, or None.
+      speed_mm_s, spacing_mm: of the hand.
+    """
+
+    objects: tuple[str, ...]
+    object: np.ndarray
+    times_us: np.ndarray
+    target_mm: np.ndarray
+    approach: np.ndarray
+    lateral: np.ndarray
+    image: np.ndarray | None
+    speed_mm_s: float
+    spacing_mm: float
+
+    def __len__(self) -> int:
+        return len(self.object)
+
+    def __getitem__(self, rows: Any) -> TouchData:
+        """Those rows: a slice, a mask or an array of indices."""
+        picked = {name: getattr(self, name)[rows] for name in _ARRAYS}
+        return dataclasses.replace(self, image=None if self.image is None else self.image[rows], **picked)
+
+    def curvature(self) -> np.ndarray:
+        """Local curvature in 1/m of each touch, positive where the surface is convex: speed (t_l - 2 t_m + t_r) / spacing^2."""
+        left, middle, right = self.times_us.T / 1e6
+        return self.speed_mm_s * (left - 2 * middle + right) / self.spacing_mm**2 * 1e3
+
+    def save(self, path: pathlib.Path) -> None:
+        """Whole or not at all."""
+        part = path.with_suffix(".part.npz")
+        image = {} if self.image is None else {"image": self.image}
+        np.savez_compressed(part, objects=np.array(self.objects), hand=[self.speed_mm_s, self.spacing_mm], **image,
+                            **{name: getattr(self, name) for name in _ARRAYS})
+        part.replace(path)
+
+    @classmethod
+    def load(cls, path: pathlib.Path) -> TouchData:
+        with np.load(path) as found:
+            speed, spacing = map(float, found["hand"])
+            return cls(tuple(map(str, found["objects"])), *(found[name] for name in _ARRAYS),
+                       found["image"] if "image" in found else None, speed, spacing)
+
+
+_ARRAYS = ("object", "times_us", "target_mm", "approach", "lateral")
+
+
+def collect(client: touchstone.Client, objects: Sequence[str], plan: Any, samples: int, *, model: str | None = None,
+            seed: int = 1, image: Any = None, spacing_mm: float = 30.0) -> TouchData:
+    """`samples` samples of a dataset over `objects`, which take turns. Touches of which a finger's time is missing (a rig
+    cannot draw again) are left out."""
+    columns = ["object", "descriptor_us", "target_mm", "approach", "lateral", "speed_mm_s"]
+    dataset = client.dataset(objects, plan, samples=samples, seed=seed, model=model, image=image,
+                             columns=columns + (["image"] if image is not None else []))
+    batches = list(dataset)
+    joined = {name: np.concatenate([batch[name] for batch in batches]) for name in columns}
+    whole = np.isfinite(joined["descriptor_us"]).all(1)
+    pixels = np.concatenate([batch["image"] for batch in batches])[whole] if image is not None else None
+    return TouchData(tuple(objects), joined["object"][whole].astype(int), joined["descriptor_us"][whole].astype(float),
+                     *(joined[name][whole].astype(float) for name in ("target_mm", "approach", "lateral")), pixels,
+                     float(joined["speed_mm_s"][0]), spacing_mm)
