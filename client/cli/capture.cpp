@@ -79,19 +79,17 @@ absl::Status LookAtObject(const CaptureOptions& options, client::Connection* con
                           (options.touch.target_mm.empty() || !options.touch.standoff_mm.has_value());
   const bool camera_without_aim = !options.eye_mm.empty() && options.at_mm.empty();
   if (!whole_view && !camera_without_aim) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<geometry::Bounds> bounds,
-                              BoundsOfObject(connection, options.object));
-  if (!bounds.has_value()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::Bounds bounds, BoundsOfObject(connection, options.object));
   v1::View* view = request->mutable_views(0);
   if (camera_without_aim) {
-    *view->mutable_camera()->mutable_at_m() = service::ToProto(bounds->Centre());
+    *view->mutable_camera()->mutable_at_m() = service::ToProto(bounds.Centre());
     return absl::OkStatus();
   }
   const auto standoff = [&](const geometry::Bounds& box, const Eigen::Vector3d& target_m,
                             const Eigen::Vector3d&) {
     return DistanceToSee((target_m - box.Centre()).norm() + 0.5 * box.DiagonalM(), request->image());
   };
-  AimAtObject(options.touch, *bounds, standoff, view->mutable_touch());
+  AimAtObject(options.touch, bounds, standoff, view->mutable_touch());
   const double standoff_m = view->touch().standoff_m();
   if (standoff_m <= kMaxStandoffM) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("--standoff-mm: '", options.object,

@@ -1,7 +1,5 @@
 #include "client/cli/interrupt.h"
 
-#include <pthread.h>
-#include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -9,6 +7,7 @@
 #include <thread>
 
 #include "client/cli/exit_code.h"
+#include "server/base/stop_signals.h"
 
 namespace touchstone::cli {
 namespace {
@@ -17,10 +16,9 @@ std::atomic<bool> raised{false};
 std::mutex handler_mutex;
 std::function<void()> handler;  // guarded by handler_mutex
 
-void WaitForSignals(sigset_t signals) {
+void WaitForSignals() {
   while (true) {
-    int signal = 0;
-    if (sigwait(&signals, &signal) != 0) continue;
+    WaitForStopSignal();
     std::lock_guard<std::mutex> lock(handler_mutex);
     if (raised.exchange(true) || !handler) _exit(kInterrupted);
     handler();
@@ -30,12 +28,8 @@ void WaitForSignals(sigset_t signals) {
 }  // namespace
 
 void Interrupt::Install() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  std::thread(WaitForSignals, signals).detach();
+  TakeStopSignals(InheritedIgnore::kKeep);
+  std::thread(WaitForSignals).detach();
 }
 
 bool Interrupt::Raised() {

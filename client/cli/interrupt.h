@@ -8,7 +8,8 @@ namespace touchstone::cli {
 
 class Interrupt {
  public:
-  // Before any thread is started: from then on a thread of its own waits for the signals.
+  // Once: from then on a thread of its own waits for the signals. An ignored SIGINT, which is what a shell gives to
+  // programs in the background, stays ignored.
   static void Install();
 
   // True once a signal has come.

@@ -66,16 +66,14 @@ absl::Status AimRows(const TouchOptions& options, client::Connection* connection
                      std::vector<TouchRow>* rows) {
   if (!options.plan.empty() || (!options.touch.target_mm.empty() && options.touch.standoff_mm.has_value()))
     return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<geometry::Bounds> bounds,
-                              BoundsOfObject(connection, options.object));
-  if (!bounds.has_value()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const geometry::Bounds bounds, BoundsOfObject(connection, options.object));
   const auto standoff = [](const geometry::Bounds& box, const Eigen::Vector3d& target_m,
                            const Eigen::Vector3d& approach) {
     constexpr double kStandoffM = 0.1, kClearanceM = 0.02;
     return std::clamp(geometry::DistanceToLeave(box, target_m, -approach) + kClearanceM, kStandoffM,
                       kMaxStandoffM);
   };
-  for (TouchRow& row : *rows) AimAtObject(options.touch, *bounds, standoff, &row.measured.commanded);
+  for (TouchRow& row : *rows) AimAtObject(options.touch, bounds, standoff, &row.measured.commanded);
   return absl::OkStatus();
 }
 

@@ -1,6 +1,7 @@
 #include "client/cli/touch_options.h"
 
 #include <cmath>
+#include <vector>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -95,16 +96,18 @@ void AimAtObject(const TouchFlags& options, const geometry::Bounds& bounds, cons
         standoff(bounds, service::FromProto(touch->target_m()), service::FromProto(touch->approach())));
 }
 
-absl::StatusOr<std::optional<geometry::Bounds>> BoundsOfObject(client::Connection* connection,
-                                                               const std::string& object) {
+absl::StatusOr<geometry::Bounds> BoundsOfObject(client::Connection* connection, const std::string& object) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse response,
                               client::Connection::Call(&v1::Source::Stub::ListObjects, connection->source(),
                                                        v1::ListObjectsRequest()));
-  for (const v1::Object& candidate : response.objects())
+  std::vector<std::string> known;
+  for (const v1::Object& candidate : response.objects()) {
     if (candidate.name() == object)
-      return std::make_optional(geometry::Bounds{service::FromProto(candidate.bounds_min_m()),
-                                                 service::FromProto(candidate.bounds_max_m())});
-  return std::optional<geometry::Bounds>();
+      return geometry::Bounds{service::FromProto(candidate.bounds_min_m()),
+                              service::FromProto(candidate.bounds_max_m())};
+    known.push_back(candidate.name());
+  }
+  return absl::NotFoundError(absl::StrCat("no object is named '", object, "'", DidYouMean(object, known)));
 }
 
 }  // namespace touchstone::cli

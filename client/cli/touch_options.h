@@ -29,9 +29,7 @@ using StandoffOf = std::function<double(const geometry::Bounds& bounds, const Ei
 void AimAtObject(const TouchFlags& options, const geometry::Bounds& bounds, const StandoffOf& standoff,
                  v1::CommandedTouch* touch);
 
-// The bounding box of an object of the source; none where it has no object of that name, which the source's own answer
-// to the command then says in its words.
-absl::StatusOr<std::optional<geometry::Bounds>> BoundsOfObject(client::Connection* connection,
-                                                               const std::string& object);
+// The bounding box of an object of the source; NOT_FOUND, with the nearest name, where it has none of that name.
+absl::StatusOr<geometry::Bounds> BoundsOfObject(client::Connection* connection, const std::string& object);
 
 }  // namespace touchstone::cli

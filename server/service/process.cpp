@@ -5,9 +5,10 @@
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
-#include <csignal>
 #include <cstdio>
 #include <memory>
+
+#include "server/base/stop_signals.h"
 
 namespace touchstone::service {
 namespace {
@@ -24,14 +25,6 @@ class JsonMessage : public spdlog::custom_flag_formatter {
     return std::make_unique<JsonMessage>();
   }
 };
-
-sigset_t EndSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  return signals;
-}
 
 }  // namespace
 
@@ -50,18 +43,6 @@ void SetUpLog(const std::string& level, bool json) {
   spdlog::set_level(spdlog::level::from_str(level));
 }
 
-void BlockSignals() {
-  const sigset_t signals = EndSignals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-}
-
-int WaitForSignal() {
-  const sigset_t signals = EndSignals();
-  int signal = 0;
-  sigwait(&signals, &signal);
-  return signal;
-}
-
 void AnnounceListening(const std::string& listen, int port) {
   const std::string host = listen.substr(0, listen.rfind(':'));
   std::printf("listening on %s:%d\n", host.c_str(), port);
@@ -76,7 +57,7 @@ int ReportStartError(const char* program, const absl::Status& status) {
 
 void ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins) {
   AnnounceListening(options.listen, port);
-  const int signal = WaitForSignal();
+  const int signal = WaitForStopSignal();
   spdlog::info("signal {}: {} for up to {} s", signal, what_begins, options.drain_s);
 }
 

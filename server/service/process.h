@@ -5,18 +5,13 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/base/stop_signals.h"
 #include "server/service/server_options.h"
 
 namespace touchstone::service {
 
 // Lines, or JSON objects, of at least this level ("info").
 void SetUpLog(const std::string& level, bool json);
-
-// Signals are taken by one thread alone, with sigwait, so that nothing happens inside a handler: call this
-// before any thread is made.
-void BlockSignals();
-// Waits for SIGTERM or SIGINT; which.
-int WaitForSignal();
 
 // Prints "listening on HOST:PORT", the line that scripts wait for.
 void AnnounceListening(const std::string& listen, int port);
@@ -36,7 +31,7 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
   if (!flags.ok()) return ReportStartError(program, absl::InvalidArgumentError(flags.status().message()));
   if (flags->done) return 0;
   SetUpLog(flags->log_level, flags->log_json);
-  BlockSignals();
+  TakeStopSignals(InheritedIgnore::kOverride);
   auto server = start(*flags);
   if (!server.ok()) return ReportStartError(program, server.status());
   ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);

@@ -1,5 +1,6 @@
 // touchstone-rig-emulator: a test tool that stands in for an arm, an end effector and a camera. What it
 // reports was never measured on anything.
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -9,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "server/base/stop_signals.h"
 #include "tests/rig/emulator.h"
 #include "tests/rig/emulator_commands.h"
 #include "tests/rig/emulator_files.h"
@@ -43,20 +45,14 @@ int Tell(const std::string& where, const std::vector<std::string>& words) {
 }
 
 int Emulate(const EmulatorOptions& options) {
-  // Signals are taken by this thread alone, so that nothing happens inside a handler.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  touchstone::TakeStopSignals(touchstone::InheritedIgnore::kOverride);
   signal(SIGPIPE, SIG_IGN);
 
   const auto emulator = touchstone::rig::Emulator::Start(options);
   std::printf("ready %s\n", emulator->config_path().c_str());
   std::fflush(stdout);
   while (!emulator->QuitAsked()) {
-    const timespec turn{0, 100'000'000};
-    if (sigtimedwait(&signals, nullptr, &turn) > 0) break;
+    if (touchstone::WaitForStopSignal(std::chrono::milliseconds(100)) != 0) break;
   }
   return 0;
 }
