@@ -78,9 +78,13 @@ def touchstone_without_noise():
 
 
 def test_a_finger_that_passes_is_seen_as_such(make):
-    env = make(objects=("lat00", "lat20"))
+    # From above, from the middle outwards: the last ones have one finger, two or all beside the object.
+    beside_mm = np.linspace(0, 90, 10)
+    touches = touchstone.touches(target_mm=[[x, 0, 0] for x in beside_mm], approach=[[0, 0, -1]] * 10, lateral=[[1, 0, 0]] * 10,
+                                 standoff_mm=100, speed_mm_s=20, stroke_mm=140)
+    env = make(objects=("lat00", "lat20"), touches=touches)
     env.reset(seed=1)
-    rows = np.array([env.step(k)[0][k] for k in range(11)])
+    rows = np.array([env.step(k)[0][k] for k in range(10)])
     met = rows[:, 4:]
     assert (met == 0).any() and (met == 1).any()
     assert (rows[:, 1:4][met == 0] == 0).all()
