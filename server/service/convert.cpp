@@ -9,7 +9,8 @@
 
 namespace touchstone::service {
 
-constexpr size_t kMaxMessageBytes = 2048;
+// Printable cuts about there, and adds dots: 2 KiB at most in all.
+constexpr size_t kMaxMessageBytes = 2048 - 8;
 
 grpc::Status ToGrpc(const absl::Status& status) {
   // The two enumerations share their numbers. A message that repeats what a client sent may not be longer than what

@@ -1,0 +1,152 @@
+"""What the programs of this folder share: a real server that can be killed, calls of its methods, and a result."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import re
+import resource
+import signal
+import subprocess
+import tempfile
+import threading
+
+import grpc
+
+from touchstone.v1 import models_pb2, sessions_pb2, source_pb2
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SERVER = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or ROOT / "build/release/bin/touchstone-server")
+# Five supershapes that take a moment to build: what is tried here does not depend on their size.
+SMALL = ("--supershape-triangles", "2000")
+PATIENCE_S = 60.0
+
+
+@dataclasses.dataclass
+class Result:
+    """What a program saw: `seen` for people, `failures` for tests. No failure: the promise was kept."""
+
+    seen: list[str] = dataclasses.field(default_factory=list)
+    failures: list[str] = dataclasses.field(default_factory=list)
+
+    def expect(self, kept: bool, broken: str) -> None:
+        if not kept:
+            self.failures.append(broken)
+
+
+class Server:
+    """A touchstone-server on a free port of this machine, with its log.
+
+    Attributes:
+      target: "127.0.0.1:port".
+      log: its lines on standard error so far.
+    """
+
+    def __init__(self, *options: str, max_files: int | None = None):
+        """max_files: soft and hard limit of open files; None: as this process has it."""
+
+        def limit():
+            if max_files is not None:
+                resource.setrlimit(resource.RLIMIT_NOFILE, (max_files, max_files))
+
+        self.process = subprocess.Popen([SERVER, "--listen", "127.0.0.1:0", *SMALL, *map(str, options)], text=True,
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=limit)
+        self.log: list[str] = []
+        threading.Thread(target=self.log.extend, args=(self.process.stderr,), daemon=True).start()
+        for line in self.process.stdout:
+            if found := re.search(r"listening on (127\.0\.0\.1:\d+)", line):
+                self.target = found.group(1)
+                break
+        else:
+            raise RuntimeError(f"{SERVER} ended with {self.process.wait()}: {''.join(self.log)}")
+        threading.Thread(target=lambda: [None for _ in self.process.stdout], daemon=True).start()
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.kill()
+
+    def alive(self) -> bool:
+        return self.process.poll() is None
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def channel(self, *options: tuple[str, int]) -> grpc.Channel:
+        """A connection of its own, however many there are to this server."""
+        return grpc.insecure_channel(self.target, options=[("grpc.use_local_subchannel_pool", 1), *options])
+
+    def resident_bytes(self) -> int:
+        """Of the memory that is in use now; ru_maxrss would only ever grow."""
+        status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(re.search(r"VmRSS:\s+(\d+) kB", status).group(1)) * 1024
+
+    def threads(self) -> int:
+        return len(os.listdir(f"/proc/{self.process.pid}/task"))
+
+
+def create_model(channel: grpc.Channel, yaml: str) -> models_pb2.Model:
+    call = channel.unary_unary("/touchstone.v1.Models/CreateModel", models_pb2.CreateModelRequest.SerializeToString,
+                               models_pb2.Model.FromString)
+    return call(models_pb2.CreateModelRequest(yaml=yaml), timeout=PATIENCE_S)
+
+
+def list_models(channel: grpc.Channel) -> list[models_pb2.Model]:
+    call = channel.unary_unary("/touchstone.v1.Models/ListModels", models_pb2.ListModelsRequest.SerializeToString,
+                               models_pb2.ListModelsResponse.FromString)
+    return list(call(models_pb2.ListModelsRequest(), timeout=PATIENCE_S).models)
+
+
+def create_session(channel: grpc.Channel, name: str, csv: bytes, piece: int = 1 << 16) -> sessions_pb2.Session:
+    call = channel.stream_unary("/touchstone.v1.Sessions/CreateSession", sessions_pb2.CreateSessionRequest.SerializeToString,
+                                sessions_pb2.Session.FromString)
+    return call((sessions_pb2.CreateSessionRequest(name=name if at == 0 else "", csv=csv[at:at + piece])
+                 for at in range(0, len(csv), piece)), timeout=PATIENCE_S)
+
+
+def list_sessions(channel: grpc.Channel) -> list[sessions_pb2.Session]:
+    call = channel.unary_unary("/touchstone.v1.Sessions/ListSessions", sessions_pb2.ListSessionsRequest.SerializeToString,
+                               sessions_pb2.ListSessionsResponse.FromString)
+    return list(call(sessions_pb2.ListSessionsRequest(), timeout=PATIENCE_S).sessions)
+
+
+def export_session(channel: grpc.Channel, name: str) -> bytes:
+    call = channel.unary_stream("/touchstone.v1.Sessions/ExportSession", sessions_pb2.ExportSessionRequest.SerializeToString,
+                                sessions_pb2.ExportSessionResponse.FromString)
+    return b"".join(part.csv for part in call(sessions_pb2.ExportSessionRequest(name=name), timeout=PATIENCE_S))
+
+
+def describe(channel: grpc.Channel, timeout_s: float = PATIENCE_S) -> source_pb2.DescribeResponse:
+    call = channel.unary_unary("/touchstone.v1.Source/Describe", source_pb2.DescribeRequest.SerializeToString,
+                               source_pb2.DescribeResponse.FromString)
+    return call(source_pb2.DescribeRequest(), timeout=timeout_s)
+
+
+def stream(channel: grpc.Channel, samples: int, batch_size: int = 4096, seed: int = 1, timeout_s: float = PATIENCE_S):
+    """The call of a dataset of two objects; iterate for its responses, cancel() to leave it."""
+    request = source_pb2.StreamDatasetRequest(batch_size=batch_size)
+    request.spec.objects.extend(["lat00", "lat20"])
+    request.spec.plan.sphere.SetInParent()
+    request.spec.samples, request.spec.seed = samples, seed
+    call = channel.unary_stream("/touchstone.v1.Source/StreamDataset", source_pb2.StreamDatasetRequest.SerializeToString,
+                                source_pb2.StreamDatasetResponse.FromString)
+    return call(request, timeout=timeout_s)
+
+
+def model_yaml(name: str, radius_mm: float) -> str:
+    return f"touchstone: model/1\nname: {name}\nend_effector: {{fingers: 3, spacing_mm: 30}}\neffects:\n  - tip_radius: {{radius_mm: {radius_mm}}}\n"
+
+
+def measurements(touches: int, first: float) -> bytes:
+    """A measurement file whose bytes depend on `first`, a time in us."""
+    rows = ["touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
+            "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us"]
+    rows += [f"{k},lat00,20,60,0,0,0,0,0,-1,1,0,0,{first + k},0,{k}" for k in range(touches)]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def scratch() -> tempfile.TemporaryDirectory:
+    return tempfile.TemporaryDirectory(prefix="touchstone-faults-")

@@ -1,0 +1,75 @@
+"""The programs of this folder, small: each keeps its promise, and each can see one that is broken."""
+
+import grpc
+import pytest
+
+import disk_full
+import flat_memory
+import hostile_bytes
+import kill_while_writing
+import many_clients
+import programs
+import replicas
+
+
+def passes(result):
+    assert not result.failures, "\n".join(result.failures[:10])
+    assert result.seen
+
+
+def test_what_was_acknowledged_before_a_kill_is_there():
+    passes(kill_while_writing.run(kills=8))
+
+
+def test_of_two_replicas_one_gets_a_name():
+    passes(replicas.run(names=10))
+
+
+def test_a_full_disk_loses_nothing_that_was_acknowledged():
+    try:
+        passes(disk_full.run())
+    except PermissionError as error:
+        pytest.skip(str(error))
+
+
+def test_every_method_answers_hostile_bytes():
+    passes(hostile_bytes.run(calls=8))
+
+
+def test_many_clients_get_the_same_bytes():
+    passes(many_clients.run(clients=60))
+
+
+def test_memory_is_flat_over_a_long_stream():
+    passes(flat_memory.run(samples=5_000_000))
+
+
+def test_a_loss_and_a_tear_are_seen():
+    written, result = kill_while_writing.Written(), programs.Result()
+    with programs.scratch() as folder, programs.Server("--sessions-dir", folder) as server, server.channel() as channel:
+        programs.create_session(channel, "torn", programs.measurements(40, 1.0))
+        written.sent = {"torn": programs.measurements(40, 2.0), "lost": b""}
+        written.acknowledged = {"torn", "lost"}
+        kill_while_writing.check(server, written, result)
+    assert len(result.failures) == 2 and "lost" in result.failures[0] and "torn" in result.failures[1]
+
+
+def test_hostile_messages_reach_every_field_of_a_request():
+    import random
+
+    request_class = {name: message for name, message, _ in hostile_bytes.methods()}["/touchstone.v1.Source/StreamDataset"]
+    fields = set()
+    for seed in range(60):
+        message = request_class()
+        hostile_bytes.fill(message, random.Random(seed))
+        fields |= {field.name for field, _ in message.ListFields()} | {f"spec.{field.name}" for field, _ in message.spec.ListFields()}
+    missing = {field.name for field in request_class.DESCRIPTOR.fields} - fields
+    assert not missing and "spec.plan" in fields
+
+
+def test_a_server_that_ended_is_seen():
+    with programs.Server() as server, server.channel() as channel:
+        server.kill()
+        assert not server.alive()
+        with pytest.raises(grpc.RpcError):
+            programs.describe(channel, timeout_s=1)
