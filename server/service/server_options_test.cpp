@@ -58,6 +58,11 @@ TEST(ServerFlags, EveryMistakeNamesItsPlace) {
               HasSubstr("did you mean '--threads'"));
 }
 
+// What the parser's library took for granted.
+TEST(OptionTable, ATableWhoseNameIsMissingIsRefusedWithItsPlace) {
+  EXPECT_THAT(std::string(ReadToml(" [\n", "a.toml", {}, {}).message()), HasSubstr("a.toml:1:3"));
+}
+
 TEST(OptionTable, AFormerKeyIsStillRead) {
   for (const char* name : {"uri", "source"}) {
     std::string uri;
