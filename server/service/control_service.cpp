@@ -8,9 +8,9 @@
 #include "server/service/convert.h"
 
 namespace touchstone::service {
-grpc::Status ControlService::AcquireLease(grpc::ServerContext*, const v1::AcquireLeaseRequest* request,
-                                          v1::Lease* response) {
-  auto lease = leases_->Acquire(request->holder(), request->take());
+grpc::Status ControlService::AcquireLease(grpc::ServerContext* context,
+                                          const v1::AcquireLeaseRequest* request, v1::Lease* response) {
+  auto lease = leases_->Acquire(request->holder(), request->take(), resources_->access->CallerOf(*context));
   if (!lease.ok()) return ToGrpc(lease.status());
   *response = *std::move(lease);
   return grpc::Status::OK;
@@ -36,7 +36,9 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
   // A stop is never refused, so what is too long or no text is mended.
   spdlog::warn(
       "stop from {} at {}: {}; {} requests under way end",
-      request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes), context->peer(),
+      WithCaller(request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes),
+                 resources_->access->CallerOf(*context)),
+      context->peer(),
       request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxReasonBytes), running);
   response->set_aborted_touches(running);
   return grpc::Status::OK;

@@ -32,7 +32,7 @@ struct Raw {
 
 std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
   GatewayOptions& o = flags->options;
-  return {
+  std::vector<Option> options = {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.common.listen},
       {"replay", "Serve this journal instead of a rig", &o.replay},
       {"journal", "The SQLite file that keeps every touch", &o.journal},
@@ -128,6 +128,9 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };
+  const std::vector<Option> access = AccessFlags(&o.common.access);
+  options.insert(options.begin() + 1, access.begin(), access.end());
+  return options;
 }
 
 // `count` numbers in the unit of files into SI; none given: `numbers` stays.
@@ -241,7 +244,11 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
     for (const auto& [key, path] :
          {std::pair("journal", &flags.options.journal), std::pair("audit_log", &flags.options.audit_log),
           std::pair("calibration", &flags.options.calibration), std::pair("replay", &flags.options.replay),
-          std::pair("camera.intrinsics", &flags.options.camera.intrinsics)})
+          std::pair("camera.intrinsics", &flags.options.camera.intrinsics),
+          std::pair("tls_cert", &flags.options.common.access.tls_cert),
+          std::pair("tls_key", &flags.options.common.access.tls_key),
+          std::pair("tls_client_ca", &flags.options.common.access.tls_client_ca),
+          std::pair("token_file", &flags.options.common.access.token_file)})
       if (line.given.count(key) == 0 && !path->empty()) *path = (folder / *path).string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(Resolve(raw, &flags));

@@ -120,6 +120,9 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   Parts& parts = *gateway->parts_;
   Resources& resources = parts.resources;
   resources.options = options.common;
+  TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
+                              Access::Create(options.common.listen, options.common.access,
+                                             options.replay.empty() ? Motion::kRig : Motion::kSimulated));
   resources.pool = std::make_unique<ThreadPool>(0);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects, source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles,
@@ -159,7 +162,8 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   }
   services.push_back({"touchstone.v1.Control", parts.control.get()});
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options.common, services));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
+                              StartServing(options.common, services, resources.access.get()));
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return gateway;

@@ -33,7 +33,8 @@ v1::Lease LeaseBook::Describe() const {
   return lease;
 }
 
-absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, Clock::time_point now) {
+absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, const Caller& caller,
+                                             Clock::time_point now) {
   if (holder.empty() || holder.size() > kMaxHolderBytes || !IsPrintableLine(holder))
     return absl::InvalidArgumentError(absl::StrCat("holder: say who asks, in 1 to ", kMaxHolderBytes,
                                                    " printable bytes, for instance 'ana@bench2'"));
@@ -43,7 +44,7 @@ absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool tak
         absl::StrCat("the lease is held by '", holder_, "' (epoch ", epoch_,
                      "): ask them to release it, or take it with take = true"));
   token_ = NewToken();
-  holder_ = holder;
+  holder_ = WithCaller(holder, caller);
   ++epoch_;
   until_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s_));
   return Describe();

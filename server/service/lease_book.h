@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/service/access.h"
 #include "touchstone/v1/control.pb.h"
 
 namespace touchstone::service {
@@ -20,7 +21,8 @@ class LeaseBook {
   using Clock = std::chrono::steady_clock;
   explicit LeaseBook(double window_s, bool required = false) : window_s_(window_s), required_(required) {}
 
-  absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take,
+  // `holder` is what the caller says of itself; who it was found to be stands behind that for others to see.
+  absl::StatusOr<v1::Lease> Acquire(const std::string& holder, bool take, const Caller& caller = {},
                                     Clock::time_point now = Clock::now());
   absl::StatusOr<v1::Lease> Renew(const std::string& token, Clock::time_point now = Clock::now());
   // Ends whatever lease stands: its token is stale from now on.

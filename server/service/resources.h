@@ -15,6 +15,7 @@
 #include "server/base/thread_pool.h"
 #include "server/base/version.h"
 #include "server/model/model.h"
+#include "server/service/access.h"
 #include "server/service/server_options.h"
 #include "server/service/session_store.h"
 #include "server/source/object_store.h"
@@ -51,6 +52,7 @@ class ModelStore {
 
 struct Resources {
   ServerOptions options;
+  std::unique_ptr<Access> access;  // who may call; set before the server starts
   std::unique_ptr<ThreadPool> pool;
   source::ObjectStore objects;
   std::unique_ptr<ModelStore> models;

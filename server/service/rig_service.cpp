@@ -117,7 +117,7 @@ grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
   const grpc::Status status = ControlService::AcquireLease(context, request, response);
   if (status.ok())
     rig_->audit()
-        .Write("lease_acquired", {{"holder", request->holder()},
+        .Write("lease_acquired", {{"holder", response->holder()},
                                   {"epoch", absl::StrCat(response->epoch())},
                                   {"taken_from", request->take() ? before : ""},
                                   {"peer", context->peer()}})
@@ -139,10 +139,12 @@ grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::Sto
   // The arm first, then words. A stop is never refused, so what is too long is cut.
   const std::string reason =
       request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxStopReasonBytes);
-  const std::string who =
-      request->holder().empty()
-          ? context->peer()
-          : absl::StrCat(Printable(request->holder(), kMaxHolderBytes), " at ", context->peer());
+  const std::string said =
+      request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes);
+  const Caller caller = resources_->access->CallerOf(*context);
+  const std::string who = request->holder().empty() && caller.name.empty()
+                              ? context->peer()
+                              : absl::StrCat(WithCaller(said, caller), " at ", context->peer());
   response->set_aborted_touches(rig_->Stop(reason, who));
   spdlog::warn("stop from {}: {}", who, reason);
   return grpc::Status::OK;
@@ -155,8 +157,9 @@ grpc::Status RigControlService::Reset(grpc::ServerContext* context, const v1::Re
   if (status.ok() && stopped) {
     // Whoever moves next acquires a lease after this moment: nothing that was retried moves because of it.
     leases_->Revoke();
-    status = rig_->Reset(request->reason(), request->holder());
-    spdlog::warn("reset by {} ({}) from {}: {}", request->holder(), request->reason(), context->peer(),
+    const std::string who = WithCaller(request->holder(), resources_->access->CallerOf(*context));
+    status = rig_->Reset(request->reason(), who);
+    spdlog::warn("reset by {} ({}) from {}: {}", who, request->reason(), context->peer(),
                  status.ok() ? "released" : std::string(status.message()));
   }
   if (!status.ok()) return ToGrpc(status);

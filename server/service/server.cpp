@@ -63,6 +63,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   Parts& parts = *server->parts_;
   Resources& resources = parts.resources;
   resources.options = options;
+  TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
+                              Access::Create(options.listen, options.access, Motion::kSimulated));
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects,
@@ -81,11 +83,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   parts.diagnosis = std::make_unique<DiagnosisService>(&resources);
 
   TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
-                              StartServing(options, {{"touchstone.v1.Source", parts.source_service.get()},
-                                                     {"touchstone.v1.Control", parts.control.get()},
-                                                     {"touchstone.v1.Models", parts.models.get()},
-                                                     {"touchstone.v1.Sessions", parts.sessions.get()},
-                                                     {"touchstone.v1.Diagnosis", parts.diagnosis.get()}}));
+                              StartServing(options,
+                                           {{"touchstone.v1.Source", parts.source_service.get()},
+                                            {"touchstone.v1.Control", parts.control.get()},
+                                            {"touchstone.v1.Models", parts.models.get()},
+                                            {"touchstone.v1.Sessions", parts.sessions.get()},
+                                            {"touchstone.v1.Diagnosis", parts.diagnosis.get()}},
+                                           resources.access.get()));
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return server;

@@ -21,7 +21,7 @@ struct Raw {
 
 std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
   ServerOptions& o = flags->options;
-  return {
+  std::vector<Option> options = {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.listen},
       {"mesh",
        "Serve a mesh file, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x][,scale=S][,fit_mm=L]; may be repeated",
@@ -56,6 +56,9 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };
+  const std::vector<Option> access = AccessFlags(&o.access);
+  options.insert(options.begin() + 1, access.begin(), access.end());
+  return options;
 }
 
 absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
@@ -97,7 +100,9 @@ absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) 
           "touchstone-server",
           "Examples:\n"
           "  touchstone-server\n"
-          "  touchstone-server --listen 0.0.0.0:50051 --mesh cup=cup.off,fit_mm=150,up=y\n"
+          "  touchstone-server --listen 127.0.0.1:50051 --mesh cup=cup.off,fit_mm=150,up=y\n"
+          "  touchstone-server --listen 0.0.0.0:50051 --tls-cert server.pem --tls-key server.key "
+          "--token-file tokens\n"
           "  touchstone-server --config server.toml --threads 8\n"
           "\nThe virtual source: simulates touches, renders images and streams datasets over gRPC.\n"
           "It prints 'listening on HOST:PORT' when it is ready and drains on SIGTERM.",

@@ -8,6 +8,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/image/renderer.h"
+#include "server/service/access_options.h"
 #include "server/source/object_store.h"
 #include "server/source/request_checks.h"
 
@@ -22,6 +23,7 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshSpecsOfFolder(const std::strin
 
 struct ServerOptions {
   std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
+  AccessOptions access;                    // who may connect there, and do what
   std::vector<source::MeshSpec> meshes;    // besides the five built-in supershapes
   int supershape_triangles = 20000;        // about; of each built-in
   std::string models_dir;                  // where models are kept; empty: in memory

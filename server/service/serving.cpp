@@ -41,16 +41,16 @@ absl::Status CheckServing(const ServerOptions& options) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Serving> StartServing(const ServerOptions& options,
-                                     const std::vector<ServedService>& services) {
+absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
+                                     Access* access) {
+  for (const ServedService& service : services) TOUCHSTONE_RETURN_IF_ERROR(CheckRolesOf(service.name));
   EnablePlugins();
   Serving serving;
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(options.max_message_mib << 20);
   builder.SetMaxSendMessageSize(options.max_message_mib << 20);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a taken port is an error, not shared
-  if (!options.listen.empty())
-    builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &serving.port);
+  if (!options.listen.empty()) builder.AddListeningPort(options.listen, access->Credentials(), &serving.port);
   for (const ServedService& service : services) builder.RegisterService(service.service);
   serving.server = builder.BuildAndStart();
   if (serving.server == nullptr || (!options.listen.empty() && serving.port == 0))

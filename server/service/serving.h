@@ -8,6 +8,7 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
+#include "server/service/access.h"
 #include "server/service/server_options.h"
 
 namespace touchstone::service {
@@ -24,8 +25,9 @@ struct Serving {
 
 // Errors name the option.
 absl::Status CheckServing(const ServerOptions& options);
-absl::StatusOr<Serving> StartServing(const ServerOptions& options,
-                                     const std::vector<ServedService>& services);
+// INTERNAL if a method has no role (access_roles.h). `access` decides on every call and outlives the server.
+absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
+                                     Access* access);
 // NOT_SERVING, no more calls, up to drain_s for running ones.
 void StopServing(const ServerOptions& options, grpc::Server* server);
 
