@@ -1,11 +1,23 @@
 #include "server/base/thread_pool.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <iterator>
 #include <memory>
 
 namespace touchstone {
+namespace {
+
+double ProcessorTimeS() {
+  timespec time;
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return time.tv_sec + 1e-9 * time.tv_nsec;
+}
+
+}  // namespace
 
 ThreadPool::ThreadPool(int threads) {
   if (threads <= 0) threads = std::max(1u, std::thread::hardware_concurrency());
@@ -21,25 +33,56 @@ ThreadPool::~ThreadPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void ThreadPool::Submit(std::function<void()> task) {
+void ThreadPool::Submit(std::function<void()> task, const std::string& client) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    tasks_.push_back(std::move(task));
+    Queue& queue = queues_[client];
+    if (queue.tasks.empty() && queue.running == 0) queue.used_s = std::max(queue.used_s, turn_s_);
+    queue.tasks.push_back(std::move(task));
   }
   wake_.notify_one();
 }
 
+ThreadPool::Queues::iterator ThreadPool::NextQueue() {
+  auto next = queues_.end();
+  for (auto queue = queues_.begin(); queue != queues_.end(); ++queue)
+    if (!queue->second.tasks.empty() && (next == queues_.end() || queue->second.used_s < next->second.used_s))
+      next = queue;
+  return next;
+}
+
+// One that used more than its share is remembered until the others have had theirs.
+void ThreadPool::ForgetIdleQueues() {
+  for (auto queue = queues_.begin(); queue != queues_.end();) {
+    const Queue& each = queue->second;
+    const bool idle = each.tasks.empty() && each.running == 0 && each.used_s <= turn_s_;
+    queue = idle ? queues_.erase(queue) : std::next(queue);
+  }
+}
+
 void ThreadPool::Work() {
+  std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    std::function<void()> task;
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      wake_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
-      if (tasks_.empty()) return;
-      task = std::move(tasks_.front());
-      tasks_.pop_front();
-    }
+    auto next = queues_.end();
+    wake_.wait(lock, [&] { return (next = NextQueue()) != queues_.end() || stopping_; });
+    if (next == queues_.end()) return;
+    Queue& queue = next->second;
+    std::function<void()> task = std::move(queue.tasks.front());
+    queue.tasks.pop_front();
+    turn_s_ = std::max(turn_s_, queue.used_s);
+    const double expected_s = queue.expected_s;
+    queue.used_s += expected_s;
+    ++queue.running;
+    lock.unlock();
+    const double before_s = ProcessorTimeS();
     task();
+    task = nullptr;  // what it held goes without the lock
+    const double took_s = ProcessorTimeS() - before_s;
+    lock.lock();
+    --queue.running;
+    queue.used_s += took_s - expected_s;
+    queue.expected_s = took_s;
+    ForgetIdleQueues();
   }
 }
 

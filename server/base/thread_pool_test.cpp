@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <mutex>
 #include <new>
+#include <string>
+#include <vector>
 
 namespace touchstone {
 namespace {
@@ -37,6 +42,49 @@ TEST(ThreadPool, ParallelForDoesNotWaitForABusyPool) {
   pool.ParallelFor(10, 1, [&](int begin, int) { sum += begin; });  // this thread does it all
   EXPECT_EQ(sum, 45);
   gate.unlock();
+}
+
+// Spins, so that the task costs processor time.
+void Work(std::chrono::milliseconds time) {
+  const auto until = std::chrono::steady_clock::now() + time;
+  while (std::chrono::steady_clock::now() < until) {
+  }
+}
+
+TEST(ThreadPool, AFewTasksOfOneClientDoNotWaitForManyOfAnother) {
+  std::vector<std::string> order;  // of one thread
+  {
+    ThreadPool pool(1);
+    std::mutex gate;
+    gate.lock();
+    pool.Submit([&] { std::lock_guard<std::mutex> wait(gate); });
+    for (int k = 0; k < 60; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(2)), order.push_back("many"); }, "many");
+    for (int k = 0; k < 3; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(2)), order.push_back("few"); }, "few");
+    gate.unlock();
+  }
+  ASSERT_EQ(order.size(), 63u);
+  const auto last = std::find(order.rbegin(), order.rend(), "few");
+  EXPECT_LT(order.rend() - last, 30) << "tasks before the last of the few";
+}
+
+// By what they cost, not by how many they are.
+TEST(ThreadPool, AClientOfLongTasksHasFewerTurns) {
+  std::vector<std::string> order;
+  {
+    ThreadPool pool(1);
+    std::mutex gate;
+    gate.lock();
+    pool.Submit([&] { std::lock_guard<std::mutex> wait(gate); });
+    for (int k = 0; k < 20; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(20)), order.push_back("long"); }, "long");
+    for (int k = 0; k < 40; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(1)), order.push_back("short"); }, "short");
+    gate.unlock();
+  }
+  const auto last = std::find(order.rbegin(), order.rend(), "short");
+  EXPECT_LT(std::count(last, order.rend(), "long"), 12) << "long tasks before the last short one";
 }
 
 // An exception in a thread of the pool would end the process.

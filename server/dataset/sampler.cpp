@@ -22,8 +22,7 @@ constexpr uint32_t kProbeAfter = 16;
 
 TouchSampler::TouchSampler(const DatasetSpecification& specification)
     : specification_(specification), simulator_(specification.model), check_(specification.plan) {
-  for (const auto& object : specification.objects)
-    generators_.push_back(touch::MakePoseGenerator(specification.plan, *object, specification.seed));
+  generators_ = touch::MakePoseGenerators(specification.plan, specification.objects, specification.seed);
   plan_ends_ = generators_[0]->Count() != 0;
   const std::vector<touch::CommandedTouch>& list = specification.plan.list;
   if (specification.plan.kind == touch::Plan::Kind::kList)
@@ -88,7 +87,7 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
     const std::vector<uint32_t>& slots = workspace->slots;
     const size_t pending = slots.size();
     if (attempt == kProbeAfter || attempt == specification_.max_draws)
-      TOUCHSTONE_RETURN_IF_ERROR(FollowToTheEnd(object, indices[slots[0]]));
+      TOUCHSTONE_RETURN_IF_ERROR(FollowToTheEnd(object, indices[slots[0]], cancelled));
     // What the index's own number or time changes (a formula) shows only here.
     if (attempt == specification_.max_draws)
       return absl::FailedPreconditionError(absl::StrCat("sample ", indices[slots[0]], ": none of ", attempt,
@@ -192,11 +191,13 @@ void TouchSampler::FillBatch(size_t object, absl::Span<const uint64_t> indices,
 }
 
 // All draws of one index at once: the error of an index that none of them can serve.
-absl::Status TouchSampler::FollowToTheEnd(size_t object, uint64_t index) const {
+absl::Status TouchSampler::FollowToTheEnd(size_t object, uint64_t index,
+                                          const std::atomic<bool>& cancelled) const {
   touch::PlanDrawer drawer(specification_.plan, specification_.objects[object], specification_.model,
                            specification_.seed, specification_.max_draws);
   touch::DrawCounts counts;
-  const absl::Status status = drawer.Draw(NumberOf(index), 0, &counts).status();
+  const absl::Status status =
+      drawer.Draw(NumberOf(index), 0, &counts, [&] { return cancelled.load(); }).status();
   if (status.ok()) return status;
   return absl::Status(status.code(), absl::StrCat("object '", specification_.objects[object]->name(),
                                                   "', sample ", index, ": ", status.message()));

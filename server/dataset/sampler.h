@@ -71,13 +71,13 @@ class TouchSampler {
   double PauseBefore(const touch::Plan& plan, uint64_t index) const;
   void FillBatch(size_t object, absl::Span<const uint64_t> indices, absl::Span<const double> previous_press_m,
                  Workspace* workspace) const;
-  absl::Status FollowToTheEnd(size_t object, uint64_t index) const;
+  absl::Status FollowToTheEnd(size_t object, uint64_t index, const std::atomic<bool>& cancelled) const;
   uint64_t NumberOf(uint64_t index) const;
 
   const DatasetSpecification& specification_;
   const touch::TouchSimulator simulator_;
   const touch::DrawCheck check_;
-  std::vector<std::unique_ptr<touch::PoseGenerator>> generators_;  // one per object
+  std::vector<std::shared_ptr<const touch::PoseGenerator>> generators_;  // one per object
   bool plan_ends_ = false;
   std::vector<std::string> list_covariates_;  // that the model needs and every touch of a list carries
 };

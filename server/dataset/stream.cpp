@@ -3,6 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <chrono>
+#include <exception>
+#include <new>
 
 #include "server/base/status.h"
 
@@ -13,8 +16,10 @@ namespace {
 // touches together makes each cheaper.
 constexpr uint64_t kFirstChunkSamples = 8192;
 constexpr uint64_t kMaxChunkSamples = 524288;
-// Bytes that one chunk may hold, whatever its columns.
-constexpr uint64_t kMaxChunkBytes = 16 << 20;
+// Of a sample while it is made: its place in the order, keys, numbers (TouchSampler::Workspace).
+constexpr uint64_t kWorkBytes = 48;
+// Nobody waits longer for a thread of the pool than other tasks take.
+constexpr double kMaxTaskS = 0.5;
 // Bytes of one batch, safely below the message limit.
 constexpr uint64_t kMaxBatchBytes = 192 << 20;
 
@@ -65,10 +70,12 @@ struct DatasetStream::Shared {
 };
 
 absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
-    std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool) {
+    std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool,
+    StreamShare share) {
   std::unique_ptr<DatasetStream> stream(new DatasetStream);
   stream->shared_ = std::make_shared<Shared>(specification);
   stream->pool_ = pool;
+  stream->share_ = std::move(share);
   uint64_t bytes = 0;
   for (const ColumnInfo& column : stream->shared_->maker.columns())
     bytes += column.type == ColumnType::kBytes
@@ -85,8 +92,8 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
                                                    " bytes, so at most ", max_rows, " go into a batch"));
   // A part may be empty: a worker beyond the last batch, or a resumption at the very end.
   stream->next_index_ = part.start_index;
-  stream->max_chunk_samples_ =
-      specification->columns.image ? 64 : std::clamp<uint64_t>(kMaxChunkBytes / bytes, 1, kMaxChunkSamples);
+  stream->bytes_per_sample_ = bytes + kWorkBytes;
+  stream->max_chunk_samples_ = specification->columns.image ? 64 : kMaxChunkSamples;
   stream->chunk_samples_ = std::min(kFirstChunkSamples, stream->max_chunk_samples_);
   return stream;
 }
@@ -99,11 +106,23 @@ const DatasetSpecification& DatasetStream::specification() const {
   return shared_->maker.specification();
 }
 
-// The batches of the next task; null at the end of the part.
+// That may be under way, or made and not taken yet.
+uint64_t DatasetStream::MaxSamples() const {
+  const StreamShare::Bytes bytes = share_.max_bytes ? share_.max_bytes() : StreamShare::Bytes();
+  const uint64_t batches = (static_cast<uint64_t>(pool_->size()) + 1) * part_.batch_size;
+  return std::max(bytes.usual / bytes_per_sample_, std::min(bytes.batches / bytes_per_sample_, batches));
+}
+
+// The batches of the next task; null at the end of the part, or where they find no room beside what is under way.
 std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
+  const uint64_t max_samples = MaxSamples();
+  const uint64_t about = std::min(
+      {chunk_samples_, max_chunk_samples_, max_samples / (static_cast<uint64_t>(pool_->size()) + 1)});
+  if (!chunks_.empty() && scheduled_samples_ + std::max<uint64_t>(about, part_.batch_size) > max_samples)
+    return nullptr;
   auto chunk = std::make_shared<Chunk>();
-  uint64_t samples = 0;
-  while (next_index_ < part_.stop_index && (samples == 0 || samples + part_.batch_size <= chunk_samples_)) {
+  uint64_t& samples = chunk->samples;
+  while (next_index_ < part_.stop_index && (samples == 0 || samples + part_.batch_size <= about)) {
     DatasetBatch batch = part_.BatchAt(next_index_);
     samples += batch.rows;
     chunk->batches.push_back(std::move(batch));
@@ -111,8 +130,31 @@ std::shared_ptr<DatasetStream::Chunk> DatasetStream::NextChunk() {
     next_index_ = step > part_.stop_index - next_index_ ? part_.stop_index : next_index_ + step;
   }
   if (chunk->batches.empty()) return nullptr;
-  chunk_samples_ = std::min(2 * chunk_samples_, max_chunk_samples_);
+  chunk_samples_ = std::min(2 * chunk_samples_, kMaxChunkSamples);
+  scheduled_samples_ += samples;
   return chunk;
+}
+
+// All of its batches were taken.
+void DatasetStream::Finish(const Chunk& chunk) {
+  scheduled_samples_ -= chunk.samples;
+  if (chunk.took_s <= kMaxTaskS) return;
+  const double fitting = chunk.samples * kMaxTaskS / chunk.took_s;
+  max_chunk_samples_ = std::min(max_chunk_samples_, std::max<uint64_t>(1, static_cast<uint64_t>(fitting)));
+}
+
+// In a thread of the pool, where an exception would end the process.
+absl::Status DatasetStream::MakeChunk(Shared* shared, Chunk* chunk,
+                                      std::unique_ptr<TouchSampler::Workspace>* workspace) {
+  if (shared->cancelled) return absl::CancelledError("the stream was cancelled");
+  try {
+    *workspace = shared->TakeWorkspace();
+    return shared->maker.Make(absl::MakeSpan(chunk->batches), shared->cancelled, workspace->get());
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("there is not enough memory for this stream: try again later");
+  } catch (const std::exception& error) {
+    return absl::InternalError(absl::StrCat("the stream ended with an unexpected error: ", error.what()));
+  }
 }
 
 // Keeps one task a thread under way and one waiting.
@@ -121,22 +163,27 @@ void DatasetStream::Schedule() {
     std::shared_ptr<Chunk> chunk = NextChunk();
     if (chunk == nullptr) return;
     chunks_.push_back(chunk);
-    pool_->Submit([shared = shared_, chunk] {
-      absl::Status status = absl::CancelledError("the stream was cancelled");
-      std::unique_ptr<TouchSampler::Workspace> workspace = shared->TakeWorkspace();
-      if (!shared->cancelled)
-        status = shared->maker.Make(absl::MakeSpan(chunk->batches), shared->cancelled, workspace.get());
-      std::lock_guard<std::mutex> lock(shared->mutex);
-      shared->workspaces.push_back(std::move(workspace));
-      chunk->status = status;
-      chunk->ready = true;
-      shared->ready.notify_all();
-    });
+    pool_->Submit(
+        [shared = shared_, chunk] {
+          const auto begin = std::chrono::steady_clock::now();
+          std::unique_ptr<TouchSampler::Workspace> workspace;
+          const absl::Status status = MakeChunk(shared.get(), chunk.get(), &workspace);
+          std::lock_guard<std::mutex> lock(shared->mutex);
+          if (workspace != nullptr) shared->workspaces.push_back(std::move(workspace));
+          chunk->status = status;
+          chunk->took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+          chunk->ready = true;
+          shared->ready.notify_all();
+        },
+        share_.client);
   }
 }
 
 absl::StatusOr<std::optional<DatasetBatch>> DatasetStream::Next(const std::function<bool()>& cancelled) {
-  if (!chunks_.empty() && chunks_.front()->taken == chunks_.front()->batches.size()) chunks_.pop_front();
+  if (!chunks_.empty() && chunks_.front()->taken == chunks_.front()->batches.size()) {
+    Finish(*chunks_.front());
+    chunks_.pop_front();
+  }
   Schedule();
   if (chunks_.empty()) return std::optional<DatasetBatch>();
 

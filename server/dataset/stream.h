@@ -35,6 +35,16 @@ struct DatasetPart {
   DatasetBatch BatchAt(uint64_t start) const;
 };
 
+// Whose work a stream is, and how much memory its batches may take. Neither changes a sample.
+struct StreamShare {
+  // `batches`: up to this there may be a batch for every thread where those of the stream are large.
+  struct Bytes {
+    uint64_t usual = 128 << 20, batches = 128 << 20;
+  };
+  std::string client;                // in the pool: clients have their turns
+  std::function<Bytes()> max_bytes;  // asked again and again, since it may shrink; none: the above
+};
+
 // Fills a run of batches, by the calling thread alone. Sample i is the same in whatever run.
 class BatchMaker {
  public:
@@ -60,7 +70,8 @@ class DatasetStream {
  public:
   // Checks the part against the specification (which must be valid).
   static absl::StatusOr<std::unique_ptr<DatasetStream>> Create(
-      std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool);
+      std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool,
+      StreamShare share = {});
   ~DatasetStream();  // cancels
 
   const DatasetSpecification& specification() const;
@@ -73,7 +84,9 @@ class DatasetStream {
   // A run of batches that one task makes.
   struct Chunk {
     std::vector<DatasetBatch> batches;
+    uint64_t samples = 0;
     absl::Status status;
+    double took_s = 0;
     bool ready = false;
     size_t taken = 0;
   };
@@ -81,15 +94,22 @@ class DatasetStream {
   struct Shared;
 
   DatasetStream() = default;
+  static absl::Status MakeChunk(Shared* shared, Chunk* chunk,
+                                std::unique_ptr<TouchSampler::Workspace>* workspace);
   void Schedule();
   std::shared_ptr<Chunk> NextChunk();
+  void Finish(const Chunk& chunk);
+  uint64_t MaxSamples() const;
 
   std::shared_ptr<Shared> shared_;
   DatasetPart part_;
   ThreadPool* pool_ = nullptr;
-  uint64_t next_index_ = 0;     // start of the first batch that is not scheduled yet
-  uint64_t chunk_samples_ = 0;  // about, of the next chunk: grows, so that the first batch comes soon
-  uint64_t max_chunk_samples_ = 0;
+  uint64_t next_index_ = 0;  // start of the first batch that is not scheduled yet
+  StreamShare share_;
+  uint64_t bytes_per_sample_ = 1;   // of its columns and of the work on it
+  uint64_t chunk_samples_ = 0;      // about, of the next chunk: grows, so that the first batch comes soon
+  uint64_t max_chunk_samples_ = 0;  // falls where samples take long
+  uint64_t scheduled_samples_ = 0;  // in chunks_
   std::deque<std::shared_ptr<Chunk>> chunks_;
 };
 

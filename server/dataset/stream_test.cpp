@@ -32,6 +32,21 @@ TEST(DatasetStream, ThreadsAndBatchSizesChangeNoByte) {
     }
 }
 
+TEST(DatasetStream, ItsShareOfMemoryChangesNoByteAndIsAskedAgainAndAgain) {
+  for (const uint64_t bytes : {uint64_t{1}, uint64_t{200'000}, uint64_t{1} << 40}) {
+    int asked = 0;
+    StreamShare share;
+    share.client = "ana";
+    share.max_bytes = [&] {
+      return ++asked % 2 == 0 ? StreamShare::Bytes{bytes, bytes} : StreamShare::Bytes{1, 1};
+    };
+    DatasetPart part;
+    part.batch_size = 1000;
+    EXPECT_EQ(Columns(SmallDataset(kSamples), part, 4, share), Whole()) << bytes;
+    EXPECT_GT(asked, 5) << bytes;
+  }
+}
+
 TEST(DatasetStream, APartIsTheSamePartOfTheWhole) {
   const std::vector<ColumnInfo> infos = ColumnsOf(SmallDataset(kSamples));
   for (const auto& [start, stop] :

@@ -42,11 +42,11 @@ inline DatasetSpecification SmallDataset(
 
 // All bytes of a part, column after column, samples in order.
 inline std::vector<std::string> Columns(const DatasetSpecification& specification, const DatasetPart& part,
-                                        int threads) {
+                                        int threads, StreamShare share = {}) {
   ThreadPool pool(threads);
   auto shared = std::make_shared<DatasetSpecification>(specification);
   EXPECT_TRUE(ValidateDataset(shared.get()).ok());
-  auto stream = DatasetStream::Create(shared, part, &pool);
+  auto stream = DatasetStream::Create(shared, part, &pool, std::move(share));
   EXPECT_TRUE(stream.ok()) << stream.status();
   std::vector<std::string> columns(ColumnsOf(*shared).size());
   for (;;) {

@@ -121,8 +121,9 @@ struct SampleRequest {
   // What a dataset contains, but for its objects, the model's default and the renderer.
   dataset::DatasetSpecification specification;
   dataset::DatasetPart part;
-  std::string session;  // that a physical source journals in; empty: "default"
-  std::string key;      // of what decides the touches: a physical source journals sample i under it and i
+  std::string session;         // that a physical source journals in; empty: "default"
+  dataset::StreamShare share;  // whose stream it is
+  std::string key;  // of what decides the touches: a physical source journals sample i under it and i
 };
 
 // What a stream of samples contains.

@@ -156,8 +156,9 @@ absl::StatusOr<std::unique_ptr<SampleStream>> VirtualSource::MakeStream(const Sa
       HeaderOf(*specification, specification->model->fingers, specification->model->spacing_m);
   header.model = specification->model;
   if (specification->columns.image) header.renderer = specification->image.renderer->name();
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<dataset::DatasetStream> stream,
-                              dataset::DatasetStream::Create(std::move(specification), request.part, pool_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      std::unique_ptr<dataset::DatasetStream> stream,
+      dataset::DatasetStream::Create(std::move(specification), request.part, pool_, request.share));
   return std::make_unique<VirtualSamples>(std::move(header), std::move(stream));
 }
 

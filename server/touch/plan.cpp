@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
+#include <map>
 
 #include "server/base/random.h"
 #include "server/base/status.h"
@@ -41,18 +42,32 @@ class AngleTable {
   std::vector<Entry> entries_;
 };
 
+// Of one plan, whatever the object: generators share them.
+struct SphereTables {
+  explicit SphereTables(const SpherePlan& plan)
+      : quarter_steps(std::max<int64_t>(1, std::llround(kPi / 2 / plan.step_angle_rad))),
+        roll_steps(plan.roll_step_rad > 0 ? std::max<int64_t>(1, std::llround(2 * kPi / plan.roll_step_rad))
+                                          : 1),
+        theta(0, 4 * quarter_steps, kPi / 2 / quarter_steps),
+        phi(-quarter_steps, 2 * quarter_steps + 1, kPi / 2 / quarter_steps),
+        roll(0, roll_steps, 2 * kPi / roll_steps) {}
+
+  const int64_t quarter_steps, roll_steps;
+  const AngleTable theta, phi, roll;
+};
+
 class SphereGenerator : public PoseGenerator {
  public:
-  SphereGenerator(const SpherePlan& plan, const geometry::Bounds& bounds, uint64_t seed)
+  SphereGenerator(const SpherePlan& plan, std::shared_ptr<const SphereTables> tables,
+                  const geometry::Bounds& bounds, uint64_t seed)
       : seed_(seed),
         centre_m_(bounds.Centre()),
         radius_m_(plan.radius_ratio * 0.5 * bounds.DiagonalM()),
-        quarter_steps_(std::max<int64_t>(1, std::llround(kPi / 2 / plan.step_angle_rad))),
-        roll_steps_(plan.roll_step_rad > 0 ? std::max<int64_t>(1, std::llround(2 * kPi / plan.roll_step_rad))
-                                           : 1),
-        theta_(0, 4 * quarter_steps_, kPi / 2 / quarter_steps_),
-        phi_(-quarter_steps_, 2 * quarter_steps_ + 1, kPi / 2 / quarter_steps_),
-        roll_(0, roll_steps_, 2 * kPi / roll_steps_) {}
+        tables_(std::move(tables)),
+        roll_steps_(tables_->roll_steps),
+        theta_(tables_->theta),
+        phi_(tables_->phi),
+        roll_(tables_->roll) {}
 
   void Draw(absl::Span<const uint64_t> numbers, uint32_t attempt, TouchPose* poses) const override {
     // All random numbers of a tile come first, so that its look-ups are on their way together.
@@ -91,9 +106,9 @@ class SphereGenerator : public PoseGenerator {
   const uint64_t seed_;
   const Eigen::Vector3d centre_m_;
   const double radius_m_;
-  const int64_t quarter_steps_;
+  const std::shared_ptr<const SphereTables> tables_;
   const int64_t roll_steps_;
-  const AngleTable theta_, phi_, roll_;
+  const AngleTable &theta_, &phi_, &roll_;
 };
 
 class FacesGenerator : public PoseGenerator {
@@ -232,10 +247,28 @@ std::unique_ptr<PoseGenerator> MakeGenerator(const Plan& plan, const geometry::B
     case Plan::Kind::kSphere:
       break;
   }
-  return std::make_unique<SphereGenerator>(plan.sphere, bounds, seed);
+  return std::make_unique<SphereGenerator>(plan.sphere, std::make_shared<const SphereTables>(plan.sphere),
+                                           bounds, seed);
 }
 
 }  // namespace
+
+std::vector<std::shared_ptr<const PoseGenerator>> MakePoseGenerators(
+    const Plan& plan, absl::Span<const std::shared_ptr<const geometry::Surface>> surfaces, uint64_t seed) {
+  std::shared_ptr<const SphereTables> tables;
+  if (plan.kind == Plan::Kind::kSphere) tables = std::make_shared<const SphereTables>(plan.sphere);
+  std::map<const geometry::Surface*, std::shared_ptr<const PoseGenerator>> made;
+  std::vector<std::shared_ptr<const PoseGenerator>> generators;
+  for (const auto& surface : surfaces) {
+    std::shared_ptr<const PoseGenerator>& generator = made[surface.get()];
+    if (generator == nullptr && tables != nullptr)
+      generator = std::make_shared<SphereGenerator>(plan.sphere, tables, surface->bounds(), seed);
+    else if (generator == nullptr)
+      generator = MakeGenerator(plan, surface->bounds(), surface.get(), seed);
+    generators.push_back(generator);
+  }
+  return generators;
+}
 
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Surface& surface,
                                                  uint64_t seed) {

@@ -75,6 +75,10 @@ class PoseGenerator {
 // Around the object that is touched; `plan` must be valid and outlive the generator, and so must the surface.
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Surface& surface,
                                                  uint64_t seed);
+// The same around several, one for each. An object that comes again shares its generator, and all share what they have
+// in common: a request that names one object often costs no more memory.
+std::vector<std::shared_ptr<const PoseGenerator>> MakePoseGenerators(
+    const Plan& plan, absl::Span<const std::shared_ptr<const geometry::Surface>> surfaces, uint64_t seed);
 // The same where only the box is known: targets of a faces plan then lie on the box's faces, on the same lines.
 std::unique_ptr<PoseGenerator> MakePoseGenerator(const Plan& plan, const geometry::Bounds& bounds,
                                                  uint64_t seed);

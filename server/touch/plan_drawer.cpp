@@ -13,6 +13,8 @@
 namespace touchstone::touch {
 namespace {
 
+constexpr uint32_t kDrawsBetweenLooks = 64;
+
 // What would help most against the flaw that was the most frequent.
 std::string Advice(DrawFlaw flaw) {
   switch (flaw) {
@@ -40,9 +42,12 @@ PlanDrawer::PlanDrawer(const Plan& plan, std::shared_ptr<const geometry::Surface
       generator_(MakePoseGenerator(plan, *surface_, seed)) {}
 
 absl::StatusOr<PlanDrawer::Drawn> PlanDrawer::Draw(uint64_t number, uint32_t first_attempt,
-                                                   DrawCounts* counts) {
+                                                   DrawCounts* counts,
+                                                   const std::function<bool()>& cancelled) {
   DrawCounts own;
   for (uint32_t attempt = first_attempt; attempt < max_draws_; ++attempt) {
+    if (attempt % kDrawsBetweenLooks == 0 && cancelled && cancelled())
+      return absl::CancelledError("the request was cancelled");
     CommandedTouch touch = TouchOfPlan(plan_, *generator_, number, attempt);
     if (!generator_->CanRedraw()) return Drawn{std::move(touch), attempt};
     simulator_.Prepare(1, &batch_);

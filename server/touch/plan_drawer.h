@@ -1,6 +1,7 @@
 // The touches of a plan around one object, one by one: each drawn until it is one that every finger completes.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -27,7 +28,9 @@ class PlanDrawer {
   // arguments and of what the drawer was made with. Every draw is counted in `counts`. FAILED_PRECONDITION: there is
   // none below max_draws; says which condition failed how often and what would help. INVALID_ARGUMENT: the model
   // needs what a plan does not have (a covariate). Not thread-safe.
-  absl::StatusOr<Drawn> Draw(uint64_t number, uint32_t first_attempt, DrawCounts* counts);
+  // CANCELLED soon after `cancelled`, where there is one, becomes true.
+  absl::StatusOr<Drawn> Draw(uint64_t number, uint32_t first_attempt, DrawCounts* counts,
+                             const std::function<bool()>& cancelled = nullptr);
 
   const PoseGenerator& generator() const { return *generator_; }
 

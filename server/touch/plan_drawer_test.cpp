@@ -54,6 +54,18 @@ std::shared_ptr<const model::Model> WithFingers(int fingers, double spacing_m) {
   return std::make_shared<const model::Model>(model::NominalModel(fingers, spacing_m));
 }
 
+TEST(PlanDrawer, HopelessDrawsEndSoonAfterTheyAreCancelled) {
+  Plan plan = Faces();
+  plan.faces.max_incidence_rad = 0.1 * kRadiansPerDegree;
+  plan.faces.max_tilt_rad = kPi / 3;
+  PlanDrawer drawer(plan, LShape(), WithFingers(3, 0.03), /*seed=*/1, /*max_draws=*/1'000'000);
+  DrawCounts counts;
+  int looks = 0;
+  const auto drawn = drawer.Draw(0, 0, &counts, [&] { return ++looks == 3; });
+  EXPECT_TRUE(absl::IsCancelled(drawn.status())) << drawn.status();
+  EXPECT_LT(counts.Draws(), 1000u);
+}
+
 TEST(PlanDrawer, EveryTouchOfAnLShapeIsOneThatEveryFingerCompletes) {
   const auto surface = LShape();
   const auto model = WithFingers(3, 0.03);

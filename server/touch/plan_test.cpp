@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/geometry/supershape.h"
 
 namespace touchstone::touch {
 namespace {
@@ -37,6 +38,26 @@ TEST(SpherePlan, StartsOnTheSphereRoundTheBoxAndAimsAtItsCentre) {
     EXPECT_NEAR(pose.approach.dot(pose.lateral), 0, 1e-12);
     EXPECT_NEAR(pose.lateral.norm(), 1, 1e-12);
   }
+}
+
+TEST(SpherePlan, AnObjectThatComesAgainSharesItsGenerator) {
+  const auto surface = [] {
+    return *geometry::Surface::Create("lat20",
+                                      *geometry::MakeSupershape(*geometry::NamedSupershape("lat20"), 500));
+  };
+  const auto one = surface(), other = surface();
+  Plan plan;
+  const auto generators = MakePoseGenerators(plan, {one, other, one, one}, 7);
+  ASSERT_EQ(generators.size(), 4u);
+  EXPECT_EQ(generators[2], generators[0]);
+  EXPECT_EQ(generators[3], generators[0]);
+  EXPECT_NE(generators[1], generators[0]);
+  const uint64_t number = 17;
+  TouchPose shared, own;
+  generators[1]->Draw({&number, 1}, 0, &shared);
+  MakePoseGenerator(plan, *other, 7)->Draw({&number, 1}, 0, &own);
+  EXPECT_EQ(shared.approach, own.approach);
+  EXPECT_EQ(shared.target_m, own.target_m);
 }
 
 TEST(SpherePlan, AnglesAreMultiplesOfTheStep) {

@@ -1,0 +1,27 @@
+#include "server/base/over_limit.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <cstdint>
+
+#include "server/base/text.h"
+
+namespace touchstone {
+
+std::string LimitInWords(double value) {
+  if (std::abs(value) < 1e15 && value == std::floor(value)) return absl::StrCat(static_cast<int64_t>(value));
+  return ShortestNumber(value);
+}
+
+absl::Status OverLimit(absl::string_view asked, double value, absl::string_view limit_name, double limit) {
+  return absl::ResourceExhaustedError(absl::StrCat(asked, " ", LimitInWords(value), ": at most ",
+                                                   LimitInWords(limit), " (", limit_name, ")"));
+}
+
+absl::Status Busy(absl::string_view what, absl::string_view limit_name, double limit) {
+  return absl::ResourceExhaustedError(absl::StrCat(what, " already (", limit_name, " = ", LimitInWords(limit),
+                                                   "): try again later, or at another one"));
+}
+
+}  // namespace touchstone
