@@ -47,7 +47,8 @@ v1::MeasuredSet ToProto(const session::MeasurementSet& set) {
   return message;
 }
 
-absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin) {
+absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin,
+                                                  const session::MeasurementLimits& limits) {
   session::MeasurementSet set;
   set.origin = origin;
   if (message.fingers() < 1 || message.fingers() > std::numeric_limits<uint16_t>::max())
@@ -77,7 +78,7 @@ absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message
   }
   set.time_s.assign(message.contact_time_s().begin(), message.contact_time_s().end());
   for (int row = 0; row < set.size(); ++row) set.line.push_back(row + 2);  // below a header
-  TOUCHSTONE_RETURN_IF_ERROR(session::CheckMeasurementSet(&set));
+  TOUCHSTONE_RETURN_IF_ERROR(session::CheckMeasurementSet(&set, limits));
   return set;
 }
 

@@ -14,6 +14,7 @@ namespace touchstone::service {
 v1::MeasuredSet ToProto(const session::MeasurementSet& set);
 
 // INVALID_ARGUMENT, with `origin` and the line that the touch would have in a file, for what no file could hold.
-absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin);
+absl::StatusOr<session::MeasurementSet> FromProto(const v1::MeasuredSet& message, const std::string& origin,
+                                                  const session::MeasurementLimits& limits = {});
 
 }  // namespace touchstone::service

@@ -17,6 +17,7 @@ namespace touchstone::session {
 namespace {
 
 constexpr size_t kMaxShown = 48;
+constexpr size_t kMaxFields = 65'536;
 
 }  // namespace
 
@@ -110,6 +111,8 @@ absl::Status CsvFields::Cut(absl::string_view line) {
   fields_.clear();
   size_t quoted = 0;
   for (size_t begin = 0;;) {
+    if (fields_.size() >= kMaxFields)
+      return absl::InvalidArgumentError(absl::StrCat("has more than ", kMaxFields, " fields"));
     size_t start = begin;
     while (start < line.size() && (line[start] == ' ' || line[start] == '\t')) ++start;
     if (start < line.size() && line[start] == '"') {

@@ -14,7 +14,8 @@ namespace touchstone::session {
 // Cuts a line at its commas. A field in quotes may hold commas and doubled quotes, but no line end.
 class CsvFields {
  public:
-  // Views into `line`, or into this object where a field was quoted; they last until the next call.
+  // Views into `line`, or into this object where a field was quoted; they last until the next call. INVALID_ARGUMENT for a
+  // line of more than 65,536 fields, which are no longer cut.
   absl::Status Cut(absl::string_view line);
   const std::vector<absl::string_view>& all() const { return fields_; }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -60,6 +61,21 @@ absl::Status CheckPose(MeasurementSet* set, int row) {
                     set->approach[row].dot(set->lateral[row]));
 }
 
+// Before anything is looked at row by row.
+absl::Status CheckLimitsOf(const MeasurementSet& set, const MeasurementLimits& limits) {
+  constexpr size_t kPoseColumns = 13;
+  const size_t columns = kPoseColumns + set.fingers + set.covariates.size() + (set.has_session_time ? 1 : 0) +
+                         (set.round.empty() ? 0 : 1) + (set.face.empty() ? 0 : 1);
+  const auto origin = [&](const char* what) { return absl::StrCat(set.origin, ": ", what, ":"); };
+  if (set.object.size() > limits.max_touches)
+    return OverLimit(origin("touches"), set.object.size(), "max_session_touches", limits.max_touches);
+  if (set.objects.size() > limits.max_objects)
+    return OverLimit(origin("objects"), set.objects.size(), "max_session_objects", limits.max_objects);
+  if (columns > limits.max_columns)
+    return OverLimit(origin("columns"), columns, "max_session_columns", limits.max_columns);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status CheckTouchNumbers(const MeasurementSet& set) {
@@ -82,7 +98,8 @@ absl::Status CheckTouchNumbers(const MeasurementSet& set) {
                    " stands on line ", set.line[first], " already; every touch needs a number of its own"));
 }
 
-absl::Status CheckMeasurementSet(MeasurementSet* set) {
+absl::Status CheckMeasurementSet(MeasurementSet* set, const MeasurementLimits& limits) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckLimitsOf(*set, limits));
   TOUCHSTONE_RETURN_IF_ERROR(CheckSizes(*set));
   for (const std::string& object : set->objects)
     if (object.empty() || object.size() > kMaxObjectNameBytes || !IsText(object))
@@ -97,7 +114,7 @@ absl::Status CheckMeasurementSet(MeasurementSet* set) {
     if (set->has_poses) TOUCHSTONE_RETURN_IF_ERROR(CheckPose(set, row));
     for (int finger = 0; finger < set->fingers; ++finger)
       if (const double time_s = set->TimeS(row, finger);
-          !std::isnan(time_s) && !(time_s >= 0 && std::isfinite(time_s)))
+          !std::isnan(time_s) && !(time_s >= 0 && time_s * 1e6 <= limits.max_time_us))
         return WrongValue(*set, row, "a contact time", time_s);
   }
   for (const auto& [name, values] : set->covariates)

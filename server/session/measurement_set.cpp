@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "server/base/nan.h"
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -20,14 +21,14 @@
 namespace touchstone::session {
 namespace {
 
-constexpr size_t kMaxColumns = 4096;
-constexpr double kMaxContactTimeUs = 1e12;  // eleven days: no approach takes longer
-constexpr double kLargestCount = 9e15;      // whole numbers up to here are exact as doubles
+constexpr size_t kMaxReserved = 1 << 20;
+constexpr double kLargestCount = 9e15;  // whole numbers up to here are exact as doubles
 
 // Reads rows into the columns of a set. One object a file.
 class RowReader {
  public:
-  RowReader(const Columns& columns, MeasurementSet* set) : columns_(columns), set_(*set) {
+  RowReader(const Columns& columns, const MeasurementLimits& limits, MeasurementSet* set)
+      : columns_(columns), limits_(limits), set_(*set) {
     covariates_.reserve(columns.covariates.size());
     for (const std::string& name : columns.covariates) covariates_.push_back(&set_.covariates[name]);
   }
@@ -97,9 +98,9 @@ class RowReader {
       case ColumnKind::kTime: {
         if (field.empty()) break;  // the finger reported nothing
         TOUCHSTONE_ASSIGN_OR_RETURN(const double value, number());
-        if (value < 0 || value > kMaxContactTimeUs)
+        if (value < 0 || value > limits_.max_time_us)
           return OutOfRange(i,
-                            absl::StrCat("a time from 0 to ", kMaxContactTimeUs,
+                            absl::StrCat("a time from 0 to ", limits_.max_time_us,
                                          " us was expected, or nothing where the finger reported nothing"));
         set_.time_s[row * columns_.fingers + column.index] = ToSi(Unit::kMicrosecond, value);
         break;
@@ -136,6 +137,9 @@ class RowReader {
       if (name.size() > kMaxObjectNameBytes || !IsText(name))
         return WrongField(i, absl::StrCat("'", Shown(name), "' is no name: at most ", kMaxObjectNameBytes,
                                           " bytes of UTF-8 without control characters were expected"));
+      if (set_.objects.size() >= limits_.max_objects && objects_.count(name) == 0)
+        return OverLimit(absl::StrCat(set_.origin, ":", line_, ": objects:"), set_.objects.size() + 1,
+                         "max_session_objects", limits_.max_objects);
       const auto [found, is_new] = objects_.try_emplace(std::string(name), static_cast<int>(objects_.size()));
       if (is_new) set_.objects.emplace_back(name);
       set_.object.push_back(found->second);
@@ -205,6 +209,7 @@ class RowReader {
   }
 
   const Columns& columns_;
+  const MeasurementLimits& limits_;
   MeasurementSet& set_;
   std::vector<std::vector<double>*> covariates_;
   absl::flat_hash_map<std::string, int> objects_;
@@ -228,7 +233,8 @@ void Reserve(size_t rows, const Columns& columns, MeasurementSet* set) {
 
 }  // namespace
 
-absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin) {
+absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin,
+                                                   const MeasurementLimits& limits) {
   MeasurementSet set;
   set.origin = origin;
   const auto wrong = [&](int line, absl::string_view what) {
@@ -236,8 +242,12 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(CsvLines lines, CsvLines::Open(csv, origin));
   CsvFields fields;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> names,
-                              ReadCsvHeader(origin, "touch,object,...", kMaxColumns, &lines, &fields));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const std::vector<std::string> names,
+      ReadCsvHeader(origin, "touch,object,...", MeasurementLimits().max_columns, &lines, &fields));
+  if (names.size() > limits.max_columns)
+    return OverLimit(absl::StrCat(origin, ":1: columns:"), names.size(), "max_session_columns",
+                     limits.max_columns);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Columns columns, ReadColumns(names, origin));
   set.fingers = columns.fingers;
   set.has_poses = columns.has_poses;
@@ -246,12 +256,16 @@ absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const 
   if (rows >= std::numeric_limits<int>::max())
     return absl::InvalidArgumentError(
         absl::StrCat(origin, ": has ", rows, " lines; at most 2^31 - 2 are read"));
-  Reserve(rows, columns, &set);
+  // A file of empty lines has no row: what is set aside is what its bytes could hold, and at first no more than a million.
+  Reserve(std::min({rows, csv.size() / names.size() + 1, limits.max_touches, kMaxReserved}), columns, &set);
 
-  RowReader reader(columns, &set);
+  RowReader reader(columns, limits, &set);
   for (absl::string_view row; lines.Next(&row);) {
     if (absl::StripAsciiWhitespace(row).empty()) continue;
     if (absl::Status status = fields.Cut(row); !status.ok()) return wrong(lines.number(), status.message());
+    if (set.line.size() >= limits.max_touches)
+      return OverLimit(absl::StrCat(origin, ":", lines.number(), ": touches:"), set.line.size() + 1,
+                       "max_session_touches", limits.max_touches);
     TOUCHSTONE_RETURN_IF_ERROR(reader.Read(fields.all(), lines.number()));
   }
   if (set.size() == 0)

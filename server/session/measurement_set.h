@@ -39,10 +39,19 @@ struct MeasurementSet {
   double TimeS(int row, int finger) const { return time_s[static_cast<size_t>(row) * fingers + finger]; }
 };
 
+// The most that a set may have; beyond it, RESOURCE_EXHAUSTED names the limit as a server's configuration does.
+struct MeasurementLimits {
+  size_t max_touches = 2147483646;  // line numbers are ints
+  size_t max_columns = 4096;
+  size_t max_objects = 2147483646;
+  double max_time_us = 1e12;  // eleven days: no approach takes longer
+};
+
 // Reads the bytes of a measurement file or of a plan. Errors name `origin`, line, column, what is wrong and
 // what was expected: a missing or unknown column, a number that is none (NaN and infinities too), a vector
 // that is not of unit length, a touch number that stands twice. Nothing is dropped.
-absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin);
+absl::StatusOr<MeasurementSet> ParseMeasurementSet(absl::string_view csv, const std::string& origin,
+                                                   const MeasurementLimits& limits = {});
 absl::StatusOr<MeasurementSet> ReadMeasurementSet(const std::string& path);
 
 }  // namespace touchstone::session

@@ -37,6 +37,26 @@ std::string Message(const std::string& csv) {
   return std::string(ParseMeasurementSet(csv, "set.csv").status().message());
 }
 
+TEST(MeasurementSet, BeyondALimitNamesItAndItsValue) {
+  MeasurementLimits limits;
+  limits.max_touches = 2;
+  limits.max_objects = 1;
+  limits.max_columns = 16;
+  limits.max_time_us = 1e10;
+  const auto status = [&](const std::string& csv) {
+    return ParseMeasurementSet(csv, "set.csv", limits).status();
+  };
+  EXPECT_TRUE(status(Set(Row(0) + Row(1))).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(status(Set(Row(0) + Row(1) + Row(2)))));
+  EXPECT_THAT(std::string(status(Set(Row(0) + Row(1) + Row(2))).message()),
+              HasSubstr("set.csv:4: touches: 3: at most 2 (max_session_touches)"));
+  EXPECT_THAT(std::string(status("object,t_0_us\na,1\nb,1\n").message()),
+              HasSubstr("objects: 2: at most 1 (max_session_objects)"));
+  EXPECT_THAT(std::string(status(absl::StrCat(kPoses, kTimes, ",round\n")).message()),
+              HasSubstr("columns: 17: at most 16 (max_session_columns)"));
+  EXPECT_THAT(std::string(status(Set(Row(0, "2e10,0,1"))).message()), HasSubstr("out of range"));
+}
+
 TEST(MeasurementSet, IsReadInSiUnits) {
   const auto set =
       ParseMeasurementSet(absl::StrCat("cov_temperature,round,face,session_time_s,", kPoses, kTimes, "\n",

@@ -30,6 +30,6 @@ absl::StatusOr<MeasurementSet> SessionMeasurementSet(const Journal& journal, con
 // Whether a set that was put together elsewhere, a message for instance, is one that a file could have been read as:
 // columns of equal length, values in range, every touch number once. Makes the vectors exact. Errors name the
 // origin, the line that the row would have in a file, and the value.
-absl::Status CheckMeasurementSet(MeasurementSet* set);
+absl::Status CheckMeasurementSet(MeasurementSet* set, const MeasurementLimits& limits = {});
 
 }  // namespace touchstone::session
