@@ -63,7 +63,7 @@ def test_a_touch_is_seen_as_the_source_gives_it(make, client):
     env = make(objects=("lat00", "lat20"))
     env.reset(seed=1, options={"object": "lat20"})
     observation, reward, terminated, truncated, info = env.step(4)
-    touches = touchstone.gym.default_touches(client, "lat00")
+    touches = touchstone.gym.default_touches(client, ("lat00", "lat20"))
     times_us = client.touch("lat20", touches[4], model=touchstone_without_noise())["descriptor_us"][0]
     met = np.isfinite(times_us)
     stroke_us = touches.stroke_mm[4] / 20 * 1e6
@@ -88,6 +88,22 @@ def test_a_finger_that_passes_is_seen_as_such(make):
     met = rows[:, 4:]
     assert (met == 0).any() and (met == 1).any()
     assert (rows[:, 1:4][met == 0] == 0).all()
+
+
+def test_touches_of_its_own_favour_no_object(client):
+    objects = ("lat00", "lat05", "lat20")
+    touches = touchstone.gym.default_touches(client, objects)
+    again = touchstone.gym.default_touches(client, objects[::-1])
+    np.testing.assert_array_equal(touches.target_mm, again.target_mm)
+    # Up to the rim: of every object some fingers pass.
+    for thing in objects:
+        times_us = client.touch(thing, touches, model=touchstone_without_noise())["descriptor_us"]
+        assert 0 < np.isnan(times_us).sum() < times_us.size, thing
+
+
+def test_an_object_that_is_not_there_is_named(make):
+    with pytest.raises(touchstone.NotFound, match="lat21"):
+        make(objects=("lat00", "lat21"))
 
 
 def test_answers_end_an_episode_with_their_reward(make):

@@ -15,6 +15,7 @@ import pkgutil
 __path__ = pkgutil.extend_path(__path__, __name__)
 
 from .batch import Batch, EncodedImages
+from .box_touches import box_touches
 from .client import Client, connect
 from .dataset import Dataset, Header
 from .errors import (
@@ -44,5 +45,5 @@ __all__ = [
     "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model", "NotFound", "ObjectInfo", "Parameter",
     "Permutation", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
     "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches", "TouchstoneError", "Value", "__version__",
-    "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches", "write_measurements",
+    "box_touches", "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches", "write_measurements",
 ]

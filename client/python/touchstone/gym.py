@@ -44,11 +44,12 @@ except ImportError as error:
                       f"({error})") from error
 
 from . import checks
+from .box_touches import box_touches
 from .client import Client, connect
 from .connection import Targets
 from .errors import InvalidRequest
 from .models import ModelLike
-from .plans import Touches, faces, touches as make_touches
+from .plans import Touches, sphere
 from .samples import Samples
 
 __all__ = ["RecogniseEnv", "RecogniseVectorEnv", "default_touches"]
@@ -56,11 +57,17 @@ __all__ = ["RecogniseEnv", "RecogniseVectorEnv", "default_touches"]
 _OBJECTS = ("lat00", "lat05", "lat10", "lat15", "lat20")
 
 
-def default_touches(client: Client, object: str, per_face: int = 4, seed: int = 0) -> Touches:
-    """Touches of every face of an object's bounding box, up to its rim, with a stroke that ends behind it."""
-    found = client.plan(faces(samples_per_face=per_face, rounds=1, spread=1.0), object, count=6 * per_face, seed=seed)
-    return make_touches(target_mm=found.target_mm, approach=found.approach, lateral=found.lateral,
-                        standoff_mm=found.standoff_mm, speed_mm_s=found.speed_mm_s, stroke_mm=found.standoff_mm + 40.0)
+def default_touches(client: Client, objects: Sequence[str], per_face: int = 4, seed: int = 0) -> Touches:
+    """Touches of every face of the box that holds all these objects, up to its rim, with a stroke that ends 40 mm behind it.
+
+    The list favours none of the objects: their sizes alone are known to it.
+    """
+    boxes = [(each.bounds_min_mm, each.bounds_max_mm) for each in client.objects() if each.name in objects]
+    if len(boxes) < len(objects):
+        for name in objects:
+            client.plan(sphere(), name, 1)  # the source's own words for what it does not have
+    low, high = np.min([box[0] for box in boxes], 0), np.max([box[1] for box in boxes], 0)
+    return box_touches(low, high, per_face, seed=seed, spread=1.0, standoff_mm=60.0, stroke_mm=100.0)
 
 
 class _Table:
@@ -86,7 +93,7 @@ class _Table:
             self.close()
             raise InvalidRequest(f"{self.client.target} moves a rig, where an episode would wait for a person at every other object; "
                                  "give a touchstone-server, or an address of none for one of this process.")
-        touches = default_touches(self.client, self.objects[0]) if touches is None else touches
+        touches = default_touches(self.client, self.objects) if touches is None else touches
         if not isinstance(touches, Touches) or not len(touches):
             raise InvalidRequest("touches must be explicit, of touchstone.touches() or client.plan(), and at least one.")
         if touches.stroke_mm is None:
@@ -120,7 +127,7 @@ class RecogniseEnv(gymnasium.Env):
     Args:
       targets: "host:port", a Client (which is not closed), or None: a touchstone-server of this process.
       objects: names; which of them it is is drawn at reset(), uniformly. reset(options={"object": name}) names it.
-      touches: explicit, with stroke_mm; None: default_touches() of the first object.
+      touches: explicit, with stroke_mm; None: default_touches() of the objects.
       model: a name, a hash, a path to a model file, its text, or a Model; default: the source's. Without an effect of
         noise in it every touch says the same each time.
       repeats: different noises of one touch.

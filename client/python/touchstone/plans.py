@@ -182,7 +182,7 @@ def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0
     again within its number until every finger starts outside of the object and meets it within the stroke.
 
     Args:
-      samples_per_face: poses per face.
+      samples_per_face: poses per face; all of one face come before the next, in the order +x, -x, +y, -y, +z, -z.
       rounds: repeats of all poses.
       max_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.
       spread: lines go through this share of a face's half width and height, 0 to 1.

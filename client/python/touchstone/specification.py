@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import Sequence
 
 from . import checks, units
 from .errors import InvalidRequest
 from .images import ImageLike, image as default_image, to_image
 from .models import ModelLike, model_ref
-from .plans import PlanLike, SpherePlan, Touches, sphere
+from .plans import FacesPlan, PlanLike, SpherePlan, Touches, sphere
 from .v1 import source_pb2
 
 # Default samples per batch: enough to make a message's overhead small, and a few MB with images.
@@ -57,6 +58,7 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
                 "samples is missing: a sphere plan has no end of its own; say for instance samples=10_000."
             )
         samples = plan.samples(len(objects))
+    _warn_of_faces_without_touches(plan, samples, len(objects))
     # The speed: explicit touches carry their own.
     message = plan.to_proto()
     if isinstance(plan, Touches):
@@ -88,6 +90,18 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
     if "image" in names:
         spec.image.CopyFrom(options.to_proto())
     return spec
+
+
+def _warn_of_faces_without_touches(plan: PlanLike, samples: int, objects: int) -> None:
+    """A plan of faces goes face by face: of a part of it that is cut short some faces are never touched, in silence."""
+    if not isinstance(plan, FacesPlan):
+        return
+    touches = -(-samples // objects)
+    reached = -(-touches // plan.samples_per_face)
+    if reached < 6:
+        warnings.warn(f"samples={samples} of {objects} objects are {touches} touches of each, which reach {reached} of the 6 faces: "
+                      f"faces(samples_per_face={plan.samples_per_face}) makes all touches of one face before the next. With "
+                      f"samples_per_face={-(-touches // 6)} they reach all.", stacklevel=4)
 
 
 def resolve_batch_size(spec: source_pb2.DatasetSpec, batch_size: int | None) -> int:
