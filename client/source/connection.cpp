@@ -33,6 +33,24 @@ absl::Status ValidateAddress(const std::string& address) {
   return absl::OkStatus();
 }
 
+// What keeps strangers from a server's memory: here the user asks for the user's own files.
+void RaiseLimits(service::Limits* limits) {
+  constexpr int kLargest = 2047, kMany = 1 << 30;
+  limits->max_request_mib = limits->max_upload_mib = limits->max_message_mib = kLargest;
+  limits->max_request_elements = limits->max_request_numbers = kMany;
+  limits->max_model_kib = 1024;
+  limits->max_model_nodes = 100'000;
+  limits->max_model_objects = 100'000;
+  limits->max_session_mib = 4095;
+  limits->max_session_touches = limits->max_session_objects = kMany;
+  limits->max_session_columns = 4096;
+  limits->max_memory_mib = 1 << 30;
+  limits->max_diagnoses_per_client = limits->max_diagnoses;
+  limits->max_streams_per_client = limits->max_streams;
+  limits->max_diagnosis_s = limits->stall_s = 1e6;
+  limits->stream_memory_mib = 128;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(ConnectionOptions options) {
@@ -42,6 +60,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(ConnectionOptions o
   if (connection->options_.servers.empty()) {
     service::ServerOptions embedded = connection->options_.embedded;
     embedded.listen.clear();
+    RaiseLimits(&embedded);
     TOUCHSTONE_ASSIGN_OR_RETURN(connection->server_, service::Server::Start(std::move(embedded)));
     connection->address_ = "this process";
     connection->channel_ = connection->server_->InProcessChannel();

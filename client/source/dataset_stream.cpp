@@ -113,7 +113,8 @@ absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
     // Why the lease was lost says more than that it is stale.
     if (absl::IsAborted(status) && options_.lease != nullptr && !options_.lease->status().ok())
       return options_.lease->status();
-    if (!IsLostServer(status)) return status;
+    // Nobody here has cancelled: the server ended what was left of a drain, or a stream that nobody read for long.
+    if (!IsLostServer(status) && !absl::IsCancelled(status)) return status;
     // Lost after the last batch but before the goodbye: there is nothing left to ask for.
     const uint64_t stop = request_.stop_index() > 0 ? request_.stop_index() : header_.samples();
     if (request_.start_index() >= stop) return false;
@@ -137,7 +138,7 @@ absl::Status DatasetStream::Reconnect(absl::Status lost) {
       return status;
     }
     // A server that is full may have room soon; anything else will not get better by waiting.
-    if (!IsLostServer(status) && !absl::IsResourceExhausted(status)) return status;
+    if (!IsLostServer(status) && !IsFullServer(status)) return status;
     if (SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
     const Clock::time_point wake =
         Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(backoff_s));

@@ -1,5 +1,7 @@
 #include "client/source/errors.h"
 
+#include <absl/strings/match.h>
+
 namespace touchstone::client {
 
 absl::Status FromGrpc(const grpc::Status& status) {
@@ -14,6 +16,10 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 bool IsLostServer(const absl::Status& status) {
   return absl::IsUnavailable(status);
+}
+
+bool IsFullServer(const absl::Status& status) {
+  return absl::IsResourceExhausted(status) && absl::StrContains(status.message(), "try again");
 }
 
 }  // namespace touchstone::client

@@ -12,4 +12,7 @@ absl::Status FromGrpc(const grpc::Status& status);
 // True if another try, at this server or another, may succeed without any change of the request.
 bool IsLostServer(const absl::Status& status);
 
+// True if a limit of the server is used up by others, so that waiting helps; false if the request itself is too large.
+bool IsFullServer(const absl::Status& status);
+
 }  // namespace touchstone::client

@@ -4,7 +4,7 @@
 
 #include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/effects/all_effects.h"
+#include "server/service/sent_model.h"
 #include "server/session/command_bytes.h"
 
 namespace touchstone::service {
@@ -61,7 +61,7 @@ absl::StatusOr<std::shared_ptr<const model::Model>> FromProto(const v1::ModelRef
       return resources.models->FindByHash(message.hash());
     case v1::ModelRef::kYaml: {
       TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
-                                  model::ParseModel(message.yaml(), "model.yaml", effects::Catalogue()));
+                                  ParseSentModel(message.yaml(), "model.yaml", resources.options));
       return std::make_shared<const model::Model>(std::move(model));
     }
     case v1::ModelRef::REF_NOT_SET:

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/diagnose.h"
@@ -129,11 +130,7 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
 absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
                  Resources* resources, const std::function<bool(const v1::Progress&)>& send,
                  v1::Report* result) {
-  const RunningGuard running(&resources->running_diagnoses);
-  if (resources->running_diagnoses > static_cast<uint32_t>(resources->options.max_diagnoses))
-    return absl::ResourceExhaustedError(
-        absl::StrCat("this server works on ", resources->options.max_diagnoses,
-                     " sets already (max_diagnoses): try again, or at another server"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources->diagnoses->Take(ClientOf(*context)));
   const auto begin = std::chrono::steady_clock::now();
   Worker worker(
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
@@ -146,9 +143,15 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
       },
       resources->pool.get());
   v1::Progress progress;
+  const double max_s = resources->options.max_diagnosis_s;
+  const auto late = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > max_s;
+  };
   while (!worker.Wait(&progress)) {
-    if (context->IsCancelled() || !send(progress)) worker.Cancel();
+    if (context->IsCancelled() || late() || !send(progress)) worker.Cancel();
   }
+  if (absl::IsCancelled(worker.report().status()) && late())
+    return OverLimit("the diagnosis is not done after seconds:", max_s, "max_diagnosis_s", max_s);
   if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
   TOUCHSTONE_RETURN_IF_ERROR(worker.report().status());
   *result = *std::move(worker.report());
@@ -161,14 +164,15 @@ template <typename Response>
 absl::Status RunAndSend(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
                         Resources* resources, grpc::ServerWriter<Response>* writer, v1::Report* report) {
   Response response;
+  StallWatch::Call call(resources->stalls.get(), context);
   const auto send = [&](const v1::Progress& progress) {
     *response.mutable_progress() = progress;
-    return writer->Write(response);
+    return call.Wait([&] { return writer->Write(response); });
   };
   TOUCHSTONE_RETURN_IF_ERROR(Run(context, evidence, work, resources, send, report));
   response.clear_progress();
   *response.mutable_report() = *report;
-  if (!writer->Write(response)) return absl::CancelledError("the client is gone");
+  if (!call.Wait([&] { return writer->Write(response); })) return absl::CancelledError("the client is gone");
   return absl::OkStatus();
 }
 
@@ -228,13 +232,11 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
                                        grpc::ServerWriter<v1::ProposeResponse>* writer) {
   const uint32_t most = resources_->options.max_proposed_touches;
   if (request->touches() > most)
-    return ToGrpc(
-        absl::InvalidArgumentError(absl::StrCat("touches = ", request->touches(), ": at most ", most)));
+    return ToGrpc(OverLimit("touches =", request->touches(), "max_proposed_touches", most));
   const int touches =
       request->touches() == 0 ? kDefaultProposedTouches : static_cast<int>(request->touches());
   if (request->photographs() > most)
-    return ToGrpc(absl::InvalidArgumentError(
-        absl::StrCat("photographs = ", request->photographs(), ": at most ", most)));
+    return ToGrpc(OverLimit("photographs =", request->photographs(), "max_proposed_touches", most));
   const int photographs =
       request->photographs() == 0 ? kDefaultProposedPhotographs : static_cast<int>(request->photographs());
   const bool touches_asked = request->touches() > 0, photographs_asked = request->photographs() > 0;

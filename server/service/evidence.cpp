@@ -10,10 +10,10 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/service/convert.h"
 #include "server/service/measured_set_message.h"
+#include "server/service/sent_model.h"
 #include "server/service/stored_session.h"
 #include "server/session/image_set_file.h"
 
@@ -45,7 +45,8 @@ absl::Status ReadSession(const v1::Evidence& message, const Resources& resources
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> bytes,
                               resources.sessions->Bytes(message.session()));
   const std::string origin = message.origin().empty() ? message.session() : message.origin();
-  if (!HoldsImages(*bytes)) return SetTouches(session::ParseMeasurementSet(*bytes, origin), input);
+  const session::MeasurementLimits limits = resources.options.OfMeasurements();
+  if (!HoldsImages(*bytes)) return SetTouches(session::ParseMeasurementSet(*bytes, origin, limits), input);
   if (message.has_images())
     return absl::InvalidArgumentError(
         absl::StrCat("evidence.images stands beside session '", message.session(),
@@ -54,22 +55,25 @@ absl::Status ReadSession(const v1::Evidence& message, const Resources& resources
   stored.images->set_origin(origin);
   TOUCHSTONE_RETURN_IF_ERROR(SetImages(*stored.images, input));
   if (stored.csv.empty()) return absl::OkStatus();
-  return SetTouches(session::ParseMeasurementSet(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv)),
-                    input);
+  return SetTouches(
+      session::ParseMeasurementSet(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv), limits),
+      input);
 }
 
 absl::Status ReadMeasurements(const v1::Evidence& message, const Resources& resources,
                               diagnosis::DiagnosisInput* input) {
   const std::string origin = message.origin().empty() ? "measurements" : message.origin();
+  const session::MeasurementLimits limits = resources.options.OfMeasurements();
   switch (message.measurements_case()) {
     case v1::Evidence::kSession:
       TOUCHSTONE_RETURN_IF_ERROR(ReadSession(message, resources, input));
       break;
     case v1::Evidence::kCsv:
-      TOUCHSTONE_RETURN_IF_ERROR(SetTouches(session::ParseMeasurementSet(message.csv(), origin), input));
+      TOUCHSTONE_RETURN_IF_ERROR(
+          SetTouches(session::ParseMeasurementSet(message.csv(), origin, limits), input));
       break;
     case v1::Evidence::kSet:
-      TOUCHSTONE_RETURN_IF_ERROR(SetTouches(FromProto(message.set(), origin), input));
+      TOUCHSTONE_RETURN_IF_ERROR(SetTouches(FromProto(message.set(), origin, limits), input));
       break;
     case v1::Evidence::MEASUREMENTS_NOT_SET:
       if (message.has_images()) break;
@@ -169,7 +173,8 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
                                           "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
 }
 
-absl::Status ReadAlso(const v1::Evidence& message, diagnosis::DiagnosisInput* input) {
+absl::Status ReadAlso(const v1::Evidence& message, const Resources& resources,
+                      diagnosis::DiagnosisInput* input) {
   if (message.also_yaml_size() > kMaxAlso)
     return absl::InvalidArgumentError(
         absl::StrCat("also_yaml has ", message.also_yaml_size(), " files: at most ", kMaxAlso));
@@ -178,8 +183,8 @@ absl::Status ReadAlso(const v1::Evidence& message, diagnosis::DiagnosisInput* in
     if (message.also_yaml(k).size() > kMaxAlsoBytes)
       return absl::InvalidArgumentError(
           absl::StrCat(place, " has ", message.also_yaml(k).size(), " bytes: at most ", kMaxAlsoBytes));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, model::ParseModel(AsModelFile(message.also_yaml(k)),
-                                                                            place, effects::Catalogue()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model,
+                                ParseSentModel(AsModelFile(message.also_yaml(k)), place, resources.options));
     if (model.effects.empty())
       return absl::InvalidArgumentError(
           absl::StrCat(place, ": has no effects; at least one that may be missing was expected"));
@@ -214,7 +219,7 @@ absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& messa
   diagnosis::DiagnosisInput input;
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
-  TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, &input));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, resources, &input));
   TOUCHSTONE_RETURN_IF_ERROR(ReadMeasurements(message, resources, &input));
   TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
   return input;

@@ -116,20 +116,13 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"limits.payload_cog_mm",
        "Its centre of gravity, flange frame; none: that of the controller's installation stays",
        &raw->payload_cog_mm},
-      {"max_batch_size", "Limit: samples a batch", &o.common.max_batch_size},
-      {"max_touches_per_request", "Limit: explicit touches per request", &o.common.max_touches_per_request},
-      {"max_images_per_request", "Limit: photographs a request", &o.common.max_images_per_request},
-      {"max_indices_per_request", "Limit: samples asked for one by one, a request",
-       &o.common.max_indices_per_request},
-      {"max_streams", "Limit: dataset streams at once", &o.common.max_streams},
-      {"max_message_mib", "Limit: size of one message, MiB", &o.common.max_message_mib},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.common.lease_window_s},
-      {"drain_s", "Seconds that running calls get after SIGTERM", &o.common.drain_s},
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };
   const std::vector<Option> access = AccessFlags(&o.common.access);
   options.insert(options.begin() + 1, access.begin(), access.end());
+  AppendLimits(&o.common, &options);
   return options;
 }
 

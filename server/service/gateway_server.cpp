@@ -10,6 +10,7 @@
 #include "server/gateway/rig/rig.h"
 #include "server/service/freedrive_service.h"
 #include "server/service/journal_sessions_service.h"
+#include "server/service/request_guard.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
 #include "server/service/source_service.h"
@@ -123,6 +124,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
                               Access::Create(options.common.listen, options.common.access,
                                              options.replay.empty() ? Motion::kRig : Motion::kSimulated));
+  resources.OpenPlaces();
   resources.pool = std::make_unique<ThreadPool>(0);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects, source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles,
@@ -142,7 +144,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     device = std::move(recorded);
   }
   const bool moves = device->moves();
-  parts.source = std::make_unique<source::PhysicalSource>(&resources.objects, options.common.Limits(),
+  parts.source = std::make_unique<source::PhysicalSource>(&resources.objects, options.common.OfSource(),
                                                           std::move(device), gateway::camera::Rectify);
   parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
   if (parts.rig != nullptr)
@@ -162,8 +164,11 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   }
   services.push_back({"touchstone.v1.Control", parts.control.get()});
+  for (const ServedService& service : services)
+    GuardRequests(service.service, &resources.options, resources.memory.get());
   TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
                               StartServing(options.common, services, resources.access.get()));
+  resources.memory->Begin();
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return gateway;

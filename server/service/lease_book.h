@@ -13,7 +13,7 @@
 namespace touchstone::service {
 
 // Of who asks and of why, as they are sent; of printable text in one line.
-inline constexpr size_t kMaxHolderBytes = 256, kMaxReasonBytes = 1000;
+inline constexpr size_t kMaxHolderBytes = 256, kMaxReasonBytes = 256;
 
 // One writer at a time, by a token that goes stale when another lease is granted or the window passes.
 class LeaseBook {

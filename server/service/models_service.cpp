@@ -4,6 +4,7 @@
 
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
+#include "server/service/sent_model.h"
 
 namespace touchstone::service {
 
@@ -29,7 +30,7 @@ grpc::Status ModelsService::GetModel(grpc::ServerContext*, const v1::GetModelReq
 
 grpc::Status ModelsService::CreateModel(grpc::ServerContext*, const v1::CreateModelRequest* request,
                                         v1::Model* response) {
-  const auto model = model::ParseModel(request->yaml(), "yaml", effects::Catalogue());
+  const auto model = ParseSentModel(request->yaml(), "yaml", resources_->options);
   if (!model.ok()) return ToGrpc(model.status());
   if (!request->validate_only()) {
     if (const absl::Status status = resources_->models->Create(*model); !status.ok()) return ToGrpc(status);

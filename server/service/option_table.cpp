@@ -106,6 +106,16 @@ absl::Status ReadTable(const toml::table& table, const std::string& prefix, cons
 
 }  // namespace
 
+void AppendLimits(Limits* limits, std::vector<Option>* options) {
+  for (const LimitRow& row : LimitTable()) {
+    Option option;
+    option.key = row.name;
+    option.meaning = absl::StrCat("Limit: ", row.meaning, *row.unit == '\0' ? "" : ", ", row.unit);
+    std::visit([&](auto member) { option.target = &(limits->*member); }, row.field);
+    options->push_back(std::move(option));
+  }
+}
+
 std::string FlagOf(const Option& option) {
   return FlagOfKey(option.key);
 }

@@ -9,6 +9,8 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "server/service/limits.h"
+
 namespace CLI {
 class App;
 }
@@ -24,6 +26,9 @@ struct Option {
   Target target;
   std::string former_key = {};  // an older name, which files and flags may still use; empty: none
 };
+
+// An option for every row of the table of limits.
+void AppendLimits(Limits* limits, std::vector<Option>* options);
 
 // "--arm-address".
 std::string FlagOf(const Option& option);

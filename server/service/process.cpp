@@ -8,10 +8,27 @@
 #include <cstdio>
 #include <memory>
 
+#include "server/base/printable.h"
 #include "server/base/stop_signals.h"
 
 namespace touchstone::service {
 namespace {
+
+// A log message in one line: what a client sent may stand in it, and must not look like a line of its own.
+class OneLine : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& to) override {
+    const std::string text =
+        Printable(absl::string_view(message.payload.data(), message.payload.size()), kMaxLineBytes);
+    to.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
+    return std::make_unique<OneLine>();
+  }
+
+ private:
+  static constexpr size_t kMaxLineBytes = 8192;
+};
 
 // A log message as a JSON string.
 class JsonMessage : public spdlog::custom_flag_formatter {
@@ -37,7 +54,9 @@ void SetUpLog(const std::string& level, bool json) {
         R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l","message":%*})");
     logger->set_formatter(std::move(formatter));
   } else {
-    logger->set_pattern("%Y-%m-%d %H:%M:%S.%e %^%l%$ %v");
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<OneLine>('*').set_pattern("%Y-%m-%d %H:%M:%S.%e %^%l%$ %*");
+    logger->set_formatter(std::move(formatter));
   }
   spdlog::set_default_logger(logger);
   spdlog::set_level(spdlog::level::from_str(level));

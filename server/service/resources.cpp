@@ -144,6 +144,16 @@ absl::Status ModelStore::CheckSame(const model::Model& kept, const model::Model&
                                                model.Hash().substr(0, 8), " another name"));
 }
 
+void Resources::OpenPlaces() {
+  streams = std::make_unique<Places>("dataset streams run", "max_streams", options.max_streams,
+                                     "max_streams_per_client", options.max_streams_per_client);
+  uploads = std::make_unique<Places>("sessions are being sent", "max_uploads", options.max_uploads);
+  diagnoses = std::make_unique<Places>("sets are being worked on", "max_diagnoses", options.max_diagnoses,
+                                       "max_diagnoses_per_client", options.max_diagnoses_per_client);
+  memory = std::make_unique<MemoryBudget>(options.max_memory_mib);
+  stalls = std::make_unique<StallWatch>(options.stall_s);
+}
+
 std::vector<std::shared_ptr<const model::Model>> ModelStore::All() const {
   std::lock_guard<std::mutex> lock(mutex_);
   Refresh();

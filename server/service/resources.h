@@ -16,6 +16,7 @@
 #include "server/base/version.h"
 #include "server/model/model.h"
 #include "server/service/access.h"
+#include "server/service/admission.h"
 #include "server/service/server_options.h"
 #include "server/service/session_store.h"
 #include "server/source/object_store.h"
@@ -51,8 +52,14 @@ class ModelStore {
 };
 
 struct Resources {
+  // What calls share out among themselves, as the options say.
+  void OpenPlaces();
+
   ServerOptions options;
   std::unique_ptr<Access> access;  // who may call; set before the server starts
+  std::unique_ptr<Places> streams, uploads, diagnoses;
+  std::unique_ptr<MemoryBudget> memory;
+  std::unique_ptr<StallWatch> stalls;
   std::unique_ptr<ThreadPool> pool;
   source::ObjectStore objects;
   std::unique_ptr<ModelStore> models;
@@ -63,7 +70,6 @@ struct Resources {
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
   std::atomic<uint32_t> running_requests{0};
   std::atomic<uint32_t> running_streams{0};
-  std::atomic<uint32_t> running_diagnoses{0};
   std::atomic<uint64_t> touches{0};
   std::atomic<uint64_t> images{0};
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();

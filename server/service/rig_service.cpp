@@ -217,7 +217,7 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
   TOUCHSTONE_ASSIGN_OR_RETURN(const source::ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_RETURN_IF_ERROR(
-      source::CheckTouchCount(request.touches_size(), resources_->options.Limits(), 0));
+      source::CheckTouchCount(request.touches_size(), resources_->options.OfSource(), 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(gateway::arm::ArmState from, rig_->arm().State());
   const geometry::Bounds bounds = object->surface->bounds();
   for (int k = 0; k < request.touches_size(); ++k) {

@@ -1,6 +1,7 @@
 // Rig.CheckViews: every check of a photograph, without motion.
 #include <absl/strings/str_cat.h>
 
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/geometry/pose.h"
 #include "server/image/renderer.h"
@@ -20,10 +21,9 @@ grpc::Status RigService::CheckViews(grpc::ServerContext*, const v1::CheckViewsRe
 absl::Status RigService::DoCheck(const v1::CheckViewsRequest& request, v1::CheckTouchesResponse* response) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const source::ServedObject* object,
                               resources_->objects.Find(request.object(), "object"));
-  const int max_views = resources_->options.Limits().max_touches_per_request;
+  const int max_views = resources_->options.OfSource().max_touches_per_request;
   if (request.views_size() > max_views)
-    return absl::InvalidArgumentError(
-        absl::StrCat("views has ", request.views_size(), ": at most ", max_views, " a request"));
+    return OverLimit("views has", request.views_size(), "max_touches_per_request", max_views);
   TOUCHSTONE_ASSIGN_OR_RETURN(gateway::arm::ArmState from, rig_->arm().State());
   for (int k = 0; k < request.views_size(); ++k) {
     const std::string where = absl::StrCat("views[", k, "]");

@@ -10,6 +10,7 @@
 #include "server/service/diagnosis_service.h"
 #include "server/service/models_service.h"
 #include "server/service/option_table.h"
+#include "server/service/request_guard.h"
 #include "server/service/resources.h"
 #include "server/service/serving.h"
 #include "server/service/sessions_service.h"
@@ -22,11 +23,6 @@ namespace {
 absl::Status CheckOptions(const ServerOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckServing(options));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.threads, 0, 1024, "threads"));
-  // A session goes through a receive buffer and the reader's line numbers, which are ints.
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_session_mib, 1, 4095, "max_session_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_sessions_mib, 1, 1 << 30, "max_sessions_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_diagnoses, 1, 1000, "max_diagnoses"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_proposed_touches, 1, 100'000, "max_proposed_touches"));
   return absl::OkStatus();
 }
 
@@ -65,6 +61,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   resources.options = options;
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
                               Access::Create(options.listen, options.access, Motion::kSimulated));
+  resources.OpenPlaces();
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects,
@@ -74,22 +71,24 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
                               DefaultModel(options.default_model, resources.models.get()));
   parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
-  parts.source = std::make_unique<source::VirtualSource>(
-      &resources.objects, options.Limits(), resources.default_model, options.renderer, resources.pool.get());
+  parts.source =
+      std::make_unique<source::VirtualSource>(&resources.objects, options.OfSource(), resources.default_model,
+                                              options.renderer, resources.pool.get());
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   parts.models = std::make_unique<ModelsService>(&resources);
   parts.sessions = std::make_unique<SessionsService>(&resources);
   parts.diagnosis = std::make_unique<DiagnosisService>(&resources);
 
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
-                              StartServing(options,
-                                           {{"touchstone.v1.Source", parts.source_service.get()},
-                                            {"touchstone.v1.Control", parts.control.get()},
-                                            {"touchstone.v1.Models", parts.models.get()},
-                                            {"touchstone.v1.Sessions", parts.sessions.get()},
-                                            {"touchstone.v1.Diagnosis", parts.diagnosis.get()}},
-                                           resources.access.get()));
+  const std::vector<ServedService> services = {{"touchstone.v1.Source", parts.source_service.get()},
+                                               {"touchstone.v1.Control", parts.control.get()},
+                                               {"touchstone.v1.Models", parts.models.get()},
+                                               {"touchstone.v1.Sessions", parts.sessions.get()},
+                                               {"touchstone.v1.Diagnosis", parts.diagnosis.get()}};
+  for (const ServedService& service : services)
+    GuardRequests(service.service, &resources.options, resources.memory.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options, services, resources.access.get()));
+  resources.memory->Begin();
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return server;

@@ -40,24 +40,13 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"renderer", "auto (the faster one), egl or cpu", &raw->renderer},
       {"egl_device", "Index of the EGL device (touchstone doctor lists them); -1: the first that renders",
        &o.renderer.egl_device},
-      {"max_batch_size", "Limit: samples a batch", &o.max_batch_size},
-      {"max_touches_per_request", "Limit: explicit touches per request", &o.max_touches_per_request},
-      {"max_images_per_request", "Limit: photographs a request", &o.max_images_per_request},
-      {"max_indices_per_request", "Limit: samples asked for one by one, a request",
-       &o.max_indices_per_request},
-      {"max_streams", "Limit: dataset streams at once", &o.max_streams},
-      {"max_message_mib", "Limit: size of one message, MiB", &o.max_message_mib},
-      {"max_session_mib", "Limit: size of one stored session, MiB", &o.max_session_mib},
-      {"max_sessions_mib", "Limit: size of all stored sessions together, MiB", &o.max_sessions_mib},
-      {"max_diagnoses", "Limit: sets compared or diagnosed at once", &o.max_diagnoses},
-      {"max_proposed_touches", "Limit: touches proposed a request", &o.max_proposed_touches},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.lease_window_s},
-      {"drain_s", "Seconds that running calls get after SIGTERM", &o.drain_s},
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };
   const std::vector<Option> access = AccessFlags(&o.access);
   options.insert(options.begin() + 1, access.begin(), access.end());
+  AppendLimits(&o, &options);
   return options;
 }
 

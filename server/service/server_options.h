@@ -9,8 +9,8 @@
 
 #include "server/image/renderer.h"
 #include "server/service/access_options.h"
+#include "server/service/limits.h"
 #include "server/source/object_store.h"
-#include "server/source/request_checks.h"
 
 namespace touchstone::service {
 
@@ -21,7 +21,8 @@ absl::StatusOr<source::MeshSpec> ParseMeshSpec(const std::string& text);
 // Every readable mesh file of a folder, sorted, named by its stem.
 absl::StatusOr<std::vector<source::MeshSpec>> MeshSpecsOfFolder(const std::string& folder);
 
-struct ServerOptions {
+// Limits are options like all others; they have a table of their own.
+struct ServerOptions : Limits {
   std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
   AccessOptions access;                    // who may connect there, and do what
   std::vector<source::MeshSpec> meshes;    // besides the five built-in supershapes
@@ -31,23 +32,7 @@ struct ServerOptions {
   std::string default_model = "nominal";
   int threads = 0;  // that simulate; 0: one per core
   image::RendererOptions renderer;
-  // Limits: every one in this place.
-  int max_batch_size = 65536;
-  int max_touches_per_request = 100000;
-  int max_images_per_request = 1000;
-  int max_indices_per_request = 100000;  // samples asked for one by one
-  int max_streams = 64;                  // dataset streams at once; one more is RESOURCE_EXHAUSTED
-  int max_message_mib = 256;
-  int max_session_mib = 1024;   // one stored session
-  int max_sessions_mib = 4096;  // all stored sessions together, and all that are being sent at once
-  int max_diagnoses = 4;        // compared, diagnosed or proposed for at once; one more is RESOURCE_EXHAUSTED
-  int max_proposed_touches = 1000;
   double lease_window_s = 2;
-  double drain_s = 10;  // what running calls get after SIGTERM
-
-  source::SourceLimits Limits() const {
-    return {max_touches_per_request, max_images_per_request, max_batch_size, max_indices_per_request};
-  }
 };
 
 }  // namespace touchstone::service

@@ -211,6 +211,8 @@ TEST(Server, RefusesAModelThatItCouldNotReadAgain) {
       "}}}]\n";
   const TestFolder folder;
   ServerOptions options = SmallServer();
+  options.max_model_kib = 1024;  // as large as any file that is read
+  options.max_model_nodes = options.max_model_objects = 100'000;
   options.models_dir = folder.path();
   {
     const auto server = StartServer(options);
@@ -286,7 +288,7 @@ TEST(Server, AMessageAboutAVeryLongNameArrives) {
   const auto server = StartServer(SmallServer());
   const auto stub = v1::Models::NewStub(ChannelTo(*server));
   for (const std::string& name :
-       {std::string(9000, 'n'), std::string(3000, '\n'), std::string(4 << 20, 'm')}) {
+       {std::string(9000, 'n'), std::string(3000, '\n'), std::string(3 << 20, 'm')}) {
     v1::GetModelRequest get;
     get.mutable_model()->set_name(name);
     v1::Model model;

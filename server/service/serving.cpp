@@ -4,6 +4,8 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <algorithm>
+
 #include "grpc/health/v1/health.pb.h"
 #include "server/base/status.h"
 #include "server/service/option_table.h"
@@ -22,22 +24,22 @@ void EnablePlugins() {
   (void)enabled;
 }
 
+void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
+  // The largest that some method takes; the others are told by their own limit (request_guard.h).
+  builder->SetMaxReceiveMessageSize(std::max(options.max_request_mib, options.max_upload_mib) << 20);
+  builder->SetMaxSendMessageSize(options.max_message_mib << 20);
+  // gRPC would unpack a message of any size before it looks at the size.
+  builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
+  builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+}
+
 }  // namespace
 
 absl::Status CheckServing(const ServerOptions& options) {
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_batch_size, 1, 1 << 20, "max_batch_size"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_streams, 1, 100'000, "max_streams"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.max_message_mib, 1, 2047, "max_message_mib"));
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRange(options.max_touches_per_request, 1, 10'000'000, "max_touches_per_request"));
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRange(options.max_indices_per_request, 1, 10'000'000, "max_indices_per_request"));
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRange(options.max_images_per_request, 1, 1'000'000, "max_images_per_request"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckLimits(options));
   TOUCHSTONE_RETURN_IF_ERROR(
       CheckRange(options.supershape_triangles, 100, 4'000'000, "supershape_triangles"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.lease_window_s, 0.01, 3600, "lease_window_s"));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRange(options.drain_s, 0.01, 3600, "drain_s"));
   return absl::OkStatus();
 }
 
@@ -47,8 +49,7 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::ve
   EnablePlugins();
   Serving serving;
   grpc::ServerBuilder builder;
-  builder.SetMaxReceiveMessageSize(options.max_message_mib << 20);
-  builder.SetMaxSendMessageSize(options.max_message_mib << 20);
+  SetLimits(options, &builder);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a taken port is an error, not shared
   if (!options.listen.empty()) builder.AddListeningPort(options.listen, access->Credentials(), &serving.port);
   for (const ServedService& service : services) builder.RegisterService(service.service);

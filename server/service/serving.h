@@ -1,4 +1,4 @@
-// What every process does to serve: health checking, reflection, one port, message limits, draining.
+// What every process does to serve: health checking, reflection, one port, limits of messages and connections, draining.
 #pragma once
 
 #include <memory>

@@ -34,6 +34,7 @@ uint64_t Mebibytes(int count) {
 absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOptions& options) {
   auto store = std::make_unique<SessionStore>();
   store->folder_ = options.sessions_dir;
+  store->limits_ = options.OfMeasurements();
   store->max_bytes_ = Mebibytes(options.max_session_mib);
   store->max_bytes_together_ = Mebibytes(options.max_sessions_mib);
   if (store->folder_.empty()) return store;
@@ -48,9 +49,9 @@ absl::StatusOr<std::unique_ptr<SessionStore>> SessionStore::Open(const ServerOpt
 
 absl::Status SessionStore::Upload::Append(const std::string& file, absl::string_view piece) {
   if (pieces_.bytes() + piece.size() > store_->max_bytes_)
-    return absl::InvalidArgumentError(absl::StrCat("csv: a session may have at most ",
-                                                   store_->max_bytes_ >> 20,
-                                                   " MiB (max_session_mib); divide it by object"));
+    return absl::ResourceExhaustedError(
+        absl::StrCat("csv: more than ", pieces_.bytes() >> 20, " MiB: a session may have at most ",
+                     store_->max_bytes_ >> 20, " MiB (max_session_mib); divide it by object"));
   counted_ += piece.size();
   const uint64_t uploading = store_->uploading_ += piece.size();
   TOUCHSTONE_RETURN_IF_ERROR(pieces_.Append(file, piece));
@@ -166,7 +167,7 @@ absl::Status SessionStore::WriteNew(const std::string& name, const std::string& 
 
 absl::StatusOr<v1::Session> SessionStore::Create(const std::string& name, std::string bytes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, DescribeSession(name, bytes, name));
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Session session, DescribeSession(name, bytes, name, limits_));
   const auto same = [&](const absl::StatusOr<v1::Session>& other) -> absl::StatusOr<v1::Session> {
     if (other.ok() && other->hash() == session.hash()) return session;
     return absl::AlreadyExistsError(

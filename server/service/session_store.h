@@ -46,6 +46,7 @@ class SessionStore {
 
   // [A-Za-z0-9_.-]{1,64}, no '.' first; the error names the field.
   static absl::Status CheckName(const std::string& name);
+  const session::MeasurementLimits& limits() const { return limits_; }
   // Bytes are as in stored_session.h. The same bytes again are taken and change nothing; other bytes are ALREADY_EXISTS.
   absl::StatusOr<v1::Session> Create(const std::string& name, std::string bytes);
   absl::StatusOr<v1::Session> Find(const std::string& name);
@@ -84,6 +85,7 @@ class SessionStore {
   absl::Status WriteNew(const std::string& name, const std::string& bytes) const;
 
   std::string folder_;
+  session::MeasurementLimits limits_;
   uint64_t max_bytes_ = 0, max_bytes_together_ = 0;
   std::atomic<uint64_t> uploading_{0};
   mutable std::mutex mutex_;

@@ -17,10 +17,14 @@ grpc::Status SessionsService::CreateSession(grpc::ServerContext* context,
 absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
                                        grpc::ServerReader<v1::CreateSessionRequest>* reader,
                                        v1::Session* response) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources_->uploads->Take(ClientOf(*context)));
+  TOUCHSTONE_RETURN_IF_ERROR(resources_->memory->Reserve(0).status());
   const RunningGuard running(&resources_->running_requests);
   SessionStore& store = *resources_->sessions;
+  StallWatch::Call call(resources_->stalls.get(), context);
   v1::CreateSessionRequest request;
-  if (!reader->Read(&request))
+  const auto read = [&] { return reader->Read(&request); };
+  if (!call.Wait(read))
     return absl::InvalidArgumentError("the stream is empty: its first message gives name, all of them csv");
   const std::string name = request.name();
   const bool validate_only = request.validate_only();
@@ -32,15 +36,15 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
       return absl::InvalidArgumentError(
           absl::StrCat("name = '", request.name(), "': the first message said '", name, "'; say it once"));
     TOUCHSTONE_RETURN_IF_ERROR(upload.Append(request.file(), request.csv()));
-  } while (reader->Read(&request));
+  } while (call.Wait(read));
 
   // A stream that broke off looks like one that ended, and might even end with a whole row.
   if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
 
   const std::string origin = name.empty() ? "csv" : name;
   TOUCHSTONE_ASSIGN_OR_RETURN(std::string bytes, upload.Take());
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      *response, validate_only ? DescribeSession(name, bytes, origin) : store.Create(name, std::move(bytes)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(*response, validate_only ? DescribeSession(name, bytes, origin, store.limits())
+                                                       : store.Create(name, std::move(bytes)));
   if (!validate_only)
     spdlog::info("session '{}' stored, {} touches, {} photographs, hash {}", name, response->touches(),
                  response->images(), response->hash().substr(0, 8));
@@ -61,15 +65,17 @@ grpc::Status SessionsService::GetSession(grpc::ServerContext*, const v1::GetSess
   return grpc::Status::OK;
 }
 
-grpc::Status SessionsService::ExportSession(grpc::ServerContext*, const v1::ExportSessionRequest* request,
+grpc::Status SessionsService::ExportSession(grpc::ServerContext* context,
+                                            const v1::ExportSessionRequest* request,
                                             grpc::ServerWriter<v1::ExportSessionResponse>* writer) {
   bool gone = false;
+  StallWatch::Call call(resources_->stalls.get(), context);
   v1::ExportSessionResponse response;
   const absl::Status status =
       resources_->sessions->Export(request->name(), [&](const std::string& file, absl::string_view piece) {
         response.set_file(file);
         response.set_csv(std::string(piece));
-        gone = !writer->Write(response);
+        gone = !call.Wait([&] { return writer->Write(response); });
         return !gone;
       });
   return ToGrpc(gone ? absl::CancelledError("the client is gone") : status);

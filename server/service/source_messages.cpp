@@ -70,7 +70,7 @@ v1::Measured MeasuredToProto(const session::JournalTouch& touch, const std::stri
 
 }  // namespace
 
-v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::SourceLimits& limits) {
+v1::DescribeResponse ToProto(const source::SourceInfo& info, const Limits& limits) {
   v1::DescribeResponse message;
   message.set_kind(info.kind == source::SourceKind::kPhysical ? v1::SOURCE_KIND_PHYSICAL
                                                               : v1::SOURCE_KIND_VIRTUAL);
@@ -91,6 +91,13 @@ v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::Sourc
   message.set_lease_required(info.moves);
   message.set_touch_duration_s(info.touch_duration_s);
   message.set_clock_uncertainty_s(info.clock_uncertainty_s);
+  for (const LimitRow& row : LimitTable()) {
+    v1::Limit* limit = message.add_limits();
+    limit->set_name(row.name);
+    limit->set_value(row.Value(limits));
+    limit->set_unit(row.unit);
+    limit->set_meaning(row.meaning);
+  }
   return message;
 }
 

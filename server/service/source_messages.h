@@ -23,7 +23,7 @@ absl::StatusOr<source::CaptureRequest> FromProto(const v1::CaptureRequest& messa
 absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& message,
                                                 const Resources& resources);
 
-v1::DescribeResponse ToProto(const source::SourceInfo& info, const source::SourceLimits& limits);
+v1::DescribeResponse ToProto(const source::SourceInfo& info, const Limits& limits);
 v1::ListObjectsResponse ToProto(const source::ObjectStore& objects);
 v1::ExpandPlanResponse ToProto(const source::ExpandedPlan& plan);
 v1::TouchResponse ToProto(const source::TouchResults& results);

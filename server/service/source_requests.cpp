@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
@@ -120,6 +122,30 @@ absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message) {
 
 namespace {
 
+// Of a plan and its draws. Finer angles and more draws cost memory and time, whatever comes of them.
+absl::Status CheckPlanLimits(const touch::Plan& plan, uint32_t max_draws, const Limits& limits) {
+  if (plan.kind == touch::Plan::Kind::kList)
+    TOUCHSTONE_RETURN_IF_ERROR(source::CheckTouchCount(plan.list.size(), limits.OfSource()));
+  if (plan.kind == touch::Plan::Kind::kSphere)
+    for (const auto& [step_rad, name] : {std::pair(plan.sphere.step_angle_rad, "step_angle_rad"),
+                                         std::pair(plan.sphere.roll_step_rad, "roll_step_rad")})
+      if (step_rad != 0 && step_rad < limits.min_step_angle_rad)
+        return absl::ResourceExhaustedError(
+            absl::StrCat("plan.sphere.", name, " = ", ShortestNumber(step_rad), ": at least ",
+                         ShortestNumber(limits.min_step_angle_rad), " (min_step_angle_rad)"));
+  TOUCHSTONE_RETURN_IF_ERROR(dataset::CheckMaxDraws(max_draws));
+  if (max_draws > static_cast<uint32_t>(limits.max_draws))
+    return OverLimit("max_draws =", max_draws, "max_draws", limits.max_draws);
+  return absl::OkStatus();
+}
+
+absl::Status CheckObjects(const google::protobuf::RepeatedPtrField<std::string>& objects,
+                          const Limits& limits) {
+  const std::set<absl::string_view> distinct(objects.begin(), objects.end());
+  if (distinct.size() <= static_cast<size_t>(limits.max_objects)) return absl::OkStatus();
+  return OverLimit("objects has distinct names:", distinct.size(), "max_objects", limits.max_objects);
+}
+
 // A rig simulates nothing: the model that a request names is not looked up there.
 bool Simulates(const Resources& resources) {
   return resources.default_model != nullptr;
@@ -153,7 +179,7 @@ absl::StatusOr<source::PlanRequest> FromProto(const v1::ExpandPlanRequest& messa
   request.first_index = message.first_index();
   request.count = message.count();
   if (message.max_draws() != 0) request.max_draws = message.max_draws();
-  TOUCHSTONE_RETURN_IF_ERROR(dataset::CheckMaxDraws(request.max_draws));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPlanLimits(request.plan, request.max_draws, resources.options));
   if (!message.has_model() || message.model().ref_case() == v1::ModelRef::REF_NOT_SET) return request;
   // A rig keeps no models, but where its fingers would be can be asked of a whole file.
   if (!Simulates(resources) && !message.model().has_yaml())
@@ -169,7 +195,7 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
     TOUCHSTONE_ASSIGN_OR_RETURN(request.model, FromProto(message.model(), resources));
   }
   // Counted before they are taken apart: what is too much must cost nothing.
-  TOUCHSTONE_RETURN_IF_ERROR(source::CheckTouchCount(message.touches_size(), resources.options.Limits()));
+  TOUCHSTONE_RETURN_IF_ERROR(source::CheckTouchCount(message.touches_size(), resources.options.OfSource()));
   for (int k = 0; k < message.touches_size(); ++k) {
     TOUCHSTONE_ASSIGN_OR_RETURN(touch::CommandedTouch touch,
                                 FromProto(message.touches(k), absl::StrCat("touches[", k, "]")));
@@ -206,6 +232,7 @@ absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& 
                                                 const Resources& resources) {
   const v1::DatasetSpec& spec = message.spec();
   source::SampleRequest request;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckObjects(spec.objects(), resources.options));
   request.objects.assign(spec.objects().begin(), spec.objects().end());
   dataset::DatasetSpecification& specification = request.specification;
   TOUCHSTONE_ASSIGN_OR_RETURN(specification.plan, FromProto(spec.plan()));
@@ -220,6 +247,7 @@ absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& 
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.image, FromProto(spec.image()));
   }
   if (spec.max_draws() != 0) specification.max_draws = spec.max_draws();
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPlanLimits(specification.plan, specification.max_draws, resources.options));
   request.part.start_index = message.start_index();
   request.part.stop_index = message.stop_index();
   request.part.batch_size = message.batch_size();

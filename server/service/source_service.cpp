@@ -2,6 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <chrono>
+
 #include "server/base/status.h"
 #include "server/service/call_guard.h"
 #include "server/service/convert.h"
@@ -17,11 +20,59 @@ grpc::Status Answer(absl::StatusOr<Response> result, Response* response) {
   return ToGrpc(result.status());
 }
 
+// All streams together may take a quarter of the memory that calls may use: requests, answers and diagnoses need some too.
+dataset::StreamShare ShareOf(const std::string& client, const Resources* resources) {
+  dataset::StreamShare share;
+  share.client = client;
+  share.max_bytes = [resources] {
+    const uint64_t streams = std::max<uint32_t>(1, resources->streams->taken());
+    const uint64_t fair = std::max<uint64_t>(1 << 20, resources->memory->bytes() / 4 / streams);
+    const uint64_t usual = uint64_t{1 << 20} * resources->options.stream_memory_mib;
+    return dataset::StreamShare::Bytes{std::min(usual, fair), fair};
+  };
+  return share;
+}
+
+// Whether a stream can end within the time of draining; one that cannot is handed over at once, with a status on which
+// clients go on at another server or at this one when it is back.
+class Handover {
+ public:
+  Handover(const dataset::DatasetPart& part, uint64_t samples)
+      : stop_(part.stop_index > 0    ? part.stop_index
+              : part.indices.empty() ? samples
+                                     : part.indices.size()),
+        stride_(std::max<uint32_t>(1, part.batch_stride)),
+        next_(part.start_index) {}
+
+  void Sent(uint64_t start, uint32_t rows) {
+    rows_ += rows;
+    next_ = start + rows;
+  }
+  absl::Status Check(double drain_s) const {
+    const double running_s = std::chrono::duration<double>(Clock::now() - begin_).count();
+    if (running_s < kMinRunningS) return absl::OkStatus();  // its speed is not known yet
+    const double left = next_ < stop_ ? static_cast<double>(stop_ - next_) / stride_ : 0;
+    if (left <= rows_ / running_s * drain_s) return absl::OkStatus();
+    return absl::UnavailableError(absl::StrCat(
+        "this source is being shut down, and about ", static_cast<uint64_t>(left),
+        " samples are left: go on with sample ", next_, " at another one, or here when it is back"));
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr double kMinRunningS = 0.5;
+  const Clock::time_point begin_ = Clock::now();
+  const uint64_t stop_;
+  const uint32_t stride_;
+  uint64_t next_;
+  uint64_t rows_ = 0;
+};
+
 }  // namespace
 
 grpc::Status SourceService::Describe(grpc::ServerContext*, const v1::DescribeRequest*,
                                      v1::DescribeResponse* response) {
-  *response = ToProto(source_->Describe(), source_->limits());
+  *response = ToProto(source_->Describe(), resources_->options);
   return grpc::Status::OK;
 }
 
@@ -86,25 +137,29 @@ grpc::Status SourceService::StreamDataset(grpc::ServerContext* context,
 
 absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::StreamDatasetRequest& message,
                                      grpc::ServerWriter<v1::StreamDatasetResponse>* writer) {
+  const std::string client = ClientOf(*context);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources_->streams->Take(client));
   const RunningGuard running(&resources_->running_streams);
-  if (resources_->running_streams > static_cast<uint32_t>(resources_->options.max_streams))
-    return absl::ResourceExhaustedError(
-        absl::StrCat("this source runs ", resources_->options.max_streams,
-                     " dataset streams already (max_streams): try again later, or at another one"));
   TOUCHSTONE_RETURN_IF_ERROR(leases_->Check(message.lease_token()));
   const source::MotionGuard guard = GuardOf(context, resources_, leases_, message.lease_token());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const source::SampleRequest request, FromProto(message, *resources_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source::SampleRequest request, FromProto(message, *resources_));
+  request.share = ShareOf(client, resources_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<source::SampleStream> stream, source_->Stream(request));
+  StallWatch::Call call(resources_->stalls.get(), context);
   v1::StreamDatasetResponse response;
+  const auto write = [&] { return writer->Write(response); };
   *response.mutable_header() = ToProto(stream->header());
-  if (!writer->Write(response)) return absl::CancelledError("the client is gone");
+  if (!call.Wait(write)) return absl::CancelledError("the client is gone");
   response.clear_header();
+  Handover handover(request.part, stream->header().samples);
   for (;;) {
+    if (resources_->draining) TOUCHSTONE_RETURN_IF_ERROR(handover.Check(resources_->options.drain_s));
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<dataset::DatasetBatch> batch, stream->Next(guard));
     if (!batch.has_value()) return absl::OkStatus();
     const uint32_t rows = batch->rows;
+    handover.Sent(batch->start_index, rows);
     *response.mutable_batch() = ToProto(*std::move(batch), stream->header().columns);
-    if (!writer->Write(response)) return absl::CancelledError("the client is gone");
+    if (!call.Wait(write)) return absl::CancelledError("the client is gone");
     resources_->touches += rows;
     if (request.specification.columns.image) resources_->images += rows;
   }

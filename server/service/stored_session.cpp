@@ -23,9 +23,10 @@ absl::Status IsAPlan(const std::string& origin) {
       absl::StrCat(origin, ":1: has no column t_*_us: it is a plan; a session holds what was measured"));
 }
 
-absl::Status DescribeTouches(absl::string_view csv, const std::string& origin, v1::Session* session,
+absl::Status DescribeTouches(absl::string_view csv, const std::string& origin,
+                             const session::MeasurementLimits& limits, v1::Session* session,
                              session::MeasurementSet* set) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(*set, session::ParseMeasurementSet(csv, origin));
+  TOUCHSTONE_ASSIGN_OR_RETURN(*set, session::ParseMeasurementSet(csv, origin, limits));
   if (set->fingers == 0) return IsAPlan(origin);
   session->set_touches(set->size());
   session->set_fingers(set->fingers);
@@ -84,12 +85,13 @@ absl::StatusOr<StoredSession> UnpackSession(absl::string_view bytes) {
 }
 
 absl::StatusOr<v1::Session> DescribeSession(const std::string& name, absl::string_view bytes,
-                                            const std::string& origin) {
+                                            const std::string& origin,
+                                            const session::MeasurementLimits& limits) {
   v1::Session session;
   session.set_name(name);
   session::MeasurementSet touches;
   if (!HoldsImages(bytes)) {
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeTouches(bytes, origin, &session, &touches));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeTouches(bytes, origin, limits, &session, &touches));
     session.set_hash(Sha256Hex(bytes));
     session.set_bytes(bytes.size());
     return session;
@@ -105,8 +107,8 @@ absl::StatusOr<v1::Session> DescribeSession(const std::string& name, absl::strin
   for (const v1::ImageFile& file : stored.images->files()) size += file.png().size();
   session.set_bytes(size);
   if (!stored.csv.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(
-        DescribeTouches(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv), &session, &touches));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeTouches(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv),
+                                               limits, &session, &touches));
     TOUCHSTONE_RETURN_IF_ERROR(CheckTouchesOfImages(images, touches));
     session.set_hash(Sha256Hex(
         absl::StrCat(images.sha256, "  images\n", Sha256Hex(stored.csv), "  ", session::kTouchesCsv, "\n")));

@@ -9,6 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
+#include "server/session/measurement_set.h"
 #include "touchstone/v1/diagnosis.pb.h"
 #include "touchstone/v1/sessions.pb.h"
 
@@ -32,7 +33,8 @@ absl::StatusOr<StoredSession> UnpackSession(absl::string_view bytes);
 // Reads the whole; errors name `origin`, file and line. Of an image set the hash is that of its files
 // (session::ImageSetHash), touches.csv behind the pictures.
 absl::StatusOr<v1::Session> DescribeSession(const std::string& name, absl::string_view bytes,
-                                            const std::string& origin);
+                                            const std::string& origin,
+                                            const session::MeasurementLimits& limits = {});
 
 // A session that comes in piece by piece, each with the file that it belongs to (CreateSessionRequest.file).
 class SessionPieces {

@@ -12,9 +12,9 @@
 
 namespace touchstone::source {
 
-// The most that one request may ask for.
+// The most that one request may ask for; beyond it, RESOURCE_EXHAUSTED.
 struct SourceLimits {
-  int max_touches_per_request = 100000;
+  int max_touches_per_request = 20000;
   int max_images_per_request = 1000;
   int max_batch_size = 65536;
   int max_indices_per_request = 100000;
@@ -29,7 +29,7 @@ absl::StatusOr<std::string> SessionName(const std::string& name);
 // At least one touch where `at_least` is 1.
 absl::Status CheckTouchCount(size_t touches, const SourceLimits& limits, size_t at_least = 1);
 
-// None, or one per touch, of 1 to 128 bytes.
+// None, or one per touch, of 1 to 256 printable bytes.
 absl::Status CheckTouchIds(const std::vector<std::string>& ids, size_t touches);
 
 // Views of one answer: how many, and how many bytes their pictures may have.

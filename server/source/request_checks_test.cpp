@@ -18,15 +18,18 @@ TEST(RequestChecks, TouchesAreAtLeastOneAndAtMostTheLimit) {
   EXPECT_TRUE(CheckTouchCount(3, limits).ok());
   EXPECT_THAT(Message(CheckTouchCount(0, limits)), HasSubstr("touches is empty"));
   EXPECT_THAT(Message(CheckTouchCount(4, limits)), HasSubstr("touches has 4: at most 3"));
+  EXPECT_TRUE(absl::IsResourceExhausted(CheckTouchCount(4, limits)));
+  EXPECT_THAT(Message(CheckTouchCount(4, limits)), HasSubstr("(max_touches_per_request)"));
   EXPECT_TRUE(CheckTouchCount(0, limits, 0).ok());
 }
 
-TEST(RequestChecks, IdsAreNoneOrOnePerTouchOf1To128Bytes) {
+TEST(RequestChecks, IdsAreNoneOrOnePerTouchOf1To256PrintableBytes) {
   EXPECT_TRUE(CheckTouchIds({}, 2).ok());
-  EXPECT_TRUE(CheckTouchIds({"a", std::string(128, 'b')}, 2).ok());
+  EXPECT_TRUE(CheckTouchIds({"a", std::string(256, 'b')}, 2).ok());
   EXPECT_THAT(Message(CheckTouchIds({"a"}, 2)), HasSubstr("touch_ids has 1"));
   EXPECT_THAT(Message(CheckTouchIds({"a", ""}, 2)), HasSubstr("touch_ids[1] has 0 bytes"));
-  EXPECT_THAT(Message(CheckTouchIds({std::string(129, 'b')}, 1)), HasSubstr("touch_ids[0] has 129 bytes"));
+  EXPECT_THAT(Message(CheckTouchIds({std::string(257, 'b')}, 1)), HasSubstr("touch_ids[0] has 257 bytes"));
+  EXPECT_THAT(Message(CheckTouchIds({"a\nb"}, 1)), HasSubstr("printable"));
 }
 
 TEST(RequestChecks, ViewsFitIntoOneAnswer) {

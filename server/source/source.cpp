@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/touch/plan_drawer.h"
 #include "server/touch/touch_notes.h"
@@ -23,8 +24,8 @@ absl::StatusOr<uint64_t> CountOf(const PlanRequest& request, uint64_t available,
     count = count == 0 ? left : std::min(count, left);
   }
   if (count > limit)
-    return absl::InvalidArgumentError(absl::StrCat("count = ", count, ": at most ", limit,
-                                                   " touches per request; ask in parts by first_index"));
+    return OverLimit("a plan is asked for in parts by first_index: count =", count, "max_touches_per_request",
+                     limit);
   return count;
 }
 
@@ -50,7 +51,8 @@ absl::StatusOr<ExpandedPlan> Source::ExpandPlan(const PlanRequest& request, cons
     for (uint64_t k = 0; k < count; ++k) {
       TOUCHSTONE_RETURN_IF_ERROR(guard());
       const uint64_t number = request.first_index + k;
-      absl::StatusOr<touch::PlanDrawer::Drawn> drawn = drawer.Draw(number, 0, &plan.draws);
+      absl::StatusOr<touch::PlanDrawer::Drawn> drawn =
+          drawer.Draw(number, 0, &plan.draws, [&] { return !guard().ok(); });
       if (!drawn.ok())
         return absl::Status(drawn.status().code(), absl::StrCat("object '", request.object, "', touch ",
                                                                 number, ": ", drawn.status().message()));

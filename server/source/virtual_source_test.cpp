@@ -91,7 +91,7 @@ TEST_F(VirtualSourceTest, AMissingCovariateIsNamedWithItsTouch) {
 }
 
 TEST_F(VirtualSourceTest, RefusesWhatItsLimitsAndObjectsDoNotAllow) {
-  EXPECT_EQ(source_.Touch(Request(101), NoObjection).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(source_.Touch(Request(101), NoObjection).status().code(), absl::StatusCode::kResourceExhausted);
   TouchRequest unknown = Request(1);
   unknown.object = "lat0";
   const absl::Status status = source_.Touch(unknown, NoObjection).status();

@@ -139,9 +139,9 @@ TEST_F(StreamConformance, MistakesAreRefusedBeforeAnyBatch) {
       {unknown_column, grpc::INVALID_ARGUMENT, "did you mean 'descriptor'"},
       {no_plan, grpc::INVALID_ARGUMENT, "plan"},
       {beyond, grpc::OUT_OF_RANGE, "5 samples"},
-      {huge_batch, grpc::INVALID_ARGUMENT, "batch_size"},
+      {huge_batch, grpc::RESOURCE_EXHAUSTED, "max_batch_size"},
       {no_such_index, grpc::OUT_OF_RANGE, "indices[1] = 5: the dataset has 5 samples"},
-      {many_indices, grpc::INVALID_ARGUMENT, "a request"},
+      {many_indices, grpc::RESOURCE_EXHAUSTED, "max_indices_per_request"},
   };
   for (const auto& [request, code, hint] : mistakes) {
     const Streamed streamed = Stream(request);

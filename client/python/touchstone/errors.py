@@ -95,5 +95,6 @@ def is_lost(error: grpc.RpcError) -> bool:
         return True
     if code in (grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN):
         return "RST_STREAM" in details or "Stream removed" in details or "Socket closed" in details
-    # All streams of the source are taken: a stream of an ended epoch may still be closing there.
-    return code == grpc.StatusCode.RESOURCE_EXHAUSTED and "larger than max" not in details
+    # All streams of the source are taken: one of an ended epoch may still be closing there. A request that is too large
+    # for a limit stays so; a source says where waiting helps.
+    return code == grpc.StatusCode.RESOURCE_EXHAUSTED and "try again" in details

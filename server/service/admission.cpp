@@ -1,0 +1,152 @@
+#include "server/service/admission.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <malloc.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "server/base/over_limit.h"
+
+namespace touchstone::service {
+namespace {
+
+uint64_t ResidentBytes() {
+  uint64_t pages = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident;
+  return resident * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+// Of the machine, or of the container where that has less.
+uint64_t MachineBytes() {
+  uint64_t bytes =
+      static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+  for (const char* file : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    uint64_t limit = 0;  // "max" is no number
+    if (std::ifstream(file) >> limit && limit > 0) bytes = std::min(bytes, limit);
+  }
+  return bytes;
+}
+
+constexpr uint64_t kMebibyte = 1 << 20;
+
+}  // namespace
+
+std::string ClientOfPeer(const std::string& peer) {
+  if (!absl::StartsWith(peer, "ipv")) return peer.substr(0, peer.find(':'));
+  return peer.substr(0, peer.rfind(':'));
+}
+
+std::string ClientOf(const grpc::ServerContext& context) {
+  return ClientOfPeer(context.peer());
+}
+
+Places::Places(std::string what, std::string limit, int max, std::string client_limit, int max_per_client)
+    : what_(std::move(what)),
+      limit_(std::move(limit)),
+      client_limit_(std::move(client_limit)),
+      max_(max),
+      max_per_client_(max_per_client) {}
+
+absl::StatusOr<Places::Place> Places::Take(const std::string& client) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (taken_ >= static_cast<uint32_t>(max_))
+    return Busy(absl::StrCat(taken_.load(), " ", what_), limit_, max_);
+  const auto found = by_client_.find(client);
+  const int own = found == by_client_.end() ? 0 : found->second;
+  if (max_per_client_ > 0 && own >= max_per_client_)
+    return Busy(absl::StrCat("for ", client, " ", own, " ", what_), client_limit_, max_per_client_);
+  ++by_client_[client];
+  ++taken_;
+  return Place(this, client);
+}
+
+void Places::Leave(const std::string& client) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  --taken_;
+  const auto found = by_client_.find(client);
+  if (--found->second == 0) by_client_.erase(found);
+}
+
+MemoryBudget::MemoryBudget(int max_mib)
+    : max_bytes_(max_mib > 0 ? max_mib * kMebibyte : MachineBytes() / 2) {}
+
+void MemoryBudget::Begin() {
+  begin_bytes_ = ResidentBytes();
+}
+
+// What was freed may still be resident: it is given back to the system, not more often than once a second.
+bool MemoryBudget::ResidentIsTooMuch() {
+  if (ResidentBytes() <= begin_bytes_ + max_bytes_) return false;
+  std::lock_guard<std::mutex> lock(trim_mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - trimmed_ > std::chrono::seconds(1)) {
+    ::malloc_trim(0);
+    trimmed_ = now;
+  }
+  return ResidentBytes() > begin_bytes_ + max_bytes_;
+}
+
+absl::StatusOr<MemoryBudget::Reservation> MemoryBudget::Reserve(uint64_t bytes) {
+  const uint64_t reserved = reserved_ += bytes;
+  Reservation reservation(this, bytes);
+  if (reserved > max_bytes_)
+    return Busy(absl::StrCat((reserved - bytes) / kMebibyte, " MiB are used and ", bytes / kMebibyte + 1,
+                             " more would be needed"),
+                "max_memory_mib", static_cast<double>(max_bytes_ / kMebibyte));
+  if (ResidentIsTooMuch())
+    return Busy(
+        absl::StrCat((ResidentBytes() - std::min<uint64_t>(ResidentBytes(), begin_bytes_)) / kMebibyte,
+                     " MiB are used"),
+        "max_memory_mib", static_cast<double>(max_bytes_ / kMebibyte));
+  return reservation;
+}
+
+StallWatch::StallWatch(double stall_s) : stall_(stall_s), thread_([this] { Run(); }) {}
+
+StallWatch::~StallWatch() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void StallWatch::Run() {
+  const std::chrono::duration<double> pause = std::min(stall_ / 4, std::chrono::duration<double>(1));
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!stopping_) {
+    wake_.wait_for(lock, calls_.empty() ? std::chrono::duration<double>(3600) : pause);
+    const auto now = std::chrono::steady_clock::now();
+    for (Call* call : calls_) {
+      if (!call->waiting_ || now - call->since_ <= stall_) continue;
+      spdlog::warn("{}: nothing moved for {} s (stall_s): the call is cancelled", call->context_->peer(),
+                   stall_.count());
+      call->context_->TryCancel();
+      call->since_ = now;
+    }
+  }
+}
+
+StallWatch::Call::Call(StallWatch* watch, grpc::ServerContext* context) : watch_(watch), context_(context) {
+  std::lock_guard<std::mutex> lock(watch_->mutex_);
+  watch_->calls_.insert(this);
+  watch_->wake_.notify_all();
+}
+
+StallWatch::Call::~Call() {
+  std::lock_guard<std::mutex> lock(watch_->mutex_);
+  watch_->calls_.erase(this);
+}
+
+void StallWatch::Call::SetWaiting(bool waiting) {
+  std::lock_guard<std::mutex> lock(watch_->mutex_);
+  waiting_ = waiting;
+  since_ = std::chrono::steady_clock::now();
+}
+
+}  // namespace touchstone::service
