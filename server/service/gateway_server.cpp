@@ -109,6 +109,7 @@ struct GatewayServer::Parts {
   std::unique_ptr<RigService> rig_service;
   std::unique_ptr<FreedriveService> freedrive;
   std::unique_ptr<JournalSessionsService> sessions;
+  std::unique_ptr<ConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
 };
@@ -169,6 +170,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
                               StartServing(options.common, services, resources.access.get()));
   resources.memory->Begin();
+  parts.acceptor = std::move(serving.acceptor);
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return gateway;
@@ -177,6 +179,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
 GatewayServer::~GatewayServer() {
   if (parts_->server == nullptr) return;
   parts_->resources.draining = true;
+  if (parts_->acceptor != nullptr) parts_->acceptor->End();
   parts_->server->Shutdown(std::chrono::system_clock::now());
   parts_->server->Wait();
 }
@@ -192,6 +195,7 @@ source::RigDevice& GatewayServer::device() {
 void GatewayServer::Drain() {
   // Running motions see this within a tick and stop the arm.
   parts_->resources.draining = true;
+  if (parts_->acceptor != nullptr) parts_->acceptor->End();
   StopServing(parts_->resources.options, parts_->server.get());
 }
 

@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/base/stop_signals.h"
+#include "server/service/connection_acceptor.h"
 #include "server/service/server_options.h"
 
 namespace touchstone::service {
@@ -32,6 +33,7 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
   if (flags->done) return 0;
   SetUpLog(flags->log_level, flags->log_json);
   TakeStopSignals(InheritedIgnore::kOverride);
+  RaiseFileLimit();
   auto server = start(*flags);
   if (!server.ok()) return ReportStartError(program, server.status());
   ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);

@@ -47,6 +47,7 @@ struct Server::Parts {
   std::unique_ptr<ModelsService> models;
   std::unique_ptr<SessionsService> sessions;
   std::unique_ptr<DiagnosisService> diagnosis;
+  std::unique_ptr<ConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
 };
@@ -89,12 +90,14 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
     GuardRequests(service.service, &resources.options, resources.memory.get());
   TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options, services, resources.access.get()));
   resources.memory->Begin();
+  parts.acceptor = std::move(serving.acceptor);
   parts.server = std::move(serving.server);
   parts.port = serving.port;
   return server;
 }
 
 Server::~Server() {
+  if (parts_->acceptor != nullptr) parts_->acceptor->End();
   if (parts_->server != nullptr) {
     parts_->server->Shutdown(std::chrono::system_clock::now());
     parts_->server->Wait();
@@ -113,6 +116,7 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 
 void Server::Drain() {
   parts_->resources.draining = true;
+  if (parts_->acceptor != nullptr) parts_->acceptor->End();
   StopServing(parts_->resources.options, parts_->server.get());
 }
 

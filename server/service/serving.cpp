@@ -1,10 +1,12 @@
 #include "server/service/serving.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "grpc/health/v1/health.pb.h"
 #include "server/base/status.h"
@@ -24,6 +26,10 @@ void EnablePlugins() {
   (void)enabled;
 }
 
+int Milliseconds(double seconds) {
+  return static_cast<int>(std::min(1e3 * seconds, static_cast<double>(std::numeric_limits<int>::max())));
+}
+
 void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   // The largest that some method takes; the others are told by their own limit (request_guard.h).
   builder->SetMaxReceiveMessageSize(std::max(options.max_request_mib, options.max_upload_mib) << 20);
@@ -31,6 +37,17 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   // gRPC would unpack a message of any size before it looks at the size.
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+  grpc::ResourceQuota quota("touchstone");
+  quota.SetMaxThreads(options.max_threads);
+  builder->SetResourceQuota(quota);
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.max_streams_per_connection);
+  builder->AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, Milliseconds(options.handshake_s));
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, Milliseconds(options.connection_idle_s));
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, Milliseconds(options.connection_age_s));
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(options.keepalive_s));
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(options.keepalive_timeout_s));
+  // Clients ask for signs of life too, the command line every 20 s.
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 10'000);
 }
 
 }  // namespace
@@ -50,14 +67,22 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::ve
   Serving serving;
   grpc::ServerBuilder builder;
   SetLimits(options, &builder);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a taken port is an error, not shared
-  if (!options.listen.empty()) builder.AddListeningPort(options.listen, access->Credentials(), &serving.port);
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> connections;
+  const bool at_path = absl::StartsWith(options.listen, "unix:");  // no address to count connections by
+  if (at_path) {
+    builder.AddListeningPort(options.listen, access->Credentials(), &serving.port);
+  } else if (!options.listen.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(serving.acceptor, ConnectionAcceptor::Listen(options.listen, options));
+    serving.port = serving.acceptor->port();
+    connections = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, access->Credentials());
+  }
   for (const ServedService& service : services) builder.RegisterService(service.service);
   serving.server = builder.BuildAndStart();
-  if (serving.server == nullptr || (!options.listen.empty() && serving.port == 0))
-    return absl::UnavailableError(absl::StrCat(
-        "listen = '", options.listen,
-        "': cannot listen there; is the address right (HOST:PORT, port 0 for any), and the port free?"));
+  if (serving.server == nullptr || (at_path && serving.port == 0))
+    return absl::UnavailableError(
+        absl::StrCat("listen = '", options.listen, "': a server could not be started there"));
+  if (connections != nullptr) serving.acceptor->Begin(std::move(connections));
   if (auto* health = serving.server->GetHealthCheckService(); health != nullptr)
     for (const ServedService& service : services) health->SetServingStatus(service.name, true);
   return serving;

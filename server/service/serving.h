@@ -9,6 +9,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "server/service/access.h"
+#include "server/service/connection_acceptor.h"
 #include "server/service/server_options.h"
 
 namespace touchstone::service {
@@ -19,6 +20,7 @@ struct ServedService {
 };
 
 struct Serving {
+  std::unique_ptr<ConnectionAcceptor> acceptor;  // ends before the server; null: no port
   std::unique_ptr<grpc::Server> server;
   int port = 0;
 };
