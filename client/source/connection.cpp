@@ -38,6 +38,7 @@ void RaiseLimits(service::Limits* limits) {
   constexpr int kLargest = 2047, kMany = 1 << 30;
   limits->max_request_mib = limits->max_upload_mib = limits->max_message_mib = kLargest;
   limits->max_request_elements = limits->max_request_numbers = kMany;
+  limits->max_touches_per_request = 100'000;  // touches of one request are one session
   limits->max_model_kib = 1024;
   limits->max_model_nodes = 100'000;
   limits->max_model_objects = 100'000;

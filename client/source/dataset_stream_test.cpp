@@ -8,6 +8,8 @@
 
 #include <thread>
 
+#include "client/source/errors.h"
+
 namespace touchstone::client {
 namespace {
 
@@ -37,7 +39,7 @@ class FakeSource : public v1::Source::Service {
     const uint64_t stop = request->stop_index() > 0 ? request->stop_index() : 100;
     const uint64_t stride = std::max<uint32_t>(1, request->batch_stride());
     for (uint64_t i = request->start_index(); i < stop; i += request->batch_size() * stride) {
-      if (batches_until_loss-- == 0) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "unplugged");
+      if (batches_until_loss-- == 0) return grpc::Status(loss, "unplugged");
       if (context->IsCancelled()) return grpc::Status::CANCELLED;
       if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
       message.Clear();
@@ -57,6 +59,7 @@ class FakeSource : public v1::Source::Service {
   }
 
   int batches_until_loss = -1;
+  grpc::StatusCode loss = grpc::StatusCode::UNAVAILABLE;
   bool slow = false;
   std::vector<v1::StreamDatasetRequest> requests;
 
@@ -121,6 +124,26 @@ TEST(DatasetStream, GoesOnAtAnotherServerWithoutAGapOrARepeat) {
     ASSERT_EQ(second.requests.size(), 1u);
     EXPECT_EQ(second.requests[0].spec().model().yaml(), "name: nominal") << "the model goes along";
   }
+}
+
+// A server cancels a stream that nobody read for minutes, and what is left when it is shut down.
+TEST(DatasetStream, GoesOnWhereAServerCancelledIt) {
+  FakeSource source;
+  source.batches_until_loss = 4;
+  source.loss = grpc::StatusCode::CANCELLED;
+  const auto connection = Connect({source.address()});
+  auto stream = DatasetStream::Open(connection.get(), Request(7));
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  const auto all = ReadAll(stream->get());
+  ASSERT_TRUE(all.ok()) << all.status();
+  EXPECT_EQ(*all, UpTo(100));
+}
+
+TEST(Errors, OnlyAServerThatSaysSoIsWorthWaitingFor) {
+  EXPECT_TRUE(IsFullServer(absl::ResourceExhaustedError(
+      "256 dataset streams run already (max_streams = 256): try again later, or at another one")));
+  EXPECT_FALSE(IsFullServer(absl::ResourceExhaustedError("batch_size = 9: at most 8 (max_batch_size)")));
+  EXPECT_FALSE(IsFullServer(absl::InvalidArgumentError("try again")));
 }
 
 TEST(DatasetStream, GoesOnWithItsStride) {
