@@ -32,6 +32,7 @@ struct OutputOptions {
 // Where touches come from: servers, or a source in this process with these meshes and this renderer.
 struct SourceOptions {
   std::vector<std::string> servers;
+  client::Credentials credentials;  // what those servers are shown
   std::vector<std::string> meshes;
   std::string mesh_folder;
   double wait_s = 10;  // for a server that is starting
@@ -70,7 +71,7 @@ class Cli {
 
   // --server, --mesh, ...: for commands that need a source.
   void AddSourceOptions(CLI::App* command);
-  // --server and --wait-s alone: for commands that need a rig.
+  // --server, --wait-s and what a server is shown: for commands that need a rig.
   void AddRigOptions(CLI::App* command);
   // The source that those options name.
   absl::StatusOr<std::unique_ptr<client::Connection>> Connect() const;
@@ -110,6 +111,7 @@ class Cli {
                            const std::string& text, OutputKind kind, bool json_is_a_format);
   void AddOutputOptions(CLI::App* command);
   void AddServerOptions(CLI::App* command, const std::string& what);
+  void AddCredentialOptions(CLI::App* command);
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
 
@@ -181,6 +183,7 @@ void AddDiagnose(Cli* cli);
 void AddPropose(Cli* cli);
 void AddSession(Cli* cli);
 void AddRig(Cli* cli);
+void AddToken(Cli* cli);
 void AddDoctor(Cli* cli);
 
 }  // namespace touchstone::cli

@@ -1,6 +1,7 @@
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
+#include <cstdlib>
 
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
@@ -24,6 +25,7 @@ void AddCommands(Cli* cli) {
   AddPropose(cli);
   AddSession(cli);
   AddRig(cli);
+  AddToken(cli);
   AddDoctor(cli);
 }
 
@@ -40,6 +42,8 @@ int main(int argc, char** argv) {
     return touchstone::cli::kRefused;
   }
 #endif
+  // gRPC's own lines about failed handshakes: what is wrong is said in words (tls_probe.h). Set it to see them.
+  ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   // A source in this process keeps no log: stdout and stderr are the command's.
   spdlog::set_level(spdlog::level::off);
   touchstone::cli::Interrupt::Install();

@@ -30,6 +30,20 @@ void Cli::AddServerOptions(CLI::App* command, const std::string& what) {
                    "How long to wait for a server that is starting, from 0. Default: 10")
       ->type_name("S")
       ->group(kGroup);
+  AddCredentialOptions(command);
+}
+
+void Cli::AddCredentialOptions(CLI::App* command) {
+  const auto add = [&](const std::string& name, std::string* value, const std::string& text) {
+    command->add_option(name, *value, text)->type_name("FILE")->group(kGroup);
+  };
+  client::Credentials& shown = source_.credentials;
+  add("--tls-ca", &shown.tls_ca,
+      "Speak TLS with the server: the CA of its certificate (PEM), or system. Default: TOUCHSTONE_TLS_CA");
+  add("--tls-cert", &shown.tls_cert, "Client certificate (PEM). Default: TOUCHSTONE_TLS_CERT");
+  add("--tls-key", &shown.tls_key, "Its private key (PEM). Default: TOUCHSTONE_TLS_KEY");
+  add("--token-file", &shown.token_file,
+      "File with the token that the server asks for. Default: TOUCHSTONE_TOKEN, or TOUCHSTONE_TOKEN_FILE");
 }
 
 void Cli::AddRigOptions(CLI::App* command) {
@@ -78,6 +92,7 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::Connect() const {
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
   client::ConnectionOptions options;
   options.servers = SplitCommas(source_.servers);
+  options.credentials = client::WithEnvironment(source_.credentials);
   return client::Connection::Open(std::move(options));
 }
 
@@ -94,12 +109,20 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     if (!(source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS))
       return absl::InvalidArgumentError(
           absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
+    options.credentials = client::WithEnvironment(source_.credentials);
     options.wait_s = source_.wait_s;
     options.on_wait = [this](const std::string& line) { Log(line); };
     TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
     Detail("connected to " + connection->address());
     return connection;
   }
+  const client::Credentials& shown = source_.credentials;
+  const char* const server_only = !shown.tls_ca.empty()                               ? "--tls-ca"
+                                  : !shown.tls_cert.empty() || !shown.tls_key.empty() ? "--tls-cert"
+                                  : !shown.token_file.empty()                         ? "--token-file"
+                                                                                      : nullptr;
+  if (server_only != nullptr)
+    return absl::InvalidArgumentError(absl::StrCat(server_only, ": works only with --server HOST:PORT"));
   service::ServerOptions& embedded = options.embedded;
   embedded.meshes = std::move(meshes);
   if (source_.threads < 0)

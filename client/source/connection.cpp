@@ -2,12 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 
 #include <chrono>
 #include <thread>
 
+#include "client/source/tls_probe.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
@@ -88,7 +87,8 @@ absl::Status Connection::ConnectToOneThatStarts() {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.wait_s);
   for (bool waiting = false;; waiting = true) {
     const absl::Status status = ConnectToNext();
-    if (status.ok() || std::chrono::steady_clock::now() + kRetryInterval > end) return status;
+    if (!absl::IsUnavailable(status) || std::chrono::steady_clock::now() + kRetryInterval > end)
+      return status;
     if (!waiting && options_.on_wait)
       options_.on_wait(absl::StrCat("waiting for ", absl::StrJoin(options_.servers, " or "),
                                     " to answer, up to ", options_.wait_s, " s"));
@@ -99,12 +99,15 @@ absl::Status Connection::ConnectToOneThatStarts() {
 absl::Status Connection::ConnectToNext() {
   if (embedded()) return absl::FailedPreconditionError("a source in this process cannot be lost");
   std::string tried;
+  bool fits = true;  // what we show, as far as anybody answers
   for (int i = 1; i <= server_count(); ++i) {
     const int index = (server_index_ + i) % server_count();
     const absl::Status status = Connect(index);
     if (status.ok()) return status;
+    fits = fits && !absl::IsInvalidArgument(status);
     absl::StrAppend(&tried, tried.empty() ? "" : "; ", status.message());
   }
+  if (!fits) return absl::InvalidArgumentError(tried);
   return absl::UnavailableError(absl::StrCat(tried,
                                              ". Is touchstone-server running there, or touchstone-gateway if "
                                              "it is a rig's? A simulation needs neither: "
@@ -122,15 +125,17 @@ absl::Status Connection::Connect(int server_index) {
   // wait for ever.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
-  auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  TOUCHSTONE_ASSIGN_OR_RETURN(auto channel, MakeChannel(address, options_.credentials, arguments));
+  const auto failed = [&](const std::string& how) {
+    const std::string why = ExplainTlsFailure(address, options_.credentials);
+    return why.empty() ? absl::UnavailableError(how) : absl::InvalidArgumentError(why);
+  };
   // Refused at once is an answer too: the next server should not wait for the whole time-out.
   const auto deadline = InSeconds(options_.connect_timeout_s);
   for (grpc_connectivity_state state; (state = channel->GetState(true)) != GRPC_CHANNEL_READY;) {
-    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE)
-      return absl::UnavailableError(absl::StrCat("no connection to ", address));
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE) return failed(absl::StrCat("no connection to ", address));
     if (!channel->WaitForStateChange(state, deadline))
-      return absl::UnavailableError(
-          absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
+      return failed(absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
   }
   server_index_ = server_index;
   address_ = address;

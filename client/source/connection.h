@@ -11,6 +11,7 @@
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
 
+#include "client/source/credentials.h"
 #include "client/source/errors.h"
 #include "server/service/server.h"
 #include "server/service/server_options.h"
@@ -35,6 +36,7 @@ inline constexpr int kMaxMessageBytes = 256 << 20;
 
 struct ConnectionOptions {
   std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process
+  Credentials credentials;           // what they are shown
   service::ServerOptions embedded;   // of the source in this process; `listen` is ignored
   double connect_timeout_s = 5;      // for one server
   double wait_s = 0;                 // Open tries again for so long while none answers: one may be starting
@@ -45,7 +47,7 @@ struct ConnectionOptions {
 class Connection {
  public:
   // Connects to the first server that answers, or starts a source in this process. UNAVAILABLE names every
-  // server that was tried, after `wait_s`.
+  // server that was tried, after `wait_s`; INVALID_ARGUMENT at once where one answers that these credentials do not fit.
   static absl::StatusOr<std::unique_ptr<Connection>> Open(ConnectionOptions options);
   ~Connection();
 

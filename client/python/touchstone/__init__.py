@@ -17,6 +17,7 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 from .batch import Batch, EncodedImages
 from .box_touches import box_touches
 from .client import Client, connect
+from .credentials import Credentials
 from .dataset import Dataset, Header
 from .errors import (
     InvalidRequest,
@@ -41,7 +42,7 @@ from .session import Session, touch_id
 from .version import __version__
 
 __all__ = [
-    "Batch", "Camera", "Client", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
+    "Batch", "Camera", "Client", "Credentials", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
     "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model", "NotFound", "ObjectInfo", "Parameter",
     "Permutation", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
     "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches", "TouchstoneError", "Value", "__version__",

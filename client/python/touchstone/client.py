@@ -12,6 +12,7 @@ import numpy as np
 from . import checks, models, units
 from .batch import Batch
 from .connection import Connection, Retry, Targets
+from .credentials import Credentials
 from .dataset import Dataset
 from .diagnosis import Diagnosis
 from .errors import InvalidRequest, TouchstoneError
@@ -31,7 +32,9 @@ _SOURCE = source_pb2_grpc.SourceStub
 _MODELS = models_pb2_grpc.ModelsStub
 
 
-def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = 60.0) -> Client:
+def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = 60.0,
+            ca: str | None = None, cert: str | None = None, key: str | None = None, token: str | None = None,
+            token_file: str | None = None) -> Client:
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
 
     Args:
@@ -40,9 +43,15 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
       timeout_s: how long to wait for the first answer; SourceUnreachable after that.
       retry_for_s: how long a lost source is tried again, and the other targets with it, before
         SourceUnreachable is raised; counted from the last thing that arrived.
+      ca: speak TLS: PEM file of the CA of the source's certificate, or "system". Default: TOUCHSTONE_TLS_CA.
+      cert, key: PEM files of a client certificate. Default: TOUCHSTONE_TLS_CERT and TOUCHSTONE_TLS_KEY.
+      token: that the source asks for. Default: TOUCHSTONE_TOKEN.
+      token_file: file with it, read for every call, so that it may be replaced. Default: TOUCHSTONE_TOKEN_FILE.
     """
     own = OwnServer() if targets is None else None
-    client = Client(own.target if own else targets, retry_for_s=retry_for_s)
+    # A source of our own asks for nothing, whatever the environment has for others.
+    credentials = Credentials() if own else Credentials.of(ca, cert, key, token, token_file)
+    client = Client(own.target if own else targets, retry_for_s=retry_for_s, credentials=credentials)
     client.own_server = own
     client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
     return client
@@ -57,8 +66,8 @@ class Client(Diagnosis):
       own_server: that connect() started for it, or None; close() ends it.
     """
 
-    def __init__(self, targets: Targets, *, retry_for_s: float = 60.0):
-        super().__init__(Connection(targets, checks.number("retry_for_s", retry_for_s)))
+    def __init__(self, targets: Targets, *, retry_for_s: float = 60.0, credentials: Credentials | None = None):
+        super().__init__(Connection(targets, checks.number("retry_for_s", retry_for_s), credentials=credentials))
         self.own_server: OwnServer | None = None
         self._description: Description | None = None
         self._leases: list[Lease] = []
@@ -76,6 +85,11 @@ class Client(Diagnosis):
     @property
     def retry_for_s(self) -> float:
         return self._connection.retry_for_s
+
+    @property
+    def credentials(self) -> Credentials:
+        """What the source is shown."""
+        return self._connection.credentials
 
     def close(self) -> None:
         self._connection.close()

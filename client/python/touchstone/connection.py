@@ -11,6 +11,7 @@ from typing import Any, Sequence, Union
 import grpc
 
 from . import errors
+from .credentials import Credentials
 
 Targets = Union[str, Sequence[str]]
 
@@ -101,10 +102,15 @@ class Retry:
 class Connection:
     """Not thread-safe to reconnect; give every thread its own."""
 
-    def __init__(self, targets: Targets, retry_for_s: float = 60.0, begin_with: int = 0):
-        """`begin_with`: which target comes first, modulo their number, so that many clients spread over them."""
+    def __init__(self, targets: Targets, retry_for_s: float = 60.0, begin_with: int = 0,
+                 credentials: Credentials | None = None):
+        """`begin_with`: which target comes first, modulo their number, so that many clients spread over them.
+
+        `credentials`: what the targets are shown; None: what the environment says.
+        """
         self.targets = parse_targets(targets)
         self.retry_for_s = retry_for_s
+        self.credentials = Credentials.of() if credentials is None else credentials
         self._position = begin_with % len(self.targets)
         self._channel: grpc.Channel | None = None
         self._pid = 0
@@ -115,7 +121,7 @@ class Connection:
 
     def another(self) -> Connection:
         """A new one to the same targets, beginning with the one in use."""
-        return Connection(self.targets, self.retry_for_s, self._position)
+        return Connection(self.targets, self.retry_for_s, self._position, self.credentials)
 
     def channel(self) -> grpc.Channel:
         if self._channel is not None and self._pid != os.getpid():
@@ -123,7 +129,7 @@ class Connection:
         if self._channel is None:
             if grpc_was_used_before_fork():
                 raise self._forked()
-            self._channel = grpc.insecure_channel(self.target, options=_OPTIONS)
+            self._channel = self.credentials.channel(self.target, _OPTIONS)
             self._pid = os.getpid()
             _processes_with_grpc.add(self._pid)
         return self._channel
@@ -156,6 +162,7 @@ class Connection:
           retry_for_s: how long to retry; by default the connection's.
         """
         retry = Retry(len(self.targets), self.retry_for_s if retry_for_s is None else retry_for_s)
+        explained = False
         while True:
             try:
                 return getattr(stub(self.channel()), method)(request, timeout=timeout_s)
@@ -163,5 +170,10 @@ class Connection:
                 failure = errors.from_rpc(error, self.target)
                 if not (repeat and errors.is_lost(error)):
                     raise failure from None
+                if not explained and len(self.targets) == 1 and isinstance(failure, errors.SourceUnreachable):
+                    explained = True
+                    why = self.credentials.explain(self.target)
+                    if why:
+                        raise errors.Refused(why, failure.code, self.target) from None
             self.move_on()
             retry.lost(failure)

@@ -80,7 +80,7 @@ class Samples(Sequence):
     def __getstate__(self) -> dict[str, Any]:
         """Without connections and leases: a lease belongs to the process that took it."""
         state = dict(self.__dict__, _own=None, _hold_lease=None)
-        state["_parent"] = (self._parent.targets, self._parent.retry_for_s)
+        state["_parent"] = (self._parent.targets, self._parent.retry_for_s, 0, self._parent.credentials)
         state["spec"] = self.spec.SerializeToString()
         state["_header"] = self._header and self._header.SerializeToString()
         return state

@@ -99,6 +99,7 @@ class TouchstoneDataset(IterableDataset):
         super().__init__()
         self._targets = target.targets if isinstance(target, Client) else parse_targets(target)
         self._retry_for_s = target.retry_for_s if isinstance(target, Client) else retry_for_s
+        self._credentials = target.credentials if isinstance(target, Client) else None
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
             touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
@@ -271,7 +272,7 @@ class TouchstoneDataset(IterableDataset):
         spec = source_pb2.DatasetSpec.FromString(self._spec)
         if self.new_samples_each_epoch:
             spec.seed = epoch_seed(self._seed, epoch)
-        connection = Connection(self._targets, self._retry_for_s, begin_with=self.rank * workers + worker)
+        connection = Connection(self._targets, self._retry_for_s, self.rank * workers + worker, self._credentials)
         dataset = Dataset(
             connection, spec, batch_size=self.batch_size, start=start, stop=stop, stride=self.ranks * workers,
             hold_lease=lambda: self._lease(connection, worker),
