@@ -27,6 +27,12 @@ absl::StatusOr<std::shared_ptr<const AccessFile>> ReadAccessFile(const std::stri
   return std::make_shared<const AccessFile>(std::move(file));
 }
 
+absl::Status CheckRole(const Caller& caller, Role needed, const std::string& what) {
+  if (caller.role >= needed) return absl::OkStatus();
+  return absl::PermissionDeniedError(absl::StrCat(what, " needs the role ", RoleName(needed), "; '",
+                                                  caller.name, "' has the role ", RoleName(caller.role)));
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Access>> Access::Create(const std::string& listen,
@@ -129,10 +135,7 @@ absl::Status Access::Authorize(absl::string_view method, const ShownCredentials&
   const Role needed = RoleNeeded(method, motion_).value_or(Role::kReader);
   if (needed == Role::kNobody) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const Caller caller, Authenticate(shown));
-  if (caller.role >= needed) return absl::OkStatus();
-  return absl::PermissionDeniedError(absl::StrCat(MethodName(method), " needs the role ", RoleName(needed),
-                                                  "; '", caller.name, "' has the role ",
-                                                  RoleName(caller.role)));
+  return CheckRole(caller, needed, MethodName(method));
 }
 
 Caller Access::CallerOf(const grpc::ServerContext& context) {
@@ -146,6 +149,10 @@ Caller Access::CallerOf(const grpc::ServerContext& context) {
       shown.certificate_names.emplace_back(name.data(), name.size());
   // Its credentials may have been taken from it since it was let in.
   return Authenticate(shown).value_or(Caller{"", Role::kNobody});
+}
+
+absl::Status Access::Require(const grpc::ServerContext& context, Role needed, const std::string& what) {
+  return CheckRole(CallerOf(context), needed, what);
 }
 
 void Access::LogRefusal(absl::string_view method, const absl::Status& why) {

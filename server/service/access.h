@@ -47,6 +47,9 @@ class Access {
   // Who makes a call that was let in; without a name where nobody is asked, as inside of this process.
   Caller CallerOf(const grpc::ServerContext& context);
 
+  // For what a request asks beyond its method: PERMISSION_DENIED if its caller's role is below `needed`.
+  absl::Status Require(const grpc::ServerContext& context, Role needed, const std::string& what);
+
   // Logs a refusal; a flood of them as one line a second.
   void LogRefusal(absl::string_view method, const absl::Status& why);
 

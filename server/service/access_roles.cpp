@@ -64,7 +64,7 @@ const std::vector<MethodRole>& MethodRoles() {
       {"/touchstone.v1.Sessions/ExportSession", kReader, kReader},
       {"/touchstone.v1.Sessions/DeleteSession", kAdmin, kAdmin},
       {"/touchstone.v1.Sessions/RestoreSession", kAdmin, kAdmin},
-      // They calculate from what is sent along and keep nothing.
+      // They calculate from what is sent along and keep nothing; Diagnose with save_model, which does, asks for an admin itself.
       {"/touchstone.v1.Diagnosis/Compare", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Diagnose", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Propose", kReader, kReader},

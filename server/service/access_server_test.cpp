@@ -16,6 +16,7 @@
 #include "server/service/test_call.h"
 #include "server/service/test_certificates.h"
 #include "touchstone/v1/control.grpc.pb.h"
+#include "touchstone/v1/diagnosis.grpc.pb.h"
 
 namespace touchstone::service {
 namespace {
@@ -135,6 +136,26 @@ TEST_F(AccessServerTest, EveryMethodTakesItsRoleAndRefusesEachLowerOne) {
                           HasSubstr(std::string("has the role ") + RoleName(role))));
     }
   }
+}
+
+TEST_F(AccessServerTest, ADiagnosisThatKeepsItsModelTakesAnAdmin) {
+  Start();
+  const auto stub = v1::Diagnosis::NewStub(Channel());
+  const auto diagnose = [&](Role role) {
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer " + tokens_[role]);
+    v1::DiagnoseRequest request;
+    request.set_save_model("mine");
+    v1::DiagnoseResponse response;
+    const auto reader = stub->Diagnose(&context, request);
+    while (reader->Read(&response)) {
+    }
+    return reader->Finish();
+  };
+  EXPECT_EQ(diagnose(Role::kOperator).error_code(), grpc::PERMISSION_DENIED);
+  EXPECT_THAT(diagnose(Role::kReader).error_message(),
+              HasSubstr("with save_model needs the role admin; 'reader-of-tests'"));
+  EXPECT_EQ(diagnose(Role::kAdmin).error_code(), grpc::INVALID_ARGUMENT);  // without evidence
 }
 
 TEST_F(AccessServerTest, TellsStrangersWhatIsMissing) {

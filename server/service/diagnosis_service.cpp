@@ -210,9 +210,13 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
                                         grpc::ServerWriter<v1::DiagnoseResponse>* writer) {
   // Before the work, what can be known before it.
   const std::string& name = request->save_model();
-  if (!name.empty())
+  if (!name.empty()) {
+    const absl::Status allowed =
+        resources_->access->Require(*context, Role::kAdmin, "Diagnosis.Diagnose with save_model");
+    if (!allowed.ok()) return ToGrpc(allowed);
     if (const absl::Status status = ModelStore::CheckName(name); !status.ok())
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
+  }
   v1::Report report;
   const Work work = [with_surface_map = request->with_surface_map()](
                         const diagnosis::DiagnosisInput& input,
