@@ -98,7 +98,7 @@ def _warn_of_faces_without_touches(plan: PlanLike, samples: int, objects: int) -
         return
     touches = -(-samples // objects)
     reached = -(-touches // plan.samples_per_face)
-    if reached < 6:
+    if reached < 6 and -(-touches // 6) < plan.samples_per_face:
         warnings.warn(f"samples={samples} of {objects} objects are {touches} touches of each, which reach {reached} of the 6 faces: "
                       f"faces(samples_per_face={plan.samples_per_face}) makes all touches of one face before the next. With "
                       f"samples_per_face={-(-touches // 6)} they reach all.", stacklevel=4)

@@ -73,7 +73,7 @@ def pools(tmp_path_factory):
     with Context(Settings(tmp_path_factory.mktemp("training"), quick=True, rig=os.environ.get("TOUCHSTONE_RIG", ""))) as context:
         context.begin("test")
         size = 300 * 20 + 500
-        yield (context.simulated(plans.SIMULATED, size, model=plans.IDEAL), context.simulated(plans.SIMULATED, size, model=plans.NOISY),
+        yield (context.simulated(size, model=plans.IDEAL), context.simulated(size, model=plans.NOISY),
                context.measured(plans.measured(context.settings), options=plans.RIG))
 
 

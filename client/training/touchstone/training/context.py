@@ -13,10 +13,10 @@ import numpy as np
 
 import touchstone
 
+from . import plans
 from .emulated_rig import EmulatedRig
 from .settings import SUPERSHAPES, Settings
 from .touch_data import TouchData, collect
-
 
 
 class Context:
@@ -59,9 +59,10 @@ class Context:
             rig.stop()
         self._rigs = {}
 
-    def simulated(self, plan: Any, samples: int, *, objects: Sequence[str] = SUPERSHAPES, model: str | None = None,
+    def simulated(self, samples: int, *, plan: Any = None, objects: Sequence[str] = SUPERSHAPES, model: str | None = None,
                   seed: int = 1, image: Any = None) -> TouchData:
-        """`samples` touches of all objects together, in turn, by the simulator."""
+        """`samples` touches of all objects together, in turn, by the simulator; `plan` None: of plans.simulated()."""
+        plan = plans.simulated(samples, len(objects)) if plan is None else plan
         return collect(self.simulator, objects, plan, samples, model=model, seed=seed, image=image)
 
     def measured(self, plan: Any, *, objects: Sequence[str] = SUPERSHAPES, options: Sequence[str] = (), seed: int = 1,

@@ -26,7 +26,7 @@ HIDDEN = ("--hide", "finger_length.offset_mm=-0.3,0.4,-0.1", "--hide", "object_p
 RIG = ("--sigma-us", f"{SIGMA_US:.0f}", *HIDDEN)
 NOMINAL = ("touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
            f"  - gaussian_noise: {{sigma_us: {SIGMA_US:.0f}}}\n")
-STANDOFF_MM = 60.0  # of plans.SIMULATED and of every faces plan
+STANDOFF_MM = 60.0  # of every plan of faces here
 # The objects whose touches are diagnosed; the models are tried on all five.
 DIAGNOSED = ("lat00", "lat20")
 

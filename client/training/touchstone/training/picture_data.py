@@ -1,8 +1,9 @@
 """Photographs of objects from both sources, chosen once for all experiments of images; what is done to them; their features.
 
-The camera sees the whole object. Simulated pictures are taken from all directions, as the seed's were; the rig's along the
-approaches of a plan of faces, `DISTANCE_MM` from where the finger would touch. The arm may not stand farther than `STANDOFF_MM`
-from a target, so the target lies in front of the object; nothing is touched.
+The camera sees the whole object, and stands where it stands whatever the object: how large an object looks tells how large it
+is, and nothing else. Simulated pictures are taken from all directions, as the seed's were, `RADIUS_MM` from the middle; the rig's
+along random approaches to the six faces of the box in which all objects lie, `DISTANCE_MM` from it. The arm may not stand farther
+than `STANDOFF_MM` from a target, so the target lies in front of the object; nothing is touched.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from .backbone import Backbone
 from .context import Context
 from .settings import SUPERSHAPES
 
-STANDOFF_MM, DISTANCE_MM = 150.0, 250.0
+STANDOFF_MM, DISTANCE_MM, RADIUS_MM = 150.0, 250.0, 310.0
 SIDE_PX = 224
 VIRTUAL = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
 # Seeds of poses: of what the rig photographs, and far from it of what is simulated.
@@ -54,18 +55,24 @@ def joined(*parts: Pictures) -> Pictures:
                     " + ".join(p.kind for p in parts))
 
 
-def rig_poses(client: touchstone.Client, name: str, count: int, seed: int) -> touchstone.Touches:
+def rig_poses(per_face: int, seed: int) -> touchstone.Touches:
     """Random approaches to the six faces in turn, none of them twice, from which the camera sees the whole object."""
-    plan = touchstone.faces(samples_per_face=1_000_000, rounds=1, standoff_mm=STANDOFF_MM, spread=0.1)
-    touches = client.plan(plan, name, count, seed=seed)
-    return dataclasses.replace(touches, target_mm=touches.target_mm - (DISTANCE_MM - STANDOFF_MM) * touches.approach)
+    touches = plans.blind(per_face, seed, spread=0.1, standoff_mm=STANDOFF_MM)
+    in_turn = touches[np.arange(6 * per_face).reshape(6, per_face).T.ravel()]
+    return dataclasses.replace(in_turn, target_mm=in_turn.target_mm - (DISTANCE_MM - STANDOFF_MM) * in_turn.approach)
+
+
+def virtual_poses(client: touchstone.Client, name: str, count: int, seed: int) -> touchstone.Touches:
+    """Random directions towards the middle of the object, all from RADIUS_MM."""
+    found = client.plan(VIRTUAL, name, count, seed=seed)
+    return dataclasses.replace(found, standoff_mm=np.full(count, RADIUS_MM))
 
 
 def virtual(context: Context, per_object: int, seed: int, normalize: bool = False) -> Pictures:
     """Simulated ones of all objects from random directions, without noise; other poses for every seed."""
     client = context.simulator
     image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
-    found = [client.capture(name, client.plan(VIRTUAL, name, per_object, seed=_VIRTUAL_SEED + seed), image=image,
+    found = [client.capture(name, virtual_poses(client, name, per_object, _VIRTUAL_SEED + seed), image=image,
                             model=plans.IDEAL)["image"] for name in SUPERSHAPES]
     return Pictures(np.concatenate(found), np.repeat(np.arange(len(SUPERSHAPES)), per_object), "virtual")
 
@@ -73,7 +80,7 @@ def virtual(context: Context, per_object: int, seed: int, normalize: bool = Fals
 def measured(context: Context, per_object: int, normalize: bool = False) -> Pictures:
     """By the rig's camera. Kept in the folder of the run: an arm takes its time."""
     settings = context.settings
-    words = json.dumps([per_object, normalize, settings.rig, plans.RIG, DISTANCE_MM, SIDE_PX])
+    words = json.dumps([per_object, normalize, settings.rig, plans.RIG, "blind", DISTANCE_MM, SIDE_PX])
     path = settings.out / "measured" / f"pictures-{hashlib.sha256(words.encode()).hexdigest()[:16]}.npz"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,15 +97,15 @@ def _photograph(context, per_object, normalize):
     client, found = context.rig(*plans.RIG), []
     total = per_object * len(SUPERSHAPES)
     image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
-    for name in SUPERSHAPES:
-        views, taken = rig_poses(client, name, 2 * per_object + 10, _RIG_SEED), 0
-        for k in range(len(views)):
+    for k, name in enumerate(SUPERSHAPES):
+        views, taken = rig_poses(per_object // 3 + 2, _RIG_SEED + k), 0
+        for view in range(len(views)):
             if taken == per_object:
                 break
             if len(found) % 25 == 0:
                 context.progress(0, f"photographed {len(found)} of {total} times with the rig")
             try:
-                found.append(client.capture(name, views[k], image=image)["image"])
+                found.append(client.capture(name, views[view], image=image)["image"])
                 taken += 1
             except touchstone.InvalidRequest:
                 continue  # out of reach; the next pose is another one

@@ -14,8 +14,20 @@ SIGMA_US = 47790.0
 IDEAL = "touchstone: model/1\nname: ideal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects: []\n"
 NOISY = ("touchstone: model/1\nname: noisy\nend_effector: {fingers: 3, spacing_mm: 30}\n"
          f"effects:\n  - gaussian_noise: {{sigma_us: {SIGMA_US:.0f}}}\n")
-# What is simulated: random approaches to the six faces, as a rig makes them, but never the same twice.
-SIMULATED = touchstone.faces(samples_per_face=1_000_000, rounds=1)
+# The shipped shapes all lie within 75 mm of their origin.
+BOX_MM = 75.0
+
+
+def simulated(samples: int, objects: int = len(OBJECTS)) -> Any:
+    """What is simulated: random approaches to the six faces alike, as a rig makes them, but never the same twice; so many of
+    all objects together. A plan of faces goes face by face, so that its size is that of the samples."""
+    return touchstone.faces(samples_per_face=-(-samples // (6 * objects)), rounds=1)
+
+
+def blind(per_face: int, seed: int, **how: Any) -> touchstone.Touches:
+    """Touches along the same lines whatever lies there: of a robot that knows where an object lies, and not which.
+    `how`: of touchstone.box_touches()."""
+    return touchstone.box_touches((-BOX_MM,) * 3, (BOX_MM,) * 3, per_face, seed=seed, **how)
 
 
 # The emulated rig in the rig's place: the seed's noise, and physics that no simulation here is told of.

@@ -44,7 +44,7 @@ def run(context: Context) -> Result:
 def _simulated(context: Context, model: str, seed: int, sets: int):
     """(features, objects) of simulated touches."""
     objects = len(plans.OBJECTS)
-    data = context.simulated(plans.SIMULATED, sets * TOUCHES * objects, model=model, seed=seed)
+    data = context.simulated(sets * TOUCHES * objects, model=model, seed=seed)
     return feature_sets(data, TOUCHES, np.random.default_rng(seed))
 
 
@@ -93,7 +93,7 @@ def _alone(context):
             # The same poses with and without the effect.
             losses.append(float(of(_simulated(context, ladder.NOMINAL, 3000 + seed, sets)) -
                                 of(_simulated(context, model, 3000 + seed, sets))))
-        ladder.write_set(context.simulated(plans.SIMULATED, settings.pick(200, 2000), model=model, seed=4000), path)
+        ladder.write_set(context.simulated(settings.pick(200, 2000), model=model, seed=4000), path)
         found[name] = context.simulator.compare(path, ladder.NOMINAL).rmse_us, losses
     return found
 
@@ -134,7 +134,7 @@ def _deal(data, rng):
 
 def _more_poses(context, rig):
     """Commanded touches that the rig was not asked for, MORE times as many; their times are the nominal model's."""
-    return context.simulated(plans.SIMULATED, MORE * len(rig), model=ladder.NOMINAL, seed=5000)
+    return context.simulated(MORE * len(rig), model=ladder.NOMINAL, seed=5000)
 
 
 def _curvature(data, times_us):

@@ -34,7 +34,7 @@ def run(context: Context) -> Result:
 
 
 def _simulated(context, model, seed, sets, touches):
-    data = context.simulated(plans.SIMULATED, sets * touches * len(plans.OBJECTS), model=model, seed=seed)
+    data = context.simulated(sets * touches * len(plans.OBJECTS), model=model, seed=seed)
     return feature_sets(data, touches, np.random.default_rng(seed))
 
 

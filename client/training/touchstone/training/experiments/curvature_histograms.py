@@ -21,8 +21,8 @@ def run(context: Context) -> Result:
     per_object = settings.pick(200, 4000)
     objects = plans.OBJECTS
     sources = {
-        "ideal": context.simulated(plans.SIMULATED, per_object * len(objects), model=plans.IDEAL),
-        "noisy": context.simulated(plans.SIMULATED, per_object * len(objects), model=plans.NOISY),
+        "ideal": context.simulated(per_object * len(objects), model=plans.IDEAL),
+        "noisy": context.simulated(per_object * len(objects), model=plans.NOISY),
         settings.measured_kind: context.measured(plans.measured(settings), options=plans.RIG),
     }
     values = {name: [data.curvature()[data.object == k] for k in range(len(objects))] for name, data in sources.items()}

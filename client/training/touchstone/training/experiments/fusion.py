@@ -84,8 +84,8 @@ def halves(touches: TouchData, seed: int) -> tuple[TouchData, TouchData]:
 
 def touch_recognisers(context: Context, seed: int, real: TouchData | None = None) -> list[TouchRecogniser]:
     """Trained on virtual touches; then also one on virtual and on these measured ones, if there are any."""
-    per_set, sets = _per_set(context), context.settings.pick(200, _SETS)
-    touches = context.simulated(plans.SIMULATED, per_set * sets, model=plans.NOISY, seed=seed)
+    per_set, sets = _per_set(context), _SETS
+    touches = context.simulated(per_set * sets, model=plans.NOISY, seed=seed)
     data = features.feature_sets(touches, per_set, np.random.default_rng([seed, 3]), sets=sets)
     found = [TouchRecogniser(seed, data)]
     if real is not None:
@@ -98,7 +98,7 @@ def all_virtual(context: Context, cache: FeatureCache, seed: int) -> dict[str, f
     """Trained and tested on virtual data alone; what is tested on is drawn with another seed."""
     size, per_set = sizes(context), _per_set(context)
     touch = touch_recognisers(context, seed)[0]
-    unseen = context.simulated(plans.SIMULATED, per_set * 12 * CLASSES, model=plans.NOISY, seed=TEST_SEEDS + seed)
+    unseen = context.simulated(per_set * 40 * CLASSES, model=plans.NOISY, seed=TEST_SEEDS + seed)
     sets, objects = features.feature_sets(unseen, per_set, np.random.default_rng([seed, 5]))
     train, test = virtual(context, size.train_per_object, seed), virtual(context, size.test_per_object, TEST_SEEDS + seed)
     values = cache(train)
@@ -150,7 +150,7 @@ def _result(context, cache, found, virtual_only):
     rows = [[*key.split(" x "), kind, *_row(runs)] for key, runs in cells.items()] + [["virtual", "virtual", "virtual", *_row(virtual_only)]]
     best = list(cells.values())[-1]
     made_on = [
-        f"touch: {settings.pick(200, _SETS)} sets of {_per_set(context)} virtual touches, others for every seed; half (by poses) of the "
+        f"touch: {_SETS} sets of {_per_set(context)} virtual touches, others for every seed; half (by poses) of the "
         f"{plans.measured(settings).samples(CLASSES):,} {kind} touches in training where they are, the other half in testing, divided "
         "anew for every seed, made once",
         f"image: {size.train_per_object * CLASSES:,} virtual pictures, others for every seed; {size.measured_train} {kind} ones with "

@@ -20,7 +20,7 @@ TEST_SHARE = 0.4  # of the poses
 def training_sets(context: Context, rig, rows: np.ndarray, seed: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Features and objects of every training set that is compared, by name; `rows` of the rig's touches may be trained on."""
     kind = context.settings.measured_kind
-    virtual = {name: feature_sets(context.simulated(plans.SIMULATED, (VIRTUAL + REAL) * TOUCHES + 500, model=model, seed=seed),
+    virtual = {name: feature_sets(context.simulated((VIRTUAL + REAL) * TOUCHES + 500, model=model, seed=seed),
                                   TOUCHES, context.rng(name, seed), sets=VIRTUAL + REAL)
                for name, model in (("ideal", plans.IDEAL), ("noisy", plans.NOISY))}
     real = drawn_sets(rig[rows], TOUCHES, REAL_ALONE, context.rng("rig", seed))

@@ -27,7 +27,7 @@ class Choices:
     features: Callable[[np.ndarray], np.ndarray] = features.histogram
     by_pose: bool = True
     recogniser: Callable[[int], Any] = recognisers.SEEDS["XGBoost"]
-    plan: Any = plans.SIMULATED
+    plan: Any = None  # plans.simulated()
     sigma_us: float = plans.SIGMA_US
 
 
@@ -84,7 +84,7 @@ def _accuracy(context: Context, rig, choices: Choices, seed: int) -> float:
     model = plans.NOISY.replace(f"{plans.SIGMA_US:.0f}", f"{choices.sigma_us:.0f}")
     rows, test_rows = split(rig, TEST_SHARE, context.rng("split", seed), by_pose=choices.by_pose)
     test = drawn_sets(rig[test_rows], TOUCHES, TEST_SETS, context.rng("test", seed), features=choices.features)
-    pool = context.simulated(choices.plan, VIRTUAL * TOUCHES + 500, model=model, seed=seed)
+    pool = context.simulated(VIRTUAL * TOUCHES + 500, plan=choices.plan, model=model, seed=seed)
     virtual = features.feature_sets(pool, TOUCHES, context.rng("virtual", seed), sets=VIRTUAL, features=choices.features)
     real = drawn_sets(rig[rows], TOUCHES, REAL, context.rng("rig", seed), features=choices.features)
     return recognisers.accuracy(choices.recogniser(seed), tuple(np.concatenate(pair) for pair in zip(virtual, real)), test)

@@ -23,7 +23,7 @@ def run(context: Context) -> Result:
     found = {where: np.zeros((len(names), settings.seeds, len(counts))) for where in ("simulated", settings.measured_kind)}
     for step, seed in enumerate(settings.runs):
         context.progress(step / settings.seeds, f"seed {seed}")
-        pool = context.simulated(plans.SIMULATED, (TRAINING_SETS + TEST_SETS) * max(counts) + 500, model=plans.NOISY, seed=seed)
+        pool = context.simulated((TRAINING_SETS + TEST_SETS) * max(counts) + 500, model=plans.NOISY, seed=seed)
         for place, touches in enumerate(counts):
             features, objects = feature_sets(pool, touches, context.rng("simulated", seed, touches), sets=TRAINING_SETS + TEST_SETS)
             order = context.rng("order", seed, touches).permutation(len(features))

@@ -50,11 +50,9 @@ def run(context: Context) -> Result:
 
 
 def _candidates(context) -> touchstone.Touches:
-    """Explicit touches of every face, up to its rim, so that fingers may pass; the same for all objects."""
-    found = context.simulator.plan(touchstone.faces(samples_per_face=context.settings.pick(4, 16), rounds=1, spread=1.0),
-                                   plans.OBJECTS[0], count=6 * context.settings.pick(4, 16), seed=21)
-    return touchstone.touches(target_mm=found.target_mm, approach=found.approach, lateral=found.lateral,
-                              standoff_mm=ladder.STANDOFF_MM, speed_mm_s=20.0, stroke_mm=STROKE_MM)
+    """Touches of every face of the box in which all objects lie, up to its rim, so that fingers may pass; the same lines for
+    all objects, drawn without knowledge of any."""
+    return plans.blind(context.settings.pick(4, 16), seed=21, spread=1.0, standoff_mm=ladder.STANDOFF_MM, stroke_mm=STROKE_MM)
 
 
 def _touch(client, candidates, model, seed):

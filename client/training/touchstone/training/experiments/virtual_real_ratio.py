@@ -25,7 +25,7 @@ def run(context: Context) -> Result:
         context.progress(step / settings.seeds, f"seed {seed}")
         rows, test_rows = split(rig, TEST_SHARE, context.rng("split", seed))
         test = drawn_sets(rig[test_rows], TOUCHES, TEST_SETS, context.rng("test", seed))
-        pool = context.simulated(plans.SIMULATED, SETS * TOUCHES + 500, model=plans.NOISY, seed=seed)
+        pool = context.simulated(SETS * TOUCHES + 500, model=plans.NOISY, seed=seed)
         virtual = feature_sets(pool, TOUCHES, context.rng("virtual", seed), sets=SETS)
         order = context.rng("order", seed).permutation(SETS)
         real = drawn_sets(rig[rows], TOUCHES, SETS, context.rng("rig", seed))
