@@ -100,6 +100,21 @@ install_current_python() {
   "$into/bin/python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/touchstone-*.whl
 }
 
+# The schemas of Kubernetes and of Argo's workflows, for tests/cluster, in an environment of their own. Where PyPI cannot be
+# reached those tests are skipped, and say so.
+install_cluster_checks() {
+  local wanted='kubernetes-validate==1.37.0 hera==7.1.0' into=$root/build/cluster_venv
+  if [[ -f $into/installed && $(< "$into/installed") == "$wanted" ]]; then return; fi
+  rm -rf "$into"
+  /usr/bin/python3 -m venv --system-site-packages "$into" || return
+  # shellcheck disable=SC2086
+  if "$into/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 $wanted; then
+    printf '%s' "$wanted" > "$into/installed"
+  else
+    echo "PyPI cannot be reached: the schemas of the manifests are not checked"
+  fi
+}
+
 # What runs in the background, "PID NAME" each; stop_programs ends it.
 programs=()
 

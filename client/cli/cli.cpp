@@ -244,6 +244,7 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
 
 int Cli::Run(int argc, char** argv) {
   command_line_ = ShellCommand(argc, argv);
+  arguments_.assign(argv + std::min(argc, 1), argv + argc);
   // Last in every help, since they are the same everywhere.
   for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
   for (const auto& [command, run] : runs_)

@@ -87,6 +87,8 @@ class Cli {
   const OutputOptions& output() const { return output_; }
   // What was typed, as a shell takes it.
   const std::string& command_line() const { return command_line_; }
+  // The same in words, without the program.
+  const std::vector<std::string>& arguments() const { return arguments_; }
 
   // A line to stderr: Log unless --quiet, Detail only with --verbose.
   void Log(absl::string_view line) const;
@@ -121,6 +123,7 @@ class Cli {
   std::map<const CLI::App*, std::function<absl::Status()>> runs_;
   std::map<const CLI::App*, CommandFiles> files_;
   std::string command_line_;
+  std::vector<std::string> arguments_;
   std::vector<std::string> inputs_;  // paths that the running command reads
   bool stdout_taken_ = false;        // an output of the running command is standard output
 };

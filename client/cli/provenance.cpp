@@ -23,14 +23,18 @@ bool IsPlain(absl::string_view word) {
 
 }  // namespace
 
+std::string ShellWord(const std::string& word) {
+  if (IsPlain(word)) return word;
+  return absl::StrCat("'", absl::StrReplaceAll(word, {{"'", "'\\''"}}), "'");
+}
+
 std::string ShellCommand(int argc, const char* const* argv) {
   std::string text;
   for (int i = 0; i < argc; ++i) {
     std::string word = argv[i];
     // The program by its name: where it lies differs from machine to machine.
     if (i == 0) word = word.substr(word.rfind('/') + 1);
-    if (!IsPlain(word)) word = absl::StrCat("'", absl::StrReplaceAll(word, {{"'", "'\\''"}}), "'");
-    absl::StrAppend(&text, i == 0 ? "" : " ", word);
+    absl::StrAppend(&text, i == 0 ? "" : " ", ShellWord(word));
   }
   return text;
 }

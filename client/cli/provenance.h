@@ -10,7 +10,10 @@
 
 namespace touchstone::cli {
 
-// A command as a shell takes it: words with other characters than letters, digits and -_./,:=+@% in single quotes.
+// A word as a shell takes it: in single quotes where it has other characters than letters, digits and -_./,:=+@%.
+std::string ShellWord(const std::string& word);
+
+// A command as a shell takes it, its program by its name alone: words with other characters than letters, digits and -_./,:=+@% in single quotes.
 std::string ShellCommand(int argc, const char* const* argv);
 
 // Now, UTC: "2031-05-06T07:08:09Z".

@@ -10,6 +10,7 @@
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/slurm.h"
 #include "client/source/dataset_folder.h"
 #include "client/source/dataset_writer.h"
 #include "server/base/status.h"
@@ -22,6 +23,7 @@ struct StreamOptions {
   PlanOptions plan;
   ImageFlags image;
   MotionFlags motion;
+  SlurmFlags slurm;
   std::vector<std::string> objects;
   std::vector<std::string> columns;
   std::string model;
@@ -171,6 +173,7 @@ absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_g
   if (o.like.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(job.spec, MakeSpec(cli, o, job.format, connection.get()));
   }
+  if (o.slurm.submit) return SubmitToSlurm(cli, o.slurm, connection.get(), std::move(job));
 
   ProgressBar bar(!cli.output().quiet);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, OpenLeased(cli, connection.get(), o.motion));
@@ -224,6 +227,8 @@ void AddStream(Cli* cli) {
       "touchstone stream --plan faces --model noisy.yaml --to folder --out faces\n"
       "touchstone stream --samples 1000000 --shards 0/4 --server a:50051,b:50051 --out data    "
       "one of four jobs\n"
+      "touchstone stream --samples 1000000 --out data --slurm --slurm-option=--time=60          "
+      "by a Slurm cluster\n"
       "touchstone stream --like data/dataset.json --out again                                  "
       "the same once more",
       [cli, options, shard_size] { return RunStream(*cli, *options, (*shard_size)->count() > 0); });
@@ -263,9 +268,11 @@ void AddStream(Cli* cli) {
       add("--to", options->format, "FORMAT",
           "webdataset: tar files; folder: touches.csv and images; hdf5. Default: webdataset", files);
   *shard_size = add("--shard-size", options->shard_size, "N", "Samples per shard. Default: 10000", files);
-  add("--shards", options->shards, "K/N",
-      "Write only shards K, K + N, ...: the part of job K of N that share the folder. Default: 0/1, all",
-      files);
+  CLI::Option* shards =
+      add("--shards", options->shards, "K/N",
+          "Write only shards K, K + N, ...: the part of job K of N that share the folder. Default: 0/1, all",
+          files);
+  AddSlurmOptions(command, &options->slurm, shards);
   add("--batch-size", options->batch_size, "N",
       "Samples per message; changes no byte. Default: the source's own", files);
   CLI::Option* like =

@@ -78,7 +78,7 @@ std::string DatasetWriter::ManifestPath() const {
   return absl::StrCat(job_.folder, "/dataset.job-", job_.job_index, "-of-", job_.job_count, ".json");
 }
 
-absl::Status DatasetWriter::Run() {
+absl::Status DatasetWriter::CheckJob() const {
   if (job_.shard_size == 0) return absl::InvalidArgumentError("--shard-size: 0; at least 1 sample per shard");
   if (job_.job_count == 0 || job_.job_index >= job_.job_count)
     return absl::InvalidArgumentError(absl::StrCat("--shards: ", job_.job_index, "/", job_.job_count,
@@ -87,6 +87,27 @@ absl::Status DatasetWriter::Run() {
     return absl::InvalidArgumentError(
         "--restart with --shards would delete the other jobs' shards; empty the folder "
         "before the jobs start");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<uint64_t>> DatasetWriter::Plan() {
+  if (job_.job_count != 1) return absl::InternalError("Plan is for a job that is alone");
+  TOUCHSTONE_RETURN_IF_ERROR(CheckJob());
+  TOUCHSTONE_RETURN_IF_ERROR(PrepareFolder());
+  TOUCHSTONE_RETURN_IF_ERROR(Resolve());
+  TOUCHSTONE_RETURN_IF_ERROR(FindFinishedShards());
+  TOUCHSTONE_RETURN_IF_ERROR(WriteManifest());
+  std::vector<uint64_t> missing;
+  for (uint64_t shard = 0; shard < layout_.ShardCount(); ++shard)
+    if (manifest_.shards.count(shard) == 0) missing.push_back(shard);
+  result_.dataset_complete = missing.empty();
+  if (missing.empty()) RemoveJobManifests();
+  lock_.reset();
+  return missing;
+}
+
+absl::Status DatasetWriter::Run() {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckJob());
   TOUCHSTONE_RETURN_IF_ERROR(PrepareFolder());
   TOUCHSTONE_RETURN_IF_ERROR(Resolve());
   TOUCHSTONE_RETURN_IF_ERROR(FindFinishedShards());
@@ -251,7 +272,6 @@ absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shar
   };
   const std::unique_ptr<void, decltype(forget_stream)> guard(this, forget_stream);
 
-  auto manifest_written = std::chrono::steady_clock::now();
   uint64_t shard = first_shard;
   std::unique_ptr<ShardWriter> writer;
   Batch batch;
@@ -275,11 +295,8 @@ absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shar
       writer.reset();
       ++shard;
       ++result_.shards_written;
-      const auto now = std::chrono::steady_clock::now();
-      if (std::chrono::duration<double>(now - manifest_written).count() >= kManifestIntervalS) {
-        TOUCHSTONE_RETURN_IF_ERROR(WriteManifest());
-        manifest_written = now;
-      }
+      const std::chrono::duration<double> unlisted = std::chrono::steady_clock::now() - manifest_written_;
+      if (unlisted.count() >= kManifestIntervalS) TOUCHSTONE_RETURN_IF_ERROR(WriteManifest());
     }
     result_.samples_written += batch.rows();
     result_.draws += batch.message().draws();
@@ -291,6 +308,7 @@ absl::Status DatasetWriter::WriteShards(uint64_t first_shard, uint64_t stop_shar
 }
 
 absl::Status DatasetWriter::WriteManifest() {
+  manifest_written_ = std::chrono::steady_clock::now();
   const bool complete = job_.job_count == 1 && manifest_.shards.size() == layout_.ShardCount();
   return WriteFileAtomically(ManifestPath(), FormatManifest(manifest_, complete));
 }
@@ -304,11 +322,15 @@ absl::Status DatasetWriter::CompleteTogether() {
   if (merged.shards.size() < layout_.ShardCount()) return absl::OkStatus();
   TOUCHSTONE_RETURN_IF_ERROR(
       WriteFileAtomically(absl::StrCat(job_.folder, "/", kManifestName), FormatManifest(merged, true)));
+  RemoveJobManifests();
+  result_.dataset_complete = true;
+  return absl::OkStatus();
+}
+
+void DatasetWriter::RemoveJobManifests() {
   std::error_code ignored;
   for (const fs::path& path : ListFolder(job_.folder))
     if (IsWholeManifest(path) && path.filename() != kManifestName) fs::remove(path, ignored);
-  result_.dataset_complete = true;
-  return absl::OkStatus();
 }
 
 }  // namespace touchstone::client

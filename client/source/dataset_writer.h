@@ -3,10 +3,12 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include <absl/status/statusor.h>
 
@@ -57,6 +59,11 @@ class DatasetWriter {
   std::function<void(const DatasetProgress&)> on_progress;
   std::function<void(const std::string&)> on_log;
 
+  // What is left to do: the numbers of the shards that are not finished, in order. Reads every finished one, as Run
+  // does, and writes dataset.json, so that parallel jobs that start later make the same dataset by the same renderer; then
+  // lets go of the folder. For a job that is alone (job_count 1).
+  absl::StatusOr<std::vector<uint64_t>> Plan();
+
   // CANCELLED after Cancel: finished shards stay, and dataset.json (or the job's own file) lists them.
   absl::Status Run();
   const DatasetResult& result() const { return result_; }
@@ -67,13 +74,15 @@ class DatasetWriter {
  private:
   class FolderLock;
 
+  absl::Status CheckJob() const;
   absl::Status PrepareFolder();
   absl::Status Resolve();  // asks the source what the dataset is
   absl::Status FindFinishedShards();
   absl::StatusOr<bool> IsWhole(uint64_t shard, const std::map<uint64_t, FinishedShard>& listed);
   absl::Status WriteShards(uint64_t first_shard, uint64_t stop_shard);
   absl::Status WriteManifest();
-  absl::Status CompleteTogether();   // parallel jobs: dataset.json once all shards are there
+  absl::Status CompleteTogether();  // parallel jobs: dataset.json once all shards are there
+  void RemoveJobManifests();
   std::string ManifestPath() const;  // of this job
   bool Mine(uint64_t shard) const { return shard % job_.job_count == job_.job_index; }
   absl::StatusOr<std::unique_ptr<DatasetStream>> OpenStream(uint64_t start_index, uint64_t stop_index,
@@ -85,6 +94,7 @@ class DatasetWriter {
   DatasetManifest manifest_;
   DatasetResult result_;
   DatasetProgress progress_;
+  std::chrono::steady_clock::time_point manifest_written_;
   std::unique_ptr<FolderLock> lock_;
   v1::DatasetSpec request_spec_;  // as asked, with the model and the renderer that the source resolved
   std::atomic<bool> cancelled_{false};

@@ -1,5 +1,7 @@
 """A stream whose server dies goes on without a gap or a repeat."""
 
+import os
+import random
 import threading
 import time
 
@@ -45,6 +47,41 @@ def test_the_same_server_started_again_goes_on(server, new_server):
 
     dataset = touchstone.connect(own.target, retry_for_s=20).dataset(**OPTIONS, batch_size=500)
     np.testing.assert_array_equal(stream(dataset, 37, crash), expected(server))
+
+
+# Long runs: TOUCHSTONE_KILLS=100, as the step cluster of deploy/test.
+KILLS = int(os.environ.get("TOUCHSTONE_KILLS", 8))
+
+
+def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, monkeypatch):
+    servers = [new_server("--supershape-triangles", "20000") for _ in range(3)]
+    options = {**OPTIONS, "samples": 2 * (KILLS + 1) * 16384, "columns": ("index", "descriptor", "pose")}
+    client = touchstone.connect([each.target for each in servers], retry_for_s=60)
+    dataset = client.dataset(**options, batch_size=16384)
+    losses, lost = [], dataset._lost
+    monkeypatch.setattr(dataset, "_lost", lambda error, retry: (losses.append(error), lost(error, retry)))
+    chance, restarts, batches = random.Random(11), [None] * len(servers), []
+    for batch in dataset:
+        batches.append(batch)
+        if len(batches) % 2 or len(batches) > 2 * KILLS:
+            continue
+        # A blow at any moment of the next batch, and at any server: the one that streams, one that waits, one that starts.
+        time.sleep(chance.uniform(0, 0.02))
+        number = chance.randrange(len(servers)) if len(batches) > 2 else 0  # the first meets the one that streams
+        if restarts[number]:
+            restarts[number].join(60)
+        servers[number].kill()
+        restarts[number] = threading.Thread(target=servers[number].start_again)
+        restarts[number].start()
+    for restart in restarts:
+        if restart:
+            restart.join(60)
+    reference = list(touchstone.connect(server.target).dataset(**options))
+    for column in ("index", "descriptor_us", "target_mm", "approach"):
+        one, other = (np.concatenate([batch[column] for batch in each]) for each in (batches, reference))
+        assert one.tobytes() == other.tobytes()
+    print(f"{KILLS} kills; {len(losses)} times the client found its stream cut or a server gone")
+    assert losses, "no blow met the stream; the test shows nothing"
 
 
 def test_a_drained_server_hands_over(server, new_server):
