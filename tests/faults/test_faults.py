@@ -10,6 +10,7 @@ import kill_while_writing
 import many_clients
 import programs
 import replicas
+import silent_and_slow
 
 
 def passes(result):
@@ -42,6 +43,10 @@ def test_many_clients_get_the_same_bytes():
 
 def test_memory_is_flat_over_a_long_stream():
     passes(flat_memory.run(samples=5_000_000))
+
+
+def test_silent_and_slow_clients_do_not_shut_others_out():
+    passes(silent_and_slow.run())
 
 
 def test_a_loss_and_a_tear_are_seen():
