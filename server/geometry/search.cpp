@@ -151,6 +151,17 @@ std::string EmbreeDescription() {
                       instructions, ", packets of ", width);
 }
 
+namespace {
+
+// A ray that starts on a triangle does not meet that triangle: its id says which.
+void IgnoreOwnTriangle(const RTCFilterFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] == -1 && RTCRayN_id(args->ray, args->N, i) == RTCHitN_primID(args->hit, args->N, i))
+      args->valid[i] = 0;
+}
+
+}  // namespace
+
 Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
     : mesh_(mesh),
       centre_m_(bounds.Centre()),
@@ -172,6 +183,7 @@ Surface::Search::Search(const TriangleMesh& mesh, const Bounds& bounds)
                              inflated_vertices_m_.size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(mesh.triangles[0]), mesh.triangles.size());
+  rtcSetGeometryOccludedFilterFunction(geometry, IgnoreOwnTriangle);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);

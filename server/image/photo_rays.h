@@ -31,7 +31,7 @@ class RayPackets {
     }
   }
 
-  // Sets tfar below 0 where something stands in the way.
+  // Sets tfar below 0 where something stands in the way. `id`: of a triangle that does not count, kNoTriangle: all do.
   void Occluded(const int* valid, RTCRay16* rays) const {
     RTCIntersectContext context = Context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
     if (of_16_) return rtcOccluded16(valid, scene_, &context, rays);
