@@ -51,24 +51,25 @@ def curves(path: pathlib.Path, caption: str, x: Sequence[float], lines: Mapping[
            marks: Mapping[str, float] | None = None) -> Figure:
     """Lines with their 95 % bands over x; `chance` as a dotted line, `marks` as named dashed ones."""
     figure, axes = plt.subplots(figsize=(7, 4))
+    scale = 100 if y_label == "accuracy" else 1  # shares are shown in per cent, as in all words and tables
     for place, (name, points) in enumerate(lines.items()):
         look = colour(name, place)
-        axes.plot(x, [p.value for p in points], color=look, marker=_MARKERS[place % len(_MARKERS)], markersize=4, label=name)
-        axes.fill_between(x, [p.low for p in points], [p.high for p in points], color=look, alpha=0.2, linewidth=0)
+        axes.plot(x, [scale * p.value for p in points], color=look, marker=_MARKERS[place % len(_MARKERS)], markersize=4, label=name)
+        axes.fill_between(x, [scale * p.low for p in points], [scale * p.high for p in points], color=look, alpha=0.2, linewidth=0)
     for place, (name, height) in enumerate((marks or {}).items()):
-        axes.axhline(height, color=_INK, linestyle="--", linewidth=1)
-        axes.annotate(name, (1, height), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8)
+        axes.axhline(scale * height, color=_INK, linestyle="--", linewidth=1)
+        axes.annotate(name, (1, scale * height), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8)
     if chance is not None:
-        axes.axhline(chance, color=_GREY, linestyle=":", linewidth=1)
-        axes.annotate("chance", (1, chance), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color=_GREY)
+        axes.axhline(scale * chance, color=_GREY, linestyle=":", linewidth=1)
+        axes.annotate("chance", (1, scale * chance), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color=_GREY)
     axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
+    axes.set_ylabel("accuracy, %" if scale == 100 else y_label)
     if len(x) <= 6:
         axes.set_xticks(x)
     if y_label == "accuracy":  # of a band beyond 100 % nothing can come
-        axes.set_ylim(top=min(axes.get_ylim()[1], 1.02))
+        axes.set_ylim(top=min(axes.get_ylim()[1], 102))
     if len(lines) > 1:
-        axes.legend(loc="best")
+        axes.legend(loc="best", frameon=True, framealpha=0.8, edgecolor="none")  # a band may lie below
     return save(figure, path, caption)
 
 

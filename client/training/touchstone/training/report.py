@@ -8,6 +8,7 @@ import json
 import math
 import pathlib
 import platform
+import re
 from typing import Sequence
 
 from .experiment import Experiment
@@ -17,10 +18,11 @@ from .settings import Settings
 _STYLE = """
 body{font:16px/1.55 system-ui,sans-serif;color:#1f2933;max-width:62rem;margin:2rem auto;padding:0 1.2rem}
 h1{margin-bottom:.2rem} h2{margin-top:3rem;border-top:1px solid #e4e7eb;padding-top:1.4rem}
-.grey{color:#616e7c} table{border-collapse:collapse;margin:1rem 0} th,td{padding:.25rem .8rem;text-align:left}
+.grey{color:#616e7c} table{border-collapse:collapse;margin:1rem 0} th,td{padding:.25rem .8rem;text-align:left;vertical-align:top}
 th{border-bottom:2px solid #7b8794} tr+tr td{border-top:1px solid #e4e7eb} caption{text-align:left;font-weight:600}
 figure{margin:1.2rem 0} figure img{max-width:100%} figcaption{color:#616e7c;font-size:.92rem}
-nav{columns:2;margin:1.2rem 0} .wide{overflow-x:auto} td.number{font-variant-numeric:tabular-nums}
+nav{columns:2;margin:1.2rem 0} .wide{overflow-x:auto} .wide table{font-size:.88rem}
+td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
 """
 
 
@@ -56,7 +58,7 @@ def _section(experiment: Experiment, result: Result) -> list[str]:
     parts = [f"<h2 id={experiment.name}>{_text(experiment.title)}</h2>", f"<p class=grey>{_text(seed)} {result.seconds:.0f} s.</p>"]
     parts += [f"<p>{_text(words)}</p>" for words in result.words]
     if result.comparisons:
-        rows = [[c.what, c.ours.words(), "" if c.seeds is None else f"{100 * c.seeds:.3g} %", _difference(c), c.made_on, c.why]
+        rows = [[c.what, c.ours.words(), "not stated" if c.seeds is None else f"{100 * c.seeds:.3g} %", _difference(c), c.made_on, c.why]
                 for c in result.comparisons]
         parts += _table("Beside the seed's numbers", ["", "here", "seed", "difference", "made on", "why it may differ"], rows)
     for table in result.tables:
@@ -74,13 +76,16 @@ def _difference(comparison) -> str:
 
 
 def _table(title, columns, rows) -> list[str]:
-    cells = lambda row, kind: "<tr>" + "".join(f"<{kind}>{_text(cell)}</{kind}>" for cell in row) + "</tr>"
+    # A number and its interval stay in one line, if there is room for it.
+    begin = lambda cell, kind: "td class=number" if kind == "td" and len(columns) <= 6 and re.match(r"[+-]?\d\S*( %| points)?( \(|$)", str(cell)) else kind
+    cells = lambda row, kind: "<tr>" + "".join(f"<{begin(cell, kind)}>{_text(cell)}</{kind}>" for cell in row) + "</tr>"
     return ["<div class=wide><table>", f"<caption>{_text(title)}</caption>", cells(columns, "th"),
             *(cells(row, "td") for row in rows), "</table></div>"]
 
 
 def _text(words: str) -> str:
-    return html.escape(str(words), quote=True)
+    """Escaped; a per cent sign stands one space from its number, and never alone in a line."""
+    return re.sub(r"(\d) ?%", "\\1\u00a0%", html.escape(str(words), quote=True))
 
 
 def _without_nan(value):

@@ -27,5 +27,5 @@ def estimate_share(values: Sequence[float]) -> Estimate:
 
 
 def estimates(values: np.ndarray) -> list[Estimate]:
-    """Of each column of (seeds, points)."""
-    return [estimate(column) for column in np.asarray(values, float).T]
+    """Of each column of (seeds, points), which are shares."""
+    return [estimate_share(column) for column in np.asarray(values, float).T]

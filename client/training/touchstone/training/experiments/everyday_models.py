@@ -15,7 +15,7 @@ from ..context import Context
 from ..experiment import Experiment
 from ..features import feature_sets
 from ..result import Comparison, Result, Table
-from ..statistics import estimate, estimates
+from ..statistics import estimate_share, estimates
 from ..touch_data import collect
 
 SIZE_MM = 150  # of the longest side: that of the shipped shapes; the models have no unit
@@ -76,14 +76,14 @@ def _result(context, counts, objects, found, confusions):
         everyday, shipped = (found[name][0, :, place] for name in ("everyday models", "shipped shapes"))
         chance = {name: 1 / len(names) for name, names in objects.items()}
         result.words = [
-            f"Trained without noise, with {TOUCHES} touches a set, {estimate(everyday).words()} of the noisy sets of ten everyday models "
-            f"are recognised (chance {chance['everyday models']:.0%}) and {estimate(shipped).words()} of five shipped shapes (chance "
+            f"Trained without noise, with {TOUCHES} touches a set, {estimate_share(everyday).words()} of the noisy sets of ten everyday models "
+            f"are recognised (chance {chance['everyday models']:.0%}) and {estimate_share(shipped).words()} of five shipped shapes (chance "
             f"{chance['shipped shapes']:.0%}): {paired.order('the former', everyday, 'the latter', shipped)}. The seed found them comparable."]
-        result.comparisons = [Comparison(f"ten everyday models, {TOUCHES} touches a set", estimate(everyday), None,
+        result.comparisons = [Comparison(f"ten everyday models, {TOUCHES} touches a set", estimate_share(everyday), None,
                                          "trained on ideal, tested on noisy simulated sets", "the seed shows a figure without numbers")]
     else:
         result.words = [f"The everyday models are not here (--everyday FOLDER): the shipped shapes take their place, of whose noisy sets "
-                        f"{estimate(found['shipped shapes'][0, :, place]).words()} are recognised after training without noise."]
+                        f"{estimate_share(found['shipped shapes'][0, :, place]).words()} are recognised after training without noise."]
     for name in objects:
         ideal, noisy = (found[name][k, :, place] for k in (0, 1))
         result.words.append(f"{name[0].upper() + name[1:]}: {paired.order('training with noise', noisy, 'training without', ideal)}.")

@@ -12,7 +12,7 @@ from ..context import Context
 from ..experiment import Experiment
 from ..picture_data import FeatureCache, virtual
 from ..result import Comparison, Result, Table
-from ..statistics import estimate
+from ..statistics import estimate_share
 from ..touch_data import TouchData
 from .image_augmentation import COPIES, MeasuredFeatures, train_with
 from .image_recognition import CLASSES, TEST_SEEDS, measured_split, sizes
@@ -159,19 +159,24 @@ def _result(context, cache, found, virtual_only):
         f"({kind} ones alone where there are any), paired in the same way, chose the weight", f"features of {cache.backbone}, frozen"]
     result = Result("", "", made_on=made_on)
     result.words = [
-        f"Trained on virtual and {kind} data, fusion by product recognises {estimate(column(best, 'product')).words()} of the {kind} "
-        f"pairs, touch alone {estimate(column(best, 'touch')).words()}, image alone {estimate(column(best, 'image')).words()}: "
+        f"Trained on virtual and {kind} data, fusion by product recognises {estimate_share(column(best, 'product')).words()} of the {kind} "
+        f"pairs, touch alone {estimate_share(column(best, 'touch')).words()}, image alone {estimate_share(column(best, 'image')).words()}: "
         + "; ".join(paired.order("the product", column(best, "product"), f"{alone} alone", column(best, alone))
                     for alone in METHODS[:2]) + ".",
         *(_beaten(method, {**cells, "all virtual": virtual_only}) for method in METHODS[2:])]
+    # In short; the whole of it is said once, below.
+    touch = f"{_SETS} virtual sets of touches"
+    image = f"{size.train_per_object * CLASSES:,} virtual pictures"
+    more_touch, more_image = f"{touch} and half of the {kind} touches", f"{image} and {size.measured_train} {kind} ones, scaled"
     why = (f"{cache.backbone.path.name} instead of ResNet-50; features of touches that the seed leaves open; {kind} test data; "
            "every set is paired with every picture")
     result.comparisons = [
-        Comparison(f"fusion by product, virtual + {kind} in training", estimate(column(best, "product")), 0.957, "; ".join(made_on[:3]), why),
-        Comparison(f"touch alone, virtual + {kind} in training", estimate(column(best, "touch")), 0.933, made_on[0], why),
-        Comparison(f"image alone, virtual + {kind} in training", estimate(column(best, "image")), 0.806, made_on[1], why),
-        Comparison(f"fusion by product, virtual in training, tested on {kind}", estimate(column(list(cells.values())[0], "product")), 0.893,
-                   "; ".join(made_on[:3]), why)]
+        Comparison(f"fusion by product, virtual + {kind} in training", estimate_share(column(best, "product")), 0.957,
+                   f"{more_touch}; {more_image}", why),
+        Comparison(f"touch alone, virtual + {kind} in training", estimate_share(column(best, "touch")), 0.933, more_touch, why),
+        Comparison(f"image alone, virtual + {kind} in training", estimate_share(column(best, "image")), 0.806, more_image, why),
+        Comparison(f"fusion by product, virtual in training, tested on {kind}", estimate_share(column(list(cells.values())[0], "product")), 0.893,
+                   f"{touch}; {image}", why)]
     result.tables = [Table("Accuracy of pairs of a touch set and a picture", ["touch trained on", "image trained on", "tested on",
                                                                             *METHODS, "weight of touch"], rows,
                            "Means with 95 % intervals over seeds. The weight of touch in the sum has the least log loss on "
@@ -206,7 +211,7 @@ def _gains(groups) -> Table:
 
 
 def _row(runs):
-    return [*(estimate([each[name] for each in runs]).words() for name in METHODS), f"{np.mean([each['weight'] for each in runs]):.2f}"]
+    return [*(estimate_share([each[name] for each in runs]).words() for name in METHODS), f"{np.mean([each['weight'] for each in runs]):.2f}"]
 
 
 _LOOKS = {"touch": ("touch", 1.0), "image": ("image", 1.0), "product": ("both", 1.0), "weighted sum": ("both", 0.5)}
@@ -215,17 +220,17 @@ _LOOKS = {"touch": ("touch", 1.0), "image": ("image", 1.0), "product": ("both", 
 def _draw(context, groups):
     figure, axes = plt.subplots(figsize=(9, 4.2))
     for place, name in enumerate(METHODS):
-        found = [estimate([each[name] for each in runs]) for runs in groups.values()]
+        found = [estimate_share([each[name] for each in runs]) for runs in groups.values()]
         thing, alpha = _LOOKS[name]
-        heights = np.array([each.value for each in found])
-        reach = [[each.value - each.low for each in found], [each.high - each.value for each in found]]
+        heights = np.array([100 * each.value for each in found])
+        reach = [[100 * (each.value - each.low) for each in found], [100 * (each.high - each.value) for each in found]]
         axes.bar(np.arange(len(groups)) + (place - 1.5) * 0.2, heights, 0.18, color=figures.colour(thing), alpha=alpha, label=name,
                  yerr=np.nan_to_num(reach), error_kw={"ecolor": "#1f2933", "elinewidth": 1, "capsize": 2})
-    axes.axhline(1 / CLASSES, color="#7b8794", linestyle=":", linewidth=1)
-    axes.annotate("chance", (1, 1 / CLASSES), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#7b8794")
+    axes.axhline(100 / CLASSES, color="#7b8794", linestyle=":", linewidth=1)
+    axes.annotate("chance", (1, 100 / CLASSES), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#7b8794")
     labels = [f"touch: {touch}\nimage: {image}" for touch, image in (key.split(" x ") for key in groups if " x " in key)]
     axes.set_xticks(range(len(groups)), [*labels, "all virtual,\ntested on virtual"], fontsize=8)
-    axes.set(ylabel="accuracy", ylim=(0, 1.05))
+    axes.set(ylabel="accuracy, %", ylim=(0, 102))
     axes.grid(False, axis="x")
     axes.legend(loc="lower center", ncols=4, bbox_to_anchor=(0.5, 1.0))
     kind = context.settings.measured_kind

@@ -9,7 +9,7 @@ from ..context import Context
 from ..experiment import Experiment
 from ..picture_data import FeatureCache, Pictures, measured, scaled, virtual
 from ..result import Comparison, Result, Table
-from ..statistics import estimate
+from ..statistics import estimate_share
 from .image_recognition import CLASSES, measured_split, sizes
 
 COPIES = 3
@@ -64,7 +64,7 @@ def _result(context, cache, accuracies):
     settings, size, kind = context.settings, sizes(context), context.settings.measured_kind
     names = ["virtual alone", f"+ {kind}", *(f"+ {kind} and {k} scaled {'copy' if k == 1 else 'copies'} of each"
                                              for k in range(1, COPIES + 1))]
-    all_estimates = [estimate(column) for column in accuracies.T]
+    all_estimates = [estimate_share(column) for column in accuracies.T]
     made_on = [f"{size.train_per_object * CLASSES:,} virtual pictures, others for every seed",
                f"{size.measured_train} {kind} pictures in training and {size.measured_test} others in testing, drawn anew for every "
                f"seed from {size.measured_per_object * CLASSES} that were photographed, and scaled (by 0.75 to 1.3), once",

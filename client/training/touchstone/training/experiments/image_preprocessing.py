@@ -10,7 +10,7 @@ from ..context import Context
 from ..experiment import Experiment
 from ..picture_data import SUPERSHAPES, FeatureCache, Pictures, binarised, inverted, measured, virtual
 from ..result import Result, Table
-from ..statistics import estimate
+from ..statistics import estimate_share
 from .image_recognition import CLASSES
 
 KINDS = ("as it is", "binarised", "inverted", "normalised")
@@ -50,12 +50,12 @@ def _result(context, cache, accuracies, train, test, per_object, test_per_object
         f"{per_object * CLASSES} virtual pictures for training, others for every seed, and {test_per_object * CLASSES} {kind} ones for "
         "testing, the same for all seeds; both prepared in the same way",
         f"features of {cache.backbone}, frozen; the head is trained anew for every seed"], words=[
-        f"On {kind} pictures '{best}' is recognised best on average, {estimate(accuracies[best]).words()}. Against pictures as they are: "
+        f"On {kind} pictures '{best}' is recognised best on average, {estimate_share(accuracies[best]).words()}. Against pictures as they are: "
         + "; ".join(orders) + ".",
         f"Normalisation found no object in {empty['virtual']} of {len(train['normalised'])} virtual and {empty[kind]} of "
         f"{len(test['normalised'])} {kind} pictures, which then are white."])
     result.tables = [Table(f"Accuracy on {kind} pictures, trained on virtual ones", ["preparation", "accuracy (95 % interval)"],
-                           [[name, estimate(accuracies[name]).words()] for name in KINDS])]
+                           [[name, estimate_share(accuracies[name]).words()] for name in KINDS])]
     result.figures = [_sheet(context, train, test, per_object, test_per_object)]
     result.data = {"accuracy": accuracies, "white": empty}
     return result

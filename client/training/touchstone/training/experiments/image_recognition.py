@@ -12,7 +12,7 @@ from ..experiment import Experiment
 from ..picture_data import FeatureCache, Pictures, measured, split, virtual
 from ..result import Comparison, Result
 from ..settings import SUPERSHAPES
-from ..statistics import estimate
+from ..statistics import estimate_share
 
 # Tested on other poses than those trained on.
 TEST_SEEDS = 500_000
@@ -65,7 +65,7 @@ def run(context: Context) -> Result:
 
 def _result(context, cache, found, confused):
     settings, size, kind = context.settings, sizes(context), context.settings.measured_kind
-    on_virtual, on_measured, shuffled = estimate(found["virtual"]), estimate(found[kind]), estimate(found["shuffled"])
+    on_virtual, on_measured, shuffled = estimate_share(found["virtual"]), estimate_share(found[kind]), estimate_share(found["shuffled"])
     chance = 1 / CLASSES
     made_on = [
         f"{size.train_per_object * CLASSES:,} virtual pictures for training (20 % of them for validation) and "

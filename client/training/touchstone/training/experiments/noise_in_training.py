@@ -10,7 +10,7 @@ from ..experiment import Experiment
 from ..features import feature_sets
 from ..measured_sets import drawn_sets, split
 from ..result import Comparison, Result, Table
-from ..statistics import estimate, estimates
+from ..statistics import estimate_share, estimates
 
 TOUCHES = 15  # a set
 VIRTUAL, REAL, REAL_ALONE, TEST_SETS = 640, 160, 768, 300
@@ -69,7 +69,7 @@ def _result(context, names, trained, found, confusions, rig_touches):
         f"{paired.order(f'80:20 virtual and {kind}', mixed, 'virtual with noise alone', noisy)}."]
     result.words = [words[0].upper() + words[1:] for words in result.words]
     result.tables = [Table(f"Accuracy on {kind} sets of poses that were not trained on", ["trained on", *names],
-                           [[title, *(estimate(found[:, k, place]).words() for k in range(len(names)))]
+                           [[title, *(estimate_share(found[:, k, place]).words() for k in range(len(names)))]
                             for place, title in enumerate(trained)])]
     result.figures = [figures.confusion(context.figure_path("confusion"), f"What XGBoost takes each object for, % of {kind} sets, all "
                                         "seeds together.", plans.OBJECTS, {t.replace(", ", ",\n").replace(" + ", "\n+ "): m

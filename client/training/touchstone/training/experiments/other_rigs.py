@@ -161,15 +161,15 @@ def _result(context, rigs, found):
         if outside.low > chance:
             above.append(rig.name)
         said = found[rig.name]["diagnosis"]
-        diagnosis = (said["refused"] if "refused" in said else f"{said['verdict']}: "
+        diagnosis = (said["refused"] if "refused" in said else f"{said['verdict'].replace('_', ' ')}: "
                      + ("; ".join(" or ".join(names) for names in said["effects"]) or "no effect"))
-        rmse = "" if "refused" in said else f"{said['rmse_us'] / 1e3:.1f} to {said['final_rmse_us'] / 1e3:.1f}"
+        rmse = "" if "refused" in said else f"{said['rmse_us'] / 1e3:.1f}, then {said['final_rmse_us'] / 1e3:.1f}"
         what = seen(np.zeros((1, rig.fingers)), rig.spacing_mm)[2]
         rows.append([rig.name, what, inside.words(), outside.words(), shuffled.words(), rmse, diagnosis])
     result.words = [
         f"{len(above)} of {len(rigs)} other hands, sensors and arms recognise the objects better than chance on {kind} touches, by the same "
         f"command" + (f": {'; '.join(above)}." if above else "."), _finger_words(rigs, found)]
-    result.tables = [Table("Rigs", ["rig", "feature", "accuracy, own simulation", f"accuracy, {kind}", "labels shuffled", "RMSE, ms",
+    result.tables = [Table("Rigs", ["rig", "feature", "accuracy, own simulation", f"accuracy, {kind}", "labels shuffled", "RMSE before and after, ms",
                                     "diagnosis of the nominal model"], rows,
                      "One finger's times have no differences: how deep it goes behind the face of a box about all objects takes their place, "
                      "which no diagnosis of differences can judge. It depends on where the object lies as the others do not.")]

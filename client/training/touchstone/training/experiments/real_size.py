@@ -190,15 +190,15 @@ def _draw(context, found, whole, best):
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), gridspec_kw={"width_ratios": [1.3, 1]})
     names = [*found, f"long run, {best} {_workers(best)}"]
     for place, fed in enumerate([*found.values(), whole]):
-        share = estimate([part[1] for part in fed.parts])
+        share = estimate([100 * part[1] for part in fed.parts])
         left.barh(place, share.value, 0.6, color=figures.colour("virtual"), xerr=[[share.value - share.low], [share.high - share.value]],
                   error_kw={"ecolor": "#1f2933", "elinewidth": 1, "capsize": 2})
-    left.axvline(MAX_WAIT_SHARE, color="#1f2933", linestyle="--", linewidth=1)
-    left.annotate(f"{MAX_WAIT_SHARE:.0%}", (MAX_WAIT_SHARE, 1.0), xycoords=("data", "axes fraction"), ha="left", va="bottom", fontsize=8)
+    left.axvline(100 * MAX_WAIT_SHARE, color="#1f2933", linestyle="--", linewidth=1)
+    left.annotate(f"at most {MAX_WAIT_SHARE:.0%}", (100 * MAX_WAIT_SHARE, 1.0), xycoords=("data", "axes fraction"), ha="left", va="bottom", fontsize=8)
     left.set_yticks(range(len(names)), names)
     left.invert_yaxis()
     left.set_xlim(left=0)
-    left.set_xlabel("share of the time that the learner waits")
+    left.set_xlabel("time that the learner waits for data, %")
     left.grid(False, axis="y")
     at = np.arange(1, PARTS + 1) / PARTS * whole.samples
     right.plot(at, whole.memory_mb, color="#1f2933", marker="o", markersize=4)

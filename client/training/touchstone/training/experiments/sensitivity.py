@@ -16,7 +16,7 @@ from ..context import Context
 from ..experiment import Experiment
 from ..measured_sets import drawn_sets, split
 from ..result import Result, Table
-from ..statistics import estimate
+from ..statistics import estimate_share
 from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, TOUCHES, VIRTUAL
 
 
@@ -73,7 +73,7 @@ def run(context: Context) -> Result:
                      ", ".join(clear) + ".") if clear else "None of these choices changes the accuracy by more than the seeds do.",
                     f"{len(table) - 1} rows are compared, each at 95 %: one in twenty may stand out by chance."]
     result.tables = [Table(f"Accuracy on {kind} sets", ["changed", "accuracy", "difference, points"],
-                           [[name, estimate(values).words(), "" if k == 0 else signed(differences[k])]
+                           [[name, estimate_share(values).words(), "" if k == 0 else signed(differences[k])]
                             for k, (name, values) in enumerate(zip(table, found))])]
     result.data = {"changed": list(table), "accuracy": found.tolist()}
     return result

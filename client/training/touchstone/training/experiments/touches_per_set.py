@@ -10,7 +10,7 @@ from ..experiment import Experiment
 from ..features import feature_sets
 from ..measured_sets import drawn_sets
 from ..result import Comparison, Result, Table
-from ..statistics import estimate, estimates
+from ..statistics import estimate_share, estimates
 
 TRAINING_SETS, TEST_SETS = 640, 500
 
@@ -59,7 +59,7 @@ def _result(context, counts, names, found, rig_touches):
             "sets. Bands: 95 % over seeds.", counts, lines, x_label="touches a feature set", chance=1 / len(plans.OBJECTS)))
         result.tables.append(Table(f"Accuracy on {where} sets", ["recogniser", *(f"{n} touches" for n in counts)],
                                    [[name, *(point.words() for point in points)] for name, points in lines.items()]))
-    result.comparisons = [Comparison(f"{name}, {counts[-1]} touches a set", estimate(found[kind][k, :, -1]), None,
+    result.comparisons = [Comparison(f"{name}, {counts[-1]} touches a set", estimate_share(found[kind][k, :, -1]), None,
                                      f"trained on {TRAINING_SETS} simulated sets, tested on {kind} ones",
                                      "the seed shows curves without numbers: XGBoost above the others")
                           for k, name in enumerate(names)]

@@ -149,7 +149,7 @@ def _calibration_words(found):
             else "about the 95 % asked for"
         # A difference of a point or less is of no use to anybody.
         honest = "less certain than right" if excess.high < 0 else "more certain than right" if excess.low > 0.01 else "as certain as right"
-        said.append(f"{name}: {share.words()} right, {enough}; stated {np.mean(stated):.1%} on average, {honest}")
+        said.append(f"{name[0].upper()}{name[1:]}: {share.words()} right, {enough}; stated {np.mean(stated):.1%} on average, {honest}")
     return "Answers given at 95 % certainty or more, all ways of choosing together. " + ". ".join(said) + "."
 
 
