@@ -7,6 +7,7 @@ import strengths
 import unlisted
 
 SEEDS = {"tuning": 1_000_000, "held-out": 2_000_000}
+SETS_PER_ARM = 1000  # seeds of each arm
 
 PAIRS = (("exposure", "defocus_blur"), ("focal_error", "vignetting"), ("camera_rotation", "gamma"),
          ("light_position", "background_level"), ("radial_distortion", "exposure"), ("camera_translation", "ambient_light"),
@@ -119,4 +120,4 @@ ARMS = (
 
 def seed_of(arm, number, range_name):
     """Of set `number` of an arm: no two sets of a range share one."""
-    return SEEDS[range_name] + 1000 * ARMS.index(arm) + number
+    return SEEDS[range_name] + SETS_PER_ARM * ARMS.index(arm) + number

@@ -178,6 +178,7 @@ def main():
     parser.add_argument("--program", default=ROOT / "build/release/bin/touchstone")
     parser.add_argument("--seeds", choices=all_arms.SEEDS, default="tuning")
     parser.add_argument("--share", type=float, default=1.0, help="of the sets of each arm; at least one each")
+    parser.add_argument("--first", type=int, default=0, help="number of the first set of each arm: others are other seeds")
     parser.add_argument("--minutes", type=float, help="no set is begun later than so long after the start")
     parser.add_argument("--arm", action="append", default=[], help="only arms whose name or group holds this; repeatable")
     parser.add_argument("--threads", type=int, default=1, help="sets at once")
@@ -196,7 +197,9 @@ def main():
         if options.arm and not any(text in arm.name or text == arm.group for text in options.arm):
             continue
         count = max(1, round(arm.sets * options.share))
-        jobs += [((k + 0.5) / count, (index, k, options.seeds, str(options.program), options.keep, common))
+        if options.first + count > all_arms.SETS_PER_ARM:
+            parser.error(f"--first {options.first}: {arm.name} would share seeds with the next arm")
+        jobs += [((k + 0.5) / count, (index, options.first + k, options.seeds, str(options.program), options.keep, common))
                  for k in range(count)]
     if options.minutes is not None:  # so that no kind of arm stands last where the time ends early
         random.Random(0).shuffle(jobs)
