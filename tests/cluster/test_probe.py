@@ -21,7 +21,7 @@ def test_a_server_that_serves_is_told_from_one_that_is_not_there(probe, bin_fold
         address = re.search(r"listening on (\S+)", server.stdout.readline()).group(1)
         assert probe(address).returncode == 0
         # Where TLS is expected, plain text is no answer.
-        assert probe(address, "--ca", "/etc/ssl/certs/ca-certificates.crt").returncode == 3
+        assert probe(address, "--ca", __file__).returncode == 3
         server.terminate()
     gone = probe(address, "--timeout-s", "1")
     assert gone.returncode == 3 and address in gone.stderr
