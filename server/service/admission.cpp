@@ -75,6 +75,8 @@ MemoryBudget::MemoryBudget(int max_mib)
     : max_bytes_(max_mib > 0 ? max_mib * kMebibyte : MachineBytes() / 2) {}
 
 void MemoryBudget::Begin() {
+  // What was freed before may be given back later, and would then look like room.
+  ::malloc_trim(0);
   begin_bytes_ = ResidentBytes();
 }
 
