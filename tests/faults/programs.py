@@ -6,7 +6,6 @@ import dataclasses
 import os
 import pathlib
 import re
-import resource
 import signal
 import subprocess
 import tempfile
@@ -46,12 +45,10 @@ class Server:
     def __init__(self, *options: str, max_files: int | None = None):
         """max_files: soft and hard limit of open files; None: as this process has it."""
 
-        def limit():
-            if max_files is not None:
-                resource.setrlimit(resource.RLIMIT_NOFILE, (max_files, max_files))
-
-        self.process = subprocess.Popen([SERVER, "--listen", "127.0.0.1:0", *SMALL, *map(str, options)], text=True,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=limit)
+        # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
+        limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
+        self.process = subprocess.Popen([*limited, SERVER, "--listen", "127.0.0.1:0", *SMALL, *map(str, options)], text=True,
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.log: list[str] = []
         threading.Thread(target=self.log.extend, args=(self.process.stderr,), daemon=True).start()
         for line in self.process.stdout:
