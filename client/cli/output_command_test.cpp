@@ -273,6 +273,20 @@ INSTANTIATE_TEST_SUITE_P(Commands, OutputCommandTest, ::testing::ValuesIn(Cases(
 
 class OutputsTest : public RealBinaryTest {};
 
+TEST_F(OutputsTest, ATokenReplacesAFileWithForceOnly) {
+  const std::vector<std::string> words = {"token", "new", "ana", "--role", "reader", "-o", "ana.token"};
+  ASSERT_EQ(Run(words).exit_code, 0);
+  const std::string first = Read("ana.token");
+  const auto refused = Run(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(Read("ana.token"), first);
+  std::vector<std::string> forced = words;
+  forced.push_back("--force");
+  EXPECT_EQ(Run(forced).exit_code, 0);
+  EXPECT_NE(Read("ana.token"), first);
+}
+
 TEST_F(OutputsTest, EveryOptionThatNamesAnOutputIsInTheTable) {
   // Whoever adds an output adds a row: help says which commands have --force.
   std::set<std::string> commands, in_table;
@@ -297,6 +311,8 @@ TEST_F(OutputsTest, EveryOptionThatNamesAnOutputIsInTheTable) {
     for (const std::string& inner : names_of(help))
       if (has_force(Run({name, inner, "--help"}).out)) commands.insert(name + " " + inner);
   }
+  // A secret is another one each time, and goes into a new file of its owner's alone, into no link and no device.
+  EXPECT_EQ(commands.erase("token new"), 1u);
   EXPECT_EQ(commands, in_table);
 }
 

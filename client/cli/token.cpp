@@ -21,6 +21,7 @@ struct TokenOptions {
 };
 
 absl::Status CannotWrite(const std::string& path) {
+  if (errno == EEXIST) return absl::InvalidArgumentError(absl::StrCat(path, " exists; --force replaces it"));
   return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::strerror(errno)));
 }
 
