@@ -36,6 +36,16 @@ Answer Held(bool held) {
   return held ? Answer::kAccepted : Answer::kWrong;
 }
 
+// What is read and written again must be read as the same.
+template <typename Read, typename Write>
+Answer RoundTrip(absl::string_view bytes, const Read& read, const Write& write) {
+  const auto value = read(std::string(bytes), kOrigin);
+  if (!value.ok()) return Refusal(value.status());
+  const std::string text = write(*value);
+  const auto again = read(text, kOrigin);
+  return Held(again.ok() && write(*again) == text);
+}
+
 // --- meshes
 
 Answer ReadMesh(absl::string_view format, absl::string_view bytes) {
@@ -72,11 +82,7 @@ Answer ReadMeasurements(absl::string_view bytes) {
 }
 
 Answer ReadImages(absl::string_view bytes) {
-  const auto set = session::ParseImagesCsv(bytes, kOrigin);
-  if (!set.ok()) return Refusal(set.status());
-  const std::string text = session::FormatImagesCsv(*set);
-  const auto again = session::ParseImagesCsv(text, kOrigin);
-  return Held(again.ok() && session::FormatImagesCsv(*again) == text);
+  return RoundTrip(bytes, session::ParseImagesCsv, session::FormatImagesCsv);
 }
 
 // --- models
@@ -98,11 +104,7 @@ Answer ReadFormula(absl::string_view bytes) {
 }
 
 Answer ReadSurfaceMap(absl::string_view bytes) {
-  const auto objects = model::ParseSurfaceMap(std::string(bytes), kOrigin);
-  if (!objects.ok()) return Refusal(objects.status());
-  const std::string text = model::FormatSurfaceMap(*objects);
-  const auto again = model::ParseSurfaceMap(text, kOrigin);
-  return Held(again.ok() && model::FormatSurfaceMap(*again) == text);
+  return RoundTrip(bytes, model::ParseSurfaceMap, model::FormatSurfaceMap);
 }
 
 Answer ReadManifest(absl::string_view bytes) {
@@ -118,11 +120,7 @@ Answer ReadManifest(absl::string_view bytes) {
 // --- a rig's files
 
 Answer ReadCamera(absl::string_view bytes) {
-  const auto camera = session::ParseCameraYaml(std::string(bytes), kOrigin);
-  if (!camera.ok()) return Refusal(camera.status());
-  const std::string text = session::FormatCameraYaml(*camera);
-  const auto again = session::ParseCameraYaml(text, kOrigin);
-  return Held(again.ok() && session::FormatCameraYaml(*again) == text);
+  return RoundTrip(bytes, session::ParseCameraYaml, session::FormatCameraYaml);
 }
 
 Answer ReadCalibrationFile(absl::string_view bytes) {
