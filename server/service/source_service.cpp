@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "server/base/status.h"
 #include "server/service/call_guard.h"
@@ -44,12 +45,17 @@ class Handover {
         stride_(std::max<uint32_t>(1, part.batch_stride)),
         next_(part.start_index) {}
 
+  // The speed is measured from the first batch on: what comes before it, such as an object's tree, is made once.
   void Sent(uint64_t start, uint32_t rows) {
-    rows_ += rows;
+    if (first_batch_.has_value())
+      rows_ += rows;
+    else
+      first_batch_ = Clock::now();
     next_ = start + rows;
   }
   absl::Status Check(double drain_s) const {
-    const double running_s = std::chrono::duration<double>(Clock::now() - begin_).count();
+    if (!first_batch_.has_value()) return absl::OkStatus();
+    const double running_s = std::chrono::duration<double>(Clock::now() - *first_batch_).count();
     if (running_s < kMinRunningS) return absl::OkStatus();  // its speed is not known yet
     const double left = next_ < stop_ ? static_cast<double>(stop_ - next_) / stride_ : 0;
     if (left <= rows_ / running_s * drain_s) return absl::OkStatus();
@@ -61,11 +67,11 @@ class Handover {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr double kMinRunningS = 0.5;
-  const Clock::time_point begin_ = Clock::now();
   const uint64_t stop_;
   const uint32_t stride_;
   uint64_t next_;
-  uint64_t rows_ = 0;
+  uint64_t rows_ = 0;  // after the first batch
+  std::optional<Clock::time_point> first_batch_;
 };
 
 }  // namespace
