@@ -1,5 +1,6 @@
 #include "client/source/connection.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
@@ -125,6 +126,8 @@ absl::Status Connection::Connect(int server_index) {
   // wait for ever.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  // A name may stand for many equal servers: every call goes to the next one of its addresses that answers.
+  if (absl::StartsWith(address, "dns:")) arguments.SetLoadBalancingPolicyName("round_robin");
   TOUCHSTONE_ASSIGN_OR_RETURN(auto channel, MakeChannel(address, options_.credentials, arguments));
   const auto failed = [&](const std::string& how) {
     const std::string why = ExplainTlsFailure(address, options_.credentials);

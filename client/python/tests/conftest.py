@@ -15,22 +15,22 @@ _REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
 
 
 class Server:
-    """A touchstone-server on a free port, or on the one given."""
+    """A touchstone-server on a free port, or on the one given, at an address of this machine alone."""
 
-    def __init__(self, program, *options, port=0):
-        self._program, self._options = str(program), options
+    def __init__(self, program, *options, port=0, host="127.0.0.1"):
+        self._program, self._options, self._host = str(program), options, host
         self._start(port)
 
     def _start(self, port):
         self.process = subprocess.Popen(
-            [self._program, "--listen", f"127.0.0.1:{port}", *self._options],
+            [self._program, "--listen", f"{self._host}:{port}", *self._options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )
         # Both pipes are drained all along, or the server would block on a full one.
         self.log = []
         threading.Thread(target=self._drain, args=(self.process.stderr, self.log), daemon=True).start()
         for line in self.process.stdout:
-            found = re.search(r"listening on 127\.0\.0\.1:(\d+)", line)
+            found = re.search(rf"listening on {re.escape(self._host)}:(\d+)", line)
             if found:
                 break
         else:
@@ -38,7 +38,7 @@ class Server:
             raise RuntimeError(f"{self._program} ended with {self.process.returncode}: {''.join(self.log)}")
         threading.Thread(target=self._drain, args=(self.process.stdout, []), daemon=True).start()
         self.port = int(found.group(1))
-        self.target = f"127.0.0.1:{self.port}"
+        self.target = f"{self._host}:{self.port}"
 
     @staticmethod
     def _drain(pipe, lines):
@@ -82,8 +82,8 @@ def new_server(server_program):
     """A function that starts servers of the test's own."""
     started = []
 
-    def start(*options, port=0):
-        started.append(Server(server_program, *options, port=port))
+    def start(*options, port=0, host="127.0.0.1"):
+        started.append(Server(server_program, *options, port=port, host=host))
         return started[-1]
 
     yield start

@@ -33,6 +33,12 @@ _OPTIONS = (
     ("grpc.keepalive_timeout_ms", 20_000),
 )
 
+
+def _options_of(target: str) -> tuple[tuple[str, Any], ...]:
+    # A name may stand for many equal sources: every call goes to the next one of its addresses that answers.
+    return (*_OPTIONS, ("grpc.lb_policy_name", "round_robin")) if target.startswith("dns:") else _OPTIONS
+
+
 # The processes, this one and those it was forked from, in which a channel was made.
 _processes_with_grpc: set[int] = set()
 
@@ -129,7 +135,7 @@ class Connection:
         if self._channel is None:
             if grpc_was_used_before_fork():
                 raise self._forked()
-            self._channel = self.credentials.channel(self.target, _OPTIONS)
+            self._channel = self.credentials.channel(self.target, _options_of(self.target))
             self._pid = os.getpid()
             _processes_with_grpc.add(self._pid)
         return self._channel
