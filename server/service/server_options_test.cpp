@@ -63,6 +63,15 @@ TEST(OptionTable, ATableWhoseNameIsMissingIsRefusedWithItsPlace) {
   EXPECT_THAT(std::string(ReadToml(" [\n", "a.toml", {}, {}).message()), HasSubstr("a.toml:1:3"));
 }
 
+TEST(OptionTable, ALetterWhereNoneMayStandIsRefusedWithItsPlace) {
+  int threads = 1;
+  const std::vector<Option> options = {{"threads", "", &threads}};
+  for (const char* letter : {"\u00FC", "\u2E90", "\uFEF7"})
+    EXPECT_THAT(
+        std::string(ReadToml(absl::StrCat("threads = 3", letter, " 3\n"), "a.toml", options, {}).message()),
+        HasSubstr("a.toml:1:"));
+}
+
 TEST(OptionTable, AFormerKeyIsStillRead) {
   for (const char* name : {"uri", "source"}) {
     std::string uri;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -62,11 +63,20 @@ class CalibrationReader {
                                     absl::StrCat("one 'object: ", kPoseExample, "' a line")));
     for (size_t i = 0; i < objects->items.size(); ++i) {
       const std::string& name = objects->keys[i].text;
-      if (name.empty()) return Error(objects->keys[i], "base_from_object: an object has no name");
+      TOUCHSTONE_RETURN_IF_ERROR(CheckName(objects->keys[i], "base_from_object"));
       TOUCHSTONE_ASSIGN_OR_RETURN(calibration_.base_from_object[name],
                                   Pose(objects->items[i], absl::StrCat("base_from_object.", name)));
     }
     return absl::OkStatus();
+  }
+
+  // YAML itself takes a key of 1,024 characters at most: a longer one could be read as another kind of key, but not be
+  // written again.
+  absl::Status CheckName(const model::YamlNode& key, absl::string_view where) const {
+    constexpr size_t kMaxNameBytes = 256;
+    if (!key.text.empty() && key.text.size() <= kMaxNameBytes) return absl::OkStatus();
+    return Error(key, absl::StrCat(where, ": '", Printable(key.text, 60), "' has ", key.text.size(),
+                                   " bytes; a name has 1 to ", kMaxNameBytes));
   }
 
   // For people: any text, and lists of texts by name one level down.
@@ -77,10 +87,12 @@ class CalibrationReader {
     for (size_t i = 0; i < made->items.size(); ++i) {
       const std::string& key = made->keys[i].text;
       const model::YamlNode& item = made->items[i];
-      if (key.empty() || key.find(' ') != std::string::npos)
+      TOUCHSTONE_RETURN_IF_ERROR(CheckName(made->keys[i], "made"));
+      if (key.find(' ') != std::string::npos)
         return Error(made->keys[i], absl::StrCat("made: '", key, "' is no name; one without spaces is"));
       if (item.kind == Kind::kMap) {
         for (size_t k = 0; k < item.items.size(); ++k) {
+          TOUCHSTONE_RETURN_IF_ERROR(CheckName(item.keys[k], absl::StrCat("made.", key)));
           const std::string what = absl::StrCat("made.", key, ".", item.keys[k].text);
           TOUCHSTONE_RETURN_IF_ERROR(Want(item.items[k], Kind::kScalar, what, "a number or text"));
           calibration_.notes[absl::StrCat(key, " ", item.keys[k].text)] = item.items[k].text;

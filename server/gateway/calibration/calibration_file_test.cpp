@@ -101,6 +101,12 @@ TEST(CalibrationFile, ErrorsNameThePlaceAndWhatWouldBeRight) {
   EXPECT_THAT(ErrorOf(head + tip + "base_from_object: {cup: [1, 2, 3]}\n"),
               HasSubstr("base_from_object.cup is a list; it must be a map"));
   EXPECT_THAT(ErrorOf(head + tip + "made: {date: [1]}\n"), HasSubstr("made.date is a list"));
+  const std::string pose = ": {translation_mm: [0, 0, 0], rotation_deg: [0, 0, 0]}}\n";
+  EXPECT_THAT(ErrorOf(head + tip + "base_from_object: {\"\"" + pose), HasSubstr("'' has 0 bytes"));
+  EXPECT_THAT(ErrorOf(head + tip + "base_from_object: {? " + std::string(257, 'x') + pose),
+              HasSubstr("has 257 bytes; a name has 1 to 256"));
+  EXPECT_THAT(ErrorOf(head + tip + "made: {rms_mm: {? " + std::string(1100, 'x') + " : 0.02}}\n"),
+              HasSubstr("made.rms_mm: 'xxx"));
   EXPECT_THAT(std::string(ReadCalibration("no/such/rig.yaml").status().message()),
               HasSubstr("no/such/rig.yaml"));
 }
