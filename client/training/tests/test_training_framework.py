@@ -78,6 +78,21 @@ def test_what_is_finished_is_not_done_again_unless_something_changed(tmp_path, m
     assert len(runs) == 4
 
 
+def test_a_run_of_one_experiment_leaves_the_others_in_the_report(tmp_path, monkeypatch):
+    counting(tmp_path, monkeypatch)
+    (one,) = command.experiments()
+    other = dataclasses.replace(one, name="other", title="Other")
+    monkeypatch.setattr(command, "experiments", lambda: [one, other])
+    titles = lambda: [each["title"] for each in json.loads((tmp_path / "report.json").read_text())["experiments"]]
+    for name in ("other", one.name):
+        monkeypatch.setattr(sys, "argv", ["x", name, "--out", str(tmp_path)])
+        command.main()
+    assert titles() == [one.title, "Other"]
+    monkeypatch.setattr(sys, "argv", ["x", one.name, "--out", str(tmp_path), "--seed", "5"])
+    command.main()
+    assert titles() == [one.title], "the other one was of another seed"
+
+
 @pytest.mark.parametrize("torn", ["", "{", "[1, 2]", '{"digest": "of other code"}'])
 def test_a_result_that_is_torn_or_of_other_code_is_not_taken(tmp_path, monkeypatch, torn):
     runs = counting(tmp_path, monkeypatch)

@@ -40,8 +40,11 @@ def main() -> int:
             print(f"{number + 1}/{len(wanted)} {each.name}: {each.title} (about {left_s / 60:.0f} min for all that is left)",
                   file=sys.stderr, flush=True)
             done.append((each, _run(each, context, again=options.again)))
+    # A run of some experiments leaves those of earlier runs in the report.
+    now = {each.name: result for each, result in done}
+    shown = [(each, now.get(each.name) or _finished(each, settings)) for each in known]
     command = "python -m touchstone.training " + shlex.join(sys.argv[1:])
-    page = report.write(settings, done, left_out, command, datetime.date.today().isoformat())
+    page = report.write(settings, [(each, result) for each, result in shown if result is not None], left_out, command, datetime.date.today().isoformat())
     for each, result in done:
         print(f"{each.title}: {result.words[0]}")
     for each, why in left_out:
@@ -88,17 +91,26 @@ def _settings(options: argparse.Namespace) -> Settings:
 def _run(experiment: Experiment, context: Context, again: bool) -> Result:
     """The experiment, or what it found before with the same code and settings."""
     context.begin(experiment.name)
-    digest = _digest(context.settings)
-    path = context.settings.out / f"{experiment.name}.json"
-    found = None if again else Result.load(path, digest)
-    if found is not None and all((context.settings.out / figure.file).exists() for figure in found.figures):
-        print(f"  finished before ({path})", file=sys.stderr)
+    found = None if again else _finished(experiment, context.settings)
+    if found is not None:
+        print(f"  finished before ({_path(experiment, context.settings)})", file=sys.stderr)
         return found
     begin = time.monotonic()
     result = experiment.run(context)
     result.name, result.title, result.seconds = experiment.name, experiment.title, round(time.monotonic() - begin, 1)
-    result.save(path, digest)
+    result.save(_path(experiment, context.settings), _digest(context.settings))
     return result
+
+
+def _path(experiment: Experiment, settings: Settings) -> pathlib.Path:
+    return settings.out / f"{experiment.name}.json"
+
+
+def _finished(experiment: Experiment, settings: Settings) -> Result | None:
+    """What it found before with the same code and settings."""
+    found = Result.load(_path(experiment, settings), _digest(settings))
+    complete = found is not None and all((settings.out / figure.file).exists() for figure in found.figures)
+    return found if complete else None
 
 
 def _digest(settings: Settings) -> str:
