@@ -8,6 +8,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 
@@ -81,6 +82,11 @@ std::vector<EglDisplay> OpenDisplays() {
   std::vector<EglDisplay> displays;
   if (!epoxy_has_egl()) {
     displays.push_back({nullptr, false, "", "", "libEGL is not installed (Debian: libegl1 and a driver)"});
+    return displays;
+  }
+  // libepoxy ends the process where it finds neither when the first function of OpenGL is called.
+  if (::dlopen("libOpenGL.so.0", RTLD_LAZY) == nullptr && ::dlopen("libGL.so.1", RTLD_LAZY) == nullptr) {
+    displays.push_back({nullptr, false, "", "", "libOpenGL is not installed (Debian: libopengl0)"});
     return displays;
   }
   // llvmpipe: its own threads only get in the way of ours. Read by the driver when its first context is made.
