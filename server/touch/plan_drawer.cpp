@@ -15,8 +15,10 @@ namespace {
 
 constexpr uint32_t kDrawsBetweenLooks = 64;
 
-// What would help most against the flaw that was the most frequent.
-std::string Advice(DrawFlaw flaw) {
+// What would help most against the flaw that was the most frequent. `too_wide`: the fingers span more than the object.
+std::string Advice(DrawFlaw flaw, bool too_wide) {
+  if (too_wide)
+    return "a larger object (scale at import) or a narrower end effector: no draw meets it with all";
   switch (flaw) {
     case DrawFlaw::kStartBlocked:
       return "a shorter standoff or a smaller max_tilt";
@@ -70,13 +72,14 @@ absl::Status PlanDrawer::Hopeless(const DrawCounts& counts) const {
   const auto mm = [](double metres) {
     return ShortestNumber(std::round(FromSi(Unit::kMillimetre, metres) * 10) / 10);
   };
+  const double span_m = (model.fingers - 1) * model.spacing_m;
   const auto worst = std::max_element(counts.by_flaw.begin() + 1, counts.by_flaw.end());
   return absl::FailedPreconditionError(
       absl::StrCat("in ", counts.Draws(), " draws no touch met it as the plan wants with all ", model.fingers,
-                   " fingers: ", counts.FlawsInWords(plan_), ". The fingers span ",
-                   mm((model.fingers - 1) * model.spacing_m), " mm and the object measures ", mm(size_m.x()),
-                   " x ", mm(size_m.y()), " x ", mm(size_m.z()),
-                   " mm; what would help: ", Advice(static_cast<DrawFlaw>(worst - counts.by_flaw.begin()))));
+                   " fingers: ", counts.FlawsInWords(plan_), ". The fingers span ", mm(span_m),
+                   " mm and the object measures ", mm(size_m.x()), " x ", mm(size_m.y()), " x ",
+                   mm(size_m.z()), " mm; what would help: ",
+                   Advice(static_cast<DrawFlaw>(worst - counts.by_flaw.begin()), span_m > size_m.norm())));
 }
 
 }  // namespace touchstone::touch

@@ -118,7 +118,18 @@ TEST(PlanDrawer, RefusesARodAndSaysWhichConditionFailedHowOften) {
   EXPECT_THAT(words, HasSubstr("in 50 draws no touch met it"));
   EXPECT_THAT(words, HasSubstr("a finger met nothing"));
   EXPECT_THAT(words, HasSubstr("200 x 0.1 x 0.1 mm"));
+  EXPECT_THAT(words, HasSubstr("a higher max_draws"));
   EXPECT_EQ(counts.Draws(), 50u);
+}
+
+TEST(PlanDrawer, DoesNotAdviseMoreDrawsForAnObjectThatIsSmallerThanTheHand) {
+  const auto pea = Boxes({{{-5, -5, -5}, {5, 5, 5}}});
+  PlanDrawer drawer(Faces(), pea, WithFingers(3, 0.03), 7, 50);
+  DrawCounts counts;
+  const std::string words(drawer.Draw(0, 0, &counts).status().message());
+  EXPECT_THAT(words, HasSubstr("The fingers span 60 mm and the object measures 10 x 10 x 10 mm"));
+  EXPECT_THAT(words, HasSubstr("a larger object (scale at import) or a narrower end effector"));
+  EXPECT_THAT(words, testing::Not(HasSubstr("max_draws")));
 }
 
 TEST(PlanDrawer, TheModelDecidesWhereTheFingersAre) {
