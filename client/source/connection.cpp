@@ -50,6 +50,8 @@ void RaiseLimits(service::Limits* limits) {
   limits->max_streams_per_client = limits->max_streams;
   limits->max_diagnosis_s = limits->stall_s = 1e6;
   limits->stream_memory_mib = 128;
+  limits->max_unary_calls_per_s = 0;
+  limits->max_unary_s = 1e6;
 }
 
 }  // namespace

@@ -33,6 +33,13 @@ ThreadPool::~ThreadPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
+size_t ThreadPool::waiting() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  size_t waiting = 0;
+  for (const auto& [client, queue] : queues_) waiting += queue.tasks.size();
+  return waiting;
+}
+
 void ThreadPool::Submit(std::function<void()> task, const std::string& client) {
   {
     std::lock_guard<std::mutex> lock(mutex_);

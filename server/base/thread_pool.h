@@ -20,6 +20,7 @@ class ThreadPool {
   ~ThreadPool();                     // runs what was submitted, then joins
 
   int size() const { return static_cast<int>(threads_.size()); }
+  size_t waiting() const;  // tasks that no thread has begun
   // A task for a client, of any name. What leaves a task as an exception ends the process.
   void Submit(std::function<void()> task, const std::string& client = "");
 
@@ -40,7 +41,7 @@ class ThreadPool {
   Queues::iterator NextQueue();  // that a task comes from; queues_.end(): there is none
   void ForgetIdleQueues();
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   Queues queues_;
   // used_s of whose turn it was last. Who comes anew begins here, so that nobody saves up time by idling.

@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/access_credentials.h"
+#include "server/service/metrics.h"
 
 namespace touchstone::service {
 namespace {
@@ -156,6 +157,7 @@ absl::Status Access::Require(const grpc::ServerContext& context, Role needed, co
 }
 
 void Access::LogRefusal(absl::string_view method, const absl::Status& why) {
+  if (calls_ != nullptr) calls_->Refused(method, static_cast<int>(why.code()));
   const auto now = std::chrono::steady_clock::now();
   uint64_t unlogged = 0;
   {

@@ -21,6 +21,8 @@
 
 namespace touchstone::service {
 
+class CallMetrics;
+
 // What a caller showed.
 struct ShownCredentials {
   std::vector<std::string> authorization;  // metadata of that name
@@ -50,6 +52,8 @@ class Access {
   // For what a request asks beyond its method: PERMISSION_DENIED if its caller's role is below `needed`.
   absl::Status Require(const grpc::ServerContext& context, Role needed, const std::string& what);
 
+  // Every refusal is counted there, too. To be called before a server starts.
+  void CountRefusals(CallMetrics* calls) { calls_ = calls; }
   // Logs a refusal; a flood of them as one line a second.
   void LogRefusal(absl::string_view method, const absl::Status& why);
 
@@ -70,6 +74,7 @@ class Access {
   FileStamp file_stamp_;
   std::shared_ptr<const AccessFile> file_;
 
+  CallMetrics* calls_ = nullptr;
   std::mutex refusal_mutex_;
   std::chrono::steady_clock::time_point refusal_logged_{};
   uint64_t refusals_unlogged_ = 0;

@@ -32,6 +32,8 @@ uint64_t MachineBytes() {
 }
 
 constexpr uint64_t kMebibyte = 1 << 20;
+constexpr double kSavedS = 5;            // of calls that were not made
+constexpr size_t kManyClients = 10'000;  // then those who have everything saved are forgotten
 
 }  // namespace
 
@@ -69,6 +71,29 @@ void Places::Leave(const std::string& client) {
   --taken_;
   const auto found = by_client_.find(client);
   if (--found->second == 0) by_client_.erase(found);
+}
+
+CallRate::CallRate(int max_per_s) : max_per_s_(max_per_s), max_saved_(kSavedS * max_per_s) {}
+
+double CallRate::Grown(const Saved& saved, Clock::time_point now) const {
+  return std::min(max_saved_,
+                  saved.calls + max_per_s_ * std::chrono::duration<double>(now - saved.at).count());
+}
+
+absl::Status CallRate::Take(const std::string& client) {
+  if (max_per_s_ == 0) return absl::OkStatus();
+  const auto now = Clock::now();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (by_client_.size() >= kManyClients)
+    for (auto each = by_client_.begin(); each != by_client_.end();)
+      each = Grown(each->second, now) >= max_saved_ ? by_client_.erase(each) : std::next(each);
+  Saved& saved = by_client_.emplace(client, Saved{max_saved_, now}).first->second;
+  saved = {Grown(saved, now), now};
+  if (saved.calls < 1)
+    return Busy(absl::StrCat(client, " has made its calls of this second"), "max_unary_calls_per_s",
+                max_per_s_);
+  saved.calls -= 1;
+  return absl::OkStatus();
 }
 
 MemoryBudget::MemoryBudget(int max_mib)

@@ -58,6 +58,26 @@ class Places {
   std::atomic<uint32_t> taken_{0};
 };
 
+// So many calls a second of each client; what it did not use in the last seconds is saved up. Thread-safe.
+class CallRate {
+ public:
+  explicit CallRate(int max_per_s);  // 0: any number
+  // RESOURCE_EXHAUSTED names the limit; clients wait and try again.
+  absl::Status Take(const std::string& client);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Saved {
+    double calls;
+    Clock::time_point at;
+  };
+  double Grown(const Saved& saved, Clock::time_point now) const;
+
+  const double max_per_s_, max_saved_;
+  std::mutex mutex_;
+  std::map<std::string, Saved> by_client_;
+};
+
 // What the process may use beyond what it has when it begins to serve. Thread-safe.
 class MemoryBudget {
  public:

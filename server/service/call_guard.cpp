@@ -1,5 +1,8 @@
 #include "server/service/call_guard.h"
 
+#include <chrono>
+
+#include "server/base/over_limit.h"
 #include "server/base/status.h"
 
 namespace touchstone::service {
@@ -15,11 +18,21 @@ source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resou
   };
 }
 
+source::MotionGuard TimeGuardOf(const Limits& limits, bool moves) {
+  return [moves, max_s = limits.max_unary_s, begin = std::chrono::steady_clock::now()]() -> absl::Status {
+    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return moves || s <= max_s ? absl::OkStatus()
+                               : OverLimit("the call is not done after seconds:", s, "max_unary_s", max_s);
+  };
+}
+
 source::MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
                                      const LeaseBook* leases, const std::string& lease_token) {
   return [resources, stops_before = resources->stop_count.load(),
-          guard = GuardOf(context, resources, leases, lease_token)]() -> absl::Status {
+          guard = GuardOf(context, resources, leases, lease_token),
+          in_time = TimeGuardOf(resources->options, leases->required())]() -> absl::Status {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
+    TOUCHSTONE_RETURN_IF_ERROR(in_time());
     if (resources->stop_count != stops_before) return absl::AbortedError("stopped: Control.Stop was called");
     return absl::OkStatus();
   };

@@ -16,7 +16,11 @@ namespace touchstone::service {
 source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resources, const LeaseBook* leases,
                             const std::string& lease_token);
 
-// The same, and that nobody has called Control.Stop since the guard was made.
+// A call that only calculates has not taken longer than max_unary_s since the guard was made. What moves takes its time:
+// ending it halfway helps nobody.
+source::MotionGuard TimeGuardOf(const Limits& limits, bool moves);
+
+// Both, and that nobody has called Control.Stop since the guard was made.
 source::MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,
                                      const LeaseBook* leases, const std::string& lease_token);
 

@@ -203,7 +203,11 @@ grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::C
     if (input.images != nullptr) return touchstone::diagnosis::ComparePhotographSet(input, how);
     return AsReport(touchstone::diagnosis::Compare(input, how));
   };
-  return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
+  const absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
+  // Photographs have theirs in grey levels.
+  if (status.ok() && report.initial().rmse_us() > 0)
+    resources_->last_comparison_rmse_us = report.initial().rmse_us();
+  return ToGrpc(status);
 }
 
 grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::DiagnoseRequest* request,

@@ -117,6 +117,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
        "Its centre of gravity, flange frame; none: that of the controller's installation stays",
        &raw->payload_cog_mm},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.common.lease_window_s},
+      {"metrics", "Counters for Prometheus and probes over HTTP, HOST:PORT (default: none)",
+       &o.common.metrics},
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };

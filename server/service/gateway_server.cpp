@@ -14,6 +14,7 @@
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
 #include "server/service/source_service.h"
+#include "server/service/status_pages.h"
 #include "server/source/physical_source.h"
 #include "server/source/recorded_rig.h"
 
@@ -112,6 +113,7 @@ struct GatewayServer::Parts {
   std::unique_ptr<ConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
+  std::unique_ptr<StatusPages> pages;  // asks the server
 };
 
 GatewayServer::GatewayServer() : parts_(std::make_unique<Parts>()) {}
@@ -122,10 +124,12 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   Parts& parts = *gateway->parts_;
   Resources& resources = parts.resources;
   resources.options = options.common;
+  if (!options.common.metrics.empty()) resources.calls = std::make_unique<CallMetrics>();
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
                               Access::Create(options.common.listen, options.common.access,
                                              options.replay.empty() ? Motion::kRig : Motion::kSimulated));
   resources.OpenPlaces();
+  resources.access->CountRefusals(resources.calls.get());
   resources.pool = std::make_unique<ThreadPool>(0);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects, source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles,
@@ -166,17 +170,22 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   }
   services.push_back({"touchstone.v1.Control", parts.control.get()});
   for (const ServedService& service : services)
-    GuardRequests(service.service, &resources.options, resources.memory.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
-                              StartServing(options.common, services, resources.access.get()));
+    GuardRequests(service.service, &resources.options, resources.memory.get(), resources.rate.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      Serving serving, StartServing(options.common, services, resources.access.get(), resources.calls.get()));
   resources.memory->Begin();
   parts.acceptor = std::move(serving.acceptor);
   parts.server = std::move(serving.server);
   parts.port = serving.port;
+  if (!options.common.metrics.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts.pages, StatusPages::Start(options.common.metrics, &resources,
+                                                                parts.server->InProcessChannel({})));
+  }
   return gateway;
 }
 
 GatewayServer::~GatewayServer() {
+  parts_->pages.reset();
   if (parts_->server == nullptr) return;
   parts_->resources.draining = true;
   if (parts_->acceptor != nullptr) parts_->acceptor->End();
@@ -195,6 +204,7 @@ source::RigDevice& GatewayServer::device() {
 void GatewayServer::Drain() {
   // Running motions see this within a tick and stop the arm.
   parts_->resources.draining = true;
+  if (parts_->pages != nullptr) parts_->pages->StopAsking();
   if (parts_->acceptor != nullptr) parts_->acceptor->End();
   StopServing(parts_->resources.options, parts_->server.get());
 }

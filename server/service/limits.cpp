@@ -77,6 +77,16 @@ const LimitRow kTable[] = {
     {"keepalive_s", "s", "silence after which a client is asked for a sign of life", &Limits::keepalive_s,
      0.01, 1e6},
     {"keepalive_timeout_s", "s", "time that it has to give one", &Limits::keepalive_timeout_s, 0.01, 1e6},
+    {"max_unary_calls_per_s", "",
+     "unary calls a second of one client, by its address, over five seconds; 0: any number",
+     &Limits::max_unary_calls_per_s, 0, kMaxInt},
+    {"max_unary_s", "s",
+     "time of an expansion, or of simulated touches or photographs, after which it is ended",
+     &Limits::max_unary_s, 0.01, 1e6},
+    {"self_probe_s", "s",
+     "time after which the process asks itself through its port, and that an answer has; three unanswered "
+     "questions end it (status 70); 0: never",
+     &Limits::self_probe_s, 0, 1e6},
     {"drain_s", "s", "time that running calls get after SIGTERM", &Limits::drain_s, 0.01, 3600},
 };
 

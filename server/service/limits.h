@@ -56,6 +56,9 @@ struct Limits {
   double connection_age_s = 43200;
   double keepalive_s = 60;
   double keepalive_timeout_s = 20;
+  int max_unary_calls_per_s = 200;
+  double max_unary_s = 60;
+  double self_probe_s = 60;
   double drain_s = 8;
 
   source::SourceLimits OfSource() const {

@@ -333,6 +333,51 @@ TEST_F(OverloadTest, ADiagnosisEndsAfterItsTime) {
   ExpectOver(reader->Finish(), "max_diagnosis_s", "0.01");
 }
 
+TEST_F(OverloadTest, AClientMakesSoManyCallsASecondAndCanStopAllTheSame) {
+  ServerOptions options;
+  options.max_unary_calls_per_s = 1;  // five at once
+  Start(options);
+  const auto describe = [&] {
+    grpc::ClientContext context;
+    v1::DescribeResponse response;
+    return v1::Source::NewStub(channel_)->Describe(&context, {}, &response);
+  };
+  for (int call = 0; call < 5; ++call) EXPECT_TRUE(describe().ok());
+  // Machines are slow at times: a call may have been saved up meanwhile, but not a hundred.
+  grpc::Status refused;
+  for (int call = 0; call < 100 && refused.ok(); ++call) refused = describe();
+  ExpectOver(refused, "max_unary_calls_per_s", "1");
+  EXPECT_THAT(refused.error_message(), HasSubstr("try again"));
+  grpc::ClientContext context;
+  v1::StopResponse stopped;
+  EXPECT_TRUE(v1::Control::NewStub(channel_)->Stop(&context, {}, &stopped).ok());
+}
+
+TEST_F(OverloadTest, CalculatingForOneCallEndsInTime) {
+  ServerOptions options;
+  options.max_unary_s = 0.01;
+  Start(options);
+  std::string yaml = "touchstone: model/1\nname: slow\neffects:\n";
+  for (int k = 0; k < 60; ++k)
+    absl::StrAppend(&yaml, "  - formula: {name: f", k,
+                    ", adds: time_us, expression: \"k*sin(travel_mm)*cos(finger+", k,
+                    ")*exp(sin(travel_mm))\", parameters: {k: {value: 1, unit: us, min: -9, max: 9}}}\n");
+  v1::TouchRequest request;
+  request.set_object("lat00");
+  request.mutable_model()->set_yaml(yaml);
+  for (int k = 0; k < 20'000; ++k) {
+    v1::CommandedTouch& touch = *request.add_touches();
+    touch.mutable_approach()->set_x(-1);
+    touch.mutable_lateral()->set_y(1);
+    touch.mutable_target_m();
+    touch.set_standoff_m(0.2);
+    touch.set_speed_m_s(0.02);
+  }
+  grpc::ClientContext context;
+  v1::TouchResponse response;
+  ExpectOver(v1::Source::NewStub(channel_)->Touch(&context, request, &response), "max_unary_s", "0.01");
+}
+
 TEST_F(OverloadTest, AnEndlessStreamIsHandedOverWhenTheServerDrains) {
   ServerOptions options;
   options.drain_s = 600;  // nobody waits for it

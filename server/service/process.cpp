@@ -1,15 +1,22 @@
 #include "server/service/process.h"
 
+#include <signal.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 #include <nlohmann/json.hpp>
 
+#include <atomic>
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <thread>
 
 #include "server/base/printable.h"
 #include "server/base/stop_signals.h"
+#include "server/service/self_probe.h"
 
 namespace touchstone::service {
 namespace {
@@ -43,6 +50,15 @@ class JsonMessage : public spdlog::custom_flag_formatter {
   }
 };
 
+constexpr double kGraceS = 10;
+
+void EndAfter(double seconds) {
+  std::thread([seconds] {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    std::_Exit(kExitDeaf);
+  }).detach();
+}
+
 }  // namespace
 
 void SetUpLog(const std::string& level, bool json) {
@@ -74,10 +90,24 @@ int ReportStartError(const char* program, const absl::Status& status) {
   return absl::IsUnavailable(status) ? 3 : 2;
 }
 
-void ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins) {
+bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins) {
   AnnounceListening(options.listen, port);
+  std::atomic<bool> deaf{false};
+  std::unique_ptr<SelfProbe> probe;
+  if (options.self_probe_s > 0)
+    probe = std::make_unique<SelfProbe>(OwnAddress(options.listen, port), !options.access.tls_cert.empty(),
+                                        options.self_probe_s, [&] {
+                                          deaf = true;
+                                          EndAfter(options.drain_s + kGraceS);
+                                          ::kill(::getpid(), SIGTERM);
+                                        });
   const int signal = WaitForStopSignal();
+  probe.reset();
+  if (deaf)
+    spdlog::critical("nobody can reach this process any more: it ends with status {}, to be started anew",
+                     kExitDeaf);
   spdlog::info("signal {}: {} for up to {} s", signal, what_begins, options.drain_s);
+  return deaf;
 }
 
 void LogStopped() {

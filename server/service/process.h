@@ -19,9 +19,12 @@ void AnnounceListening(const std::string& listen, int port);
 
 // What went wrong, on stderr, and the exit status for it: 3 where something is unavailable, else 2.
 int ReportStartError(const char* program, const absl::Status& status);
-// Until a signal says otherwise; logs what the signal begins.
-void ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins);
+// Until a signal says otherwise, or until the process is deaf (self_probe.h); logs what then begins. Whether it was deaf:
+// then it ends within drain_s and a little, whatever hangs.
+bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins);
 void LogStopped();
+// Exit status of a deaf process: start it anew.
+inline constexpr int kExitDeaf = 70;
 
 // The life of a server's process, as its exit status: log, start, serving until a signal, draining. `Flags` has
 // log_level, log_json and done; `options_of` gives the options that every server has; `start` makes from the
@@ -36,10 +39,10 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
   RaiseFileLimit();
   auto server = start(*flags);
   if (!server.ok()) return ReportStartError(program, server.status());
-  ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);
+  const bool deaf = ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);
   (*server)->Drain();
   LogStopped();
-  return 0;
+  return deaf ? kExitDeaf : 0;
 }
 
 }  // namespace touchstone::service

@@ -6,7 +6,9 @@
 #include <google/protobuf/io/zero_copy_stream.h>
 #include <grpc/byte_buffer.h>
 #include <grpc/byte_buffer_reader.h>
+#include <grpc/grpc.h>
 #include <grpc/slice.h>
+#include <grpc/support/alloc.h>
 #include <grpcpp/impl/rpc_service_method.h>
 
 #include <algorithm>
@@ -96,15 +98,23 @@ class BufferStream : public google::protobuf::io::ZeroCopyInputStream {
 class GuardedHandler : public MethodHandler {
  public:
   GuardedHandler(std::unique_ptr<MethodHandler> handler, const google::protobuf::MethodDescriptor& method,
-                 const Limits* limits, MemoryBudget* memory)
-      : handler_(std::move(handler)), request_(*method.input_type()), limits_(*limits), memory_(memory) {
+                 const Limits* limits, MemoryBudget* memory, CallRate* rate)
+      : handler_(std::move(handler)),
+        request_(*method.input_type()),
+        limits_(*limits),
+        memory_(memory),
+        rate_(rate) {
     const std::string& service = method.service()->name();
     large_ = service == "Diagnosis" || service == "Sessions";
     needs_memory_ = service != "Control" && service != "Rig" && service != "Freedrive";
+    counts_ = needs_memory_ && !method.server_streaming();
   }
 
   void* Deserialize(grpc_call* call, grpc_byte_buffer* buffer, grpc::Status* status,
                     void** handler_data) override {
+    if (counts_)
+      if (const absl::Status taken = rate_->Take(ClientOfCall(call)); !taken.ok())
+        return Refuse(taken, buffer, status);
     absl::StatusOr<uint64_t> bytes = Measure(buffer);
     if (!bytes.ok()) return Refuse(bytes.status(), buffer, status);
     std::optional<MemoryBudget::Reservation> reservation;
@@ -133,6 +143,13 @@ class GuardedHandler : public MethodHandler {
   }
 
  private:
+  static std::string ClientOfCall(grpc_call* call) {
+    char* const peer = grpc_call_get_peer(call);
+    const std::string client = ClientOfPeer(peer == nullptr ? "" : peer);
+    gpr_free(peer);
+    return client;
+  }
+
   static void* Refuse(const absl::Status& why, grpc_byte_buffer* buffer, grpc::Status* status) {
     *status = ToGrpc(why);
     grpc_byte_buffer_destroy(buffer);
@@ -169,14 +186,15 @@ class GuardedHandler : public MethodHandler {
   const google::protobuf::Descriptor& request_;
   const Limits& limits_;
   MemoryBudget* const memory_;
-  bool large_ = false, needs_memory_ = false;
+  CallRate* const rate_;
+  bool large_ = false, needs_memory_ = false, counts_ = false;
   std::mutex mutex_;
   std::unordered_map<void*, MemoryBudget::Reservation> reservations_;  // by the decoded request
 };
 
 }  // namespace
 
-void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* memory) {
+void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* memory, CallRate* rate) {
   for (const std::unique_ptr<RpcServiceMethod>& method : service->*MemberOf(MethodsOfService())) {
     if (method->method_type() != grpc::internal::RpcMethod::NORMAL_RPC &&
         method->method_type() != grpc::internal::RpcMethod::SERVER_STREAMING)
@@ -186,7 +204,7 @@ void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* m
     const auto* descriptor = google::protobuf::DescriptorPool::generated_pool()->FindMethodByName(name);
     if (descriptor == nullptr) continue;
     std::unique_ptr<MethodHandler>& handler = (*method).*MemberOf(HandlerOfMethod());
-    handler = std::make_unique<GuardedHandler>(std::move(handler), *descriptor, limits, memory);
+    handler = std::make_unique<GuardedHandler>(std::move(handler), *descriptor, limits, memory, rate);
   }
 }
 

@@ -9,8 +9,8 @@
 namespace touchstone::service {
 
 // Every method of the service that takes one message is asked for through the guard from now on. RESOURCE_EXHAUSTED names
-// the limit. Before the service is registered. `limits` and `memory` must outlive the service. Calls of Control, Rig and
-// Freedrive are never refused for want of memory: a stop always comes through.
-void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* memory);
+// the limit. Before the service is registered. `limits`, `memory` and `rate` must outlive the service. Calls of Control, Rig
+// and Freedrive are never refused for want of memory, nor counted: a stop always comes through. Other unary ones are counted.
+void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* memory, CallRate* rate);
 
 }  // namespace touchstone::service

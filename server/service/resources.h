@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -17,6 +18,7 @@
 #include "server/model/model.h"
 #include "server/service/access.h"
 #include "server/service/admission.h"
+#include "server/service/metrics.h"
 #include "server/service/server_options.h"
 #include "server/service/session_store.h"
 #include "server/source/object_store.h"
@@ -56,8 +58,10 @@ struct Resources {
   void OpenPlaces();
 
   ServerOptions options;
-  std::unique_ptr<Access> access;  // who may call; set before the server starts
+  std::unique_ptr<CallMetrics> calls;  // counted there, if anybody asks; set before the server starts
+  std::unique_ptr<Access> access;      // who may call; set before the server starts
   std::unique_ptr<Places> streams, uploads, diagnoses;
+  std::unique_ptr<CallRate> rate;
   std::unique_ptr<MemoryBudget> memory;
   std::unique_ptr<StallWatch> stalls;
   std::unique_ptr<ThreadPool> pool;
@@ -70,8 +74,10 @@ struct Resources {
   std::atomic<uint64_t> stop_count{0};  // grows with every Stop; running touches compare
   std::atomic<uint32_t> running_requests{0};
   std::atomic<uint32_t> running_streams{0};
+  std::atomic<uint64_t> samples{0};  // of datasets
   std::atomic<uint64_t> touches{0};
   std::atomic<uint64_t> images{0};
+  std::atomic<double> last_comparison_rmse_us{std::numeric_limits<double>::quiet_NaN()};  // of touches
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
 

@@ -15,6 +15,7 @@
 #include "server/service/serving.h"
 #include "server/service/sessions_service.h"
 #include "server/service/source_service.h"
+#include "server/service/status_pages.h"
 #include "server/source/virtual_source.h"
 
 namespace touchstone::service {
@@ -50,6 +51,7 @@ struct Server::Parts {
   std::unique_ptr<ConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   int port = 0;
+  std::unique_ptr<StatusPages> pages;  // asks the server
 };
 
 Server::Server() : parts_(std::make_unique<Parts>()) {}
@@ -60,9 +62,11 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   Parts& parts = *server->parts_;
   Resources& resources = parts.resources;
   resources.options = options;
+  if (!options.metrics.empty()) resources.calls = std::make_unique<CallMetrics>();
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
                               Access::Create(options.listen, options.access, Motion::kSimulated));
   resources.OpenPlaces();
+  resources.access->CountRefusals(resources.calls.get());
   resources.pool = std::make_unique<ThreadPool>(options.threads);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects,
@@ -87,21 +91,31 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
                                                {"touchstone.v1.Sessions", parts.sessions.get()},
                                                {"touchstone.v1.Diagnosis", parts.diagnosis.get()}};
   for (const ServedService& service : services)
-    GuardRequests(service.service, &resources.options, resources.memory.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options, services, resources.access.get()));
+    GuardRequests(service.service, &resources.options, resources.memory.get(), resources.rate.get());
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
+                              StartServing(options, services, resources.access.get(), resources.calls.get()));
   resources.memory->Begin();
   parts.acceptor = std::move(serving.acceptor);
   parts.server = std::move(serving.server);
   parts.port = serving.port;
+  if (!options.metrics.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        parts.pages, StatusPages::Start(options.metrics, &resources, parts.server->InProcessChannel({})));
+  }
   return server;
 }
 
 Server::~Server() {
+  parts_->pages.reset();
   if (parts_->acceptor != nullptr) parts_->acceptor->End();
   if (parts_->server != nullptr) {
     parts_->server->Shutdown(std::chrono::system_clock::now());
     parts_->server->Wait();
   }
+}
+
+int Server::metrics_port() const {
+  return parts_->pages == nullptr ? 0 : parts_->pages->port();
 }
 
 int Server::port() const {
@@ -116,6 +130,7 @@ std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
 
 void Server::Drain() {
   parts_->resources.draining = true;
+  if (parts_->pages != nullptr) parts_->pages->StopAsking();
   if (parts_->acceptor != nullptr) parts_->acceptor->End();
   StopServing(parts_->resources.options, parts_->server.get());
 }

@@ -22,6 +22,9 @@ class Server {
   // The port listened on; 0 without one.
   int port() const;
 
+  // That of the counters and probes; 0 without one.
+  int metrics_port() const;
+
   // A channel to this server without a socket.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 

@@ -41,6 +41,7 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
       {"egl_device", "Index of the EGL device (touchstone doctor lists them); -1: the first that renders",
        &o.renderer.egl_device},
       {"lease_window_s", "Seconds within which a lease must be renewed", &o.lease_window_s},
+      {"metrics", "Counters for Prometheus and probes over HTTP, HOST:PORT (default: none)", &o.metrics},
       {"log_level", "trace, debug, info, warn, error or off", &flags->log_level},
       {"log_json", "Log lines as JSON", &flags->log_json},
   };

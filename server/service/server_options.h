@@ -24,11 +24,12 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshSpecsOfFolder(const std::strin
 // Limits are options like all others; they have a table of their own.
 struct ServerOptions : Limits {
   std::string listen = "127.0.0.1:50051";  // port 0: any free one; empty: no port (embedded)
-  AccessOptions access;                    // who may connect there, and do what
-  std::vector<source::MeshSpec> meshes;    // besides the five built-in supershapes
-  int supershape_triangles = 20000;        // about; of each built-in
-  std::string models_dir;                  // where models are kept; empty: in memory
-  std::string sessions_dir;                // where sessions are kept; empty: in memory
+  std::string metrics;   // HOST:PORT of counters and probes over HTTP (status_pages.h); empty: none
+  AccessOptions access;  // who may connect there, and do what
+  std::vector<source::MeshSpec> meshes;  // besides the five built-in supershapes
+  int supershape_triangles = 20000;      // about; of each built-in
+  std::string models_dir;                // where models are kept; empty: in memory
+  std::string sessions_dir;              // where sessions are kept; empty: in memory
   std::string default_model = "nominal";
   int threads = 0;  // that simulate; 0: one per core
   image::RendererOptions renderer;

@@ -4,12 +4,14 @@
 #include <absl/strings/str_cat.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <limits>
 
 #include "grpc/health/v1/health.pb.h"
 #include "server/base/status.h"
+#include "server/service/call_log.h"
 #include "server/service/option_table.h"
 
 namespace touchstone::service {
@@ -61,7 +63,7 @@ absl::Status CheckServing(const ServerOptions& options) {
 }
 
 absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
-                                     Access* access) {
+                                     Access* access, CallMetrics* calls) {
   for (const ServedService& service : services) TOUCHSTONE_RETURN_IF_ERROR(CheckRolesOf(service.name));
   EnablePlugins();
   Serving serving;
@@ -76,6 +78,11 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::ve
     serving.port = serving.acceptor->port();
     connections = builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, access->Credentials());
+  }
+  if (calls != nullptr || spdlog::should_log(spdlog::level::debug)) {
+    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+    interceptors.push_back(MakeCallInterceptors(calls));
+    builder.experimental().SetInterceptorCreators(std::move(interceptors));
   }
   for (const ServedService& service : services) builder.RegisterService(service.service);
   serving.server = builder.BuildAndStart();

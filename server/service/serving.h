@@ -10,6 +10,7 @@
 
 #include "server/service/access.h"
 #include "server/service/connection_acceptor.h"
+#include "server/service/metrics.h"
 #include "server/service/server_options.h"
 
 namespace touchstone::service {
@@ -27,9 +28,10 @@ struct Serving {
 
 // Errors name the option.
 absl::Status CheckServing(const ServerOptions& options);
-// INTERNAL if a method has no role (access_roles.h). `access` decides on every call and outlives the server.
+// INTERNAL if a method has no role (access_roles.h). `access` decides on every call, `calls` counts them
+// if it is there; both outlive the server.
 absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
-                                     Access* access);
+                                     Access* access, CallMetrics* calls);
 // NOT_SERVING, no more calls, up to drain_s for running ones.
 void StopServing(const ServerOptions& options, grpc::Server* server);
 

@@ -93,8 +93,9 @@ grpc::Status SourceService::ExpandPlan(grpc::ServerContext* context, const v1::E
   const absl::StatusOr<source::PlanRequest> request = FromProto(*message, *resources_);
   if (!request.ok()) return ToGrpc(request.status());
   // Nothing moves, so nobody needs a lease; a client that is gone needs no answer.
-  const source::MotionGuard guard = [context]() -> absl::Status {
-    if (!context->IsCancelled()) return absl::OkStatus();
+  const source::MotionGuard guard = [context,
+                                     in_time = TimeGuardOf(resources_->options, false)]() -> absl::Status {
+    if (!context->IsCancelled()) return in_time();
     return absl::CancelledError("the client is gone, or the call's deadline has passed");
   };
   const absl::StatusOr<source::ExpandedPlan> plan = source_->ExpandPlan(*request, guard);
@@ -166,6 +167,7 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
     handover.Sent(batch->start_index, rows);
     *response.mutable_batch() = ToProto(*std::move(batch), stream->header().columns);
     if (!call.Wait(write)) return absl::CancelledError("the client is gone");
+    resources_->samples += rows;
     resources_->touches += rows;
     if (request.specification.columns.image) resources_->images += rows;
   }

@@ -49,6 +49,11 @@ def test_the_same_server_started_again_goes_on(server, new_server):
     np.testing.assert_array_equal(stream(dataset, 37, crash), expected(server))
 
 
+def test_a_client_that_calls_too_often_waits_and_goes_on(new_server):
+    with touchstone.connect(new_server("--max-unary-calls-per-s", "50").target, retry_for_s=0) as client:
+        assert len({client.describe().version for _ in range(400)}) == 1  # 250 at once, then 50 a second
+
+
 # Long runs: TOUCHSTONE_KILLS=100, as the step cluster of deploy/test.
 KILLS = int(os.environ.get("TOUCHSTONE_KILLS", 8))
 

@@ -173,6 +173,9 @@ class Connection:
             try:
                 return getattr(stub(self.channel()), method)(request, timeout=timeout_s)
             except grpc.RpcError as error:
+                if errors.is_too_fast(error):
+                    time.sleep(random.uniform(0.01, 0.05))
+                    continue
                 failure = errors.from_rpc(error, self.target)
                 if not (repeat and errors.is_lost(error)):
                     raise failure from None

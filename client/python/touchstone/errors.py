@@ -84,6 +84,11 @@ def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
     return kind(details, code, target)
 
 
+def is_too_fast(error: grpc.RpcError) -> bool:
+    """True if this client has made too many calls in the last second: the same source answers in a moment."""
+    return error.code() == grpc.StatusCode.RESOURCE_EXHAUSTED and "max_unary_calls_per_s" in (error.details() or "")
+
+
 def is_lost(error: grpc.RpcError) -> bool:
     """True if the connection or the server went away, so that the same request may succeed elsewhere or later."""
     code, details = error.code(), error.details() or ""

@@ -69,7 +69,9 @@ class OwnServer:
     def __init__(self, options: Sequence[str] = (), *, timeout_s: float = 30.0):
         """Waits until it serves. SourceUnreachable with its own words if it does not."""
         program = find_server()
-        self._process = start_bound([program, "--listen", "127.0.0.1:0", *options], stderr=subprocess.PIPE)
+        # It serves this process alone: nobody else is held up by many calls.
+        own = ["--listen", "127.0.0.1:0", "--max-unary-calls-per-s", "0"]
+        self._process = start_bound([program, *own, *options], stderr=subprocess.PIPE)
         atexit.register(self.stop)
         self._said: list[str] = []
         targets: queue.Queue[str] = queue.Queue()

@@ -1,0 +1,83 @@
+// A process that nobody reaches is told from a busy one and from one that refuses.
+#include "server/service/self_probe.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include "server/service/server.h"
+
+namespace touchstone::service {
+namespace {
+
+// A port on which the system takes connections and nobody ever looks at them.
+class DeafListener {
+ public:
+  DeafListener() : file_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::bind(file_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(file_, 100), 0);
+    ::getsockname(file_, reinterpret_cast<sockaddr*>(&address), &size);
+    address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  }
+  ~DeafListener() { ::close(file_); }
+  const std::string& address() const { return address_; }
+
+ private:
+  const int file_;
+  std::string address_;
+};
+
+TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
+  const DeafListener listener;
+  std::atomic<int> ends{0};
+  const SelfProbe probe(listener.address(), false, 0.05, [&] { ++ends; });
+  while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(ends, 1);
+}
+
+TEST(SelfProbe, ThatIsOverDoesNotWaitForItsAnswer) {
+  const DeafListener listener;
+  std::atomic<int> ends{0};
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    const SelfProbe probe(listener.address(), false, 3600, [&] { ++ends; });
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::minutes(30));
+  EXPECT_EQ(ends, 0);
+}
+
+// Also one that takes no more of its connections says so at once: that is an answer.
+TEST(SelfProbe, LeavesAServerAloneThatAnswersOrRefuses) {
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.supershape_triangles = 500;
+  options.threads = 1;
+  auto server = Server::Start(options).value();
+  std::atomic<int> ends{0};
+  const SelfProbe probe(OwnAddress(options.listen, server->port()), false, 0.3, [&] { ++ends; });
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  server.reset();  // nobody listens there any more
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(ends, 0);
+}
+
+TEST(SelfProbe, AsksWhereThisMachineReachesTheServer) {
+  EXPECT_EQ(OwnAddress("127.0.0.1:0", 50051), "127.0.0.1:50051");
+  EXPECT_EQ(OwnAddress("0.0.0.0:0", 50051), "127.0.0.1:50051");
+  EXPECT_EQ(OwnAddress("[::]:50051", 50051), "127.0.0.1:50051");
+  EXPECT_EQ(OwnAddress("10.0.0.7:50051", 50051), "10.0.0.7:50051");
+  EXPECT_EQ(OwnAddress("unix:/run/touchstone", 0), "unix:/run/touchstone");
+}
+
+}  // namespace
+}  // namespace touchstone::service
