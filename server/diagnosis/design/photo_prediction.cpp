@@ -160,7 +160,7 @@ class PhotoPredictor {
 
   std::vector<float> Recorded(const image::Photo& photo) const {
     std::vector<float> grey = photo.grey;
-    for (float& value : grey) value = record_->Mean(value);
+    record_->ToMeans(&grey);
     return grey;
   }
 

@@ -128,6 +128,26 @@ TEST(DiagnosePhotographs, NamesALensBesideAnExposureThatAlbedoCouldHold) {
   const bool lens_first = d.steps[0].effect == "radial_distortion";
   EXPECT_EQ(d.steps[0].effect, lens_first ? "radial_distortion" : "exposure");
   EXPECT_EQ(d.steps[1].effect, lens_first ? "exposure" : "radial_distortion");
+  // Before a black ground, objects that reflect more look the same.
+  ASSERT_EQ(d.confounded.size(), 1u);
+  EXPECT_EQ(d.confounded[0].effects[0], "exposure");
+  EXPECT_NE(d.confounded[0].discriminating_measurement.find("card of known reflectance"), std::string::npos);
+}
+
+TEST(DiagnosePhotographs, TellsAnExposureFromAlbedoWhereTheGroundIsLitOrSurfacesShine) {
+  const std::vector<NamedValues> grounds = {{{"background_level", {"grey=40"}}},
+                                            {{"specular", {"strength=0.4", "exponent=20"}}}};
+  for (const auto& known : grounds) {
+    HiddenCamera rig;
+    rig.photographs = 6;
+    rig.side_px = 112;
+    rig.known = known;
+    rig.hidden = {{"exposure", {"stops=0.3"}}};
+    const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+    ASSERT_EQ(d.steps.size(), 1u);
+    EXPECT_EQ(d.steps[0].effect, "exposure");
+    EXPECT_TRUE(d.confounded.empty());
+  }
 }
 
 // Black is 0.8 grey levels of clipped and rounded noise, not light of the ground.

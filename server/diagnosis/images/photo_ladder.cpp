@@ -24,6 +24,7 @@ constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures 
 constexpr double kAlbedoNats = 5;
 constexpr double kDoubted = 0.5, kMaxBesideRest = 0.9;
 constexpr double kZeroWithinErrors = 2;
+constexpr char kExposure[] = "exposure", kAlbedoOfAll[] = "the albedo of all objects";
 
 class PhotoLadder {
  public:
@@ -47,6 +48,7 @@ class PhotoLadder {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGivenEffects());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     changed_ |= !d_.steps.empty();
+    NameAlbedo();
     if (changed_) {
       TOUCHSTONE_ASSIGN_OR_RETURN(*after_, ExpectPhotographs(photographs_, improved_, true, pool_));
     }
@@ -180,6 +182,22 @@ class PhotoLadder {
     step.quality.heldout_rmse_grey *= heldout_ratio;
     d_.steps.push_back(std::move(step));
     return absl::OkStatus();
+  }
+
+  // Surfaces that all reflect another share of the light look like another exposure, unless the ground behind them is
+  // lit or they shine, since neither comes from their albedo: the catalogue has no such effect, and no fit can tell.
+  void NameAlbedo() {
+    const image::PhotoSimulator simulator(std::make_shared<const model::Model>(improved_));
+    for (const std::string& object : photographs_.objects) {
+      const effects::PhotoSettings settings = simulator.SettingsFor(object);
+      if (settings.background_light > 0 || settings.specular_strength > 0) return;
+    }
+    for (PhotographStep& step : d_.steps) {
+      if (step.effect != kExposure) continue;
+      const std::string decides = selection::DiscriminatingMeasurement({step.effect});
+      if (step.discriminating_measurement.empty()) step.discriminating_measurement = decides;
+      d_.confounded.push_back({{step.effect, kAlbedoOfAll}, decides});
+    }
   }
 
   // On what the improved model leaves, expected with the noise that it leaves.

@@ -41,7 +41,7 @@ const model::ParameterInfo& ParameterOf(const model::Effect& effect, int fingers
 
 std::vector<float> RecordedGrey(const image::Photo& photo, const RecordTable& record) {
   std::vector<float> grey = photo.grey;
-  for (float& value : grey) value = record.Mean(value);
+  record.ToMeans(&grey);
   return grey;
 }
 

@@ -144,7 +144,7 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
       absl::StatusOr<image::Photo> photo = simulator.Run(photographs.requests[k], outputs, &workspace);
       statuses[k] = photo.status();
       if (!photo.ok()) continue;
-      for (float& grey : photo->grey) grey = photographs.record->Mean(grey);
+      photographs.record->ToMeans(&photo->grey);
       photos[k] = *std::move(photo);
     }
   });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -63,6 +64,14 @@ RecordTable::RecordTable(const PixelNoise& noise) : noise_(noise), variance_(kEn
     by_grey.push_back(Record(static_cast<double>(i) / kPerGrey, noise));
     mean_.push_back(static_cast<float>(by_grey.back().mean_grey));
   }
+  const auto kept = [&](int i) { return by_grey[i].mean_grey == static_cast<double>(i) / kPerGrey; };
+  int first = kEntries / 2, last = first;
+  if (kept(first)) {
+    while (first > 0 && kept(first - 1)) --first;
+    while (last + 1 < kEntries && kept(last + 1)) ++last;
+    first_kept_grey_ = static_cast<float>(first) / kPerGrey;
+    last_kept_grey_ = static_cast<float>(last) / kPerGrey;
+  }
   int from = 0;
   for (int i = 0; i < kEntries; ++i) {
     while (from + 1 < kEntries && by_grey[from + 1].mean_grey <= static_cast<double>(i) / kPerGrey) ++from;
@@ -75,6 +84,20 @@ float RecordTable::Mean(float grey) const {
   const float place = std::clamp(grey, 0.0f, static_cast<float>(kWhite)) * kPerGrey;
   const int below = std::min(static_cast<int>(place), kEntries - 2);
   return mean_[below] + (place - static_cast<float>(below)) * (mean_[below + 1] - mean_[below]);
+}
+
+void RecordTable::ToMeans(std::vector<float>* grey) const {
+  // A diagnosis does this for every pixel that it expects, and most of them are grey levels that no clipping changes
+  // (interpolating gives them back exactly), or a ground that is the same everywhere.
+  float ground = std::numeric_limits<float>::quiet_NaN(), ground_mean = 0;
+  for (float& value : *grey) {
+    if (value >= first_kept_grey_ && value <= last_kept_grey_) continue;
+    if (value != ground) {
+      ground = value;
+      ground_mean = Mean(value);
+    }
+    value = ground_mean;
+  }
 }
 
 double RecordTable::At(const std::vector<float>& values, double mean) const {

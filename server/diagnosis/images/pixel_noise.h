@@ -25,6 +25,8 @@ class RecordTable {
  public:
   explicit RecordTable(const PixelNoise& noise);
   float Mean(float grey) const;
+  // The same of a whole picture, in place.
+  void ToMeans(std::vector<float>* grey) const;
   // Of a pixel that records `mean` on average.
   double Variance(double mean) const { return At(variance_, mean); }
   double Clipped(double mean) const { return At(clipped_, mean); }
@@ -32,7 +34,9 @@ class RecordTable {
  private:
   double At(const std::vector<float>& values, double mean) const;
   PixelNoise noise_;
-  std::vector<float> mean_;                // by grey level
+  std::vector<float> mean_;  // by grey level
+  float first_kept_grey_ = 1,
+        last_kept_grey_ = 0;               // between them a record's mean is the grey level; none: 1 and 0
   std::vector<float> variance_, clipped_;  // by what is recorded on average
 };
 

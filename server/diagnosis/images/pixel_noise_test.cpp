@@ -28,6 +28,18 @@ TEST(PixelNoise, RecordsWhatRoundedAndClippedDrawsDoOnAverage) {
   }
 }
 
+TEST(PixelNoise, RecordsAPictureAsItsPixels) {
+  PixelNoise noise;
+  noise.sigma_grey = 2, noise.gain = 0.02;
+  const RecordTable table(noise);
+  std::vector<float> picture;
+  for (int i = 0; i < 1003; ++i)
+    picture.push_back(-3 + 0.26f * static_cast<float>(i));  // beyond black and white
+  std::vector<float> means = picture;
+  table.ToMeans(&means);
+  for (size_t i = 0; i < picture.size(); ++i) EXPECT_EQ(means[i], table.Mean(picture[i])) << picture[i];
+}
+
 TEST(PixelNoise, IsFoundInPicturesOfSmoothShades) {
   constexpr int kSide = 300;
   RandomStream random(4, RandomDomain::kTest);

@@ -33,8 +33,9 @@ inline constexpr char kGivenPrefix[] = "given:";
 // Whether either effect declares that the other may be taken for it.
 bool IsDeclaredConfounded(const model::Effect& one, const std::string& other);
 
-// The measurement or intervention that tells two or more effects apart, for people. Effects declare it
-// (Effect::confounded_with); of several pairs the one of the effects that are named first counts.
+// The measurements or interventions that tell the first effect from each of the others, for people. Effects declare them
+// (Effect::confounded_with). Effects of photographs of which nothing is declared are told by what checks each of them. Of
+// one effect: what tells it from nameless causes.
 std::string DiscriminatingMeasurement(const std::vector<std::string>& effects);
 
 }  // namespace touchstone::diagnosis::selection
