@@ -44,6 +44,7 @@ CallMetrics::CallMetrics()
   const auto add = [this](const std::string& service, const std::string& method) {
     const prometheus::Labels labels = {{"grpc_service", service}, {"grpc_method", method}};
     methods_.push_back({labels, &started_.Add(labels), &seconds_.Add(labels, kDurations_s)});
+    HandledOf(methods_.back(), grpc::StatusCode::OK);  // there with zero, so that a rate has a beginning
   };
   for (const MethodRole& row : MethodRoles()) {
     const std::string path = row.method;  // "/touchstone.v1.Source/Touch"
@@ -63,21 +64,21 @@ void CallMetrics::Started(absl::string_view method) {
   Find(method).started->Increment();
 }
 
-void CallMetrics::CountEnd(const OfMethod& method, int code) {
+prometheus::Counter& CallMetrics::HandledOf(const OfMethod& method, int code) {
   prometheus::Labels labels = method.labels;
   labels["grpc_code"] = StatusCodeName(code);
-  handled_.Add(labels).Increment();
+  return handled_.Add(labels);
 }
 
 void CallMetrics::Handled(absl::string_view method, int code, double seconds) {
   const OfMethod& of = Find(method);
-  CountEnd(of, code);
+  HandledOf(of, code).Increment();
   of.seconds->Observe(seconds);
 }
 
 void CallMetrics::Refused(absl::string_view method, int code) {
   Started(method);
-  CountEnd(Find(method), code);
+  HandledOf(Find(method), code).Increment();
 }
 
 std::string MetricsText(const Resources& resources) {

@@ -36,7 +36,7 @@ class CallMetrics {
     prometheus::Histogram* seconds;
   };
   const OfMethod& Find(absl::string_view method) const;
-  void CountEnd(const OfMethod& method, int code);
+  prometheus::Counter& HandledOf(const OfMethod& method, int code);
 
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Counter>&started_, &handled_;
