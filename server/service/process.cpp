@@ -96,7 +96,7 @@ bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_b
   std::unique_ptr<SelfProbe> probe;
   if (options.self_probe_s > 0)
     probe = std::make_unique<SelfProbe>(OwnAddress(options.listen, port), !options.access.tls_cert.empty(),
-                                        options.self_probe_s, [&] {
+                                        options.self_probe_s, options.self_probe_s, [&] {
                                           deaf = true;
                                           EndAfter(options.drain_s + kGraceS);
                                           ::kill(::getpid(), SIGTERM);

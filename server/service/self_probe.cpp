@@ -33,8 +33,9 @@ std::string OwnAddress(const std::string& listen, int port) {
   return absl::StrCat(host, ":", port);
 }
 
-SelfProbe::SelfProbe(const std::string& address, bool tls, double every_s, std::function<void()> on_deaf)
-    : address_(address), tls_(tls), every_s_(every_s), on_deaf_(std::move(on_deaf)) {
+SelfProbe::SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
+                     std::function<void()> on_deaf)
+    : address_(address), tls_(tls), every_s_(every_s), answer_s_(answer_s), on_deaf_(std::move(on_deaf)) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -57,7 +58,7 @@ void SelfProbe::Run() {
     unanswered = Answers() ? 0 : unanswered + 1;
     if (unanswered > 0)
       spdlog::warn("{} could not be reached by this process itself within {} s ({} of {})", address_,
-                   every_s_, unanswered, kUnanswered);
+                   answer_s_, unanswered, kUnanswered);
   }
   on_deaf_();
 }
@@ -72,7 +73,7 @@ bool SelfProbe::Answers() {
   const auto channel = grpc::CreateCustomChannel(address_, CredentialsFor(tls_), arguments);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +
-                       std::chrono::microseconds(static_cast<int64_t>(1e6 * every_s_)));
+                       std::chrono::microseconds(static_cast<int64_t>(1e6 * answer_s_)));
   const auto ask = [&](grpc::ClientContext* question) {
     const std::lock_guard<std::mutex> lock(mutex_);
     asking_ = question;

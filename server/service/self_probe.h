@@ -21,8 +21,9 @@ std::string OwnAddress(const std::string& listen, int port);
 class SelfProbe {
  public:
   static constexpr int kUnanswered = 3;
-  // Asks every `every_s` seconds and waits as long for an answer. `on_deaf` is called once, from a thread of its own.
-  SelfProbe(const std::string& address, bool tls, double every_s, std::function<void()> on_deaf);
+  // Asks every `every_s` seconds; an answer has `answer_s`. `on_deaf` is called once, from a thread of its own.
+  SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
+            std::function<void()> on_deaf);
   ~SelfProbe();
   SelfProbe(const SelfProbe&) = delete;
   SelfProbe& operator=(const SelfProbe&) = delete;
@@ -33,7 +34,7 @@ class SelfProbe {
 
   const std::string address_;
   const bool tls_;
-  const double every_s_;
+  const double every_s_, answer_s_;
   const std::function<void()> on_deaf_;
   std::mutex mutex_;
   std::condition_variable wake_;

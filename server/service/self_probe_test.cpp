@@ -40,7 +40,7 @@ class DeafListener {
 TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
   const DeafListener listener;
   std::atomic<int> ends{0};
-  const SelfProbe probe(listener.address(), false, 0.05, [&] { ++ends; });
+  const SelfProbe probe(listener.address(), false, 0.05, 0.05, [&] { ++ends; });
   while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   EXPECT_EQ(ends, 1);
 }
@@ -50,7 +50,9 @@ TEST(SelfProbe, ThatIsOverDoesNotWaitForItsAnswer) {
   std::atomic<int> ends{0};
   const auto begin = std::chrono::steady_clock::now();
   {
-    const SelfProbe probe(listener.address(), false, 3600, [&] { ++ends; });
+    // Long enough that it asks; on a machine that is slower still, there is no answer to wait for.
+    const SelfProbe probe(listener.address(), false, 0.001, 3600, [&] { ++ends; });
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::minutes(30));
   EXPECT_EQ(ends, 0);
@@ -64,10 +66,10 @@ TEST(SelfProbe, LeavesAServerAloneThatAnswersOrRefuses) {
   options.threads = 1;
   auto server = Server::Start(options).value();
   std::atomic<int> ends{0};
-  const SelfProbe probe(OwnAddress(options.listen, server->port()), false, 0.3, [&] { ++ends; });
-  std::this_thread::sleep_for(std::chrono::seconds(1));
+  const SelfProbe probe(OwnAddress(options.listen, server->port()), false, 0.05, 600, [&] { ++ends; });
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   server.reset();  // nobody listens there any more
-  std::this_thread::sleep_for(std::chrono::seconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   EXPECT_EQ(ends, 0);
 }
 

@@ -17,10 +17,11 @@ SERIES = re.compile(r"\b(?:touchstone|grpc_server)_[a-z_]+\b")
 
 
 @pytest.fixture
-def server():
+def server(request):
     """Its process and, once it serves, its pages' address."""
-    with subprocess.Popen([PROGRAM, "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0", "--self-probe-s", "0.3",
-                           "--supershape-triangles", "2000"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    options = ["--self-probe-s", str(getattr(request, "param", 60)), "--supershape-triangles", "2000"]
+    with subprocess.Popen([PROGRAM, "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0", *options],
+                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         pages = None
         for line in process.stderr:
             pages = pages or re.search(r"metrics at (http://\S+)/metrics", line)
@@ -53,6 +54,7 @@ def test_probes_are_answered(server):
     assert get(pages + "/livez") == "alive\n" and get(pages + "/readyz") == "ready\n"
 
 
+@pytest.mark.parametrize("server", [0.3], indirect=True)
 def test_a_server_that_nobody_can_connect_to_any_more_ends_to_be_started_anew(server):
     process, _ = server
     hard = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)[1]
