@@ -25,16 +25,9 @@ class RigAccess : public PhysicalTest {
               service::HashOfToken(tokens_[role]) + "\n";
     }
     std::ofstream(folder_.Path("tokens")) << text;
-    const std::string tokens = folder_.Path("tokens");
-    const char* argv[] = {"touchstone-gateway",
-                          "--config",
-                          emulator_->config_path().c_str(),
-                          "--listen",
-                          "127.0.0.1:0",
-                          "--supershape-triangles",
-                          "2000",
-                          "--token-file",
-                          tokens.c_str()};
+    const std::string config = emulator_->config_path(), tokens = folder_.Path("tokens");
+    const char* argv[] = {"touchstone-gateway",     "--config", config.c_str(), "--listen",    "127.0.0.1:0",
+                          "--supershape-triangles", "2000",     "--token-file", tokens.c_str()};
     auto parsed = service::ParseGatewayFlags(sizeof argv / sizeof *argv, argv);
     ASSERT_TRUE(parsed.ok()) << parsed.status();
     auto gateway = service::GatewayServer::Start(parsed->options);
