@@ -18,7 +18,7 @@ constexpr uint32_t kDrawsBetweenLooks = 64;
 // What would help most against the flaw that was the most frequent. `too_wide`: the fingers span more than the object.
 std::string Advice(DrawFlaw flaw, bool too_wide) {
   if (too_wide)
-    return "a larger object (scale at import) or a narrower end effector: no draw meets it with all";
+    return "a larger object (scale at import) or a narrower end effector: no draw brings all fingers onto it";
   switch (flaw) {
     case DrawFlaw::kStartBlocked:
       return "a shorter standoff or a smaller max_tilt";
