@@ -8,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 
@@ -34,8 +35,13 @@ std::string OwnAddress(const std::string& listen, int port) {
 }
 
 SelfProbe::SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
-                     std::function<void()> on_deaf)
-    : address_(address), tls_(tls), every_s_(every_s), answer_s_(answer_s), on_deaf_(std::move(on_deaf)) {
+                     std::function<void()> on_deaf, int unanswered)
+    : address_(address),
+      tls_(tls),
+      every_s_(every_s),
+      answer_s_(answer_s),
+      on_deaf_(std::move(on_deaf)),
+      unanswered_(unanswered) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -50,7 +56,7 @@ SelfProbe::~SelfProbe() {
 }
 
 void SelfProbe::Run() {
-  for (int unanswered = 0; unanswered < kUnanswered;) {
+  for (int unanswered = 0; unanswered < unanswered_;) {
     {
       std::unique_lock<std::mutex> lock(mutex_);
       if (wake_.wait_for(lock, std::chrono::duration<double>(every_s_), [this] { return stopping_; })) return;
@@ -58,7 +64,7 @@ void SelfProbe::Run() {
     unanswered = Answers() ? 0 : unanswered + 1;
     if (unanswered > 0)
       spdlog::warn("{} could not be reached by this process itself within {} s ({} of {})", address_,
-                   answer_s_, unanswered, kUnanswered);
+                   answer_s_, unanswered, unanswered_);
   }
   on_deaf_();
 }
@@ -70,6 +76,11 @@ bool SelfProbe::Answers() {
   ::close(file);
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a new connection
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);          // to this process, whatever the environment says
+  // gRPC gives up connecting after this time, 20 s by itself, with the same error as if it had been refused.
+  constexpr double kMaxMs = 2e9;
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS,
+                   static_cast<int>(std::min(2e3 * answer_s_ + 1e3, kMaxMs)));
   const auto channel = grpc::CreateCustomChannel(address_, CredentialsFor(tls_), arguments);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +

@@ -21,9 +21,10 @@ std::string OwnAddress(const std::string& listen, int port);
 class SelfProbe {
  public:
   static constexpr int kUnanswered = 3;
-  // Asks every `every_s` seconds; an answer has `answer_s`. `on_deaf` is called once, from a thread of its own.
+  // Asks every `every_s` seconds; an answer has `answer_s`. `on_deaf` is called once, from a thread of its own, after
+  // `unanswered` questions in a row, at least one.
   SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
-            std::function<void()> on_deaf);
+            std::function<void()> on_deaf, int unanswered = kUnanswered);
   ~SelfProbe();
   SelfProbe(const SelfProbe&) = delete;
   SelfProbe& operator=(const SelfProbe&) = delete;
@@ -36,6 +37,7 @@ class SelfProbe {
   const bool tls_;
   const double every_s_, answer_s_;
   const std::function<void()> on_deaf_;
+  const int unanswered_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;

@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <string>
 #include <thread>
 
@@ -42,6 +43,29 @@ TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
   std::atomic<int> ends{0};
   const SelfProbe probe(listener.address(), false, 0.05, 0.05, [&] { ++ends; });
   while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(ends, 1);
+}
+
+// gRPC by itself gives up connecting after 20 s, which is no answer either.
+TEST(SelfProbe, EndsWhatIsSilentForLongerThanGrpcWouldTryToConnect) {
+  const DeafListener listener;
+  std::atomic<int> ends{0};
+  const SelfProbe probe(
+      listener.address(), false, 0.05, 21, [&] { ++ends; }, 1);
+  while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(ends, 1);
+}
+
+// A proxy of the environment says nothing about this server, here one that refuses.
+TEST(SelfProbe, AsksThisMachineAndNoProxy) {
+  const DeafListener listener;
+  std::atomic<int> ends{0};
+  ::setenv("http_proxy", "http://127.0.0.1:1", 1);
+  {
+    const SelfProbe probe(listener.address(), false, 0.05, 0.05, [&] { ++ends; });
+    while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  ::unsetenv("http_proxy");
   EXPECT_EQ(ends, 1);
 }
 
