@@ -44,7 +44,7 @@ def write(server: Server, written: Written, round_: int, writer: int, rng: rando
 
 def check(server: Server, written: Written, result: Result, names: set[str] | None = None) -> set[str]:
     """What is stored is exactly what was sent, and holds all that was acknowledged. names: whose bytes to fetch; None: all."""
-    with server.channel(("grpc.max_receive_message_length", -1)) as channel:
+    with server.channel() as channel:
         models = {model.name: model.yaml for model in list_models(channel)}
         sessions = {session.name for session in list_sessions(channel)}
         there = {name for name in models if name.startswith("model-")} | sessions

@@ -17,6 +17,7 @@ from touchstone.v1 import models_pb2, sessions_pb2, source_pb2
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SERVER = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or ROOT / "build/release/bin/touchstone-server")
+GATEWAY, EMULATOR = SERVER.parent / "touchstone-gateway", SERVER.parent / "touchstone-rig-emulator"
 # Five supershapes that take a moment to build: what is tried here does not depend on their size.
 SMALL = ("--supershape-triangles", "2000")
 PATIENCE_S = 60.0
@@ -34,32 +35,29 @@ class Result:
             self.failures.append(broken)
 
 
-class Server:
-    """A touchstone-server on a free port of this machine, with its log.
+class Program:
+    """A process that says on standard output when it is ready, killed at the end.
 
     Attributes:
-      target: "127.0.0.1:port".
+      ready: what it said then.
       log: its lines on standard error so far.
     """
 
-    def __init__(self, *options: str, max_files: int | None = None):
-        """max_files: soft and hard limit of open files; None: as this process has it."""
-
-        # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
-        limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
-        self.process = subprocess.Popen([*limited, SERVER, "--listen", "127.0.0.1:0", *SMALL, *map(str, options)], text=True,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def __init__(self, words: list, ready: str, environment: dict[str, str] | None = None):
+        """ready: a regular expression with one group; environment: variables beside those of this process."""
+        self.process = subprocess.Popen(list(map(str, words)), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                        env={**os.environ, **(environment or {})})
         self.log: list[str] = []
         threading.Thread(target=self.log.extend, args=(self.process.stderr,), daemon=True).start()
         for line in self.process.stdout:
-            if found := re.search(r"listening on (127\.0\.0\.1:\d+)", line):
-                self.target = found.group(1)
+            if found := re.search(ready, line):
+                self.ready = found.group(1)
                 break
         else:
-            raise RuntimeError(f"{SERVER} ended with {self.process.wait()}: {''.join(self.log)}")
+            raise RuntimeError(f"{words[0]} ended with {self.process.wait()}: {''.join(self.log)}")
         threading.Thread(target=lambda: [None for _ in self.process.stdout], daemon=True).start()
 
-    def __enter__(self) -> Server:
+    def __enter__(self):
         return self
 
     def __exit__(self, *_) -> None:
@@ -72,10 +70,6 @@ class Server:
         self.process.send_signal(signal.SIGKILL)
         self.process.wait()
 
-    def channel(self, *options: tuple[str, int]) -> grpc.Channel:
-        """A connection of its own, however many there are to this server."""
-        return grpc.insecure_channel(self.target, options=[("grpc.use_local_subchannel_pool", 1), *options])
-
     def resident_bytes(self) -> int:
         """Of the memory that is in use now; ru_maxrss would only ever grow."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
@@ -85,16 +79,46 @@ class Server:
         return len(os.listdir(f"/proc/{self.process.pid}/task"))
 
 
+class Server(Program):
+    """A touchstone-server, or with `gateway` a touchstone-gateway, on a free port of this machine."""
+
+    def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None,
+                 environment: dict[str, str] | None = None):
+        """max_files: soft and hard limit of open files; None: as this process has it."""
+        # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
+        limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
+        super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", "127.0.0.1:0", *SMALL, *options],
+                         r"listening on (127\.0\.0\.1:\d+)", environment)
+
+    @property
+    def target(self) -> str:
+        """ "127.0.0.1:port"."""
+        return self.ready
+
+    def channel(self, *options: tuple[str, int]) -> grpc.Channel:
+        """A connection of its own, however many there are to this server."""
+        return grpc.insecure_channel(self.target, options=[("grpc.use_local_subchannel_pool", 1), *options])
+
+
 def create_model(channel: grpc.Channel, yaml: str) -> models_pb2.Model:
     call = channel.unary_unary("/touchstone.v1.Models/CreateModel", models_pb2.CreateModelRequest.SerializeToString,
                                models_pb2.Model.FromString)
     return call(models_pb2.CreateModelRequest(yaml=yaml), timeout=PATIENCE_S)
 
 
+def _pages(call, request):
+    while True:
+        page = call(request, timeout=PATIENCE_S)
+        yield page
+        request.page_token = page.next_page_token
+        if not request.page_token:
+            return
+
+
 def list_models(channel: grpc.Channel) -> list[models_pb2.Model]:
     call = channel.unary_unary("/touchstone.v1.Models/ListModels", models_pb2.ListModelsRequest.SerializeToString,
                                models_pb2.ListModelsResponse.FromString)
-    return list(call(models_pb2.ListModelsRequest(), timeout=PATIENCE_S).models)
+    return [model for page in _pages(call, models_pb2.ListModelsRequest()) for model in page.models]
 
 
 def create_session(channel: grpc.Channel, name: str, csv: bytes, piece: int = 1 << 16) -> sessions_pb2.Session:
@@ -107,7 +131,7 @@ def create_session(channel: grpc.Channel, name: str, csv: bytes, piece: int = 1 
 def list_sessions(channel: grpc.Channel) -> list[sessions_pb2.Session]:
     call = channel.unary_unary("/touchstone.v1.Sessions/ListSessions", sessions_pb2.ListSessionsRequest.SerializeToString,
                                sessions_pb2.ListSessionsResponse.FromString)
-    return list(call(sessions_pb2.ListSessionsRequest(), timeout=PATIENCE_S).sessions)
+    return [session for page in _pages(call, sessions_pb2.ListSessionsRequest()) for session in page.sessions]
 
 
 def export_session(channel: grpc.Channel, name: str) -> bytes:

@@ -6,6 +6,7 @@ import pytest
 import disk_full
 import flat_memory
 import hostile_bytes
+import kill_gateway
 import kill_while_writing
 import many_clients
 import programs
@@ -20,6 +21,10 @@ def passes(result):
 
 def test_what_was_acknowledged_before_a_kill_is_there():
     passes(kill_while_writing.run(kills=8))
+
+
+def test_a_killed_gateway_keeps_the_touches_it_acknowledged():
+    passes(kill_gateway.run(kills=4))
 
 
 def test_of_two_replicas_one_gets_a_name():
@@ -57,6 +62,19 @@ def test_a_loss_and_a_tear_are_seen():
         written.acknowledged = {"torn", "lost"}
         kill_while_writing.check(server, written, result)
     assert len(result.failures) == 2 and "lost" in result.failures[0] and "torn" in result.failures[1]
+
+
+def test_a_touch_that_a_session_lost_or_changed_is_seen():
+    from touchstone.v1 import source_pb2
+
+    answers = {}
+    for number, first_s in enumerate((0.001, 0.002, 0.003)):
+        answer = source_pb2.TouchResponse()
+        answer.results.add().contact_time_s.extend([first_s, 0.5, float("nan")])
+        answers[number] = answer.SerializeToString()
+    result = programs.Result()
+    kill_gateway.compare(b"touch,t_l_us,t_m_us,t_r_us\n0,1000,500000,\n1,2000.5,500000,\n", answers, result)
+    assert len(result.failures) == 3 and "touch 1" in result.failures[0] and "touch 2" in result.failures[1]
 
 
 def test_hostile_messages_reach_every_field_of_a_request():
