@@ -130,10 +130,11 @@ TEST_F(AccessServerTest, EveryMethodTakesItsRoleAndRefusesEachLowerOne) {
       EXPECT_NE(status.error_code(), grpc::UNAUTHENTICATED) << row.method;
       EXPECT_EQ(status.error_code() == grpc::PERMISSION_DENIED, role < row.simulated)
           << row.method << status.error_message();
-      if (role < row.simulated)
+      if (role < row.simulated) {
         EXPECT_THAT(status.error_message(),
                     AllOf(HasSubstr(MethodName(row.method) + " needs the role " + RoleName(row.simulated)),
                           HasSubstr(std::string("has the role ") + RoleName(role))));
+      }
     }
   }
 }

@@ -47,15 +47,16 @@ class Handover {
 
   // The speed is measured from the first batch on: what comes before it, such as an object's tree, is made once.
   void Sent(uint64_t start, uint32_t rows) {
-    if (first_batch_.has_value())
+    if (sent_)
       rows_ += rows;
     else
       first_batch_ = Clock::now();
+    sent_ = true;
     next_ = start + rows;
   }
   absl::Status Check(double drain_s) const {
-    if (!first_batch_.has_value()) return absl::OkStatus();
-    const double running_s = std::chrono::duration<double>(Clock::now() - *first_batch_).count();
+    if (!sent_) return absl::OkStatus();
+    const double running_s = std::chrono::duration<double>(Clock::now() - first_batch_).count();
     if (running_s < kMinRunningS) return absl::OkStatus();  // its speed is not known yet
     const double left = next_ < stop_ ? static_cast<double>(stop_ - next_) / stride_ : 0;
     if (left <= rows_ / running_s * drain_s) return absl::OkStatus();
@@ -71,7 +72,8 @@ class Handover {
   const uint32_t stride_;
   uint64_t next_;
   uint64_t rows_ = 0;  // after the first batch
-  std::optional<Clock::time_point> first_batch_;
+  bool sent_ = false;
+  Clock::time_point first_batch_;  // once it was sent
 };
 
 }  // namespace

@@ -118,7 +118,9 @@ TEST_F(GatewayPhotographs, ThatWereAcknowledgedOutliveAKilledGatewayAndAreAnImag
     const session::PhotographRow& row = set->photographs[k];
     EXPECT_EQ(row.commanded.eye_m, Eigen::Vector3d(sides_m[k], 0, 0.25));
     EXPECT_EQ(row.round, rounds[k]);
-    if (k > 0) EXPECT_GT(row.session_time_s, set->photographs[k - 1].session_time_s);
+    if (k > 0) {
+      EXPECT_GT(row.session_time_s, set->photographs[k - 1].session_time_s);
+    }
     ASSERT_TRUE(row.measured.has_value());
     // What the client was told of the same picture.
     const v1::Vector3& told = taken[k].photographs(0).measured().eye_m();
