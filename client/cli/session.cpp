@@ -191,6 +191,21 @@ absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
   return absl::OkStatus();
 }
 
+// All of them, however many pages they take.
+absl::StatusOr<std::vector<v1::Session>> ListSessions(client::Connection* connection, bool deleted) {
+  std::vector<v1::Session> sessions;
+  v1::ListSessionsRequest request;
+  request.set_deleted(deleted);
+  do {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        v1::ListSessionsResponse page,
+        client::Connection::Call(&v1::Sessions::Stub::ListSessions, connection->sessions(), request));
+    for (v1::Session& session : *page.mutable_sessions()) sessions.push_back(std::move(session));
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return sessions;
+}
+
 absl::Status RunList(const Cli& cli, const SessionOptions& options) {
   if (!options.file.empty()) {
     if (IsJournalPath(options.file)) return ListJournal(cli, options.file, options.deleted);
@@ -198,31 +213,28 @@ absl::Status RunList(const Cli& cli, const SessionOptions& options) {
         absl::StrCat("'", options.file, "' is no journal; its name ends in .db"));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
-  v1::ListSessionsRequest request;
-  request.set_deleted(options.deleted);
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::ListSessionsResponse response,
-      client::Connection::Call(&v1::Sessions::Stub::ListSessions, connection->sessions(), request));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<v1::Session> sessions,
+                              ListSessions(connection.get(), options.deleted));
   if (cli.output().json) {
     Json list = Json::array();
-    for (const v1::Session& session : response.sessions()) list.push_back(SessionJson(session));
+    for (const v1::Session& session : sessions) list.push_back(SessionJson(session));
     PrintJson({{"sessions", list}});
     return absl::OkStatus();
   }
   if (options.deleted) {
     Table table({"SESSION", "TOUCHES", "DELETED", "OBJECTS"});
-    for (const v1::Session& session : response.sessions())
+    for (const v1::Session& session : sessions)
       table.Add({session.name(), std::to_string(session.touches()),
                  DeletedText(session.deleted_unix_s(), session.deleted_by()),
                  absl::StrJoin(session.objects(), ", ")});
     return cli.Print(table.Text());
   }
-  if (response.sessions().empty()) {
+  if (sessions.empty()) {
     cli.Log("The server keeps no session; touchstone session create NAME FILE stores one.");
     return absl::OkStatus();
   }
   Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "PICTURES", "HASH", "OBJECTS"});
-  for (const v1::Session& session : response.sessions())
+  for (const v1::Session& session : sessions)
     table.Add({session.name(), std::to_string(session.touches()), std::to_string(session.fingers()),
                session.has_poses() ? "yes" : "no", std::to_string(session.images()),
                session.hash().empty() ? "-" : session.hash().substr(0, 12),

@@ -116,6 +116,15 @@ const char* ColourWords(int color_type) {
   }
 }
 
+absl::StatusOr<PictureSize> PlainSize(const spng_ihdr& header) {
+  const bool grey = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE;
+  if (header.bit_depth != 8 || (!grey && header.color_type != SPNG_COLOR_TYPE_TRUECOLOR))
+    return absl::InvalidArgumentError(
+        absl::StrFormat("PNG: is %d-bit %s; 8-bit grey or RGB without transparency was expected",
+                        header.bit_depth, ColourWords(header.color_type)));
+  return PictureSize{static_cast<int>(header.width), static_cast<int>(header.height), grey ? 1 : 3};
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int height, int channels) {
@@ -195,14 +204,15 @@ absl::StatusOr<Image> DecodePicture(const std::string& bytes) {
   return image;
 }
 
+absl::StatusOr<PictureSize> PlainPngSize(absl::string_view png) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
+  return PlainSize(open.header);
+}
+
 absl::StatusOr<Image> DecodePlainPng(absl::string_view png) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
-  const bool grey = open.header.color_type == SPNG_COLOR_TYPE_GRAYSCALE;
-  if (open.header.bit_depth != 8 || (!grey && open.header.color_type != SPNG_COLOR_TYPE_TRUECOLOR))
-    return absl::InvalidArgumentError(
-        absl::StrFormat("PNG: is %d-bit %s; 8-bit grey or RGB without transparency was expected",
-                        open.header.bit_depth, ColourWords(open.header.color_type)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(Image image, Decode(open, grey));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PictureSize size, PlainSize(open.header));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Image image, Decode(open, size.channels == 1));
   // The pixels may be whole although the end of the file is missing, whose checksum libspng does not look at.
   static constexpr absl::string_view kEnd("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
   if (!absl::EndsWith(png, kEnd))

@@ -21,6 +21,14 @@ absl::StatusOr<Image> DecodePng(const std::string& png);
 // A PNG or JPEG file, whichever its first bytes say.
 absl::StatusOr<Image> DecodePicture(const std::string& bytes);
 
+struct PictureSize {
+  int width = 0, height = 0, channels = 0;
+  size_t bytes() const { return size_t{1} * width * height * channels; }
+};
+// What a PNG that DecodePlainPng takes will take in memory, from its header alone: a few hundred bytes can stand for
+// twelve million.
+absl::StatusOr<PictureSize> PlainPngSize(absl::string_view png);
+
 // What was measured must not be converted on the way: a PNG of 8-bit grey or RGB as it is, whole to its last chunk.
 // INVALID_ARGUMENT says what the file is otherwise (16 bits, palette, transparency, damaged).
 absl::StatusOr<Image> DecodePlainPng(absl::string_view png);

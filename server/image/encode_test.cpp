@@ -75,6 +75,18 @@ TEST(Encoding, RefusesWhatIsNoImage) {
               HasSubstr("from 1 to 100"));
 }
 
+TEST(Png, TellsItsSizeByItsHeader) {
+  const std::vector<uint8_t> pixels = TestPixels(64, 48, 3);
+  const std::string png = *EncodePng(pixels.data(), 64, 48, 3);
+  const auto size = PlainPngSize(png.substr(0, 40));  // the pixels do not matter
+  ASSERT_TRUE(size.ok()) << size.status();
+  EXPECT_EQ(size->width, 64);
+  EXPECT_EQ(size->height, 48);
+  EXPECT_EQ(size->channels, 3);
+  EXPECT_EQ(size->bytes(), pixels.size());
+  EXPECT_EQ(PlainPngSize("no picture").status().code(), absl::StatusCode::kInvalidArgument);
+}
+
 TEST(Png, RefusesBrokenData) {
   const std::vector<uint8_t> pixels = TestPixels(64, 64, 1);
   const std::string png = *EncodePng(pixels.data(), 64, 64, 1);

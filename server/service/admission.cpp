@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <utility>
 
 #include "server/base/over_limit.h"
 
@@ -130,6 +131,13 @@ absl::StatusOr<MemoryBudget::Reservation> MemoryBudget::Reserve(uint64_t bytes) 
                      " MiB are used"),
         "max_memory_mib", static_cast<double>(max_bytes_ / kMebibyte));
   return reservation;
+}
+
+absl::Status MemoryBudget::Reservation::Grow(uint64_t bytes) {
+  absl::StatusOr<Reservation> more = budget_->Reserve(bytes);
+  if (!more.ok()) return more.status();
+  bytes_ += std::exchange(more->bytes_, 0);
+  return absl::OkStatus();
 }
 
 StallWatch::StallWatch(double stall_s) : stall_(stall_s), thread_([this] { Run(); }) {}

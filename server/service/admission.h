@@ -98,6 +98,8 @@ class MemoryBudget {
     ~Reservation() {
       if (budget_ != nullptr) budget_->reserved_ -= bytes_;
     }
+    // So many bytes more, under the conditions of Reserve.
+    absl::Status Grow(uint64_t bytes);
 
    private:
     MemoryBudget* budget_;

@@ -33,9 +33,18 @@ absl::Status SetTouches(absl::StatusOr<session::MeasurementSet> set, diagnosis::
   return absl::OkStatus();
 }
 
-absl::Status SetImages(const v1::ImageSetFiles& files, diagnosis::DiagnosisInput* input) {
+// Their pixels, which can be a thousand times their files, count while anybody has them.
+absl::Status SetImages(const v1::ImageSetFiles& files, const Resources& resources,
+                       diagnosis::DiagnosisInput* input) {
+  struct Counted {
+    MemoryBudget::Reservation memory;
+    session::ImageSet set;
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(MemoryBudget::Reservation memory,
+                              resources.memory->Reserve(session::PixelBytes(files)));
   TOUCHSTONE_ASSIGN_OR_RETURN(session::ImageSet images, session::ParseImageSet(files));
-  input->images = std::make_shared<const session::ImageSet>(std::move(images));
+  const auto counted = std::make_shared<const Counted>(Counted{std::move(memory), std::move(images)});
+  input->images = std::shared_ptr<const session::ImageSet>(counted, &counted->set);
   return absl::OkStatus();
 }
 
@@ -53,7 +62,7 @@ absl::Status ReadSession(const v1::Evidence& message, const Resources& resources
                      "', which holds photographs already; one of the two was expected"));
   TOUCHSTONE_ASSIGN_OR_RETURN(StoredSession stored, UnpackSession(*bytes));
   stored.images->set_origin(origin);
-  TOUCHSTONE_RETURN_IF_ERROR(SetImages(*stored.images, input));
+  TOUCHSTONE_RETURN_IF_ERROR(SetImages(*stored.images, resources, input));
   if (stored.csv.empty()) return absl::OkStatus();
   return SetTouches(
       session::ParseMeasurementSet(stored.csv, absl::StrCat(origin, "/", session::kTouchesCsv), limits),
@@ -79,7 +88,7 @@ absl::Status ReadMeasurements(const v1::Evidence& message, const Resources& reso
       if (message.has_images()) break;
       return absl::InvalidArgumentError("evidence.measurements is empty: set session, csv or set, or images");
   }
-  return message.has_images() ? SetImages(message.images(), input) : absl::OkStatus();
+  return message.has_images() ? SetImages(message.images(), resources, input) : absl::OkStatus();
 }
 
 // Every object of the evidence, and where its name first stands: "set.csv:17".

@@ -156,7 +156,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     parts.rig->audit().NameHolders([leases = parts.leases.get()] { return leases->Holder(); });
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());
   parts.sessions = std::make_unique<JournalSessionsService>(
-      journal, parts.leases.get(), parts.rig == nullptr ? nullptr : &parts.rig->audit());
+      &resources, journal, parts.leases.get(), parts.rig == nullptr ? nullptr : &parts.rig->audit());
   std::vector<ServedService> services = {{"touchstone.v1.Source", parts.source_service.get()},
                                          {"touchstone.v1.Sessions", parts.sessions.get()}};
   if (parts.rig != nullptr) {

@@ -1,11 +1,19 @@
 #include "server/service/journal_sessions_service.h"
 
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <spdlog/spdlog.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/convert.h"
 #include "server/service/journalled_session.h"
+#include "server/service/list_page.h"
 
 namespace touchstone::service {
 namespace {
@@ -26,6 +34,24 @@ v1::Session SessionToProto(const session::JournalSession& session) {
   return message;
 }
 
+// Where a session stands in either list: rising among those that are there, falling in the trash.
+using Place = std::pair<double, int64_t>;
+
+Place PlaceOf(const session::JournalSession& session) {
+  return {session.deleted_unix_s, session.id};
+}
+
+// Nothing: the list's beginning.
+absl::StatusOr<std::optional<Place>> PlaceOf(const std::string& page_token) {
+  if (page_token.empty()) return std::nullopt;
+  Place place;
+  const std::vector<absl::string_view> parts = absl::StrSplit(page_token, ' ');
+  if (parts.size() != 2 || !absl::SimpleAtod(parts[0], &place.first) ||
+      !absl::SimpleAtoi(parts[1], &place.second))
+    return WrongPageToken(page_token);
+  return place;
+}
+
 }  // namespace
 
 grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
@@ -40,10 +66,27 @@ grpc::Status JournalSessionsService::CreateSession(grpc::ServerContext*,
 grpc::Status JournalSessionsService::ListSessions(grpc::ServerContext*,
                                                   const v1::ListSessionsRequest* request,
                                                   v1::ListSessionsResponse* response) {
-  const auto sessions = request->deleted() ? journal_->DeletedSessions() : journal_->Sessions();
+  const auto size = PageSize(request->page_size(), resources_->options.max_page_size);
+  if (!size.ok()) return ToGrpc(size.status());
+  const auto from = PlaceOf(request->page_token());
+  if (!from.ok()) return ToGrpc(from.status());
+  const bool deleted = request->deleted();
+  const auto sessions = deleted ? journal_->DeletedSessions() : journal_->Sessions();
   if (!sessions.ok()) return ToGrpc(sessions.status());
-  for (const session::JournalSession& session : *sessions)
-    *response->add_sessions() = SessionToProto(session);
+  auto first = sessions->begin();
+  if (from->has_value())
+    while (first != sessions->end() && (deleted ? PlaceOf(*first) >= **from : PlaceOf(*first) <= **from))
+      ++first;
+  const auto add = [&](const session::JournalSession& session) {
+    v1::Session* const message = response->add_sessions();
+    *message = SessionToProto(session);
+    return message->ByteSizeLong();
+  };
+  const auto token = [](const session::JournalSession& session) {
+    return absl::StrCat(ShortestNumber(session.deleted_unix_s), " ", session.id);
+  };
+  FillPage(absl::MakeConstSpan(*sessions).subspan(first - sessions->begin()), *size, add, token,
+           response->mutable_next_page_token());
   return grpc::Status::OK;
 }
 
@@ -78,13 +121,17 @@ grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext* context,
   const auto made = FilesOfJournal(*journal_, *session);
   if (!made.ok()) return ToGrpc(made.status());
   if (!made->left_out.empty()) context->AddTrailingMetadata(kLeftOutMetadata, made->left_out);
+  bool gone = false;
+  StallWatch::Call call(resources_->stalls.get(), context);
   v1::ExportSessionResponse response;
-  return ToGrpc(
+  const absl::Status status =
       ForEachPiece(PackSession(made->files), kPiece, [&](const std::string& file, absl::string_view piece) {
         response.set_file(file);
         response.set_csv(std::string(piece));
-        return writer->Write(response);
-      }));
+        gone = !call.Wait([&] { return writer->Write(response); });
+        return !gone;
+      });
+  return ToGrpc(gone ? absl::CancelledError("the client is gone") : status);
 }
 
 absl::Status JournalSessionsService::Admit(const std::string& lease_token, const char* event,

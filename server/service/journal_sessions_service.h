@@ -3,6 +3,7 @@
 
 #include "server/gateway/audit/audit_log.h"
 #include "server/service/lease_book.h"
+#include "server/service/resources.h"
 #include "server/session/journal.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
@@ -11,8 +12,9 @@ namespace touchstone::service {
 class JournalSessionsService final : public v1::Sessions::Service {
  public:
   // `audit` may be null: a recorded session is served, which nobody deletes.
-  JournalSessionsService(session::Journal* journal, const LeaseBook* leases, gateway::audit::AuditLog* audit)
-      : journal_(journal), leases_(leases), audit_(audit) {}
+  JournalSessionsService(const Resources* resources, session::Journal* journal, const LeaseBook* leases,
+                         gateway::audit::AuditLog* audit)
+      : resources_(resources), journal_(journal), leases_(leases), audit_(audit) {}
 
   // A rig's sessions come from touching; UNIMPLEMENTED says so.
   grpc::Status CreateSession(grpc::ServerContext*, grpc::ServerReader<v1::CreateSessionRequest>*,
@@ -31,6 +33,7 @@ class JournalSessionsService final : public v1::Sessions::Service {
   // That the caller may change sessions; then a line of the audit log says who does it, before it is done.
   absl::Status Admit(const std::string& lease_token, const char* event, const std::string& session);
 
+  const Resources* const resources_;
   session::Journal* const journal_;
   const LeaseBook* const leases_;
   gateway::audit::AuditLog* const audit_;

@@ -40,6 +40,7 @@ const LimitRow kTable[] = {
     {"max_session_mib", "MiB", "size of a stored session", &Limits::max_session_mib, 1, 4095},
     {"max_sessions_mib", "MiB", "size of all stored sessions, and of all that are being sent",
      &Limits::max_sessions_mib, 1, 1 << 30},
+    {"max_page_size", "", "models or sessions of one page of a list", &Limits::max_page_size, 1, 100'000},
     {"max_session_touches", "", "touches of a measured set", &Limits::max_session_touches, 1, kMaxInt},
     {"max_session_objects", "", "objects of a measured set", &Limits::max_session_objects, 1, kMaxInt},
     {"max_session_columns", "", "columns of a measured set", &Limits::max_session_columns, 3, 4096},

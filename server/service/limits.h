@@ -34,6 +34,7 @@ struct Limits {
   int max_model_objects = 1000;
   int max_session_mib = 256;
   int max_sessions_mib = 4096;
+  int max_page_size = 1000;
   int max_session_touches = 4'000'000;
   int max_session_objects = 1000;
   int max_session_columns = 64;

@@ -4,6 +4,7 @@
 
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
+#include "server/service/list_page.h"
 #include "server/service/sent_model.h"
 
 namespace touchstone::service {
@@ -14,9 +15,19 @@ grpc::Status ModelsService::ListEffects(grpc::ServerContext*, const v1::ListEffe
   return grpc::Status::OK;
 }
 
-grpc::Status ModelsService::ListModels(grpc::ServerContext*, const v1::ListModelsRequest*,
+grpc::Status ModelsService::ListModels(grpc::ServerContext*, const v1::ListModelsRequest* request,
                                        v1::ListModelsResponse* response) {
-  for (const auto& model : resources_->models->All()) *response->add_models() = ToProto(*model);
+  const auto size = PageSize(request->page_size(), resources_->options.max_page_size);
+  if (!size.ok()) return ToGrpc(size.status());
+  const auto models = resources_->models->Behind(request->page_token());
+  const auto add = [&](const std::shared_ptr<const model::Model>& model) {
+    v1::Model* const message = response->add_models();
+    *message = ToProto(*model);
+    return message->ByteSizeLong();
+  };
+  FillPage(
+      absl::MakeConstSpan(models), *size, add, [](const auto& model) { return model->name; },
+      response->mutable_next_page_token());
   return grpc::Status::OK;
 }
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "server/base/sanitizers.h"
+#include "server/image/encode.h"
 #include "server/service/server.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/diagnosis.grpc.pb.h"
@@ -309,6 +310,27 @@ TEST_F(OverloadTest, WhatThereIsNoMemoryForIsRefusedAndAStopIsNot) {
   grpc::ClientContext context;
   v1::StopResponse stopped;
   EXPECT_TRUE(v1::Control::NewStub(channel_)->Stop(&context, {}, &stopped).ok());
+}
+
+// 20 kB of one grey stand for 4 MiB: what a client sends says little about what it takes.
+TEST_F(OverloadTest, PicturesOfAnUploadCountAsTheirPixels) {
+  ServerOptions options;
+  options.max_memory_mib = 8;
+  Start(options);
+  const int side = image::kMaxImageSide;
+  const std::vector<uint8_t> pixels(size_t{1} * side * side);
+  grpc::ClientContext context;
+  v1::Session session;
+  const auto writer = v1::Sessions::NewStub(channel_)->CreateSession(&context, &session);
+  v1::CreateSessionRequest request;
+  request.set_name("flat");
+  request.set_csv(*image::EncodePng(pixels.data(), side, side, 1));
+  for (int k = 0; k < 3; ++k) {
+    request.set_file(absl::StrCat(k, ".png"));
+    ASSERT_TRUE(writer->Write(request));
+  }
+  writer->WritesDone();
+  ExpectOver(writer->Finish(), "max_memory_mib = 8", "13 more would be needed");
 }
 
 TEST_F(OverloadTest, ADiagnosisEndsAfterItsTime) {

@@ -155,12 +155,12 @@ void Resources::OpenPlaces() {
   stalls = std::make_unique<StallWatch>(options.stall_s);
 }
 
-std::vector<std::shared_ptr<const model::Model>> ModelStore::All() const {
+std::vector<std::shared_ptr<const model::Model>> ModelStore::Behind(const std::string& name) const {
   std::lock_guard<std::mutex> lock(mutex_);
   Refresh();
-  std::vector<std::shared_ptr<const model::Model>> all;
-  for (const auto& [name, model] : models_) all.push_back(model);
-  return all;
+  std::vector<std::shared_ptr<const model::Model>> behind;
+  for (auto one = models_.upper_bound(name); one != models_.end(); ++one) behind.push_back(one->second);
+  return behind;
 }
 
 }  // namespace touchstone::service

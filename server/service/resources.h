@@ -40,7 +40,8 @@ class ModelStore {
   // Once this is OK the model is kept: it is on the disk and was read back. ALREADY_EXISTS if the name stands for another
   // one, INVALID_ARGUMENT if its file could not be read again.
   absl::Status Create(const model::Model& model);
-  std::vector<std::shared_ptr<const model::Model>> All() const;
+  // By name, those behind `name` in the order of bytes; empty: all.
+  std::vector<std::shared_ptr<const model::Model>> Behind(const std::string& name) const;
 
  private:
   void Refresh() const;  // reads files that appeared

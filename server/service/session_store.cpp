@@ -147,13 +147,6 @@ absl::StatusOr<v1::Session> SessionStore::Find(const std::string& name) {
   return session;
 }
 
-std::vector<v1::Session> SessionStore::All() {
-  std::vector<v1::Session> all;
-  for (const std::string& name : Names())
-    if (auto session = Find(name); session.ok()) all.push_back(*std::move(session));
-  return all;
-}
-
 // Never over another one: two replicas may be given the same name at once.
 absl::Status SessionStore::WriteNew(const std::string& name, const std::string& bytes) const {
   const bool images = HoldsImages(bytes);

@@ -36,6 +36,8 @@ class SessionStore {
     Upload& operator=(const Upload&) = delete;
     // `file` as in CreateSessionRequest.
     absl::Status Append(const std::string& file, absl::string_view piece);
+    // Of memory, to read what came so far: a second copy, and the pixels of pictures.
+    uint64_t BytesToRead() const { return pieces_.bytes() + pieces_.PixelBytes(); }
     absl::StatusOr<std::string> Take() { return pieces_.Take(); }
 
    private:
@@ -50,8 +52,8 @@ class SessionStore {
   // Bytes are as in stored_session.h. The same bytes again are taken and change nothing; other bytes are ALREADY_EXISTS.
   absl::StatusOr<v1::Session> Create(const std::string& name, std::string bytes);
   absl::StatusOr<v1::Session> Find(const std::string& name);
-  // By name. A file in the folder that is neither is left out.
-  std::vector<v1::Session> All();
+  // By name, in the order of bytes; a file in the folder that is no session may be among them.
+  std::vector<std::string> Names() const;
   absl::StatusOr<std::shared_ptr<const std::string>> Bytes(const std::string& name);
   // Hands the files over in pieces, until `take` returns false.
   absl::Status Export(const std::string& name,
@@ -79,8 +81,7 @@ class SessionStore {
   std::string PathOf(const std::string& name, bool images) const;
   // The file of a name, and which version of it; false: there is none.
   bool Stat(const std::string& name, Version* version, std::string* path = nullptr) const;
-  std::vector<std::string> Names() const;  // in the folder, sorted
-  Usage Stored() const;                    // without a folder: with mutex_ held
+  Usage Stored() const;  // without a folder: with mutex_ held
   absl::Status NoSession(const std::string& name) const;
   absl::Status WriteNew(const std::string& name, const std::string& bytes) const;
 

@@ -3,8 +3,11 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 #include "server/base/status.h"
 #include "server/service/convert.h"
+#include "server/service/list_page.h"
 
 namespace touchstone::service {
 
@@ -18,7 +21,7 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
                                        grpc::ServerReader<v1::CreateSessionRequest>* reader,
                                        v1::Session* response) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources_->uploads->Take(ClientOf(*context)));
-  TOUCHSTONE_RETURN_IF_ERROR(resources_->memory->Reserve(0).status());
+  TOUCHSTONE_ASSIGN_OR_RETURN(MemoryBudget::Reservation memory, resources_->memory->Reserve(0));
   const RunningGuard running(&resources_->running_requests);
   SessionStore& store = *resources_->sessions;
   StallWatch::Call call(resources_->stalls.get(), context);
@@ -35,6 +38,7 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
     if (!request.name().empty() && request.name() != name)
       return absl::InvalidArgumentError(
           absl::StrCat("name = '", request.name(), "': the first message said '", name, "'; say it once"));
+    TOUCHSTONE_RETURN_IF_ERROR(memory.Grow(request.csv().size()));
     TOUCHSTONE_RETURN_IF_ERROR(upload.Append(request.file(), request.csv()));
   } while (call.Wait(read));
 
@@ -42,6 +46,7 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
   if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
 
   const std::string origin = name.empty() ? "csv" : name;
+  TOUCHSTONE_RETURN_IF_ERROR(memory.Grow(upload.BytesToRead()));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::string bytes, upload.Take());
   TOUCHSTONE_ASSIGN_OR_RETURN(*response, validate_only ? DescribeSession(name, bytes, origin, store.limits())
                                                        : store.Create(name, std::move(bytes)));
@@ -51,9 +56,22 @@ absl::Status SessionsService::DoCreate(grpc::ServerContext* context,
   return absl::OkStatus();
 }
 
-grpc::Status SessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
+grpc::Status SessionsService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest* request,
                                            v1::ListSessionsResponse* response) {
-  for (v1::Session& session : resources_->sessions->All()) *response->add_sessions() = std::move(session);
+  const auto size = PageSize(request->page_size(), resources_->options.max_page_size);
+  if (!size.ok()) return ToGrpc(size.status());
+  // A server has no trash.
+  const auto names = request->deleted() ? std::vector<std::string>() : resources_->sessions->Names();
+  const auto first = std::upper_bound(names.begin(), names.end(), request->page_token());
+  const auto add = [&](const std::string& name) -> size_t {
+    auto session = resources_->sessions->Find(name);
+    if (!session.ok()) return 0;  // deleted a moment ago, or a file that is no session
+    response->add_sessions()->Swap(&*session);
+    return response->sessions().rbegin()->ByteSizeLong();
+  };
+  FillPage(
+      absl::MakeConstSpan(names).subspan(first - names.begin()), *size, add,
+      [](const std::string& name) { return name; }, response->mutable_next_page_token());
   return grpc::Status::OK;
 }
 

@@ -166,6 +166,10 @@ absl::Status SessionPieces::Append(const std::string& file, absl::string_view pi
   return absl::OkStatus();
 }
 
+uint64_t SessionPieces::PixelBytes() const {
+  return session_.images ? session::PixelBytes(*session_.images) : 0;
+}
+
 absl::StatusOr<std::string> SessionPieces::Take() {
   current_ = nullptr;
   any_ = false;

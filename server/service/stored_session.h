@@ -42,6 +42,7 @@ class SessionPieces {
   // INVALID_ARGUMENT: a file that another one interrupted, or a measurement file beside an image set's.
   absl::Status Append(const std::string& file, absl::string_view piece);
   uint64_t bytes() const { return bytes_; }
+  uint64_t PixelBytes() const;  // as session::PixelBytes of the pictures so far
   // Packed; leaves nothing behind. INVALID_ARGUMENT if an image set has no images.csv.
   absl::StatusOr<std::string> Take();
 

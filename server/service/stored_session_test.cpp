@@ -80,7 +80,7 @@ TEST_P(StoredSessionTest, KeepsPhotographsAsTheyWereSent) {
   EXPECT_TRUE(created->has_poses());
   EXPECT_EQ(created->hash(), session::ParseImageSet(Photographs())->sha256);
   EXPECT_EQ(store_->Find("pictures")->SerializeAsString(), created->SerializeAsString());
-  EXPECT_EQ(store_->All().size(), 1u);
+  EXPECT_EQ(store_->Names().size(), 1u);
 
   SessionPieces again;
   ASSERT_TRUE(store_
@@ -119,7 +119,7 @@ TEST_P(StoredSessionTest, ANameStandsForOneKindOfSession) {
   EXPECT_TRUE(absl::IsAlreadyExists(store_->Create("monday", kTouches).status()));
   ASSERT_TRUE(store_->Create("tuesday", kTouches).ok());
   EXPECT_TRUE(absl::IsAlreadyExists(Create("tuesday", Photographs(), "").status()));
-  EXPECT_EQ(store_->All().size(), 2u);
+  EXPECT_EQ(store_->Names().size(), 2u);
 }
 
 TEST_P(StoredSessionTest, WhatIsWrongIsNotStored) {
@@ -136,8 +136,10 @@ TEST_P(StoredSessionTest, WhatIsWrongIsNotStored) {
 class EvidenceOfImages : public ::testing::Test {
  protected:
   EvidenceOfImages() {
-    ServerOptions options;
-    resources_.sessions = *SessionStore::Open(options);
+    resources_.options.max_memory_mib = 64;
+    resources_.OpenPlaces();
+    resources_.memory->Begin();
+    resources_.sessions = *SessionStore::Open(resources_.options);
     resources_.models = *ModelStore::Open("");
     model::Model model;
     model.name = "nominal";
@@ -187,6 +189,18 @@ TEST_F(EvidenceOfImages, TouchesAndPhotographsComeTogether) {
   EXPECT_THAT(std::string(Read().status().message()), HasSubstr("which holds photographs already"));
   evidence_.set_csv(kTouches);
   EXPECT_TRUE(Read().ok()) << "a file of touches beside photographs";
+}
+
+TEST_F(EvidenceOfImages, PixelsCountAsLongAsTheyAreHeld) {
+  *evidence_.mutable_images() = Photographs();
+  {
+    const auto pictures = Read();
+    ASSERT_TRUE(pictures.ok()) << pictures.status();
+    EXPECT_FALSE(resources_.memory->Reserve(resources_.memory->bytes()).ok());
+  }
+  const auto all = resources_.memory->Reserve(resources_.memory->bytes());
+  EXPECT_TRUE(all.ok()) << all.status();
+  EXPECT_TRUE(absl::IsResourceExhausted(Read().status()));
 }
 
 TEST_F(EvidenceOfImages, AnObjectWithoutAMeshIsNamedWithItsRow) {

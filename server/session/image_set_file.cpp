@@ -70,21 +70,31 @@ absl::StatusOr<PicturesByName> NamedPictures(const v1::ImageSetFiles& files, con
   return named;
 }
 
-absl::Status DecodePictures(const PicturesByName& named, ImageSet* set) {
+// Before the first picture is decoded, so that a set that cannot be taken costs nothing.
+absl::Status CheckPictureSizes(const PicturesByName& named, const ImageSet& set) {
   uint64_t pixel_bytes = 0;
+  for (const PhotographRow& row : set.photographs) {
+    const absl::StatusOr<image::PictureSize> size = image::PlainPngSize(*named.at(row.file));
+    if (!size.ok()) return WrongPicture(set, row, absl::StrCat("cannot be read: ", size.status().message()));
+    if (size->width != set.camera.width_px || size->height != set.camera.height_px)
+      return WrongPicture(
+          set, row,
+          absl::StrCat("is ", size->width, " x ", size->height, " pixels; ", set.camera.width_px, " x ",
+                       set.camera.height_px, ", as camera.yaml says, were expected"));
+    pixel_bytes += size->bytes();
+    if (pixel_bytes > kMaxImageSetBytes) return TooLarge(set.origin, "the pixels");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DecodePictures(const PicturesByName& named, ImageSet* set) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPictureSizes(named, *set));
   for (PhotographRow& row : set->photographs) {
     absl::StatusOr<image::Image> picture = image::DecodePlainPng(*named.at(row.file));
     if (!picture.ok())
       return WrongPicture(*set, row, absl::StrCat("cannot be read: ", picture.status().message()));
-    if (picture->width != set->camera.width_px || picture->height != set->camera.height_px)
-      return WrongPicture(
-          *set, row,
-          absl::StrCat("is ", picture->width, " x ", picture->height, " pixels; ", set->camera.width_px,
-                       " x ", set->camera.height_px, ", as camera.yaml says, were expected"));
     row.channels = picture->channels;
     row.pixels = std::move(picture->pixels);
-    pixel_bytes += row.pixels.size();
-    if (pixel_bytes > kMaxImageSetBytes) return TooLarge(set->origin, "the pixels");
   }
   return absl::OkStatus();
 }
@@ -141,6 +151,13 @@ absl::StatusOr<ImageSet> ParseImageSet(const v1::ImageSetFiles& files) {
   TOUCHSTONE_RETURN_IF_ERROR(DecodePictures(named, &set));
   set.sha256 = ImageSetHash(set, files);
   return set;
+}
+
+uint64_t PixelBytes(const v1::ImageSetFiles& files) {
+  uint64_t bytes = 0;
+  for (const v1::ImageFile& file : files.files())
+    if (const auto size = image::PlainPngSize(file.png()); size.ok()) bytes += size->bytes();
+  return bytes;
 }
 
 absl::StatusOr<ImageSet> ReadImageSet(const std::string& folder) {

@@ -30,6 +30,9 @@ bool HasTouches(const std::string& folder);
 absl::StatusOr<ImageSet> ReadImageSet(const std::string& folder);
 absl::StatusOr<ImageSet> ParseImageSet(const v1::ImageSetFiles& files);
 
+// What the pixels of such a set take in memory, by the headers of its pictures; pictures that cannot be read count nothing.
+uint64_t PixelBytes(const v1::ImageSetFiles& files);
+
 // The files of a folder as they are, for sending: images.csv, camera.yaml and the pictures that its rows name (other
 // files are left alone). images.csv is checked on the way; pictures are not decoded. `origin` of the message is `folder`.
 absl::StatusOr<v1::ImageSetFiles> ReadImageSetFiles(const std::string& folder);

@@ -271,6 +271,7 @@ absl::StatusOr<JournalImage> ReadImage(SqliteFile* file, int64_t image_id) {
 absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id, bool with_counts) {
   const SqliteSnapshot snapshot(file);
   JournalSession session;
+  session.id = session_id;
   {
     SqliteStatement row = file->Prepare(
         "SELECT name, created_unix_s, source, calibration, fingers, spacing_m, deleted_unix_s, deleted_by "
