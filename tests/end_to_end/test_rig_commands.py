@@ -139,6 +139,8 @@ def session(rig, plan, tmp_path_factory):
     """The journal of a run that was interrupted by Ctrl-C, then killed, and then went on to its end."""
     journal = tmp_path_factory.mktemp("session") / "session.db"
     words = [BIN / "touchstone", "rig", "run", plan, "-o", journal, "--session", "monday", "--server", rig]
+    # In the background of a shell an interrupt is ignored, and programs inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     for signal_number, enough in ((signal.SIGINT, 3), (signal.SIGKILL, 8)):
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                    stdin=subprocess.DEVNULL)
