@@ -98,8 +98,8 @@ struct JournalClock {
 };
 
 struct JournalSession {
-  int64_t id =
-      0;  // in this journal: greater than those of all sessions that were made before and are still there
+  // In this journal: greater than those of all sessions that were made before and are still there.
+  int64_t id = 0;
   std::string name;
   double created_unix_s = 0;
   // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"; an emulator says that it is one.

@@ -66,12 +66,11 @@ class Client:
 
 def _touch_until_killed(gateway: Server, client: Client, answers: dict[int, bytes], result: Result) -> None:
     """Touches on from the first number that has no answer; renews the lease with every one, which takes a fraction of a second."""
-    number = len(answers)
     while gateway.alive():
+        number = len(answers)
         try:
             answers[number] = client.touch(number)
             client.control.RenewLease(control_pb2.RenewLeaseRequest(token=client.token), timeout=PATIENCE_S)
-            number += 1
         except grpc.RpcError as error:
             if error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED):
                 return

@@ -43,10 +43,9 @@ class Program:
       log: its lines on standard error so far.
     """
 
-    def __init__(self, words: list, ready: str, environment: dict[str, str] | None = None):
-        """ready: a regular expression with one group; environment: variables beside those of this process."""
-        self.process = subprocess.Popen(list(map(str, words)), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                        env={**os.environ, **(environment or {})})
+    def __init__(self, words: list, ready: str):
+        """ready: a regular expression with one group."""
+        self.process = subprocess.Popen(list(map(str, words)), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.log: list[str] = []
         threading.Thread(target=self.log.extend, args=(self.process.stderr,), daemon=True).start()
         for line in self.process.stdout:
@@ -82,13 +81,12 @@ class Program:
 class Server(Program):
     """A touchstone-server, or with `gateway` a touchstone-gateway, on a free port of this machine."""
 
-    def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None,
-                 environment: dict[str, str] | None = None):
+    def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None):
         """max_files: soft and hard limit of open files; None: as this process has it."""
         # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
         limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
         super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", "127.0.0.1:0", *SMALL, *options],
-                         r"listening on (127\.0\.0\.1:\d+)", environment)
+                         r"listening on (127\.0\.0\.1:\d+)")
 
     @property
     def target(self) -> str:
