@@ -69,6 +69,7 @@ void Initialise(EGLDisplay egl_display, EglDisplay* result) {
     result->problem = absl::StrCat("EGL cannot be initialised: ", EglErrorText(eglGetError()));
     return;
   }
+  result->version = 10 * major + minor;
   result->vendor = Text(eglQueryString(egl_display, EGL_VENDOR));
   const char* extensions = eglQueryString(egl_display, EGL_EXTENSIONS);
   if (!Has(extensions, "EGL_KHR_surfaceless_context")) {
@@ -81,12 +82,12 @@ void Initialise(EGLDisplay egl_display, EglDisplay* result) {
 std::vector<EglDisplay> OpenDisplays() {
   std::vector<EglDisplay> displays;
   if (!epoxy_has_egl()) {
-    displays.push_back({nullptr, false, "", "", "libEGL is not installed (Debian: libegl1 and a driver)"});
+    displays.push_back({nullptr, 0, false, "", "", "libEGL is not installed (Debian: libegl1 and a driver)"});
     return displays;
   }
   // libepoxy ends the process where it finds neither when the first function of OpenGL is called.
   if (::dlopen("libOpenGL.so.0", RTLD_LAZY) == nullptr && ::dlopen("libGL.so.1", RTLD_LAZY) == nullptr) {
-    displays.push_back({nullptr, false, "", "", "libOpenGL is not installed (Debian: libopengl0)"});
+    displays.push_back({nullptr, 0, false, "", "", "libOpenGL is not installed (Debian: libopengl0)"});
     return displays;
   }
   // llvmpipe: its own threads only get in the way of ours. Read by the driver when its first context is made.
@@ -120,7 +121,7 @@ std::vector<EglDisplay> OpenDisplays() {
     displays.push_back(std::move(display));
   }
   if (displays.empty()) {
-    displays.push_back({nullptr, false, "", "",
+    displays.push_back({nullptr, 0, false, "", "",
                         "EGL offers neither devices nor a surfaceless platform; is a driver installed "
                         "(Debian: libegl-mesa0, or the maker's)?"});
   }
@@ -149,14 +150,21 @@ absl::StatusOr<std::unique_ptr<EglContext>> EglContext::Create(const EglDisplay&
     if (!eglChooseConfig(display.display, wanted, &config, 1, &count) || count < 1)
       return absl::UnavailableError("the driver offers no configuration for OpenGL without a window");
   }
-  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                               3,
-                               EGL_CONTEXT_MINOR_VERSION,
-                               3,
-                               EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                               EGL_NONE};
-  EGLContext context = eglCreateContext(display.display, config, EGL_NO_CONTEXT, attributes);
+  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,       3,
+                                    EGL_CONTEXT_MINOR_VERSION,       3,
+                                    EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
+  // Core in EGL 1.5. Without it a driver may end the process when its device is lost, or draw on as if nothing were.
+  const bool tells_loss = display.version >= 15;
+  if (tells_loss)
+    attributes.insert(attributes.end(),
+                      {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
+  attributes.push_back(EGL_NONE);
+  EGLContext context = eglCreateContext(display.display, config, EGL_NO_CONTEXT, attributes.data());
+  if (context == EGL_NO_CONTEXT && tells_loss) {  // the driver does not do it
+    attributes.resize(6);
+    attributes.push_back(EGL_NONE);
+    context = eglCreateContext(display.display, config, EGL_NO_CONTEXT, attributes.data());
+  }
   if (context == EGL_NO_CONTEXT)
     return absl::UnavailableError(absl::StrCat("no OpenGL 3.3 core context: ", EglErrorText(eglGetError())));
   if (!eglMakeCurrent(display.display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
@@ -165,7 +173,13 @@ absl::StatusOr<std::unique_ptr<EglContext>> EglContext::Create(const EglDisplay&
     return absl::UnavailableError(
         absl::StrCat("the OpenGL context cannot be made current without a window: ", EglErrorText(error)));
   }
-  return std::unique_ptr<EglContext>(new EglContext(display.display, context));
+  std::unique_ptr<EglContext> made(new EglContext(display.display, context));
+  made->tells_loss_ = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
+  return made;
+}
+
+bool EglContext::Lost() const {
+  return tells_loss_ && glGetGraphicsResetStatus() != GL_NO_ERROR;
 }
 
 EglContext::~EglContext() {

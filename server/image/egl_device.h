@@ -17,6 +17,7 @@ namespace touchstone::image {
 // A device that could be asked for a context, whether or not it gives one.
 struct EglDisplay {
   void* display = nullptr;  // EGLDisplay; null: see problem
+  int version = 0;          // of EGL: 15 is 1.5
   bool software = false;
   std::string vendor;
   std::string driver;   // the driver's file, or the platform
@@ -33,6 +34,9 @@ class EglContext {
   // The context is current on return.
   static absl::StatusOr<std::unique_ptr<EglContext>> Create(const EglDisplay& display);
   ~EglContext();
+  // Whether the device was reset or is gone since the context was made: nothing that was drawn is to be trusted, and
+  // only a new context can draw again. False where the driver does not tell.
+  bool Lost() const;
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
@@ -40,6 +44,7 @@ class EglContext {
   EglContext(void* display, void* context) : display_(display), context_(context) {}
   void* display_;
   void* context_;
+  bool tells_loss_ = false;
 };
 
 // Whether this GL_RENDERER draws on the processor.

@@ -15,6 +15,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
 
 #include "server/base/status.h"
 #include "server/image/egl_device.h"
@@ -70,21 +71,56 @@ class EglRenderer final : public Renderer {
     std::promise<absl::StatusOr<Image>> image;
   };
 
+  // What draws, with the context that it needs; used and destroyed on the context's thread.
+  struct Drawing {
+    std::unique_ptr<EglContext> context;
+    std::unique_ptr<GlRasterizer> rasterizer;  // goes first
+  };
+
+  static absl::StatusOr<Drawing> MakeDrawing(int device) {
+    Drawing drawing;
+    TOUCHSTONE_ASSIGN_OR_RETURN(drawing.context, EglContext::Create(EglDisplays()[device]));
+    TOUCHSTONE_ASSIGN_OR_RETURN(drawing.rasterizer, GlRasterizer::Create());
+    return drawing;
+  }
+
   // The life of the context's thread.
   void Run(int device, std::promise<absl::Status> started) {
-    absl::StatusOr<std::unique_ptr<EglContext>> context = EglContext::Create(EglDisplays()[device]);
-    if (!context.ok()) return started.set_value(context.status());
-    absl::StatusOr<std::unique_ptr<GlRasterizer>> rasterizer = GlRasterizer::Create();
-    if (!rasterizer.ok()) return started.set_value(rasterizer.status());
-    gl_renderer_ = (*rasterizer)->gl_renderer();
+    absl::StatusOr<Drawing> drawing = MakeDrawing(device);
+    if (!drawing.ok()) return started.set_value(drawing.status());
+    gl_renderer_ = drawing->rasterizer->gl_renderer();
     started.set_value(absl::OkStatus());
 
     while (Job* job = NextJob()) {
       // Taken out first: as soon as the value is set, the caller may be gone with his job.
       std::promise<absl::StatusOr<Image>> image = std::move(job->image);
-      image.set_value((*rasterizer)->Draw(job->surface, *job->mesh, job->camera, job->options));
+      image.set_value(Draw(device, *job, &drawing));
     }
-    rasterizer->reset();  // while its context is still current
+  }
+
+  // A device that was lost may be there again: then the picture is drawn anew, by a new context on the same device, so
+  // that its bytes are what they would have been. Never by another one. UNAVAILABLE where that cannot be.
+  absl::StatusOr<Image> Draw(int device, const Job& job, absl::StatusOr<Drawing>* drawing) {
+    for (int attempt = 0; attempt < 2; ++attempt) {
+      if (!drawing->ok()) {
+        *drawing = MakeDrawing(device);
+        if (drawing->ok() && (*drawing)->rasterizer->gl_renderer() != gl_renderer_)
+          *drawing = absl::UnavailableError(
+              absl::StrCat("it draws as ", (*drawing)->rasterizer->gl_renderer(), " now"));
+        if (!drawing->ok()) return Gone(drawing->status().message());
+      }
+      absl::StatusOr<Image> image =
+          (*drawing)->rasterizer->Draw(job.surface, *job.mesh, job.camera, job.options);
+      if (!(*drawing)->context->Lost()) return image;
+      *drawing = absl::UnavailableError("it was reset while it drew");
+    }
+    return Gone(drawing->status().message());
+  }
+
+  absl::Status Gone(absl::string_view why) const {
+    return absl::UnavailableError(
+        absl::StrCat("the graphics device was lost (EGL on ", gl_renderer_, "): ", why,
+                     ". The next picture tries it again; a start with the renderer cpu does without it"));
   }
 
   // Null when the renderer goes.

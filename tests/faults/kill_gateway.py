@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import math
+import pathlib
 import random
 import re
 import socket
@@ -22,6 +23,11 @@ SPEEDUP = 50
 COLUMNS = ("t_l_us", "t_m_us", "t_r_us")
 # Of host time, so that a busy machine is not taken for a fault of the rig.
 PATIENT = ("--arm-watchdog-hz", "1", "--arm-silence-s", "1.5", "--effector-silence-s", "3")
+
+
+def dashboard_port(config: str) -> int:
+    """Of the emulated arm of that configuration."""
+    return int(re.search(r"dashboard_port = (\d+)", pathlib.Path(config).read_text()).group(1))
 
 
 class Client:
@@ -93,8 +99,7 @@ def run(kills: int = 100, seed: int = 1) -> Result:
     interrupted = recovered = 0
     with scratch() as folder, Program([EMULATOR, "--dir", folder, "--speedup", SPEEDUP, "--powered", "--object", "lat20",
                                        "--supershape-triangles", 2000], r"ready (\S+)") as emulator:
-        config = emulator.ready
-        dashboard = int(re.search(r"dashboard_port = (\d+)", open(config).read()).group(1))
+        config, dashboard = emulator.ready, dashboard_port(emulator.ready)
         for round_ in range(kills + 1):
             with Server("--config", config, *PATIENT, gateway=True) as gateway, gateway.channel() as channel:
                 client = Client(channel, dashboard)

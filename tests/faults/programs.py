@@ -18,6 +18,7 @@ from touchstone.v1 import models_pb2, sessions_pb2, source_pb2
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SERVER = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or ROOT / "build/release/bin/touchstone-server")
 GATEWAY, EMULATOR = SERVER.parent / "touchstone-gateway", SERVER.parent / "touchstone-rig-emulator"
+CLIENT = SERVER.parent / "touchstone"
 # Five supershapes that take a moment to build: what is tried here does not depend on their size.
 SMALL = ("--supershape-triangles", "2000")
 PATIENCE_S = 60.0
@@ -43,9 +44,10 @@ class Program:
       log: its lines on standard error so far.
     """
 
-    def __init__(self, words: list, ready: str):
-        """ready: a regular expression with one group."""
-        self.process = subprocess.Popen(list(map(str, words)), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def __init__(self, words: list, ready: str, environment: dict[str, str] | None = None):
+        """ready: a regular expression with one group. environment: beside that of this process."""
+        self.process = subprocess.Popen(list(map(str, words)), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                        env=os.environ | (environment or {}))
         self.log: list[str] = []
         threading.Thread(target=self.log.extend, args=(self.process.stderr,), daemon=True).start()
         for line in self.process.stdout:
@@ -81,12 +83,13 @@ class Program:
 class Server(Program):
     """A touchstone-server, or with `gateway` a touchstone-gateway, on a free port of this machine."""
 
-    def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None):
+    def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None, environment: dict[str, str] | None = None,
+                 listen: str = "127.0.0.1:0"):
         """max_files: soft and hard limit of open files; None: as this process has it."""
         # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
         limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
-        super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", "127.0.0.1:0", *SMALL, *options],
-                         r"listening on (127\.0\.0\.1:\d+)")
+        super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", listen, *SMALL, *options],
+                         r"listening on (127\.0\.0\.1:\d+)", environment)
 
     @property
     def target(self) -> str:

@@ -3,6 +3,7 @@
 import grpc
 import pytest
 
+import clock_jumps
 import disk_full
 import flat_memory
 import hostile_bytes
@@ -52,6 +53,10 @@ def test_memory_is_flat_over_a_long_stream():
 
 def test_silent_and_slow_clients_do_not_shut_others_out():
     passes(silent_and_slow.run())
+
+
+def test_a_clock_that_is_set_changes_no_limit_and_no_byte():
+    passes(clock_jumps.run(jumps=20, names=("an hour back", "fifteen years ahead")))
 
 
 def test_a_loss_and_a_tear_are_seen():

@@ -114,6 +114,26 @@ TEST_F(CameraTest, SaysWhyAFolderGivesNothing) {
   EXPECT_THAT(std::string(old.message()), HasSubstr("a.png, is older than asked for"));
 }
 
+TEST_F(CameraTest, TakesNoPictureWhoseAgeAClockHides) {
+  const auto camera = Open(Options("folder:" + folder_, 0.5));
+  ASSERT_NE(camera, nullptr);
+  Write("a.png", 10);
+  // As after the clock was set back: by an hour, or by less than one waits for a picture.
+  for (const std::chrono::milliseconds ahead :
+       {std::chrono::milliseconds(3'600'000), std::chrono::milliseconds(250)}) {
+    std::filesystem::last_write_time(folder_ + "/a.png",
+                                     std::filesystem::file_time_type::clock::now() + ahead);
+    const absl::Status status = camera->Take(timing::HostNowS()).status();
+    EXPECT_TRUE(absl::IsUnavailable(status)) << status;
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr("a.png, was written at a time that had not come yet"));
+  }
+  Write("b.png", 50);
+  const absl::StatusOr<image::Frame> frame = camera->Take(0);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->rgb.at(0), 50);
+}
+
 TEST_F(CameraTest, PlaysAVideoAndBeginsItAnew) {
   const std::string path = folder_ + "/film.avi";
   {

@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "server/gateway/camera/camera_kinds.h"
+#include "server/gateway/timing/host_time.h"
 
 namespace touchstone::gateway::camera {
 namespace {
@@ -26,14 +27,17 @@ bool IsPicture(const std::filesystem::path& path) {
   return false;
 }
 
-// The file's last change on the steady clock; far in the past if it is gone.
-double ChangedAtS(const std::string& path) {
+// A file as it was written once.
+struct Stamp {
+  std::string path;
+  double unix_s = -1e18;  // of its last change, by the clock of who keeps it; far in the past if it is gone
+  bool operator==(const Stamp& other) const { return path == other.path && unix_s == other.unix_s; }
+};
+
+Stamp StampOf(const std::string& path) {
   struct stat info;
-  if (stat(path.c_str(), &info) != 0) return -1e18;
-  const double wall_s =
-      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  return timing::HostNowS() -
-         (wall_s - (static_cast<double>(info.st_mtim.tv_sec) + 1e-9 * info.st_mtim.tv_nsec));
+  if (path.empty() || stat(path.c_str(), &info) != 0) return {path};
+  return {path, static_cast<double>(info.st_mtim.tv_sec) + 1e-9 * info.st_mtim.tv_nsec};
 }
 
 class FolderCamera : public CameraDevice {
@@ -48,8 +52,15 @@ class FolderCamera : public CameraDevice {
       const std::string name = Newest();
       std::string why = "it has no picture";
       if (!name.empty()) {
-        const double changed_s = ChangedAtS(name);
-        if (changed_s + kCoarseS < after_host_s) {
+        const Stamp stamp = StampOf(name);
+        const double ahead_s = stamp.unix_s - timing::UnixNowS(), changed_s = timing::HostNowS() + ahead_s;
+        if (ahead_s > kCoarseS) of_the_future_ = stamp;
+        if (stamp == of_the_future_) {
+          why = absl::StrCat(
+              "its newest picture, ", std::filesystem::path(name).filename().string(),
+              ", was written at a time that had not come yet: a clock was set back, or the folder's is "
+              "ahead, so how old it is cannot be known");
+        } else if (changed_s + kCoarseS < after_host_s) {
           why = absl::StrCat("its newest picture, ", std::filesystem::path(name).filename().string(),
                              ", is older than asked for");
         } else {
@@ -89,6 +100,7 @@ class FolderCamera : public CameraDevice {
   const CameraOptions options_;
   const std::string path_;
   mutable std::mutex mutex_;
+  Stamp of_the_future_;  // remembered, since its time comes while one waits
   uint64_t frames_ = 0;
 };
 
