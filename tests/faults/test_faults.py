@@ -9,6 +9,7 @@ import flat_memory
 import hostile_bytes
 import kill_gateway
 import kill_while_writing
+import lost_device
 import many_clients
 import programs
 import replicas
@@ -57,6 +58,10 @@ def test_silent_and_slow_clients_do_not_shut_others_out():
 
 def test_a_clock_that_is_set_changes_no_limit_and_no_byte():
     passes(clock_jumps.run(jumps=20, names=("an hour back", "fifteen years ahead")))
+
+
+def test_a_graphics_device_that_is_lost_changes_no_picture():
+    passes(lost_device.run(pictures=6000, resets=10, absences=2))
 
 
 def test_a_loss_and_a_tear_are_seen():

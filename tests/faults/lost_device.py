@@ -1,0 +1,85 @@
+"""The graphics device of a server is reset, and goes and comes back, while a client draws a dataset of pictures: every picture
+that arrives has the bytes that it should have, the client's dataset is whole, and touches without pictures go on.
+
+The driver is a real one, the loss is not: lost_device.cpp tells of it in the driver's name."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import pathlib
+import random
+import struct
+import subprocess
+import time
+
+from programs import CLIENT, PATIENCE_S, SERVER, Result, Server, scratch, stream
+
+
+class Device:
+    """Of a server that is started with `environment`."""
+
+    def __init__(self, folder: str):
+        self._path = pathlib.Path(folder) / "device"
+        self._path.write_bytes(bytes(8))
+        with self._path.open("r+b") as file:
+            self._state = mmap.mmap(file.fileno(), 8)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return {"LD_PRELOAD": str(SERVER.parent / "touchstone-lost-device.so"), "TOUCHSTONE_LOST_DEVICE": str(self._path)}
+
+    def reset(self) -> None:
+        self._state[:4] = struct.pack("<i", 1)
+
+    def told(self) -> bool:
+        return self._state[:4] == bytes(4)
+
+    def gone(self, gone: bool) -> None:
+        self._state[4:] = struct.pack("<i", gone)
+
+
+def _draw(server: Server, pictures: int, out: pathlib.Path) -> subprocess.Popen:
+    words = ["stream", "--server", server.target, "--objects", "lat00,lat20", "--samples", str(pictures), "--shard-size", "1000", "--image",
+             "128x128"]
+    return subprocess.Popen([CLIENT, *words, "--out", out, "--quiet"], stderr=subprocess.PIPE, text=True)
+
+
+def run(pictures: int = 30_000, resets: int = 50, absences: int = 10, seed: int = 1) -> Result:
+    """pictures: of the dataset. resets: while it is drawn, or a few more. absences: how often the device stays away for a moment."""
+    result, rng, told, away = Result(), random.Random(seed), 0, 0
+    with scratch() as folder:
+        device, whole, made = Device(folder), pathlib.Path(folder) / "whole", pathlib.Path(folder) / "made"
+        with Server("--renderer", "egl", environment=device.environment) as server, server.channel() as channel:
+            client = _draw(server, pictures, whole)
+            _, words = client.communicate(timeout=600)
+            result.expect(client.returncode == 0, f"without any loss: the client ended with {client.returncode}: {words}")
+            client = _draw(server, pictures, made)
+            while client.poll() is None and (told < resets or away < absences):
+                time.sleep(rng.uniform(0.0, 0.05))
+                stays = away < absences and rng.random() < absences / resets
+                device.gone(stays)
+                device.reset()
+                deadline = time.monotonic() + PATIENCE_S
+                while not device.told() and client.poll() is None and time.monotonic() < deadline:
+                    time.sleep(0.001)
+                if client.poll() is not None:
+                    break
+                told += device.told()
+                if stays:
+                    rows = sum(response.batch.rows for response in stream(channel, 20_000))
+                    result.expect(rows == 20_000, f"without a device, a stream without pictures gave {rows} of 20,000 samples")
+                    time.sleep(rng.uniform(0.0, 0.3))
+                    device.gone(False)
+                    away += 1
+            device.gone(False)
+            _, words = client.communicate(timeout=600)
+            result.expect(client.returncode == 0, f"the client ended with {client.returncode}: {words}")
+            result.expect(server.alive(), "the server ended")
+        shards = {path.name: path.read_bytes() for path in whole.glob("shard-*.tar")}
+        result.expect({path.name: path.read_bytes() for path in made.glob("shard-*.tar")} == shards, "the dataset has other bytes than without losses")
+        result.expect(len(shards) == pictures // 1000, f"{len(shards)} shards of {pictures // 1000}")
+    result.expect(told >= resets // 2 and away >= min(absences, 1), f"only {told} resets and {away} absences while {pictures:,} pictures were drawn")
+    result.seen.append(f"{told} resets, after {away} of which the device stayed away for a moment, while {pictures:,} pictures were drawn: the dataset has the "
+                       "bytes that it has without (a real driver, whose losses are told by a preloaded library)")
+    return result
