@@ -9,6 +9,7 @@
 
 #include "client/source/tls_probe.h"
 #include "server/base/status.h"
+#include "server/service/host_port.h"
 
 namespace touchstone::client {
 namespace {
@@ -22,12 +23,9 @@ std::chrono::system_clock::time_point InSeconds(double seconds) {
 
 // "host:port" with a port from 1 to 65535, or an address scheme of gRPC's own ("unix:/run/touchstone").
 absl::Status ValidateAddress(const std::string& address) {
-  const size_t colon = address.rfind(':');
   if (address.rfind("unix:", 0) == 0 && address.size() > 5) return absl::OkStatus();
-  const std::string port = colon == std::string::npos ? "" : address.substr(colon + 1);
-  const bool digits =
-      !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
-  if (colon == 0 || !digits || std::stoi(port) < 1 || std::stoi(port) > 65535)
+  const std::optional<service::HostPort> parsed = service::ParseHostPort(address);
+  if (!parsed || parsed->host.empty() || parsed->port == 0)
     return absl::InvalidArgumentError(
         absl::StrCat("--server: '", address, "' is not HOST:PORT, for instance 127.0.0.1:50051"));
   return absl::OkStatus();

@@ -19,6 +19,7 @@
 #include <iterator>
 
 #include "server/base/status.h"
+#include "server/service/host_port.h"
 
 namespace touchstone::service {
 namespace {
@@ -100,20 +101,20 @@ absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> ConnectionAcceptor::Listen(c
 
 absl::Status ConnectionAcceptor::Open(const std::string& address) {
   const auto failed = [&](absl::string_view why) {
-    return absl::UnavailableError(
-        absl::StrCat("listen = '", address, "': cannot listen there: ", why,
-                     "; is the address right (HOST:PORT, port 0 for any), and the port free?"));
+    return absl::UnavailableError(absl::StrCat("listen = '", address, "': cannot listen there: ", why,
+                                               "; is the address right, and the port free?"));
   };
-  const size_t colon = address.rfind(':');
-  if (colon == std::string::npos) return failed("there is no port");
-  std::string host = address.substr(0, colon);
-  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  const std::optional<HostPort> parsed = ParseHostPort(address);
+  if (!parsed)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "listen = '", address,
+        "': write HOST:PORT with a port up to 65535 (0: any free one), for instance 127.0.0.1:50051"));
   addrinfo hints{}, *found = nullptr;
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  const int error =
-      ::getaddrinfo(host.empty() ? nullptr : host.c_str(), address.c_str() + colon + 1, &hints, &found);
+  const int error = ::getaddrinfo(parsed->host.empty() ? nullptr : parsed->host.c_str(),
+                                  absl::StrCat(parsed->port).c_str(), &hints, &found);
   if (error != 0) return failed(::gai_strerror(error));
   std::string why = "no address";
   for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {

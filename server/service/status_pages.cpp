@@ -1,6 +1,5 @@
 #include "server/service/status_pages.h"
 
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <grpcpp/client_context.h>
 #include <spdlog/spdlog.h>
@@ -16,6 +15,7 @@
 
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/service/access_options.h"
+#include "server/service/host_port.h"
 #include "server/service/metrics.h"
 #include "server/service/resources.h"
 
@@ -134,19 +134,16 @@ class StatusPages::Http {
 absl::StatusOr<std::unique_ptr<StatusPages>> StatusPages::Start(const std::string& address,
                                                                 const Resources* resources,
                                                                 std::shared_ptr<grpc::Channel> channel) {
-  const size_t colon = address.rfind(':');
-  int port = -1;
-  if (colon == std::string::npos || !absl::SimpleAtoi(address.substr(colon + 1), &port) || port < 0 ||
-      port > 65535)
-    return absl::InvalidArgumentError(
-        absl::StrCat("metrics = '", address, "': write HOST:PORT, for instance 127.0.0.1:9464"));
-  std::string host = colon == 0 ? "127.0.0.1" : address.substr(0, colon);
-  if (!IsLocalAddress(absl::StrCat(host, ":", port)))
+  const std::optional<HostPort> parsed = ParseHostPort(address);
+  if (!parsed)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "metrics = '", address, "': write HOST:PORT with a port up to 65535, for instance 127.0.0.1:9464"));
+  const std::string host = parsed->host.empty() ? "127.0.0.1" : parsed->host;
+  if (!parsed->host.empty() && !IsLocalAddress(address))
     spdlog::warn("metrics: other machines can read the counters at {} in plain text; they change nothing",
                  address);
-  if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
   std::unique_ptr<StatusPages> pages(new StatusPages(resources, std::move(channel)));
-  const beast::error_code error = pages->http_->Listen(host, absl::StrCat(port));
+  const beast::error_code error = pages->http_->Listen(host, absl::StrCat(parsed->port));
   if (error)
     return absl::UnavailableError(absl::StrCat("metrics = '", address,
                                                "': cannot listen there: ", error.message(),
