@@ -11,7 +11,9 @@
 #include <boost/beast/http.hpp>
 
 #include <chrono>
+#include <optional>
 #include <thread>
+#include <vector>
 
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/service/access_options.h"
@@ -30,6 +32,8 @@ using tcp = boost::asio::ip::tcp;
 constexpr std::chrono::seconds kPatience{2};  // with a slow client
 constexpr std::chrono::milliseconds kPause{200};
 constexpr uint32_t kMaxHeadBytes = 8192;
+// So that the counters are there while both probes wait for a server that does not answer.
+constexpr int kThreads = 3;
 constexpr char kPages[] = "GET /metrics, /livez or /readyz\n";
 
 // Whether the server answers, and what.
@@ -89,7 +93,7 @@ class StatusPages::Http {
   explicit Http(const StatusPages* pages) : pages_(pages) {}
   ~Http() {
     io_.stop();
-    if (thread_.joinable()) thread_.join();
+    for (std::thread& thread : threads_) thread.join();
   }
 
   // Returns what went wrong, and serves from then on if nothing did.
@@ -105,7 +109,8 @@ class StatusPages::Http {
     if (!error) port_ = acceptor_.local_endpoint(error).port();
     if (error) return error;
     Accept();
-    thread_ = std::thread([this] { io_.run(); });
+    // A connection is one chain of callbacks, and so is accepting.
+    for (int k = 0; k < kThreads; ++k) threads_.emplace_back([this] { io_.run(); });
     return error;
   }
   int port() const { return port_; }
@@ -128,7 +133,7 @@ class StatusPages::Http {
   tcp::acceptor acceptor_{io_};
   asio::steady_timer pause_{io_};
   int port_ = 0;
-  std::thread thread_;
+  std::vector<std::thread> threads_;
 };
 
 absl::StatusOr<std::unique_ptr<StatusPages>> StatusPages::Start(const std::string& address,
