@@ -1,10 +1,10 @@
-// Lets waits with a time limit last as long as they were asked to, whatever happens to the clock of the day.
+// Lets waits with a time limit last as long as they were asked to, whatever happens to the wall clock.
 //
 // gRPC's timers (deadlines, handshakes, keepalive, the waits between two attempts) wait in abseil, and the abseil of Debian
-// 12 (20220623; later ones use the steady clock) has the kernel wake it when the clock of the day shows a time. Set that
+// 12 (20220623; later ones use the steady clock) has the kernel wake it when the wall clock shows a time. Set that
 // clock back an hour, as NTP does after a start with a flat battery, and no timer fires for an hour; no call of gRPC's
 // or of abseil's can wake its timers before. Both reach the kernel through libc's syscall(), which a program may define
-// itself: this one turns the time of day into the same time of the steady clock when the wait begins, and leaves every
+// itself: this one turns the wall time into the same time of the steady clock when the wait begins, and leaves every
 // other call as it is. Linked into the programs, not into libraries.
 #include <dlfcn.h>
 #include <linux/futex.h>
@@ -36,13 +36,13 @@ constexpr int64_t kNsPerS = 1'000'000'000;
 // What is waited for longer is waited for so long, and then again: who waits for ever names the end of time.
 constexpr int64_t kLongestS = 1'000'000'000;
 
-timespec SteadyTimeOf(const timespec& day) {
-  timespec day_now{}, steady_now{};
-  clock_gettime(CLOCK_REALTIME, &day_now);
+timespec SteadyTimeOf(const timespec& wall) {
+  timespec wall_now{}, steady_now{};
+  clock_gettime(CLOCK_REALTIME, &wall_now);
   clock_gettime(CLOCK_MONOTONIC, &steady_now);
   const int64_t wait_s =
-      std::clamp<int64_t>(day.tv_sec, day_now.tv_sec - 1, day_now.tv_sec + kLongestS) - day_now.tv_sec;
-  const int64_t wait_ns = std::max<int64_t>(wait_s * kNsPerS + day.tv_nsec - day_now.tv_nsec, 0);
+      std::clamp<int64_t>(wall.tv_sec, wall_now.tv_sec - 1, wall_now.tv_sec + kLongestS) - wall_now.tv_sec;
+  const int64_t wait_ns = std::max<int64_t>(wait_s * kNsPerS + wall.tv_nsec - wall_now.tv_nsec, 0);
   const int64_t until_ns = steady_now.tv_sec * kNsPerS + steady_now.tv_nsec + wait_ns;
   return {until_ns / kNsPerS, until_ns % kNsPerS};
 }

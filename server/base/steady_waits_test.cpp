@@ -1,4 +1,4 @@
-// Linked with steady_waits.cpp. That the clock of the day is set meanwhile is tried by tests/faults/clock_jumps.py.
+// Linked with steady_waits.cpp. That the wall clock is set meanwhile is tried by tests/faults/clock_jumps.py.
 #include <linux/futex.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -17,7 +17,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-timespec DayIn(int64_t ns) {
+timespec WallIn(int64_t ns) {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
   const int64_t until_ns = now.tv_sec * 1'000'000'000 + now.tv_nsec + ns;
@@ -41,12 +41,12 @@ class SteadyWaits : public testing::Test {
 
 TEST_F(SteadyWaits, LastUntilTheirTime) {
   const auto began = std::chrono::steady_clock::now();
-  EXPECT_EQ(Wait(DayIn(80'000'000)), ETIMEDOUT);
+  EXPECT_EQ(Wait(WallIn(80'000'000)), ETIMEDOUT);
   EXPECT_GE(Since(began), milliseconds(79));
 }
 
 TEST_F(SteadyWaits, EndAtOnceWhereTheirTimeIsOver) {
-  EXPECT_EQ(Wait(DayIn(-1)), ETIMEDOUT);
+  EXPECT_EQ(Wait(WallIn(-1)), ETIMEDOUT);
   EXPECT_EQ(Wait({0, 0}), ETIMEDOUT);
   EXPECT_EQ(Wait({std::numeric_limits<int64_t>::min(), 0}), ETIMEDOUT);
 }
@@ -65,7 +65,7 @@ TEST_F(SteadyWaits, AreWokenBeforeTheEndOfTime) {
 TEST_F(SteadyWaits, LeaveOtherCallsAsTheyAre) {
   EXPECT_EQ(syscall(SYS_getpid), getpid());
   word_ = 1;
-  EXPECT_EQ(Wait(DayIn(1'000'000'000)), EAGAIN);  // the word is not what was expected
+  EXPECT_EQ(Wait(WallIn(1'000'000'000)), EAGAIN);  // the word is not what was expected
   EXPECT_EQ(syscall(SYS_close, -1), -1);
   EXPECT_EQ(errno, EBADF);
 }

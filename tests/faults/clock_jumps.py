@@ -30,7 +30,7 @@ BUSY_S = 20.0
 
 
 class HostClock:
-    """The clock of the day of the programs that are started with `environment`; host_clock.cpp does it."""
+    """The wall clock of the programs that are started with `environment`; host_clock.cpp does it."""
 
     def __init__(self, folder: str):
         self._path = pathlib.Path(folder) / "clock"

@@ -1,5 +1,5 @@
-// A host whose clock of the day is set while programs run, as by `date -s`, NTP or a battery that went flat: preloaded
-// into a program (LD_PRELOAD), it adds the offset that a file holds now to the clock of the day and to nothing else. What
+// A host whose wall clock is set while programs run, as by `date -s`, NTP or a battery that went flat: preloaded
+// into a program (LD_PRELOAD), it adds the offset that a file holds now to the wall clock and to nothing else. What
 // waits until a time of that clock wakes when that clock shows it, as the kernel does (timers(2), futex(2)
 // FUTEX_CLOCK_REALTIME), which is how gRPC's timers wait on Debian 12. libfaketime knows no futex.
 #include <dlfcn.h>
@@ -59,7 +59,7 @@ int OwnClock(clockid_t clock, timespec* time) {
   return Own<int(clockid_t, timespec*)>("clock_gettime")(clock, time);
 }
 
-int64_t DayNs() {
+int64_t WallNs() {
   timespec now{};
   OwnClock(CLOCK_REALTIME, &now);
   return now.tv_sec * kNsPerS + now.tv_nsec + (shared_offset == nullptr ? 0 : shared_offset->load());
@@ -70,7 +70,7 @@ timespec ToTimespec(int64_t ns) {
   return {seconds, ns - seconds * kNsPerS};
 }
 
-// Waits until the clock of the day, which may be set meanwhile, shows `until`.
+// Waits until the wall clock, which may be set meanwhile, shows `until`.
 long WaitUntil(long (*own)(long, ...), uint32_t* word, long operation, uint32_t expected,
                const timespec& until, long mask) {
   // Who waits for ever names the end of time.
@@ -80,12 +80,12 @@ long WaitUntil(long (*own)(long, ...), uint32_t* word, long operation, uint32_t 
   while (true) {
     timespec now{};
     OwnClock(CLOCK_MONOTONIC, &now);
-    const int64_t left_ns = until_ns - std::max<int64_t>(DayNs(), 0);
+    const int64_t left_ns = until_ns - std::max<int64_t>(WallNs(), 0);
     const timespec look =
         ToTimespec(now.tv_sec * kNsPerS + now.tv_nsec + std::clamp<int64_t>(left_ns, 0, kLookNs));
     const long result =
         own(SYS_futex, word, operation & ~FUTEX_CLOCK_REALTIME, expected, &look, nullptr, mask);
-    if (result != -1 || errno != ETIMEDOUT || DayNs() >= until_ns) return result;
+    if (result != -1 || errno != ETIMEDOUT || WallNs() >= until_ns) return result;
   }
 }
 
@@ -95,19 +95,19 @@ extern "C" {
 
 int clock_gettime(clockid_t clock, timespec* time) noexcept {
   if (clock != CLOCK_REALTIME && clock != CLOCK_REALTIME_COARSE) return OwnClock(clock, time);
-  *time = ToTimespec(DayNs());
+  *time = ToTimespec(WallNs());
   return 0;
 }
 
 int gettimeofday(timeval* time, void* zone) noexcept {
   (void)zone;
-  const timespec now = ToTimespec(DayNs());
+  const timespec now = ToTimespec(WallNs());
   *time = {now.tv_sec, now.tv_nsec / 1000};
   return 0;
 }
 
 time_t time(time_t* result) noexcept {
-  const time_t now = ToTimespec(DayNs()).tv_sec;
+  const time_t now = ToTimespec(WallNs()).tv_sec;
   if (result != nullptr) *result = now;
   return now;
 }
