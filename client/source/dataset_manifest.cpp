@@ -184,19 +184,28 @@ std::string FormatManifest(const DatasetManifest& manifest, bool complete) {
 
 namespace {
 
-// nlohmann throws where a value has another type than the one that is asked for.
+// Asked for a whole number, nlohmann makes one of a fraction or a negative, and of 1e70 anything at all.
+absl::StatusOr<uint64_t> WholeNumber(const Json& of, const char* key) {
+  const Json& value = of.at(key);
+  if (value.is_number_unsigned()) return value.get<uint64_t>();
+  return absl::InvalidArgumentError(
+      absl::StrCat("'", key, "' is ", Shown(value), "; a whole number was expected"));
+}
+
+// nlohmann throws where a value has another type than the one that is asked for, or is not there.
 absl::StatusOr<DatasetManifest> ReadFields(Json json) {
   DatasetManifest manifest;
-  const uint64_t shard_size = json["shard_size"], samples = json["samples"];
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t shard_size, WholeNumber(json, "shard_size"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t samples, WholeNumber(json, "samples"));
   TOUCHSTONE_RETURN_IF_ERROR(ParseShardFormat(json["format"].get<std::string>()).status());
   if (json.contains("renderer")) static_cast<void>(json["renderer"].get<std::string>());
   if (shard_size == 0) return absl::InvalidArgumentError("'shard_size' is 0");
   for (const Json& item : json["shards"]) {
     FinishedShard shard;
     shard.name = item.at("name").get<std::string>();
-    shard.first_index = item.at("first_index");
-    shard.samples = item.at("samples");
-    shard.bytes = item.at("bytes");
+    TOUCHSTONE_ASSIGN_OR_RETURN(shard.first_index, WholeNumber(item, "first_index"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(shard.samples, WholeNumber(item, "samples"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(shard.bytes, WholeNumber(item, "bytes"));
     shard.sha256 = item.at("sha256").get<std::string>();
     if (shard.first_index >= samples || shard.first_index % shard_size != 0)
       return absl::InvalidArgumentError(absl::StrCat("shard '", shard.name, "' begins at sample ",
@@ -218,10 +227,6 @@ absl::StatusOr<DatasetManifest> ParseManifest(const std::string& text, const std
     return absl::InvalidArgumentError(absl::StrCat(origin, ": is no touchstone ", kManifestFormat, " file"));
   for (const char* key : {"format", "samples", "shard_size", "shards"})
     if (!json.contains(key)) return absl::InvalidArgumentError(absl::StrCat(origin, ": has no '", key, "'"));
-  for (const char* key : {"samples", "shard_size"})
-    if (!json[key].is_number_unsigned())
-      return absl::InvalidArgumentError(
-          absl::StrCat(origin, ": '", key, "' is ", Shown(json[key]), "; a whole number was expected"));
   if (!json["shards"].is_array())
     return absl::InvalidArgumentError(absl::StrCat(origin, ": 'shards' is no list"));
   try {

@@ -120,5 +120,19 @@ TEST(DatasetManifest, AValueOfAnotherTypeIsAnError) {
   EXPECT_GT(refused, 100);
 }
 
+TEST(DatasetManifest, NumberOfAShardIsWhole) {
+  const Example example;
+  const auto whole = nlohmann::ordered_json::parse(FormatManifest(example.Manifest(), false));
+  for (const char* key : {"first_index", "samples", "bytes"})
+    for (const nlohmann::ordered_json& value :
+         {nlohmann::ordered_json(0.5), nlohmann::ordered_json(-1), nlohmann::ordered_json(1e300),
+          nlohmann::ordered_json(nullptr)}) {
+      nlohmann::ordered_json changed = whole;
+      changed["shards"][0][key] = value;
+      const absl::Status status = ParseManifest(changed.dump(), "there/dataset.json").status();
+      EXPECT_THAT(std::string(status.message()), HasSubstr(std::string("'") + key + "' is ")) << value;
+    }
+}
+
 }  // namespace
 }  // namespace touchstone::client
