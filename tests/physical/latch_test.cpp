@@ -282,13 +282,16 @@ TEST_F(Latch, NothingThatCouldMoveTheArmIsSentAfterAStopAtAnyMoment) {
   std::mt19937 random(20261122);
   std::uniform_real_distribution<double> moment(0, whole_s);
   int while_powering = 0;
-  for (int k = 0; k < 40; ++k) {
+  constexpr int kWhilePowering =
+      4;  // at least; how long powering up takes depends on what else the machine does
+  for (int k = 0; k < 40 || (while_powering < kWhilePowering && k < 400); ++k) {
     // A person switches the arm off.
     SendToDashboard("power off\n");
     WaitUntil([&] { return RigState().arm().robot_mode() == v1::ROBOT_MODE_POWER_OFF; }, "the arm is off");
     KeptLease lease(control_.get(), "client", true);
     auto touch = TouchLater(lease.token(), FromAbove(0.05, 1), "stopped " + std::to_string(k));
-    std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
+    // Powering up comes first: every second stop is an early one.
+    std::this_thread::sleep_for(std::chrono::duration<double>(moment(random) * (k % 2 == 0 ? 1 : 0.3)));
     Stop("at any moment");
     const size_t commands = CommandCount();
     const bool ran = RigState().arm().robot_mode() == v1::ROBOT_MODE_RUNNING;
@@ -304,7 +307,7 @@ TEST_F(Latch, NothingThatCouldMoveTheArmIsSentAfterAStopAtAnyMoment) {
     }
     ASSERT_TRUE(Reset().ok());
   }
-  EXPECT_GT(while_powering, 3) << "too few stops came while the arm was powered up";
+  EXPECT_GE(while_powering, kWhilePowering) << "too few stops came while the arm was powered up";
   ExpectEveryResultIsItsOwnTouch();
 }
 
