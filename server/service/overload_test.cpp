@@ -172,6 +172,28 @@ TEST_F(OverloadTest, RequestsHaveASizeByTheirMethod) {
   EXPECT_EQ(Compare(text).error_code(), grpc::INVALID_ARGUMENT);
 }
 
+// As of a client that hangs up between its headers and its message.
+TEST_F(OverloadTest, ACallWithoutAMessageIsRefused) {
+  Start();
+  for (const char* method : {"/touchstone.v1.Source/Describe", "/touchstone.v1.Source/StreamDataset",
+                             "/touchstone.v1.Models/CreateModel", "/touchstone.v1.Control/Stop"}) {
+    grpc::GenericStub stub(channel_);
+    grpc::ClientContext context;
+    grpc::CompletionQueue queue;
+    grpc::Status status;
+    void* tag = nullptr;
+    bool ok = false;
+    const auto call = stub.PrepareCall(&context, method, &queue);
+    call->StartCall(nullptr);
+    queue.Next(&tag, &ok);
+    call->WritesDone(nullptr);
+    queue.Next(&tag, &ok);
+    call->Finish(&status, nullptr);
+    queue.Next(&tag, &ok);
+    EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT) << method << ": " << status.error_message();
+  }
+}
+
 TEST_F(OverloadTest, WhatIsNoMessageIsRefusedAsSuch) {
   Start();
   for (const char* bytes : {"\x12", "\x0b\x12", "\xff\xff\xff\xff\xff\xff", "\x0a\x7f"})

@@ -112,6 +112,10 @@ class GuardedHandler : public MethodHandler {
 
   void* Deserialize(grpc_call* call, grpc_byte_buffer* buffer, grpc::Status* status,
                     void** handler_data) override {
+    // Whoever hangs up, or ends its side, before the message came sent none.
+    if (buffer == nullptr)
+      return Refuse(absl::InvalidArgumentError("the call ended before its request came: send one message"),
+                    nullptr, status);
     if (counts_)
       if (const absl::Status taken = rate_->Take(ClientOfCall(call)); !taken.ok())
         return Refuse(taken, buffer, status);

@@ -1,5 +1,5 @@
-"""Every method of the protocol is sent random bytes, random messages and extreme values: each call ends with a status that
-names what is wrong, and the server lives."""
+"""Every method of the protocol, at a server and at the gateway of an emulated rig, is sent no message, random bytes, random messages
+and extreme values: each call ends with a status that names what is wrong, and the process lives."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor import FieldDescriptor
 
-from programs import ROOT, Result, Server, describe
+from programs import EMULATOR, ROOT, Program, Result, Server, describe
 
 # A status goes in a header, and headers have a limit of 8 KiB together.
 MAX_STATUS_BYTES = 2048
 CALL_S = 5.0
+# UNIMPLEMENTED: methods of a rig at a server, and of a simulation at a gateway.
+NO_MESSAGE = (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.UNIMPLEMENTED)
 NUMBERS = (0, 1, -1, 2**31 - 1, -(2**31), 2**32 - 1, 2**63 - 1, -(2**63), 2**64 - 1)
 REALS = (0.0, -0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 1e300, -1e300, 5e-324, 1e-9)
 TEXTS = ("", "lat00", "lat20", "nominal", "x" * 8192, "a\nb\r\x1b[31m", "\x00", "../../etc/passwd", "%n%s", "ä" * 200, "-1", "{}")
@@ -84,29 +86,44 @@ def _hostile(request_class, rng: random.Random) -> bytes:
     return bytes(data)
 
 
+def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes: dict, result: Result) -> None:
+    """Hostile calls of one method. codes: how often each status came; counted up."""
+    name, request_class, client_streams = method
+    with server.channel(("grpc.max_metadata_size", 1 << 20)) as channel:
+        code, words = _answer(channel.stream_stream(name)(iter(()), timeout=CALL_S))
+        result.expect(code in NO_MESSAGE and (words or code == grpc.StatusCode.UNIMPLEMENTED), f"{name} without a message: {code.name} {words!r}")
+        call = (channel.stream_stream if client_streams else channel.unary_stream)(name)
+        for k in range(calls):
+            data = _hostile(request_class, rng)
+            code, words = _answer(call(iter([data]) if client_streams else data, timeout=CALL_S))
+            codes[code] = codes.get(code, 0) + 1
+            place = f"{name}, call {k}"
+            # Bytes that are no message are gRPC's own to refuse: INTERNAL without a word.
+            result.expect(code != grpc.StatusCode.UNKNOWN and not (code == grpc.StatusCode.INTERNAL and words),
+                          f"{place}: {code.name} {words[:200]!r}")
+            result.expect(len(words.encode()) <= MAX_STATUS_BYTES, f"{place}: a status of {len(words.encode())} bytes")
+            if not server.alive():
+                result.failures.append(f"{place}: the server ended with {server.process.returncode}; {data[:80]!r}...")
+                return
+        describe(channel)
+
+
 def run(calls: int = 300, seed: int = 1) -> Result:
-    """calls: how many of each method."""
-    result, rng, codes, all_methods = Result(), random.Random(seed), {}, methods()
-    # A crash of one call would hide the others': each method has a server of its own.
-    for method, request_class, client_streams in all_methods:
-        with Server("--log-level", "off", "--max-unary-calls-per-s", "0") as server, server.channel(("grpc.max_metadata_size", 1 << 20)) as channel:
-            call = (channel.stream_stream if client_streams else channel.unary_stream)(method)
-            for k in range(calls):
-                data = _hostile(request_class, rng)
-                code, words = _answer(call(iter([data]) if client_streams else data, timeout=CALL_S))
-                codes[code] = codes.get(code, 0) + 1
-                place = f"{method}, call {k} of seed {seed}"
-                # Bytes that are no message are gRPC's own to refuse: INTERNAL without a word.
-                result.expect(code != grpc.StatusCode.UNKNOWN and not (code == grpc.StatusCode.INTERNAL and words),
-                              f"{place}: {code.name} {words[:200]!r}")
-                result.expect(len(words.encode()) <= MAX_STATUS_BYTES, f"{place}: a status of {len(words.encode())} bytes")
-                if not server.alive():
-                    result.failures.append(f"{place}: the server ended with {server.process.returncode}; {data[:80]!r}...")
-                    break
-            else:
-                describe(channel)
-    told = ", ".join(f"{count} {code.name}" for code, count in sorted(codes.items(), key=lambda item: -item[1]))
-    result.seen.append(f"{len(all_methods)} methods, {calls} hostile calls each: {told}")
+    """calls: how many of each method at a server; at a gateway, whose rig they may move, a tenth."""
+    result, rng, all_methods = Result(), random.Random(seed), methods()
+    at_server, at_gateway = {}, {}
+    # A crash of one call would hide the others': each method has a process of its own.
+    for method in all_methods:
+        with Server("--log-level", "off", "--max-unary-calls-per-s", "0") as server:
+            _attack(server, method, calls, rng, at_server, result)
+    with tempfile.TemporaryDirectory() as folder, \
+         Program([EMULATOR, "--dir", folder, "--speedup", 50, "--powered", "--object", "lat20", "--supershape-triangles", 2000], r"ready (\S+)") as emulator:
+        for method in all_methods:
+            with Server("--config", emulator.ready, "--log-level", "off", "--max-unary-calls-per-s", "0", gateway=True) as gateway:
+                _attack(gateway, method, max(2, calls // 10), rng, at_gateway, result)
+    for what, codes, count in (("server", at_server, calls), ("gateway of an emulated rig", at_gateway, max(2, calls // 10))):
+        told = ", ".join(f"{count} {code.name}" for code, count in sorted(codes.items(), key=lambda item: -item[1]))
+        result.seen.append(f"{len(all_methods)} methods of a {what}, {count} hostile calls each and one without a message: {told}")
     return result
 
 
