@@ -153,7 +153,7 @@ def measure_as_fast_as_the_machine_bears(folder, circle, measured):
         except AssertionError as error:
             if slower == 16 or not any(words in str(error) for words in STARVED):
                 raise
-            print(f"{circle.name}: a protective stop at {circle.speedup / slower} times real time, again at a quarter")
+            print(f"{circle.name}: a stop for want of the processor at {circle.speedup / slower} times real time, again at a quarter")
 
 
 def go_round(folder, circle):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import mmap
 import os
 import pathlib
 import random
@@ -18,8 +17,8 @@ import time
 
 import grpc
 
-from kill_gateway import PATIENT, SPEEDUP, Client, compare, dashboard_port
-from programs import CLIENT, EMULATOR, PATIENCE_S, SERVER, Program, Result, Server, describe, export_session, scratch, stream
+from kill_gateway import PATIENT, Client, compare, dashboard_port
+from programs import CLIENT, PATIENCE_S, Preloaded, Result, Server, describe, emulated_rig, export_session, scratch, stream
 from touchstone.v1 import control_pb2
 
 HOUR_S, YEAR_S = 3600, 365.25 * 86400
@@ -29,21 +28,14 @@ JUMPS = {"an hour back": -HOUR_S, "an hour ahead": HOUR_S, "ten years back": -10
 BUSY_S = 20.0
 
 
-class HostClock:
-    """The wall clock of the programs that are started with `environment`; host_clock.cpp does it."""
+class HostClock(Preloaded):
+    """The wall clock of the programs that are started with its environment; host_clock.cpp does it."""
 
     def __init__(self, folder: str):
-        self._path = pathlib.Path(folder) / "clock"
-        self._path.write_bytes(bytes(8))
-        with self._path.open("r+b") as file:
-            self._offset = mmap.mmap(file.fileno(), 8)
-
-    @property
-    def environment(self) -> dict[str, str]:
-        return {"LD_PRELOAD": str(SERVER.parent / "touchstone-host-clock.so"), "TOUCHSTONE_HOST_CLOCK": str(self._path)}
+        super().__init__("touchstone-host-clock", "TOUCHSTONE_HOST_CLOCK", folder)
 
     def set(self, ahead_s: float) -> None:
-        self._offset[:] = struct.pack("<q", round(ahead_s * 1e9))
+        self.state[:] = struct.pack("<q", round(ahead_s * 1e9))
 
     def jump(self, seconds: float) -> None:
         """From the true time, back or ahead."""
@@ -119,8 +111,7 @@ def _ends(call) -> bool:
 def _rig(folder: str, jumps: int, names: tuple[str, ...], result: Result) -> None:
     """At a gateway with an emulated rig: touches and the lease that they need."""
     clock, rng, answers = HostClock(folder), random.Random(1), {}
-    with Program([EMULATOR, "--dir", folder, "--speedup", SPEEDUP, "--powered", "--object", "lat20", "--supershape-triangles", 2000],
-                 r"ready (\S+)") as emulator, \
+    with emulated_rig(folder) as emulator, \
          Server("--config", emulator.ready, *PATIENT, "--lease-window-s", "3", gateway=True, environment=clock.environment) as gateway, \
          gateway.channel() as channel:
         client = Client(channel, dashboard_port(emulator.ready))

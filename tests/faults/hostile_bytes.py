@@ -12,7 +12,7 @@ import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor import FieldDescriptor
 
-from programs import EMULATOR, ROOT, Program, Result, Server, describe
+from programs import ROOT, Result, Server, describe, emulated_rig, scratch
 
 # A status goes in a header, and headers have a limit of 8 KiB together.
 MAX_STATUS_BYTES = 2048
@@ -116,8 +116,7 @@ def run(calls: int = 300, seed: int = 1) -> Result:
     for method in all_methods:
         with Server("--log-level", "off", "--max-unary-calls-per-s", "0") as server:
             _attack(server, method, calls, rng, at_server, result)
-    with tempfile.TemporaryDirectory() as folder, \
-         Program([EMULATOR, "--dir", folder, "--speedup", 50, "--powered", "--object", "lat20", "--supershape-triangles", 2000], r"ready (\S+)") as emulator:
+    with scratch() as folder, emulated_rig(folder) as emulator:
         for method in all_methods:
             with Server("--config", emulator.ready, "--log-level", "off", "--max-unary-calls-per-s", "0", gateway=True) as gateway:
                 _attack(gateway, method, max(2, calls // 10), rng, at_gateway, result)

@@ -16,10 +16,9 @@ import time
 
 import grpc
 
-from programs import EMULATOR, PATIENCE_S, Program, Result, Server, export_session, scratch
+from programs import PATIENCE_S, Result, Server, emulated_rig, export_session, scratch
 from touchstone.v1 import control_pb2, control_pb2_grpc, rig_pb2, rig_pb2_grpc, source_pb2, source_pb2_grpc
 
-SPEEDUP = 50
 COLUMNS = ("t_l_us", "t_m_us", "t_r_us")
 # Of host time, so that a busy machine is not taken for a fault of the rig.
 PATIENT = ("--arm-watchdog-hz", "1", "--arm-silence-s", "1.5", "--effector-silence-s", "3")
@@ -97,8 +96,7 @@ def run(kills: int = 100, seed: int = 1) -> Result:
     """kills: how often the gateway is killed."""
     result, rng, answers = Result(), random.Random(seed), {}
     interrupted = recovered = 0
-    with scratch() as folder, Program([EMULATOR, "--dir", folder, "--speedup", SPEEDUP, "--powered", "--object", "lat20",
-                                       "--supershape-triangles", 2000], r"ready (\S+)") as emulator:
+    with scratch() as folder, emulated_rig(folder) as emulator:
         config, dashboard = emulator.ready, dashboard_port(emulator.ready)
         for round_ in range(kills + 1):
             with Server("--config", config, *PATIENT, gateway=True) as gateway, gateway.channel() as channel:

@@ -5,7 +5,6 @@ The driver is a real one, the loss is not: lost_device.cpp tells of it in the dr
 
 from __future__ import annotations
 
-import mmap
 import os
 import pathlib
 import random
@@ -13,30 +12,23 @@ import struct
 import subprocess
 import time
 
-from programs import CLIENT, PATIENCE_S, SERVER, Result, Server, scratch, stream
+from programs import CLIENT, PATIENCE_S, Preloaded, Result, Server, scratch, stream
 
 
-class Device:
-    """Of a server that is started with `environment`."""
+class Device(Preloaded):
+    """Of a server that is started with its environment."""
 
     def __init__(self, folder: str):
-        self._path = pathlib.Path(folder) / "device"
-        self._path.write_bytes(bytes(8))
-        with self._path.open("r+b") as file:
-            self._state = mmap.mmap(file.fileno(), 8)
-
-    @property
-    def environment(self) -> dict[str, str]:
-        return {"LD_PRELOAD": str(SERVER.parent / "touchstone-lost-device.so"), "TOUCHSTONE_LOST_DEVICE": str(self._path)}
+        super().__init__("touchstone-lost-device", "TOUCHSTONE_LOST_DEVICE", folder)
 
     def reset(self) -> None:
-        self._state[:4] = struct.pack("<i", 1)
+        self.state[:4] = struct.pack("<i", 1)
 
     def told(self) -> bool:
-        return self._state[:4] == bytes(4)
+        return self.state[:4] == bytes(4)
 
     def gone(self, gone: bool) -> None:
-        self._state[4:] = struct.pack("<i", gone)
+        self.state[4:] = struct.pack("<i", gone)
 
 
 def _draw(server: Server, pictures: int, out: pathlib.Path) -> subprocess.Popen:

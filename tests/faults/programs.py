@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import mmap
 import os
 import pathlib
 import re
@@ -78,6 +79,28 @@ class Program:
 
     def threads(self) -> int:
         return len(os.listdir(f"/proc/{self.process.pid}/task"))
+
+
+class Preloaded:
+    """A library of this folder that a program is started with, and eight bytes that it and this process share.
+
+    Attributes:
+      environment: what the program is started with.
+      state: the eight bytes, zero at first.
+    """
+
+    def __init__(self, library: str, variable: str, folder: str):
+        """variable: by which the library learns where the bytes lie."""
+        path = pathlib.Path(folder) / library
+        path.write_bytes(bytes(8))
+        with path.open("r+b") as file:
+            self.state = mmap.mmap(file.fileno(), 8)
+        self.environment = {"LD_PRELOAD": str(SERVER.parent / f"{library}.so"), variable: str(path)}
+
+
+def emulated_rig(folder: str) -> Program:
+    """A rig that is 50 times as fast as a real one; `ready` is the path of its gateway's configuration."""
+    return Program([EMULATOR, "--dir", folder, "--speedup", 50, "--powered", "--object", "lat20", *SMALL], r"ready (\S+)")
 
 
 class Server(Program):
