@@ -1,27 +1,44 @@
 #include "server/base/thread_pool.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
-#include <iterator>
 #include <memory>
+#include <system_error>
+#include <utility>
+
+#include "server/base/thread_time.h"
 
 namespace touchstone {
 namespace {
 
-double ProcessorTimeS() {
-  timespec time;
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return time.tv_sec + 1e-9 * time.tv_nsec;
-}
+using Clock = std::chrono::steady_clock;
+
+// After which a task looks whether it is others' turn.
+constexpr double kTurnS = FairQueue::kExpectedS;
+// Threads that may wait in the middle of a task; each has a stack. As many as streams at once (max_streams).
+constexpr int kMaxStopped = 256;
 
 }  // namespace
 
-ThreadPool::ThreadPool(int threads) {
-  if (threads <= 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { Work(); });
+struct ThreadPool::Running {
+  ThreadPool* pool;
+  FairQueue::Stream* stream;
+  double begin_s = ThreadTimeS();  // of what was not charged yet
+  Clock::time_point looked = Clock::now();
+
+  double Uncharged() {
+    const double now_s = ThreadTimeS();
+    return now_s - std::exchange(begin_s, now_s);
+  }
+};
+
+thread_local ThreadPool::Running* ThreadPool::running_here_ = nullptr;
+
+ThreadPool::ThreadPool(int tasks_at_once)
+    : size_(tasks_at_once > 0 ? tasks_at_once : std::max<int>(1, std::thread::hardware_concurrency())) {
+  for (int k = 0; k < size_; ++k) threads_.emplace_back([this] { Work(); });
 }
 
 ThreadPool::~ThreadPool() {
@@ -35,62 +52,81 @@ ThreadPool::~ThreadPool() {
 
 size_t ThreadPool::waiting() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  size_t waiting = 0;
-  for (const auto& [client, queue] : queues_) waiting += queue.tasks.size();
-  return waiting;
+  return queue_.waiting();
 }
 
-void ThreadPool::Submit(std::function<void()> task, const std::string& client) {
+void ThreadPool::Submit(std::function<void()> task, const std::string& client, uint64_t stream) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    Queue& queue = queues_[client];
-    if (queue.tasks.empty() && queue.running == 0) queue.used_s = std::max(queue.used_s, turn_s_);
-    queue.tasks.push_back(std::move(task));
+    queue_.Add(client, stream, {std::move(task)});
   }
   wake_.notify_one();
-}
-
-ThreadPool::Queues::iterator ThreadPool::NextQueue() {
-  auto next = queues_.end();
-  for (auto queue = queues_.begin(); queue != queues_.end(); ++queue)
-    if (!queue->second.tasks.empty() && (next == queues_.end() || queue->second.used_s < next->second.used_s))
-      next = queue;
-  return next;
-}
-
-// One that used more than its share is remembered until the others have had theirs.
-void ThreadPool::ForgetIdleQueues() {
-  for (auto queue = queues_.begin(); queue != queues_.end();) {
-    const Queue& each = queue->second;
-    const bool idle = each.tasks.empty() && each.running == 0 && each.used_s <= turn_s_;
-    queue = idle ? queues_.erase(queue) : std::next(queue);
-  }
 }
 
 void ThreadPool::Work() {
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    auto next = queues_.end();
-    wake_.wait(lock, [&] { return (next = NextQueue()) != queues_.end() || stopping_; });
-    if (next == queues_.end()) return;
-    Queue& queue = next->second;
-    std::function<void()> task = std::move(queue.tasks.front());
-    queue.tasks.pop_front();
-    turn_s_ = std::max(turn_s_, queue.used_s);
-    const double expected_s = queue.expected_s;
-    queue.used_s += expected_s;
-    ++queue.running;
+    const auto may_begin = [&] { return queue_.waiting() > 0 && running_ < size_; };
+    wake_.wait(lock, [&] { return may_begin() || (stopping_ && queue_.waiting() == 0); });
+    if (!may_begin()) return;
+    FairQueue::Begun begun = *queue_.Begin();
+    if (stopping_ && queue_.waiting() == 0) wake_.notify_all();
+    ++running_;
+    if (begun.task.resumes) {
+      begun.task.run();  // the thread that waits in it goes on in place of this one
+      continue;
+    }
     lock.unlock();
-    const double before_s = ProcessorTimeS();
-    task();
-    task = nullptr;  // what it held goes without the lock
-    const double took_s = ProcessorTimeS() - before_s;
+    Running running{this, begun.stream};
+    running_here_ = &running;
+    begun.task.run();
+    begun.task.run = nullptr;  // what it held goes without the lock
+    running_here_ = nullptr;
+    const double took_s = running.Uncharged();
     lock.lock();
-    --queue.running;
-    queue.used_s += took_s - expected_s;
-    queue.expected_s = took_s;
-    ForgetIdleQueues();
+    queue_.Charge(begun.stream, took_s);
+    queue_.End(begun.stream);
+    --running_;
   }
+}
+
+void ThreadPool::GiveWay() {
+  if (running_here_ != nullptr) running_here_->pool->LetOthersGoFirst(running_here_);
+}
+
+void ThreadPool::LetOthersGoFirst(Running* running) {
+  const auto now = Clock::now();
+  if (std::chrono::duration<double>(now - running->looked).count() < kTurnS) return;
+  running->looked = now;
+  std::unique_lock<std::mutex> lock(mutex_);
+  queue_.Charge(running->stream, running->Uncharged());
+  if (stopping_ || !queue_.OthersAreNext(*running->stream) || !AddThread()) return;
+  bool resumed = false;
+  std::condition_variable resume;
+  const auto go_on = [&] {
+    --stopped_;
+    resumed = true;
+    resume.notify_one();
+  };
+  queue_.GoOnLater(running->stream, {go_on, true});
+  --running_;
+  ++stopped_;
+  wake_.notify_one();
+  resume.wait(lock, [&] { return resumed; });
+  running->begin_s = ThreadTimeS();
+  running->looked = Clock::now();
+}
+
+// So that size_ threads work while those that stopped and one more wait.
+bool ThreadPool::AddThread() {
+  if (stopped_ >= kMaxStopped) return false;
+  if (static_cast<int>(threads_.size()) > size_ + stopped_) return true;
+  try {
+    threads_.emplace_back([this] { Work(); });
+  } catch (const std::system_error&) {  // the machine has no more: the task goes on
+    return false;
+  }
+  return true;
 }
 
 void ThreadPool::ParallelFor(int count, int grain, const std::function<void(int, int)>& body) {

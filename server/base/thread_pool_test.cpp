@@ -8,6 +8,7 @@
 #include <mutex>
 #include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace touchstone {
@@ -85,6 +86,75 @@ TEST(ThreadPool, AClientOfLongTasksHasFewerTurns) {
   }
   const auto last = std::find(order.rbegin(), order.rend(), "short");
   EXPECT_LT(std::count(last, order.rend(), "long"), 12) << "long tasks before the last short one";
+}
+
+// As above, where both look like one client.
+TEST(ThreadPool, AStreamDoesNotWaitForTheManyTasksOfAnotherOneOfItsClient) {
+  std::vector<std::string> order;
+  {
+    ThreadPool pool(1);
+    std::mutex gate;
+    gate.lock();
+    pool.Submit([&] { std::lock_guard<std::mutex> wait(gate); });
+    for (int k = 0; k < 60; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(2)), order.push_back("many"); }, "one", 1);
+    for (int k = 0; k < 3; ++k)
+      pool.Submit([&] { Work(std::chrono::milliseconds(2)), order.push_back("few"); }, "one", 2);
+    gate.unlock();
+  }
+  ASSERT_EQ(order.size(), 63u);
+  const auto last = std::find(order.rbegin(), order.rend(), "few");
+  EXPECT_LT(order.rend() - last, 30) << "tasks before the last of the few";
+}
+
+// A task goes on until another one, which the pool has no thread for, has run.
+TEST(ThreadPool, ALongTaskGivesWayToOthersInItsMiddle) {
+  for (const char* other : {"another client", "client"}) {
+    std::atomic<bool> begun{false}, done{false}, ended{false};
+    ThreadPool pool(1);
+    pool.Submit(
+        [&] {
+          begun = true;
+          const auto limit = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+          while (!done && std::chrono::steady_clock::now() < limit) ThreadPool::GiveWay();
+          ended = true;
+        },
+        "client", 1);
+    while (!begun) std::this_thread::yield();
+    pool.Submit([&] { done = true; }, other, 2);
+    while (!ended) std::this_thread::yield();
+    EXPECT_TRUE(done) << other << " had no turn";
+  }
+}
+
+TEST(ThreadPool, RunsNoMoreAtOnceWhenTasksWaitInTheirMiddle) {
+  std::atomic<int> at_once{0}, most{0}, ended{0};
+  {
+    ThreadPool pool(2);
+    for (uint64_t stream = 0; stream < 20; ++stream)
+      for (int k = 0; k < 2; ++k)
+        pool.Submit(
+            [&] {
+              for (int piece = 0; piece < 5; ++piece) {
+                const int now = ++at_once;
+                for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
+                }
+                Work(std::chrono::milliseconds(10));
+                --at_once;
+                ThreadPool::GiveWay();
+              }
+              ++ended;
+            },
+            stream % 2 == 0 ? "even" : "odd", stream);
+    // Most are in their middle when the pool is to end.
+    while (ended == 0) std::this_thread::yield();
+  }
+  EXPECT_EQ(ended, 40) << "a pool ends when all tasks have";
+  EXPECT_LE(most, 2);
+}
+
+TEST(ThreadPool, OutsideOfATaskNobodyGivesWay) {
+  ThreadPool::GiveWay();
 }
 
 // An exception in a thread of the pool would end the process.

@@ -1,4 +1,5 @@
 #include "server/base/status.h"
+#include "server/base/thread_pool.h"
 #include "server/dataset/stream.h"
 #include "server/image/photo_image.h"
 
@@ -40,6 +41,7 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
   for (DatasetBatch& batch : batches) {
     for (uint32_t row = 0; row < batch.rows; ++row, ++slot) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
+      ThreadPool::GiveWay();
       const touch::TouchPose& pose = poses[slot];
       image::Camera camera =
           image::CameraOfTouch(pose.target_m, pose.approach, pose.lateral, pose.standoff_m);

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/base/thread_pool.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/plan_drawer.h"
 
@@ -108,6 +109,7 @@ absl::Status TouchSampler::RunObject(size_t object, absl::Span<const uint64_t> i
     workspace->missed.clear();
     for (size_t begin = 0; begin < pending; begin += kBlock) {
       if (cancelled.load(std::memory_order_relaxed)) return absl::CancelledError("the stream was cancelled");
+      ThreadPool::GiveWay();
       block.clear();
       const absl::Span<const uint32_t> places = order.subspan(begin, kBlock);
       if (pending == indices.size())  // none is done yet: every place is its own slot
@@ -196,8 +198,11 @@ absl::Status TouchSampler::FollowToTheEnd(size_t object, uint64_t index,
   touch::PlanDrawer drawer(specification_.plan, specification_.objects[object], specification_.model,
                            specification_.seed, specification_.max_draws);
   touch::DrawCounts counts;
-  const absl::Status status =
-      drawer.Draw(NumberOf(index), 0, &counts, [&] { return cancelled.load(); }).status();
+  const auto is_cancelled = [&] {
+    ThreadPool::GiveWay();
+    return cancelled.load();
+  };
+  const absl::Status status = drawer.Draw(NumberOf(index), 0, &counts, is_cancelled).status();
   if (status.ok()) return status;
   return absl::Status(status.code(), absl::StrCat("object '", specification_.objects[object]->name(),
                                                   "', sample ", index, ": ", status.message()));

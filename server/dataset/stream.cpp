@@ -3,11 +3,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <new>
 
 #include "server/base/status.h"
+#include "server/base/thread_time.h"
 
 namespace touchstone::dataset {
 namespace {
@@ -18,7 +18,7 @@ constexpr uint64_t kFirstChunkSamples = 8192;
 constexpr uint64_t kMaxChunkSamples = 524288;
 // Of a sample while it is made: its place in the order, keys, numbers (TouchSampler::Workspace).
 constexpr uint64_t kWorkBytes = 48;
-// Nobody waits longer for a thread of the pool than other tasks take.
+// The batches of a task come together at its end, so it should not take longer.
 constexpr double kMaxTaskS = 0.5;
 // Bytes of one batch, safely below the message limit.
 constexpr uint64_t kMaxBatchBytes = 192 << 20;
@@ -73,6 +73,8 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Create(
     std::shared_ptr<const DatasetSpecification> specification, const DatasetPart& part, ThreadPool* pool,
     StreamShare share) {
   std::unique_ptr<DatasetStream> stream(new DatasetStream);
+  static std::atomic<uint64_t> streams{0};
+  stream->number_ = ++streams;
   stream->shared_ = std::make_shared<Shared>(specification);
   stream->pool_ = pool;
   stream->share_ = std::move(share);
@@ -165,17 +167,17 @@ void DatasetStream::Schedule() {
     chunks_.push_back(chunk);
     pool_->Submit(
         [shared = shared_, chunk] {
-          const auto begin = std::chrono::steady_clock::now();
+          const double begin_s = ThreadTimeS();
           std::unique_ptr<TouchSampler::Workspace> workspace;
           const absl::Status status = MakeChunk(shared.get(), chunk.get(), &workspace);
           std::lock_guard<std::mutex> lock(shared->mutex);
           if (workspace != nullptr) shared->workspaces.push_back(std::move(workspace));
           chunk->status = status;
-          chunk->took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+          chunk->took_s = ThreadTimeS() - begin_s;
           chunk->ready = true;
           shared->ready.notify_all();
         },
-        share_.client);
+        share_.client, number_);
   }
 }
 

@@ -41,7 +41,7 @@ struct StreamShare {
   struct Bytes {
     uint64_t usual = 128 << 20, batches = 128 << 20;
   };
-  std::string client;                // in the pool: clients have their turns
+  std::string client;                // in the pool: clients have their turns, and the streams of each
   std::function<Bytes()> max_bytes;  // asked again and again, since it may shrink; none: the above
 };
 
@@ -104,6 +104,7 @@ class DatasetStream {
   std::shared_ptr<Shared> shared_;
   DatasetPart part_;
   ThreadPool* pool_ = nullptr;
+  uint64_t number_ = 0;      // in the pool
   uint64_t next_index_ = 0;  // start of the first batch that is not scheduled yet
   StreamShare share_;
   uint64_t bytes_per_sample_ = 1;   // of its columns and of the work on it

@@ -439,38 +439,57 @@ TEST_F(OverloadTest, AnEndlessStreamIsHandedOverWhenTheServerDrains) {
   EXPECT_THAT(status.error_message(), HasSubstr(absl::StrCat("go on with sample ", next)));
 }
 
-// Twenty streams of a slow model and one of another client on two threads.
-TEST_F(OverloadTest, AClientDoesNotWaitForAllThatAnotherOneHasAskedFor) {
-  Start();
-  std::string yaml = "touchstone: model/1\nname: slow\neffects:\n";
-  for (int k = 0; k < 20; ++k)
-    absl::StrAppend(&yaml, "  - formula: {name: f", k,
-                    ", adds: time_us, expression: \"k*sin(travel_mm)*cos(finger+", k,
-                    ")*exp(sin(travel_mm))\", parameters: {k: {value: 1, unit: us, min: -9, max: 9}}}\n");
-  v1::StreamDatasetRequest slow = Request(100'000'000);
-  slow.mutable_spec()->mutable_model()->set_yaml(yaml);
-  const auto stub = v1::Source::NewStub(channel_);
-  constexpr int kSlow = 20;
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>>> readers;
-  for (int k = 0; k < kSlow; ++k) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    readers.push_back(stub->StreamDataset(contexts.back().get(), slow));
+// Twenty streams of a slow model, and what else is asked for meanwhile, on two threads.
+class SlowStreamsTest : public OverloadTest {
+ protected:
+  static constexpr int kSlow = 20;
+
+  void SetUp() override {
+    Start();
+    std::string yaml = "touchstone: model/1\nname: slow\neffects:\n";
+    for (int k = 0; k < 20; ++k)
+      absl::StrAppend(&yaml, "  - formula: {name: f", k,
+                      ", adds: time_us, expression: \"k*sin(travel_mm)*cos(finger+", k,
+                      ")*exp(sin(travel_mm))\", parameters: {k: {value: 1, unit: us, min: -9, max: 9}}}\n");
+    v1::StreamDatasetRequest slow = Request(100'000'000);
+    slow.mutable_spec()->mutable_model()->set_yaml(yaml);
+    const auto stub = v1::Source::NewStub(channel_);
+    for (int k = 0; k < kSlow; ++k) {
+      contexts_.push_back(std::make_unique<grpc::ClientContext>());
+      readers_.push_back(stub->StreamDataset(contexts_.back().get(), slow));
+    }
+    v1::StreamDatasetResponse response;
+    for (const auto& reader : readers_) ASSERT_TRUE(reader->Read(&response));  // all have work in the pool
   }
-  v1::StreamDatasetResponse response;
-  for (const auto& reader : readers) ASSERT_TRUE(reader->Read(&response));  // all have work in the pool
-  const uint64_t before = GetState().touches();
-  grpc::ClientContext other;
-  const auto reader = v1::Source::NewStub(server_->InProcessChannel())->StreamDataset(&other, Request(100));
-  uint64_t rows = 0;
-  while (reader->Read(&response)) rows += response.batch().rows();
-  EXPECT_TRUE(reader->Finish().ok());
-  EXPECT_EQ(rows, 100u);
-  // Fewer than half of the slow ones have had a turn since: in the order of their requests all would have had several.
-  const uint64_t touches = GetState().touches() - before;
-  EXPECT_LT(touches, kSlow / 2 * 8192u + 100u);
-  for (const auto& context : contexts) context->TryCancel();
-  for (const auto& each : readers) each->Finish();
+  void TearDown() override {
+    for (const auto& context : contexts_) context->TryCancel();
+    for (const auto& each : readers_) each->Finish();
+  }
+
+  // Reads a small dataset; returns how many touches the slow streams had made when it was there.
+  uint64_t SlowTouchesUntilSmallDatasetThrough(const std::shared_ptr<grpc::Channel>& channel) {
+    const uint64_t before = GetState().touches();
+    grpc::ClientContext context;
+    const auto reader = v1::Source::NewStub(channel)->StreamDataset(&context, Request(100));
+    v1::StreamDatasetResponse response;
+    uint64_t rows = 0;
+    while (reader->Read(&response)) rows += response.batch().rows();
+    EXPECT_TRUE(reader->Finish().ok());
+    EXPECT_EQ(rows, 100u);
+    return GetState().touches() - before - rows;
+  }
+
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts_;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>>> readers_;
+};
+
+// Fewer than half of them have had a turn: in the order of their requests all would have had several.
+TEST_F(SlowStreamsTest, AnotherClientDoesNotWaitForThem) {
+  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(server_->InProcessChannel()), kSlow / 2 * 8192u);
+}
+
+TEST_F(SlowStreamsTest, AnotherStreamOfTheirClientDoesNotWaitForThem) {
+  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(channel_), kSlow / 2 * 8192u);
 }
 
 }  // namespace
