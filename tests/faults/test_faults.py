@@ -14,6 +14,7 @@ import many_clients
 import programs
 import replicas
 import silent_and_slow
+import slow_streams
 
 
 def passes(result):
@@ -62,6 +63,10 @@ def test_a_clock_that_is_set_changes_no_limit_and_no_byte():
 
 def test_a_graphics_device_that_is_lost_changes_no_picture():
     passes(lost_device.run(pictures=6000, resets=10, absences=2))
+
+
+def test_a_quick_stream_does_not_wait_for_slow_ones_of_its_address():
+    passes(slow_streams.run(streams=4, times=3))
 
 
 def test_a_loss_and_a_tear_are_seen():
