@@ -70,9 +70,9 @@ bool FairQueue::OthersAreNext(const Stream& stream) const {
 }
 
 void FairQueue::GoOnLater(Stream* stream, Task rest) {
+  stream->tasks.push_front(std::move(rest));  // first: where there is no memory nothing has changed
   PutBack(stream);
   PutBack(stream->client);
-  stream->tasks.push_front(std::move(rest));
   ++stream->client->waiting;
   ++waiting_;
 }

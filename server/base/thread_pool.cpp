@@ -5,7 +5,6 @@
 #include <chrono>
 #include <exception>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include "server/base/thread_time.h"
@@ -123,7 +122,7 @@ bool ThreadPool::AddThread() {
   if (static_cast<int>(threads_.size()) > size_ + stopped_) return true;
   try {
     threads_.emplace_back([this] { Work(); });
-  } catch (const std::system_error&) {  // the machine has no more: the task goes on
+  } catch (const std::exception&) {  // the machine has no more: the task goes on
     return false;
   }
   return true;
