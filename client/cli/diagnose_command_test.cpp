@@ -170,6 +170,8 @@ TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {
   EXPECT_THAT(Run({"session", "show", "mondy", at}).err, HasSubstr("did you mean 'monday'?"));
   EXPECT_EQ(Run({"session", "delete", "monday", at}).exit_code, 0);
   EXPECT_EQ(Run({"session", "show", "monday", at}).exit_code, 2);
+  EXPECT_THAT(Run({"session", "list", at}).err, HasSubstr("keeps no session"));
+  EXPECT_THAT(Run({"session", "list", "--deleted", at}).err, HasSubstr("Nothing is in the trash"));
   EXPECT_THAT(Run({"session", "list"}).err, HasSubstr("--server is missing"));
 }
 

@@ -221,6 +221,12 @@ absl::Status RunList(const Cli& cli, const SessionOptions& options) {
     PrintJson({{"sessions", list}});
     return absl::OkStatus();
   }
+  if (sessions.empty()) {
+    cli.Log(options.deleted
+                ? "Nothing is in the trash; what a server deletes is gone, rigs and journals have one."
+                : "The server keeps no session; touchstone session create NAME FILE stores one.");
+    return absl::OkStatus();
+  }
   if (options.deleted) {
     Table table({"SESSION", "TOUCHES", "DELETED", "OBJECTS"});
     for (const v1::Session& session : sessions)
@@ -228,10 +234,6 @@ absl::Status RunList(const Cli& cli, const SessionOptions& options) {
                  DeletedText(session.deleted_unix_s(), session.deleted_by()),
                  absl::StrJoin(session.objects(), ", ")});
     return cli.Print(table.Text());
-  }
-  if (sessions.empty()) {
-    cli.Log("The server keeps no session; touchstone session create NAME FILE stores one.");
-    return absl::OkStatus();
   }
   Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "PICTURES", "HASH", "OBJECTS"});
   for (const v1::Session& session : sessions)
