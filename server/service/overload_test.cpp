@@ -483,13 +483,13 @@ class SlowStreamsTest : public OverloadTest {
   std::vector<std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>>> readers_;
 };
 
-// They have had fewer than a turn each: in the order of the requests each would have had several.
+// Fewer than half of them have had a turn: in the order of the requests all would have had several.
 TEST_F(SlowStreamsTest, AnotherClientDoesNotWaitForThem) {
-  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(server_->InProcessChannel()), kSlow * 8192u);
+  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(server_->InProcessChannel()), kSlow / 2 * 8192u);
 }
 
 TEST_F(SlowStreamsTest, AnotherStreamOfTheirClientDoesNotWaitForThem) {
-  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(channel_), kSlow * 8192u);
+  EXPECT_LT(SlowTouchesUntilSmallDatasetThrough(channel_), kSlow / 2 * 8192u);
 }
 
 }  // namespace

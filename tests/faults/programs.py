@@ -170,15 +170,20 @@ def describe(channel: grpc.Channel, timeout_s: float = PATIENCE_S) -> source_pb2
     return call(source_pb2.DescribeRequest(), timeout=timeout_s)
 
 
+def open_stream(channel: grpc.Channel, request: source_pb2.StreamDatasetRequest, timeout_s: float):
+    """The call of the dataset; iterate for its responses, cancel() to leave it."""
+    call = channel.unary_stream("/touchstone.v1.Source/StreamDataset", source_pb2.StreamDatasetRequest.SerializeToString,
+                                source_pb2.StreamDatasetResponse.FromString)
+    return call(request, timeout=timeout_s)
+
+
 def stream(channel: grpc.Channel, samples: int, batch_size: int = 4096, seed: int = 1, timeout_s: float = PATIENCE_S):
     """The call of a dataset of two objects; iterate for its responses, cancel() to leave it."""
     request = source_pb2.StreamDatasetRequest(batch_size=batch_size)
     request.spec.objects.extend(["lat00", "lat20"])
     request.spec.plan.sphere.SetInParent()
     request.spec.samples, request.spec.seed = samples, seed
-    call = channel.unary_stream("/touchstone.v1.Source/StreamDataset", source_pb2.StreamDatasetRequest.SerializeToString,
-                                source_pb2.StreamDatasetResponse.FromString)
-    return call(request, timeout=timeout_s)
+    return open_stream(channel, request, timeout_s)
 
 
 def model_yaml(name: str, radius_mm: float) -> str:

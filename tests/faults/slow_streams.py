@@ -10,7 +10,7 @@ import time
 import grpc
 from touchstone.v1 import source_pb2
 
-from programs import Result, Server
+from programs import Result, Server, open_stream
 
 LONG_S = 600.0  # more than anything here takes
 
@@ -35,18 +35,12 @@ def _request(samples: int, kind: str = "quick", batch_size: int = 4096) -> sourc
     return request
 
 
-def _stream(channel: grpc.Channel, request: source_pb2.StreamDatasetRequest):
-    call = channel.unary_stream("/touchstone.v1.Source/StreamDataset", source_pb2.StreamDatasetRequest.SerializeToString,
-                                source_pb2.StreamDatasetResponse.FromString)
-    return call(request, timeout=LONG_S)
-
-
 class _Slow:
     """A stream that is read for as long as it lives."""
 
     def __init__(self, channel: grpc.Channel, request: source_pb2.StreamDatasetRequest):
         self.batches = 0
-        self._call = _stream(channel, request)
+        self._call = open_stream(channel, request, LONG_S)
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
@@ -75,7 +69,7 @@ def _round_s(slow: list[_Slow]) -> float:
 def _first_batch_s(server: Server) -> float:
     with server.channel() as channel:
         begin = time.monotonic()
-        for response in _stream(channel, _request(1000)):
+        for response in open_stream(channel, _request(1000), LONG_S):
             if response.HasField("batch"):
                 return time.monotonic() - begin
     raise RuntimeError("the stream ended without a batch")
