@@ -62,11 +62,15 @@ void FairQueue::Charge(Stream* stream, double took_s) {
   stream->client->used_s += took_s;
 }
 
+// As Begin would choose if the task went back among the waiting.
 bool FairQueue::OthersAreNext(const Stream& stream) const {
-  const Stream* const next = NextStream();
-  if (next == nullptr || next == &stream) return false;
-  return next->client == stream.client ? next->used_s < stream.used_s - kExpectedS
-                                       : next->client->used_s < stream.client->used_s - kExpectedS;
+  const Client& client = *stream.client;
+  for (const auto& [name, each] : clients_)
+    if (&each != &client && each.waiting > 0 && each.used_s < client.used_s - kExpectedS) return true;
+  // It is this client's turn.
+  for (const auto& [number, each] : client.streams)
+    if (&each != &stream && !each.tasks.empty() && each.used_s < stream.used_s - kExpectedS) return true;
+  return false;
 }
 
 void FairQueue::GoOnLater(Stream* stream, Task rest) {

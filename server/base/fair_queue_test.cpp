@@ -79,6 +79,18 @@ TEST_F(FairQueueTest, WhoStopsInTheMiddleGoesOnBeforeItsOtherTasks) {
   EXPECT_EQ(ran_, "aybc");
 }
 
+// Also while another client, which has used a little less, runs and waits too.
+TEST_F(FairQueueTest, AStreamGivesWayToOthersOfItsClientBesideABusyClient) {
+  for (uint64_t stream = 1; stream <= 3; ++stream) Add("x", stream, "x");
+  for (int k = 0; k < 2; ++k) Add("y", 9, "y");
+  const FairQueue::Begun x = *queue_.Begin(), y = *queue_.Begin();
+  ASSERT_NE(x.stream->client, y.stream->client);
+  queue_.Charge(y.stream, 0.0200);
+  queue_.Charge(x.stream, 0.0201);
+  EXPECT_TRUE(queue_.OthersAreNext(*x.stream)) << "two streams of x have had nothing";
+  EXPECT_FALSE(queue_.OthersAreNext(*y.stream));
+}
+
 TEST_F(FairQueueTest, AloneNobodyGivesWay) {
   Add("x", 1, "a"), Add("x", 1, "b");
   const FairQueue::Begun begun = *queue_.Begin();
