@@ -10,6 +10,8 @@ import threading
 import pytest
 
 import touchstone
+from touchstone import connection
+from touchstone.dataset import Dataset
 
 _REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
 
@@ -96,3 +98,22 @@ def new_server(server_program):
 def client(server):
     with touchstone.connect(server.target) as connected:
         yield connected
+
+
+@pytest.fixture
+def losses(monkeypatch):
+    """The errors by which datasets of this process found their source lost, in order.
+
+    Data come at most 64 KiB ahead of what was read: without that bound all of a short stream lies in buffers on the way
+    by the time its source is killed, and nothing is lost.
+    """
+    found, lost = [], Dataset._lost
+
+    def record(dataset, error, retry):
+        found.append(error)
+        lost(dataset, error, retry)
+
+    monkeypatch.setattr(Dataset, "_lost", record)
+    monkeypatch.setattr(connection, "_OPTIONS", (*connection._OPTIONS, ("grpc.http2.bdp_probe", 0),
+                                                 ("grpc.http2.lookahead_bytes", 65536)))
+    return found

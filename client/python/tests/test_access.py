@@ -32,9 +32,11 @@ def files(tmp_path_factory):
 
 
 def write_tokens(folder, **token_of_role):
-    (folder / "tokens").write_text("".join(
+    """In a new file that takes the name: as long as the last one, it could not be told from it within a clock tick."""
+    (folder / "tokens.new").write_text("".join(
         f"{role} {role} sha256:{hashlib.sha256(token.encode()).hexdigest()}\n" for role, token in token_of_role.items()
     ))
+    (folder / "tokens.new").replace(folder / "tokens")
 
 
 @pytest.fixture

@@ -198,9 +198,10 @@ def test_who_holds_the_lease_is_told_and_how_to_take_it(rig, rig_client):
 
 
 def test_a_lease_is_renewed_until_it_is_taken(rig, rig_client, plan):
-    rig.window_s = 0.05
+    # A renewal may take half of it.
+    rig.window_s = 3.0
     with rig_client.session() as session:
-        _eventually(lambda: rig.renewals >= 5)
+        _eventually(lambda: rig.renewals >= 3)
         rig.holder, rig.epoch = "ben@desk", rig.epoch + 1
         _eventually(lambda: rig_client._leases[-1].lost is not None)
         with pytest.raises(touchstone.Refused, match="ben@desk"):

@@ -15,6 +15,7 @@ import touchstone
 torch = pytest.importorskip("torch", reason="PyTorch is not installed; the tests of touchstone.torch need it.")
 
 from touchstone.torch import TouchstoneDataset, epoch_seed  # noqa: E402
+from touchstone.v1 import control_pb2, control_pb2_grpc  # noqa: E402
 
 # PyTorch's advice about more workers than cores is not ours.
 pytestmark = pytest.mark.filterwarnings("ignore:This DataLoader will create")
@@ -242,11 +243,15 @@ def test_epochs_repeat_or_renew_the_samples(server, workers, persistent):
 
 def test_workers_spread_over_servers_and_survive_the_loss_of_one(server, new_server, values):
     own = new_server()
-    loader = TouchstoneDataset([server.target, own.target], **{**OPTIONS, "batch_size": 10}).loader(num_workers=2)
+    # The pictures are there for their size, 24 MB a worker: most of it is not sent yet when the server is killed.
+    options = {**OPTIONS, "batch_size": 10, "columns": (*OPTIONS["columns"], "image"), "image": touchstone.image(128, 128, "rgb")}
+    loader = TouchstoneDataset([server.target, own.target], **options).loader(num_workers=2)
     parts = []
     for k, batch in enumerate(loader):
         parts.append(batch["descriptor_us"])
         if k == 5:
+            with touchstone.connect(own.target) as client:
+                assert client.call(control_pb2_grpc.ControlStub, "GetState", control_pb2.GetStateRequest()).running_streams == 1
             own.kill()
     np.testing.assert_array_equal(torch.cat(parts).numpy(), values)
 

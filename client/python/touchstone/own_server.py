@@ -69,15 +69,18 @@ class OwnServer:
     def __init__(self, options: Sequence[str] = (), *, timeout_s: float = 30.0):
         """Waits until it serves. SourceUnreachable with its own words if it does not."""
         program = find_server()
-        # It serves this process alone: nobody else is held up by many calls.
-        own = ["--listen", "127.0.0.1:0", "--max-unary-calls-per-s", "0"]
+        # It serves this process alone: nobody else is held up by many calls. And it has nothing to finish for anybody
+        # when it is stopped; it would wait until the idle channels of this process look, which they do every 5 s.
+        own = ["--listen", "127.0.0.1:0", "--max-unary-calls-per-s", "0", "--drain-s", "0.1"]
         self._process = start_bound([program, *own, *options], stderr=subprocess.PIPE)
         atexit.register(self.stop)
         self._said: list[str] = []
         targets: queue.Queue[str] = queue.Queue()
         # Both pipes are read all along, or the server would wait for a full one.
-        for pipe in (self._process.stdout, self._process.stderr):
-            threading.Thread(target=self._read, args=(pipe, targets), daemon=True).start()
+        readers = [threading.Thread(target=self._read, args=(pipe, targets), daemon=True)
+                   for pipe in (self._process.stdout, self._process.stderr)]
+        for reader in readers:
+            reader.start()
         deadline = time.monotonic() + timeout_s
         while True:
             try:
@@ -87,6 +90,10 @@ class OwnServer:
                 ended = self._process.poll() is not None
                 if ended or time.monotonic() > deadline:
                     break
+        if ended:
+            # Its last words may still be in the pipe.
+            for reader in readers:
+                reader.join(timeout=5)
         said = "".join(self._said[-5:]).strip() or "nothing was said"
         what = f"ended with {self._process.returncode}" if ended else f"was not ready after {timeout_s:g} s"
         self.stop()

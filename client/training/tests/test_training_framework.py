@@ -140,16 +140,22 @@ def test_random_numbers_depend_on_what_they_are_for_and_on_the_seed(tmp_path):
     assert len({drawn(1, "a", 2), drawn(2, "a", 2), drawn(1, "a", 3), drawn(1, "b", 2)}) == 4
 
 
-def running(names):
-    """Numbers of processes whose program has one of these names."""
-    found = set()
+def descendants(ancestor, names):
+    """Numbers of the processes that descend from that one and whose program has one of these names."""
+    parents, named = {}, set()
     for entry in pathlib.Path("/proc").iterdir():
         try:
-            if entry.name.isdigit() and os.path.basename(os.readlink(entry / "exe")) in names:
-                found.add(int(entry.name))
+            if entry.name.isdigit():
+                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+                if os.path.basename(os.readlink(entry / "exe")) in names:
+                    named.add(int(entry.name))
         except OSError:
             continue
-    return found
+
+    def descends(number):
+        return number in parents and (parents[number] == ancestor or descends(parents[number]))
+
+    return set(filter(descends, named))
 
 
 def test_a_rig_of_its_own_ends_with_the_process_that_is_killed(tmp_path):
@@ -159,14 +165,12 @@ rig = EmulatedRig("")
 print(rig.client.describe().kind, flush=True)
 import time; time.sleep(600)
 """
-    programs = {"touchstone-rig-emulator", "touchstone-gateway"}
-    before = running(programs)
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline().strip() == "physical"
-        started = running(programs) - before
+        started = descendants(process.pid, {"touchstone-rig-emulator", "touchstone-gateway"})
         assert len(started) == 2
         process.send_signal(signal.SIGKILL)
     deadline = time.monotonic() + 60
-    while running(programs) & started:
+    while any(pathlib.Path(f"/proc/{number}").exists() for number in started):
         assert time.monotonic() < deadline, "they outlive the process that started them"
         time.sleep(0.2)

@@ -200,17 +200,31 @@ def test_shuffled_labels_of_pictures_give_chance(tmp_path):
     assert abs(np.mean(shuffled) - 0.2) < 3 * np.std(shuffled, ddof=1) / np.sqrt(20) + 0.02
 
 
-def _batches(count, pause_s):
-    for k in range(count):
-        time.sleep(pause_s)
-        yield {"image": torch.from_numpy(_noise(50, 64, k).transpose(0, 3, 1, 2)), "object": torch.arange(50) % 5}
+def test_the_learner_tells_how_long_it_waited(monkeypatch):
+    now_s, step = 0.0, streaming._step
 
+    def spend(seconds):
+        nonlocal now_s
+        now_s += seconds
 
-def test_the_learner_tells_how_long_it_waited():
-    slow, fast = (streaming.feed(_batches(20, pause_s), 1000, 64, 5, 1) for pause_s in (0.2, 0.0))
+    def batches(count, pause_s):
+        for k in range(count):
+            spend(pause_s)
+            yield {"image": torch.from_numpy(_noise(50, 64, k).transpose(0, 3, 1, 2)), "object": torch.arange(50) % 5}
+
+    def step_of_100_ms(*arguments):
+        spend(0.1)
+        return step(*arguments)
+
+    # A clock of its own: on a busy machine a step takes as long as a pause.
+    monkeypatch.setattr(streaming, "time", types.SimpleNamespace(monotonic=lambda: now_s))
+    monkeypatch.setattr(streaming, "_step", step_of_100_ms)
+    slow, fast = (streaming.feed(batches(20, pause_s), 1000, 64, 5, 1) for pause_s in (0.2, 0.0))
     assert slow.samples == fast.samples == 1000
-    assert 19 * 0.2 <= slow.wait_share * slow.seconds < slow.seconds
-    assert fast.wait_share < 0.5 < slow.wait_share
+    # The first batch is there before the clock starts.
+    assert slow.start_s == pytest.approx(0.2) and slow.seconds == pytest.approx(20 * 0.1 + 19 * 0.2)
+    assert slow.wait_share * slow.seconds == pytest.approx(19 * 0.2)
+    assert fast.wait_share == 0 and fast.seconds == pytest.approx(20 * 0.1)
     assert len(slow.parts) == len(slow.memory_mb) == streaming.PARTS and min(slow.memory_mb) > 10
 
 

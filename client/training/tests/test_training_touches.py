@@ -74,7 +74,7 @@ def pools(tmp_path_factory):
         context.begin("test")
         size = 300 * 20 + 500
         yield (context.simulated(size, model=plans.IDEAL), context.simulated(size, model=plans.NOISY),
-               context.measured(plans.measured(context.settings), options=plans.RIG))
+               context.measured(plans.measured(context.settings), options=(*plans.RIG, "--speedup", "60")))
 
 
 def accuracies(pool, rig, touches, shuffle=False):
