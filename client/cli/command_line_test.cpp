@@ -1,9 +1,7 @@
 // The command line as people and scripts meet it: the real binary, its exit codes, words and files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <signal.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -68,17 +66,9 @@ TEST_F(CommandLineTest, HelpBeginsWithExamples) {
 }
 
 TEST_F(CommandLineTest, AServerThatIsStartingIsWaitedFor) {
-  // A port that is free now.
-  const int probe = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  ASSERT_EQ(::bind(probe, reinterpret_cast<sockaddr*>(&address), size), 0);
-  ASSERT_EQ(::getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  ::close(probe);
+  // No port: another process might take it meanwhile.
   service::ServerOptions options;
-  options.listen = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  options.listen = "unix:" + Path("socket");
   const pid_t child = Start({"objects", "--server", options.listen, "--wait-s", "300"});
   while (Read(".err").find("waiting for " + options.listen) == std::string::npos)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

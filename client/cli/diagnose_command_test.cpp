@@ -298,7 +298,16 @@ TEST_F(DiagnoseCommandTest, AnInterruptEndsItSoon) {
   }
   Write("set.csv", large);
   const pid_t child = Start(Command("diagnose"));
-  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  // Until it has a handler; without one the signal would end it with the same status.
+  const std::string status_of_child = "/proc/" + std::to_string(child) + "/status";
+  const auto catches = [&] {
+    const std::string status = ReadFile(status_of_child).value_or("");
+    const size_t at = status.find("SigCgt:");
+    return at != std::string::npos &&
+           (std::stoull(status.substr(at + 7), nullptr, 16) >> (SIGINT - 1) & 1) != 0;
+  };
+  while (!catches()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // somewhere in its work
   ::kill(child, SIGINT);
   const Outcome outcome = Wait(child);
   if (outcome.exit_code == 0) GTEST_SKIP() << "this machine was done before";

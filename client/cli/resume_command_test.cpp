@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,6 +39,18 @@ class ResumeTest : public RealBinaryTest, public ::testing::WithParamInterface<s
                                                 : Sha256HexOfFile(entry.path().string()).value_or("?");
     return files;
   }
+  int Shards(const std::string& name) const {
+    if (!fs::exists(Path(name))) return 0;
+    int shards = 0;
+    for (const auto& entry : fs::directory_iterator(Path(name)))
+      shards +=
+          entry.path().filename().string().rfind("shard-", 0) == 0 && entry.path().extension() != ".part";
+    return shards;
+  }
+  static bool HasEnded(pid_t child) {
+    siginfo_t found{};
+    return ::waitid(P_PID, child, &found, WEXITED | WNOHANG | WNOWAIT) == 0 && found.si_pid == child;
+  }
   std::vector<std::string> Stream(const std::string& out, std::vector<std::string> more = {}) const {
     std::vector<std::string> arguments = {"stream",       "--to",  GetParam(), "--samples", "6000",
                                           "--shard-size", "250",   "--seed",   "5",         "--objects",
@@ -48,10 +61,8 @@ class ResumeTest : public RealBinaryTest, public ::testing::WithParamInterface<s
 };
 
 TEST_P(ResumeTest, KilledAtAnyMomentTheResultIsTheSameByteForByte) {
-  const auto start = std::chrono::steady_clock::now();
   const Outcome whole = Run(Stream("whole"));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  const auto took = std::chrono::steady_clock::now() - start;
   const auto expected = Snapshot("whole");
   EXPECT_EQ(expected.count("dataset.json"), 1u);
 
@@ -59,7 +70,10 @@ TEST_P(ResumeTest, KilledAtAnyMomentTheResultIsTheSameByteForByte) {
   int kills_in_the_middle = 0;
   for (int attempt = 0; attempt < 8; ++attempt) {
     const pid_t child = Start(Stream("killed"));
-    std::this_thread::sleep_for(took * (0.3 + 0.6 * (random() % 1000) / 1000.0));
+    const int shards = 1 + random() % 20;  // of 24
+    while (Shards("killed") < shards && !HasEnded(child))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 5000));
     ::kill(child, SIGKILL);
     if (Wait(child).exit_code == 128 + SIGKILL) ++kills_in_the_middle;
     if (attempt % 2 == 1) continue;

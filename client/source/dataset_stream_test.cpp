@@ -41,7 +41,8 @@ class FakeSource : public v1::Source::Service {
     for (uint64_t i = request->start_index(); i < stop; i += request->batch_size() * stride) {
       if (batches_until_loss-- == 0) return grpc::Status(loss, "unplugged");
       if (context->IsCancelled()) return grpc::Status::CANCELLED;
-      if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      while (endless && i > 0 && !context->IsCancelled())
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       message.Clear();
       v1::Batch* batch = message.mutable_batch();
       batch->set_start_index(i);
@@ -60,7 +61,7 @@ class FakeSource : public v1::Source::Service {
 
   int batches_until_loss = -1;
   grpc::StatusCode loss = grpc::StatusCode::UNAVAILABLE;
-  bool slow = false;
+  bool endless = false;  // after the first batch none comes
   std::vector<v1::StreamDatasetRequest> requests;
 
  private:
@@ -78,7 +79,7 @@ v1::StreamDatasetRequest Request(uint32_t batch_size) {
 std::unique_ptr<Connection> Connect(std::vector<std::string> servers) {
   ConnectionOptions options;
   options.servers = std::move(servers);
-  options.connect_timeout_s = 1;
+  options.connect_timeout_s = 60;  // what is gone is refused at once
   auto connection = Connection::Open(options);
   EXPECT_TRUE(connection.ok()) << connection.status();
   return std::move(*connection);
@@ -188,11 +189,13 @@ TEST(DatasetStream, GivesUpAfterTheTimeThatItWasGiven) {
 
 TEST(DatasetStream, CancelEndsItFromAnotherThread) {
   FakeSource source;
-  source.slow = true;
+  source.endless = true;
   const auto connection = Connect({source.address()});
   auto stream = DatasetStream::Open(connection.get(), Request(1));
+  Batch batch;
+  ASSERT_TRUE(*(*stream)->Next(&batch));
   std::thread canceller([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));  // the other thread waits for a batch by then
     (*stream)->Cancel();
   });
   const auto all = ReadAll(stream->get());

@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "server/base/thread_time.h"
+
 namespace touchstone {
 namespace {
 
@@ -45,10 +47,10 @@ TEST(ThreadPool, ParallelForDoesNotWaitForABusyPool) {
   gate.unlock();
 }
 
-// Spins, so that the task costs processor time.
-void Work(std::chrono::milliseconds time) {
-  const auto until = std::chrono::steady_clock::now() + time;
-  while (std::chrono::steady_clock::now() < until) {
+// Spins until the task has cost so much processor time, which on a busy machine is not the time that passes.
+void Work(std::chrono::duration<double> time) {
+  const double until = ThreadTimeS() + time.count();
+  while (ThreadTimeS() < until) {
   }
 }
 

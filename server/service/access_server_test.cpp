@@ -271,6 +271,7 @@ TEST_F(AccessServerTest, InsecureIsSaidAgainAndAgain) {
     return count;
   };
   while (times() < 3) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  server_.reset();  // its threads use the log
 }
 
 TEST_F(AccessServerTest, NoTokenStandsInTheLogAndWhoStopsDoes) {

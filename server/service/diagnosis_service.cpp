@@ -46,6 +46,13 @@ absl::StatusOr<v1::Report> WithoutExceptions(
   }
 }
 
+// Where every diagnosis begins.
+v1::Progress Reading() {
+  v1::Progress progress;
+  progress.set_stage("reading");
+  return progress;
+}
+
 // The work runs in a thread of its own and only leaves notes here, so that progress is sent in time whatever
 // the work is at, and a client that reads slowly does not hold it up.
 class Worker {
@@ -87,7 +94,7 @@ class Worker {
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  v1::Progress progress_;
+  v1::Progress progress_ = Reading();
   bool finished_ = false;
   std::atomic<bool> cancelled_{false};
   absl::StatusOr<v1::Report> report_ = absl::UnknownError("not finished");
@@ -125,8 +132,8 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   }
 }
 
-// Reads the evidence, works on it, sends progress and at the end the report. `send` returns false when the
-// client is gone.
+// Reads the evidence, works on it, sends progress and at the end the report. What begins is said at once, so that who waits
+// sees that the request has arrived. `send` returns false when the client is gone.
 absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, const Work& work,
                  Resources* resources, const std::function<bool(const v1::Progress&)>& send,
                  v1::Report* result) {
@@ -134,7 +141,6 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
   const auto begin = std::chrono::steady_clock::now();
   Worker worker(
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
-        if (!how.progress("reading", 0)) return absl::CancelledError("the request was cancelled");
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources));
         TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work(input, how));
@@ -142,7 +148,8 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
         return report;
       },
       resources->pool.get());
-  v1::Progress progress;
+  v1::Progress progress = Reading();
+  if (!send(progress)) worker.Cancel();
   const double max_s = resources->options.max_diagnosis_s;
   const auto late = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > max_s;

@@ -93,8 +93,17 @@ TEST(Server, ASlowReaderHoldsBackOnlyItself) {
   grpc::ClientContext slow_context;
   const auto slow = stub->StreamDataset(&slow_context, Request(100'000'000, 4096));
   v1::StreamDatasetResponse response;
-  ASSERT_TRUE(slow->Read(&response));  // and reads no more: its buffers fill
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ASSERT_TRUE(slow->Read(&response));
+  // And reads no more: until its buffers are full and nothing is made for it.
+  const auto control = v1::Control::NewStub(ChannelTo(*server));
+  v1::State state;
+  uint64_t made = 0;
+  do {
+    made = state.touches();
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    grpc::ClientContext context;
+    ASSERT_TRUE(control->GetState(&context, {}, &state).ok());
+  } while (state.touches() == 0 || state.touches() != made);
   EXPECT_EQ(Descriptors(ChannelTo(*server), Request(200000, 4096)).size(), 200000u * 12u);
   slow_context.TryCancel();
   while (slow->Read(&response)) {
@@ -303,7 +312,7 @@ TEST(Server, AMessageAboutAVeryLongNameArrives) {
 }
 
 TEST(Server, WhoAsksMayNotForgeALineOfTheLog) {
-  const auto server = StartServer(SmallServer());
+  auto server = StartServer(SmallServer());
   const auto stub = v1::Control::NewStub(ChannelTo(*server));
   v1::AcquireLeaseRequest request;
   request.set_holder("eve\n2026-11-24 10:00:00.000 info ana released the stop");
@@ -321,6 +330,7 @@ TEST(Server, WhoAsksMayNotForgeALineOfTheLog) {
   spdlog::set_default_logger(std::make_shared<spdlog::logger>(
       "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(logged, /*force_flush=*/true)));
   EXPECT_TRUE(stub->Stop(&stopping, stop, &stopped).ok());
+  server.reset();  // its threads use the logger
   spdlog::set_default_logger(before);
   const std::string text = logged.str();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;

@@ -17,7 +17,7 @@ BIN = pathlib.Path(os.environ.get("TOUCHSTONE_BIN", ROOT / "build/release/bin"))
 PYTHON_CLIENT = ROOT / "client/python"
 HIDDEN_OFFSETS_MM = (0.2, 0.0, -0.2)
 HIDDEN_SIGMA_US = 2000
-SPEEDUP = 50
+SPEEDUP = 20
 DONE = 3  # stage of a touch in a journal
 PATIENCE_S = 120
 

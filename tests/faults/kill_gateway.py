@@ -89,6 +89,7 @@ def _check(client: Client, answers: dict[int, bytes], numbers: list[int], result
     before = client.programs()
     for number in numbers:
         result.expect(client.touch(number) == answers[number], f"touch {number} was acknowledged, and is answered otherwise now")
+        client.control.RenewLease(control_pb2.RenewLeaseRequest(token=client.token), timeout=PATIENCE_S)
     result.expect(client.programs() == before, f"the arm moved for touches that were acknowledged before: {numbers}")
 
 
@@ -110,7 +111,12 @@ def run(kills: int = 100, seed: int = 1) -> Result:
                     compare(export_session(channel, "killed"), answers, result)
                     break
                 toucher = threading.Thread(target=_touch_until_killed, args=(gateway, client, answers, result))
+                begun = len(answers)
                 toucher.start()
+                # Every other one after a touch, however long that takes here; the others also before or within the first.
+                deadline = time.monotonic() + PATIENCE_S
+                while round_ % 2 and len(answers) == begun and time.monotonic() < deadline:
+                    time.sleep(0.001)
                 time.sleep(rng.uniform(0.0, 1.0))
                 gateway.kill()
                 toucher.join()

@@ -8,7 +8,7 @@ import time
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
+from programs import (PATIENCE_S, Result, Server, create_model, create_session, export_session, list_models, list_sessions,
                       measurements, model_yaml, scratch)
 
 WRITERS = 4
@@ -87,8 +87,13 @@ def run(kills: int = 500, seed: int = 1) -> Result:
             with Server(*options) as server:
                 writers = [threading.Thread(target=write, args=(server, written, round_, k, random.Random(rng.random())))
                            for k in range(WRITERS)]
+                acknowledged = len(written.acknowledged)
                 for writer in writers:
                     writer.start()
+                # They write by then, however long it takes here to connect.
+                deadline = time.monotonic() + PATIENCE_S
+                while len(written.acknowledged) == acknowledged and time.monotonic() < deadline:
+                    time.sleep(0.001)
                 time.sleep(rng.uniform(0.0, 0.2))
                 server.kill()
                 for writer in writers:

@@ -98,9 +98,12 @@ class Preloaded:
         self.environment = {"LD_PRELOAD": str(SERVER.parent / f"{library}.so"), variable: str(path)}
 
 
-def emulated_rig(folder: str) -> Program:
-    """A rig that is 50 times as fast as a real one; `ready` is the path of its gateway's configuration."""
-    return Program([EMULATOR, "--dir", folder, "--speedup", 50, "--powered", "--object", "lat20", *SMALL], r"ready (\S+)")
+def emulated_rig(folder: str, speedup: float = 50) -> Program:
+    """A rig that is so much faster than a real one; `ready` is the path of its gateway's configuration.
+
+    Its fingers give 50 mm: a gateway that does not get the processor for 2.5 s / speedup lets them be pushed too far.
+    """
+    return Program([EMULATOR, "--dir", folder, "--speedup", speedup, "--powered", "--object", "lat20", *SMALL], r"ready (\S+)")
 
 
 class Server(Program):

@@ -11,6 +11,8 @@ using testing::HasSubstr;
 
 class FullDiskTest : public PhysicalTest {
  protected:
+  static constexpr double kSlow = 0.005;  // 50 mm in more than a second of the host's
+
   void Start() {
     StartRig([](rig::EmulatorOptions* options) { options->speedup = 8; });
     StartGateway();
@@ -38,7 +40,7 @@ TEST_F(FullDiskTest, RefusesATouchThatCannotBeWrittenDownAndTheIdIsFreeAfterward
 
 TEST_F(FullDiskTest, KeepsAResultUntilThereIsSpaceAndDoesNotTouchAgain) {
   Start();
-  auto touching = TouchLater(lease_->token(), FromAbove(0.01, 1), "a");
+  auto touching = TouchLater(lease_->token(), FromAbove(kSlow, 1), "a");
   WaitUntilApproaching();
   {
     const FullDisk full;
@@ -47,12 +49,12 @@ TEST_F(FullDiskTest, KeepsAResultUntilThereIsSpaceAndDoesNotTouchAgain) {
         << answer.status.error_message();
     EXPECT_THAT(answer.status.error_message(),
                 HasSubstr("was made, but its result could not be written down"));
-    const Answer again = Touch(lease_->token(), FromAbove(0.01, 1), "a");
+    const Answer again = Touch(lease_->token(), FromAbove(kSlow, 1), "a");
     EXPECT_EQ(again.status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED)
         << again.status.error_message();
   }
   const uint64_t touches = emulator_->touches();
-  const Answer answer = Touch(lease_->token(), FromAbove(0.01, 1), "a");
+  const Answer answer = Touch(lease_->token(), FromAbove(kSlow, 1), "a");
   EXPECT_TRUE(answer.status.ok()) << answer.status.error_message();
   EXPECT_EQ(emulator_->touches(), touches) << "the result was there: nothing is touched again";
   ExpectEveryResultIsItsOwnTouch();
@@ -60,7 +62,7 @@ TEST_F(FullDiskTest, KeepsAResultUntilThereIsSpaceAndDoesNotTouchAgain) {
 
 TEST_F(FullDiskTest, ATouchThatFailsOnAFullDiskCanBeMadeAgainUnderItsId) {
   Start();
-  auto touching = TouchLater(lease_->token(), FromAbove(0.01, 1), "a");
+  auto touching = TouchLater(lease_->token(), FromAbove(kSlow, 1), "a");
   WaitUntilApproaching();
   {
     const FullDisk full;
@@ -69,10 +71,10 @@ TEST_F(FullDiskTest, ATouchThatFailsOnAFullDiskCanBeMadeAgainUnderItsId) {
     ASSERT_TRUE(control_->Stop(&context, {}, &stopped).ok());
     EXPECT_FALSE(touching.get().status.ok());
   }
-  EXPECT_FALSE(Touch(lease_->token(), FromAbove(0.01, 1), "a").status.ok()) << "the stop holds";
+  EXPECT_FALSE(Touch(lease_->token(), FromAbove(kSlow, 1), "a").status.ok()) << "the stop holds";
   ASSERT_TRUE(Reset().ok());
   lease_ = std::make_unique<KeptLease>(control_.get(), "full disk", true);
-  const Answer answer = Touch(lease_->token(), FromAbove(0.01, 1), "a");
+  const Answer answer = Touch(lease_->token(), FromAbove(kSlow, 1), "a");
   EXPECT_TRUE(answer.status.ok()) << answer.status.error_message();
   ExpectEveryResultIsItsOwnTouch();
 }

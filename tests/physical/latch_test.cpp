@@ -112,7 +112,7 @@ TEST_F(Latch, AShellLoopAroundTheCommandMovesNothingAfterAStop) {
   const std::string plan = folder_.Path("plan.csv"), tries = folder_.Path("tries");
   std::ofstream(plan) << "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,"
                          "approach_y,approach_z,lateral_x,lateral_y,lateral_z\n"
-                         "0,lat00,2.5,50,0,0,70,0,0,-1,1,0,0\n1,lat00,20,50,10,0,70,0,0,-1,1,0,0\n";
+                         "0,lat00,1.25,50,0,0,70,0,0,-1,1,0,0\n1,lat00,20,50,10,0,70,0,0,-1,1,0,0\n";
   ProcessGroup loop(
       {"sh", "-c",
        "while ! \"$1\" rig run \"$2\" -o \"$3\" --session test --server \"$4\" -q 2>>\"$5\"; do "

@@ -9,8 +9,8 @@ namespace touchstone {
 
 class Safety : public PhysicalTest {
  protected:
-  // Slow enough to be interrupted in mid-approach: 50 mm in about 1 s of the host's.
-  static constexpr double kSlow = 0.0025;
+  // Slow enough to be interrupted in mid-approach: 50 mm in about 2 s of the host's.
+  static constexpr double kSlow = 0.00125;
 
   void Stop(const std::string& reason) {
     v1::StopRequest request;

@@ -306,6 +306,9 @@ TEST(UrArm, PowersOnAndReleasesTheBrakes) {
   arm_options.secondary_port = controller->ports().secondary;
   arm_options.rtde_port = controller->ports().rtde;
   arm_options.script.time_scale = 20;
+  // As for the other tests: a busy machine's pauses are no frozen controller.
+  arm_options.frozen_after_s = 3;
+  arm_options.program_start_s = 10;
   arm_options.connect_wait_s = kPatienceS;
   gateway::timing::ChangeNotifier changes;
   const auto arm = gateway::arm::ConnectUrArm(arm_options, &changes).value();

@@ -48,6 +48,7 @@ TEST_F(EffectorLineTest, LosesAndChangesNoContactOnABadLine) {
 TEST_F(EffectorLineTest, GoesOnWithATouchWhenTheLineComesBack) {
   Start();
   Open(Options());
+  const int hellos = device_->hellos();  // one, or more where an answer took long
   ASSERT_TRUE(effector_->StartCapture(5).ok());
   std::vector<uint64_t> truth = {device_->Press(0)};
   ASSERT_TRUE(WaitForContacts(1));
@@ -64,7 +65,7 @@ TEST_F(EffectorLineTest, GoesOnWithATouchWhenTheLineComesBack) {
   ASSERT_TRUE(effector_->EndCapture().ok());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(effector_->Touch()->contact_ticks[i], truth[i]);
   EXPECT_GE(effector_->State().reconnections, 1u);
-  EXPECT_EQ(device_->hellos(), 1) << "Hello would have disarmed it";
+  EXPECT_EQ(device_->hellos(), hellos) << "Hello would have disarmed it";
 }
 
 TEST_F(EffectorLineTest, SaysThatATouchIsLostWithTheDevicesMemory) {

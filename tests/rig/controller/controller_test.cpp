@@ -85,7 +85,7 @@ TEST_P(TouchAtSpeedup, RunsThroughItsPhasesAndKeepsItsRegisters) {
     TestClient script(controller->ports().secondary);
     std::string text = kTouch;
     // The watchdog counts simulated time: at a thousand times the speed no host beats in time.
-    if (GetParam() > 1) text.replace(text.find("10.0"), 4, "0.01");
+    if (GetParam() > 1) text.replace(text.find("10.0"), 4, "0.0001");
     touch.Beat();
     script.Send(text);
     touch.Until([&] { return touch.phase == 2; });
@@ -157,11 +157,11 @@ TEST(Controller, EndsTheProgramWhoseWatchdogNobodyFeeds) {
   TouchClient touch(controller->ports().rtde);
   TestClient script(controller->ports().secondary);
   script.Send(
-      "def watched():\n rtde_set_watchdog(\"input_int_register_24\", 0.5, \"stop\")\n"
+      "def watched():\n rtde_set_watchdog(\"input_int_register_24\", 0.05, \"stop\")\n"
       " write_output_integer_register(25, 1)\n while True: sync() end\nend\n");
   touch.Until([&] { return touch.phase == 1; });
   // Fed for longer than its period: goes on.
-  const double fed_until_s = touch.timestamp_s + 6;
+  const double fed_until_s = touch.timestamp_s + 22;
   touch.Until([&] { return touch.timestamp_s > fed_until_s; });
   EXPECT_EQ(touch.safety_mode, 1);
   EXPECT_EQ(touch.runtime_state, 2u);

@@ -263,7 +263,7 @@ TEST_F(DeviceTest, KeepsItsRecordWhenOnlyTheLineWasUnplugged) {
     Host host(Port());
     host.Begin(3, firmware::Sensor::kOptical);
     ASSERT_TRUE(host.Arm(9));
-    faults_.Set("unplug", 0.3);
+    faults_.Set("unplug", 3600);
     ASSERT_TRUE(WaitFor([&] { return !std::filesystem::exists(Port()); }));
     at_s = Press({0.0, 0.001, 0.002});
     // Its end of the line has hung up.
@@ -271,6 +271,7 @@ TEST_F(DeviceTest, KeepsItsRecordWhenOnlyTheLineWasUnplugged) {
     ssize_t got = 1;
     EXPECT_TRUE(WaitFor([&] { return (got = read(host.fd_, &byte, 1)) == 0 || (got < 0 && errno == EIO); }));
   }
+  faults_.Set("unplug", 0);  // in again
   ASSERT_TRUE(WaitFor([&] { return std::filesystem::exists(Port()); }));
   Host host(Port());
   const auto contacts = host.Contacts(9, 3);
