@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,6 +42,21 @@ class RealBinaryTest : public ::testing::Test {
     raw.push_back(nullptr);
     ::execv(raw[0], raw.data());
     ::_exit(98);
+  }
+
+  // Whether Wait would return at once.
+  static bool HasEnded(pid_t child) {
+    siginfo_t found{};
+    return ::waitid(P_PID, child, &found, WEXITED | WNOHANG | WNOWAIT) == 0 && found.si_pid == child;
+  }
+
+  // Whether the program has a handler for the signal by now.
+  static bool Catches(pid_t child, int signal) {
+    std::ifstream status("/proc/" + std::to_string(child) + "/status");
+    for (std::string line; std::getline(status, line);)
+      if (line.rfind("SigCgt:", 0) == 0)
+        return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+    return false;
   }
 
   Outcome Wait(pid_t child) {

@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,10 +45,6 @@ class ResumeTest : public RealBinaryTest, public ::testing::WithParamInterface<s
       shards +=
           entry.path().filename().string().rfind("shard-", 0) == 0 && entry.path().extension() != ".part";
     return shards;
-  }
-  static bool HasEnded(pid_t child) {
-    siginfo_t found{};
-    return ::waitid(P_PID, child, &found, WEXITED | WNOHANG | WNOWAIT) == 0 && found.si_pid == child;
   }
   std::vector<std::string> Stream(const std::string& out, std::vector<std::string> more = {}) const {
     std::vector<std::string> arguments = {"stream",       "--to",  GetParam(), "--samples", "6000",
