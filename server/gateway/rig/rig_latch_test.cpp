@@ -54,6 +54,7 @@ class FakeArm final : public arm::Arm {
 
   absl::StatusOr<ArmState> State() const override {
     std::lock_guard<std::mutex> lock(mutex_);
+    ++looks;
     return state_;
   }
   std::vector<ArmState> History(double from_s, double to_s) const override {
@@ -95,6 +96,7 @@ class FakeArm final : public arm::Arm {
 
   std::function<void()> before_send;
   std::atomic<int> programs{0}, stops{0}, heartbeats{0};
+  mutable std::atomic<int> looks{0};
   std::atomic<double> heartbeat_s{0};
 
  private:
@@ -166,10 +168,10 @@ class RigLatch : public testing::Test {
   bool WaitForLatch() {
     return WaitFor([&] { return !rig_->StopReason().empty(); });
   }
-  // Two looks of the safety watch at the least.
+  // Two whole looks of the safety watch, where nobody else looks.
   void LetTheWatchLook() {
-    const double until_s = timing::HostNowS() + 0.2;
-    while (timing::HostNowS() < until_s) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const int begun = arm_->looks;
+    EXPECT_TRUE(WaitFor([&] { return arm_->looks >= begun + 3; }));
   }
   absl::Status Home() {
     return rig_->Home([] { return absl::OkStatus(); });

@@ -225,7 +225,8 @@ TEST_F(DeviceTest, CrossesTheThresholdOfAResistorAtTheContact) {
   Host host(Port());
   host.Begin(3, firmware::Sensor::kResistor);
   ASSERT_TRUE(host.Arm(1));
-  const auto at_s = Press({0.03, 0.01, 0.0203});
+  // Far enough ahead that the device is told in time, also where this thread has to wait for the processor.
+  const auto at_s = Press({1.03, 1.01, 1.0203});
   const auto contacts = host.Contacts(1, 3);
   ASSERT_TRUE(contacts);
   // The converter's steps: 40 counts a millisecond.
