@@ -27,7 +27,7 @@ class Heartbeats {
 
   // Heartbeats are sent for kPermitS from now on. Any thread.
   void Permit();
-  // None is sent any more: nothing is under way.
+  // None is begun any more: nothing is under way. One that is being sent may still go out, which feeds the watchdog once.
   void End();
 
  private:
