@@ -240,7 +240,7 @@ TEST(LeaseKeeper, RenewsAsLongAsItLives) {
   {
     const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
     ASSERT_TRUE(keeper.ok());
-    EXPECT_TRUE(Eventually([&] { return rig.renewed >= 5; }));
+    EXPECT_TRUE(Eventually([&] { return rig.renewed >= 10; }));
     EXPECT_EQ(rig.acquired, 1);
   }
   EXPECT_EQ(rig.released, 1);

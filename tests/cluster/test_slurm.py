@@ -52,21 +52,22 @@ def test_a_node_that_dies_in_the_middle_changes_no_byte(cluster, bin_folder, who
     assert (submitted["tasks"], submitted["shards"], submitted["complete"]) == (6, SHARDS, False)
 
     def victim():
-        """A task that runs, has finished one of its two shards and begun another."""
+        """A task that runs, has finished one of its two shards and begun another; and what it has of that."""
         for task in cluster.tasks():
             if task["JobState"] != "RUNNING" or not task.get("ArrayTaskId", "").isdigit():
                 continue
             first, second = (out / f"shard-{shard:06d}.tar" for shard in range(int(task["ArrayTaskId"]), SHARDS, 6))
-            if first.exists() and second.with_suffix(".tar.part").exists():
-                return task
+            part = second.with_suffix(".tar.part")
+            if first.exists() and part.exists():
+                return task, part
         return None
 
     found = []
     for _ in range(3):
         cluster.wait_until(lambda: found.append(victim()) or found[-1], 120, lambda: "no task was seen at work\n" + logs(out))
-        task = found[-1]
+        task, part = found[-1]
         cluster.kill_node(task["NodeList"])
-        if (out / f"shard-{int(task['ArrayTaskId']) + 6:06d}.tar.part").exists():
+        if part.exists():
             break
         cluster.start_node(task["NodeList"])  # it had just finished: another one
     # Slurm misses the node, gives its task to another one, and the task begins again.

@@ -18,7 +18,8 @@ import time
 import grpc
 
 from kill_gateway import PATIENT, Client, compare, dashboard_port
-from programs import CLIENT, PATIENCE_S, Preloaded, Result, Server, describe, emulated_rig, export_session, scratch, stream
+from programs import (CLIENT, PATIENCE_S, Preloaded, Result, Server, describe, emulated_rig, export_session, scratch, stream,
+                      wait_until)
 from touchstone.v1 import control_pb2
 
 HOUR_S, YEAR_S = 3600, 365.25 * 86400
@@ -162,9 +163,7 @@ def _reconnecting(folder: str, result: Result) -> None:
         target = server.target
         client = subprocess.Popen([CLIENT, *words, "--server", target, "--out", made], env=os.environ | clock.environment,
                                   stderr=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + PATIENCE_S
-        while not list(made.glob("shard-*.tar")) and time.monotonic() < deadline:
-            time.sleep(0.001)
+        wait_until(lambda: any(made.glob("shard-*.tar")))
     try:
         result.expect(client.poll() is None, "the client ended before its server was killed")
         time.sleep(2)

@@ -16,7 +16,7 @@ import time
 
 import grpc
 
-from programs import PATIENCE_S, Result, Server, emulated_rig, export_session, scratch
+from programs import PATIENCE_S, Result, Server, emulated_rig, export_session, scratch, wait_until
 from touchstone.v1 import control_pb2, control_pb2_grpc, rig_pb2, rig_pb2_grpc, source_pb2, source_pb2_grpc
 
 COLUMNS = ("t_l_us", "t_m_us", "t_r_us")
@@ -114,9 +114,8 @@ def run(kills: int = 100, seed: int = 1) -> Result:
                 begun = len(answers)
                 toucher.start()
                 # Every other one after a touch, however long that takes here; the others also before or within the first.
-                deadline = time.monotonic() + PATIENCE_S
-                while round_ % 2 and len(answers) == begun and time.monotonic() < deadline:
-                    time.sleep(0.001)
+                if round_ % 2:
+                    wait_until(lambda: len(answers) > begun)
                 time.sleep(rng.uniform(0.0, 1.0))
                 gateway.kill()
                 toucher.join()

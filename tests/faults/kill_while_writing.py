@@ -8,8 +8,8 @@ import time
 
 import grpc
 
-from programs import (PATIENCE_S, Result, Server, create_model, create_session, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch)
+from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
+                      measurements, model_yaml, scratch, wait_until)
 
 WRITERS = 4
 
@@ -91,9 +91,7 @@ def run(kills: int = 500, seed: int = 1) -> Result:
                 for writer in writers:
                     writer.start()
                 # They write by then, however long it takes here to connect.
-                deadline = time.monotonic() + PATIENCE_S
-                while len(written.acknowledged) == acknowledged and time.monotonic() < deadline:
-                    time.sleep(0.001)
+                wait_until(lambda: len(written.acknowledged) > acknowledged)
                 time.sleep(rng.uniform(0.0, 0.2))
                 server.kill()
                 for writer in writers:

@@ -5,14 +5,13 @@ The driver is a real one, the loss is not: lost_device.cpp tells of it in the dr
 
 from __future__ import annotations
 
-import os
 import pathlib
 import random
 import struct
 import subprocess
 import time
 
-from programs import CLIENT, PATIENCE_S, Preloaded, Result, Server, scratch, stream
+from programs import CLIENT, Preloaded, Result, Server, scratch, stream, wait_until
 
 
 class Device(Preloaded):
@@ -52,9 +51,7 @@ def run(pictures: int = 30_000, resets: int = 50, absences: int = 10, seed: int 
                 stays = away < absences and rng.random() < absences / resets
                 device.gone(stays)
                 device.reset()
-                deadline = time.monotonic() + PATIENCE_S
-                while not device.told() and client.poll() is None and time.monotonic() < deadline:
-                    time.sleep(0.001)
+                wait_until(lambda: device.told() or client.poll() is not None)
                 if client.poll() is not None:
                     break
                 told += device.told()

@@ -11,6 +11,8 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
+from typing import Callable
 
 import grpc
 
@@ -101,7 +103,7 @@ class Preloaded:
 def emulated_rig(folder: str, speedup: float = 50) -> Program:
     """A rig that is so much faster than a real one; `ready` is the path of its gateway's configuration.
 
-    Its fingers give 50 mm: a gateway that does not get the processor for 2.5 s / speedup lets them be pushed too far.
+    Its fingers give 50 mm: at 20 mm/s a gateway that does not get the processor for 2.5 s / speedup lets them be pushed too far.
     """
     return Program([EMULATOR, "--dir", folder, "--speedup", speedup, "--powered", "--object", "lat20", *SMALL], r"ready (\S+)")
 
@@ -123,8 +125,19 @@ class Server(Program):
         return self.ready
 
     def channel(self, *options: tuple[str, int]) -> grpc.Channel:
-        """A connection of its own, however many there are to this server."""
-        return grpc.insecure_channel(self.target, options=[("grpc.use_local_subchannel_pool", 1), *options])
+        return own_channel(self.target, *options)
+
+
+def own_channel(target: str, *options: tuple[str, int]) -> grpc.Channel:
+    """A connection of its own, however many this process has to that server."""
+    return grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), *options])
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    """Until it is done, or the patience is over, which is for the caller to find out."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not done() and time.monotonic() < deadline:
+        time.sleep(0.001)
 
 
 def create_model(channel: grpc.Channel, yaml: str) -> models_pb2.Model:

@@ -13,7 +13,7 @@ import time
 import grpc
 from touchstone.v1 import source_pb2
 
-from programs import Result, Server, open_stream
+from programs import Result, Server, open_stream, own_channel
 
 LONG_S = 600.0  # more than anything here takes
 
@@ -72,7 +72,7 @@ def _round_s(slow: list[_Slow], turns: int = 4) -> float:
 
 def first_batch_s(target: str) -> float:
     """How long a quick stream over a connection of its own waits for its first batch."""
-    with grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1)]) as channel:
+    with own_channel(target) as channel:
         begin = time.monotonic()
         for response in open_stream(channel, _request(1000), LONG_S):
             if response.HasField("batch"):

@@ -101,12 +101,17 @@ def client(server):
 
 
 @pytest.fixture
-def losses(monkeypatch):
-    """The errors by which datasets of this process found their source lost, in order.
+def little_ahead(monkeypatch):
+    """Data come at most 64 KiB ahead of what was read: without that bound all of a short stream lies in buffers on the way
+    by the time its source is killed, and nothing is lost. Gives the options of gRPC that do this, for other processes."""
+    options = (("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", 65536))
+    monkeypatch.setattr(connection, "_OPTIONS", connection._OPTIONS + options)
+    return options
 
-    Data come at most 64 KiB ahead of what was read: without that bound all of a short stream lies in buffers on the way
-    by the time its source is killed, and nothing is lost.
-    """
+
+@pytest.fixture
+def losses(monkeypatch, little_ahead):
+    """The errors by which datasets of this process found their source lost, in order."""
     found, lost = [], Dataset._lost
 
     def record(dataset, error, retry):
@@ -114,6 +119,4 @@ def losses(monkeypatch):
         lost(dataset, error, retry)
 
     monkeypatch.setattr(Dataset, "_lost", record)
-    monkeypatch.setattr(connection, "_OPTIONS", (*connection._OPTIONS, ("grpc.http2.bdp_probe", 0),
-                                                 ("grpc.http2.lookahead_bytes", 65536)))
     return found

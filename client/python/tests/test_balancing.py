@@ -12,21 +12,20 @@ NAME = "servers.touchstone.test"
 DATASET = dict(objects=["lat00", "lat20"], samples=200_000, seed=5, columns=("index", "descriptor"))
 
 # Runs where NAME has the addresses of both servers. Opens streams until each server has one, says so, waits until one of the
-# servers is gone, and prints a digest of every stream and how often one was lost. Data come at most 64 KiB ahead of what was
-# read: without that bound whole streams lie in buffers on the way before one of the servers is gone.
+# servers is gone, and prints a digest of every stream and how often one was lost. Arguments: options of gRPC, port, addresses.
 CLIENT = f"""
-import hashlib, sys, time
+import ast, hashlib, sys, time
 import touchstone
 from touchstone import connection
 from touchstone.v1 import control_pb2, control_pb2_grpc
 
-connection._OPTIONS = (*connection._OPTIONS, ("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", 65536))
+connection._OPTIONS += ast.literal_eval(sys.argv[1])
 
 def running(target):
     with touchstone.connect(target) as client:
         return client.call(control_pb2_grpc.ControlStub, "GetState", control_pb2.GetStateRequest()).running_streams
 
-port, addresses = sys.argv[1], sys.argv[2:]
+port, addresses = sys.argv[2], sys.argv[3:]
 dataset = touchstone.connect(f"dns:///{NAME}:{{port}}", retry_for_s=60).dataset(**{DATASET!r}, batch_size=500)
 losses, lost = [], dataset._lost
 dataset._lost = lambda error, retry: (losses.append(error), lost(error, retry))
@@ -47,7 +46,7 @@ print(len(losses), "lost", flush=True)
 """
 
 
-def test_streams_to_a_name_spread_over_its_servers_and_outlive_one(new_server, tmp_path):
+def test_streams_to_a_name_spread_over_its_servers_and_outlive_one(new_server, little_ahead, tmp_path):
     first = new_server()
     second = new_server(port=first.port, host="127.0.0.2")
     hosts = tmp_path / "hosts"
@@ -55,8 +54,8 @@ def test_streams_to_a_name_spread_over_its_servers_and_outlive_one(new_server, t
     own_hosts = ["unshare", "--mount", "sh", "-c", 'mount --bind "$0" /etc/hosts && exec "$@"', str(hosts)]
     if subprocess.run([*own_hosts, "true"], capture_output=True).returncode:
         pytest.skip("only root may give a process names of its own (unshare --mount)")
-    with subprocess.Popen([*own_hosts, sys.executable, "-c", CLIENT, str(first.port), first.target, second.target],
-                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
+    with subprocess.Popen([*own_hosts, sys.executable, "-c", CLIENT, repr(little_ahead), str(first.port), first.target,
+                           second.target], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
         assert client.stdout.readline() == "spread\n"
         first.kill()
         *digests, losses = client.communicate("go on\n", timeout=120)[0].splitlines()

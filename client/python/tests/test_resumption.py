@@ -32,7 +32,7 @@ def stream(dataset, at, disturb):
     return np.concatenate([b["descriptor_us"] for b in batches])
 
 
-def started_again(server, once):
+def start_again(server, once):
     """Starts it as soon as `once()` is true; where that never comes, the client's patience ends the test."""
 
     def start():
@@ -57,7 +57,7 @@ def test_the_same_server_started_again_goes_on(server, new_server, losses):
 
     def crash():
         own.kill()
-        started_again(own, once=lambda: len(losses) >= 3)
+        start_again(own, once=lambda: len(losses) >= 3)
 
     dataset = touchstone.connect(own.target, retry_for_s=60).dataset(**OPTIONS, batch_size=500)
     np.testing.assert_array_equal(stream(dataset, 37, crash), expected(server))
@@ -140,7 +140,7 @@ def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses,
     batches = iter(dataset)
     next(batches)
     own.kill()
-    started_again(own, once=told)
+    start_again(own, once=told)
     begin = time.monotonic()
     assert sum(batch.rows for batch in batches) == OPTIONS["samples"] - 500
     assert time.monotonic() - begin < 300

@@ -140,22 +140,28 @@ def test_random_numbers_depend_on_what_they_are_for_and_on_the_seed(tmp_path):
     assert len({drawn(1, "a", 2), drawn(2, "a", 2), drawn(1, "a", 3), drawn(1, "b", 2)}) == 4
 
 
-def descendants(ancestor, names):
-    """Numbers of the processes that descend from that one and whose program has one of these names."""
-    parents, named = {}, set()
+def processes():
+    """{number: (its parent's number, its program)} of all that run; not of those that ended and were not waited for."""
+    found = {}
     for entry in pathlib.Path("/proc").iterdir():
         try:
             if entry.name.isdigit():
-                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-                if os.path.basename(os.readlink(entry / "exe")) in names:
-                    named.add(int(entry.name))
+                parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
+                found[int(entry.name)] = int(parent), os.path.basename(os.readlink(entry / "exe"))
         except OSError:
             continue
+    return found
+
+
+def descendants(ancestor, names):
+    """Numbers of the processes that descend from that one and whose program has one of these names."""
+    running = processes()
 
     def descends(number):
-        return number in parents and (parents[number] == ancestor or descends(parents[number]))
+        parent = running.get(number, (None,))[0]
+        return parent == ancestor or (parent in running and descends(parent))
 
-    return set(filter(descends, named))
+    return {number for number, (_, program) in running.items() if program in names and descends(number)}
 
 
 def test_a_rig_of_its_own_ends_with_the_process_that_is_killed(tmp_path):
@@ -171,6 +177,6 @@ import time; time.sleep(600)
         assert len(started) == 2
         process.send_signal(signal.SIGKILL)
     deadline = time.monotonic() + 60
-    while any(pathlib.Path(f"/proc/{number}").exists() for number in started):
+    while started & set(processes()):
         assert time.monotonic() < deadline, "they outlive the process that started them"
         time.sleep(0.2)

@@ -2,7 +2,6 @@
 
 import pathlib
 import subprocess
-import time
 import types
 
 import cv2
