@@ -46,7 +46,7 @@ endif()
 # files' own are therefore unique within a folder, as people who read it would have them. Off, a change of one file
 # compiles that one alone; the step tsan of deploy/test shows that files stand on their own.
 option(TOUCHSTONE_UNITY "Compile the files of a folder several at a time" ON)
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 6)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 
 # touchstone_library(NAME [SEPARATE] SOURCES a.cpp ... LINKS base geometry absl::status ...)
 # makes the static library touchstone_NAME; a plain word in LINKS is a folder of this project. SEPARATE: its files
