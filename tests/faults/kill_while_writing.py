@@ -8,8 +8,19 @@ import time
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch, wait_until)
+from programs import (
+    Result,
+    Server,
+    create_model,
+    create_session,
+    export_session,
+    list_models,
+    list_sessions,
+    measurements,
+    model_yaml,
+    scratch,
+    wait_until,
+)
 
 WRITERS = 4
 
@@ -91,7 +102,7 @@ def run(kills: int = 500, seed: int = 1) -> Result:
                 for writer in writers:
                     writer.start()
                 # They write by then, however long it takes here to connect.
-                wait_until(lambda: len(written.acknowledged) > acknowledged)
+                wait_until(lambda: len(written.acknowledged) > acknowledged)  # noqa: B023 - not called after this round
                 time.sleep(rng.uniform(0.0, 0.2))
                 server.kill()
                 for writer in writers:

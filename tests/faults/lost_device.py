@@ -66,7 +66,8 @@ def run(pictures: int = 30_000, resets: int = 50, absences: int = 10, seed: int 
             result.expect(client.returncode == 0, f"the client ended with {client.returncode}: {words}")
             result.expect(server.alive(), "the server ended")
         shards = {path.name: path.read_bytes() for path in whole.glob("shard-*.tar")}
-        result.expect({path.name: path.read_bytes() for path in made.glob("shard-*.tar")} == shards, "the dataset has other bytes than without losses")
+        result.expect({path.name: path.read_bytes() for path in made.glob("shard-*.tar")} == shards,
+                      "the dataset has other bytes than without losses")
         result.expect(len(shards) == pictures // 1000, f"{len(shards)} shards of {pictures // 1000}")
     result.expect(told >= resets // 2 and away >= min(absences, 1), f"only {told} resets and {away} absences while {pictures:,} pictures were drawn")
     kept = "the dataset has the bytes that it has without" if not result.failures else "not all was kept"

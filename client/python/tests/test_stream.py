@@ -178,7 +178,7 @@ def test_the_sources_own_words_reach_the_caller(client, kind, change, says):
 
 def test_nobody_listening_is_said_at_once():
     begin = time.monotonic()
-    with pytest.raises(touchstone.SourceUnreachable, match="127.0.0.1:9: no source answers.*Start touchstone-server"):
+    with pytest.raises(touchstone.SourceUnreachable, match=r"127\.0\.0\.1:9: no source answers.*Start touchstone-server"):
         touchstone.connect("127.0.0.1:9", timeout_s=0.5)
     assert time.monotonic() - begin < 5
 

@@ -45,7 +45,7 @@ def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path):
 
 @pytest.mark.parametrize("effect", ["focal_error", "exposure", "vignetting"])
 def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect, tmp_path):
-    report, mark, truth = marked(tmp_path, [effect])
+    report, mark, _ = marked(tmp_path, [effect])
     assert mark.right_first and not mark.confidently_wrong, (mark.verdict, mark.claims)
     assert mark.over_floor < judge.OVER_FLOOR < report["initial"]["rmse_grey"] / report["noise_floor_grey"]
     assert all(abs(error) < 4 for error in mark.errors) and mark.errors
