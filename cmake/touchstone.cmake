@@ -1,10 +1,15 @@
 # Compiler flags and the three functions that every folder's CMakeLists.txt uses.
 
 add_library(touchstone_flags INTERFACE)
-target_include_directories(touchstone_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+target_include_directories(touchstone_flags INTERFACE
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<BUILD_INTERFACE:${CMAKE_BINARY_DIR}/generated>)
+target_compile_features(touchstone_flags INTERFACE cxx_std_17)
 # Macros name files from the root of the repository: an object is the same wherever a clone lies, and ccache finds it.
-target_compile_options(touchstone_flags INTERFACE -Wall -Wextra -Wno-unused-parameter -ffp-contract=off
-  -fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=)
+# What an installed library's user inherits stands outside BUILD_INTERFACE: the instruction set, on which the alignment
+# of Eigen's types depends, and no fused multiply-add, since the linker may keep the user's copy of an inline function.
+target_compile_options(touchstone_flags INTERFACE
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wno-unused-parameter>" -ffp-contract=off
+  "$<BUILD_INTERFACE:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64" AND TOUCHSTONE_ARCH)
   target_compile_options(touchstone_flags INTERFACE -march=${TOUCHSTONE_ARCH})
 endif()
@@ -132,4 +137,24 @@ function(touchstone_link target visibility)
     endif()
     target_link_libraries(${target} ${visibility} ${link})
   endforeach()
+endfunction()
+
+# touchstone_links_of(RESULT TARGET): the targets that TARGET links, directly or through others, and itself.
+function(touchstone_links_of result target)
+  set(pending ${target})
+  set(seen)
+  while(pending)
+    list(POP_FRONT pending one)
+    if(one IN_LIST seen OR NOT TARGET ${one})
+      continue()
+    endif()
+    list(APPEND seen ${one})
+    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
+      get_target_property(links ${one} ${property})
+      if(links)
+        list(APPEND pending ${links})
+      endif()
+    endforeach()
+  endwhile()
+  set(${result} ${seen} PARENT_SCOPE)
 endfunction()
