@@ -10,7 +10,7 @@
 #include <absl/types/span.h>
 
 #include "server/session/measurement_set.h"
-#include "server/source/request_checks.h"
+#include "server/source/source_limits.h"
 
 namespace touchstone::service {
 
