@@ -2,10 +2,12 @@
 
 #include <chrono>
 
+#include "server/base/clock.h"
+
 namespace touchstone::gateway::timing {
 
 double HostNowS() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return SteadyClock().NowS();
 }
 
 double UnixNowS() {
