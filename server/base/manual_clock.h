@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <stdexcept>
 #include <vector>
 
 #include "server/base/clock.h"
@@ -21,16 +22,16 @@ class ManualClock final : public Clock {
     MoveTo(lock, now_ + DurationOf(seconds));
   }
 
-  // Returns once so many threads wait for a time that has not come.
+  // Returns once so many threads wait for a time that has not come. Throws where they do not within kPatience.
   void AwaitWaiters(int count = 1) const {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [&] { return Waiting() >= count; });
+    Await(lock, count);
   }
 
   // Once so many threads wait: the time that the first of them waits for is now. What passed until then, in seconds.
   double AdvanceToFirst(int waiters = 1) {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [&] { return Waiting() >= waiters; });
+    Await(lock, waiters);
     Time first = Time::max();
     for (const Waiter* waiter : waiters_)
       if (waiter->until > now_) first = std::min(first, waiter->until);
@@ -46,6 +47,13 @@ class ManualClock final : public Clock {
     Time until;
     int held;  // by so many calls of MoveTo, which are about to wake it: it stays where it is
   };
+
+  static constexpr std::chrono::seconds kPatience{60};  // of the machine's time, which may be busy
+
+  void Await(std::unique_lock<std::mutex>& lock, int count) const {
+    if (!changed_.wait_for(lock, kPatience, [&] { return Waiting() >= count; }))
+      throw std::runtime_error("nobody waits for the clock");
+  }
 
   static Duration DurationOf(double seconds) {
     return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
