@@ -2,9 +2,28 @@
 
 #include <chrono>
 
-#include "server/base/clock.h"
-
 namespace touchstone::gateway::timing {
+namespace {
+
+class Host final : public Clock {
+ public:
+  Time Now() const override {
+    return Time(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(HostNowS())));
+  }
+
+ private:
+  void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
+                Time until) const override {
+    changed.wait_for(lock, until - Now());
+  }
+};
+
+}  // namespace
+
+const Clock& HostClock() {
+  static const Host clock;
+  return clock;
+}
 
 double HostNowS() {
   return SteadyClock().NowS();
