@@ -8,6 +8,9 @@ namespace {
 class Steady final : public Clock {
  public:
   Time Now() const override { return std::chrono::steady_clock::now(); }
+  double UnixNowS() const override {
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  }
 
  private:
   void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,

@@ -19,6 +19,8 @@ class Clock {
   // In seconds since the steady clock's zero.
   double NowS() const;
   double SecondsSince(Time begin) const;
+  // The wall clock: seconds since 1970 (UTC), for records; it may step.
+  virtual double UnixNowS() const = 0;
 
   // Waits until `over()` or that time, and returns what `over()` says then. `lock` guards what `over` looks at; whoever
   // changes that notifies `changed`.

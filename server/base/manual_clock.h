@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "server/base/clock.h"
@@ -15,11 +16,29 @@ class ManualClock final : public Clock {
     std::lock_guard<std::mutex> lock(mutex_);
     return now_;
   }
+  // Runs beside Now.
+  double UnixNowS() const override { return kUnixAtZeroS + NowS(); }
 
   // Wakes whoever waits for a time up to then. The caller holds no lock that a waiting thread needs.
   void Advance(double seconds) {
     std::unique_lock<std::mutex> lock(mutex_);
     MoveTo(lock, now_ + DurationOf(seconds));
+  }
+
+  // Threads that wait for a time that has not come.
+  int waiting() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return Waiting();
+  }
+  // Lets time pass until `done`, from one wait to the next, each time that at least so many threads wait.
+  template <typename Done>
+  void PassUntil(Done done, int waiters = 1) {
+    while (!done()) {
+      if (waiting() >= waiters)
+        AdvanceToFirst();
+      else
+        std::this_thread::yield();
+    }
   }
 
   // Returns once so many threads wait for a time that has not come. Throws where they do not within kPatience.
@@ -48,6 +67,7 @@ class ManualClock final : public Clock {
     int held;  // by so many calls of MoveTo, which are about to wake it: it stays where it is
   };
 
+  static constexpr double kUnixAtZeroS = 1.7e9;
   static constexpr std::chrono::seconds kPatience{60};  // of the machine's time, which may be busy
 
   void Await(std::unique_lock<std::mutex>& lock, int count) const {

@@ -10,6 +10,7 @@ class Host final : public Clock {
   Time Now() const override {
     return Time(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(HostNowS())));
   }
+  double UnixNowS() const override { return SteadyClock().UnixNowS(); }
 
  private:
   void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
@@ -30,7 +31,7 @@ double HostNowS() {
 }
 
 double UnixNowS() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return SteadyClock().UnixNowS();
 }
 
 }  // namespace touchstone::gateway::timing
