@@ -269,7 +269,7 @@ TEST_F(RigLatch, AProgramThatSomethingElseEndedLatches) {
   ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
   // As after a trip of the watchdog, or "stop" at the teach pendant.
   arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
-  PassUnderSupervision(0.5, [] { return false; });
+  PassUnderSupervision(0.85, [] { return false; });
   EXPECT_EQ(rig_->StopReason(), "") << "its end is not certain yet";
   PassUnderSupervision(60,
                        [&] { return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
