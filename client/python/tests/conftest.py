@@ -4,13 +4,14 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import threading
 
 import pytest
 
 import touchstone
-from touchstone import connection
+from touchstone import connection, credentials
 from touchstone.dataset import Dataset
 
 _REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
@@ -57,7 +58,7 @@ class Server:
     def stop(self):
         self.process.terminate()
         try:
-            self.process.wait(timeout=20)
+            self.process.wait(timeout=60)
         except subprocess.TimeoutExpired:
             self.kill()
             raise
@@ -98,6 +99,47 @@ def new_server(server_program):
 def client(server):
     with touchstone.connect(server.target) as connected:
         yield connected
+
+
+@pytest.fixture
+def nobody():
+    """An address of this machine at which nobody listens, for as long as the test runs."""
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        yield f"127.0.0.1:{bound.getsockname()[1]}"
+
+
+class Clock:
+    """Stands in for the module `time`: its time passes where it is waited for, and at no other moment.
+
+    Attributes:
+      during: called in every wait.
+    """
+
+    def __init__(self):
+        self.now_s, self.during = 0.0, lambda: None
+
+    def monotonic(self):
+        return self.now_s
+
+    def sleep(self, seconds):
+        self.now_s += seconds
+        self.during()
+
+
+@pytest.fixture
+def retry_clock(monkeypatch):
+    """The clock of connections of this process that try a lost source again."""
+    clock = Clock()
+    monkeypatch.setattr(connection, "time", clock)
+    return clock
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """What is refused is refused at the first attempt, however slow the machine is to find out why."""
+    monkeypatch.setattr(connection.Retry, "lost", lambda *_: pytest.fail("tried again although nothing could change"))
+    monkeypatch.setattr(credentials, "_PROBE_S", 60.0)
 
 
 @pytest.fixture
