@@ -7,11 +7,13 @@ them. TOUCHSTONE_TEST_TIMES names a file for a line per test that ran: seconds o
 
 import collections
 import os
+import re
 
 import pytest
 
 _MARKER = "second_tier"
 _KINDS = ("statistical: ", "repeated: ", "long: ")
+_GROUP = re.compile(r"@\w+$")  # which pytest-xdist appends to the id of a test with an xdist_group
 _COUNTS = pytest.StashKey[collections.Counter]()
 
 
@@ -19,14 +21,14 @@ class _Times:
     """Writes a line per test as soon as its teardown is reported, in the process that hears of all tests."""
 
     def __init__(self, path):
-        self._file = open(path, "w", encoding="utf-8")
+        self._file = open(path, "w", buffering=1, encoding="utf-8")
         self._seconds = collections.Counter()
 
     def pytest_runtest_logreport(self, report):
         self._seconds[report.nodeid] += report.duration
         if report.when == "teardown":
             tier = "second" if _MARKER in report.keywords else "first"
-            self._file.write(f"{self._seconds.pop(report.nodeid):.3f}\t{tier}\t{report.nodeid}\n")
+            self._file.write(f"{self._seconds.pop(report.nodeid):.3f}\t{tier}\t{_GROUP.sub('', report.nodeid)}\n")
 
     def pytest_unconfigure(self):
         self._file.close()
@@ -35,6 +37,8 @@ class _Times:
 def pytest_configure(config):
     config.addinivalue_line("markers", f"{_MARKER}(why): runs only with TOUCHSTONE_TEST_TIER=all; why begins with one of: "
                                        + ", ".join(map(repr, _KINDS)))
+    # Of pytest-xdist, which may not be there.
+    config.addinivalue_line("markers", "xdist_group(name): tests that run in the same process")
     config.stash[_COUNTS] = collections.Counter()
     path = os.environ.get("TOUCHSTONE_TEST_TIMES")
     if path and not hasattr(config, "workerinput"):

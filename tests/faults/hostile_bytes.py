@@ -90,7 +90,7 @@ def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes
     """Hostile calls of one method. codes: how often each status came; counted up."""
     name, request_class, client_streams = method
     with server.channel(("grpc.max_metadata_size", 1 << 20)) as channel:
-        code, words = _answer(channel.stream_stream(name)(iter(()), timeout=CALL_S))
+        code, words = _answer(channel.stream_stream(name)(iter(()), timeout=PATIENCE_S))
         result.expect(code in NO_MESSAGE and (words or code == grpc.StatusCode.UNIMPLEMENTED), f"{name} without a message: {code.name} {words!r}")
         call = (channel.stream_stream if client_streams else channel.unary_stream)(name)
         for k in range(calls):

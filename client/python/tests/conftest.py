@@ -75,7 +75,8 @@ def server_program():
 @pytest.fixture(scope="session")
 def server(server_program):
     """One server for all tests that leave it as it is."""
-    running = Server(server_program)
+    # It limits nobody, and when it ends it does not wait until the idle channels of this process look.
+    running = Server(server_program, "--max-unary-calls-per-s", "0", "--drain-s", "0.1")
     yield running
     running.stop()
 
@@ -133,6 +134,21 @@ def retry_clock(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(connection, "time", clock)
     return clock
+
+
+@pytest.fixture
+def start_again(retry_clock):
+    """A function that has a server started again in the client's first wait in which `once()` is true. Where that never comes,
+    the client's patience ends the test."""
+
+    def arrange(server, once):
+        def start():
+            if once() and server.process.poll() is not None:
+                server.start_again()
+
+        retry_clock.during = start
+
+    return arrange
 
 
 @pytest.fixture

@@ -32,16 +32,6 @@ def stream(dataset, at, disturb):
     return np.concatenate([b["descriptor_us"] for b in batches])
 
 
-def start_again(server, clock, once):
-    """Starts it in the first wait of the client in which `once()` is true; the client's patience ends the test before."""
-
-    def start():
-        if once() and server.process.poll() is not None:
-            server.start_again()
-
-    clock.during = start
-
-
 def test_another_server_goes_on_where_the_first_was_killed(server, new_server, losses):
     first, second = new_server(), new_server()
     client = touchstone.connect([first.target, second.target], retry_for_s=20)
@@ -51,9 +41,9 @@ def test_another_server_goes_on_where_the_first_was_killed(server, new_server, l
     np.testing.assert_array_equal(values, expected(server))
 
 
-def test_the_same_server_started_again_goes_on(server, new_server, losses, retry_clock):
+def test_the_same_server_started_again_goes_on(server, new_server, losses, start_again):
     own = new_server()
-    start_again(own, retry_clock, once=lambda: len(losses) >= 3)
+    start_again(own, once=lambda: len(losses) >= 3)
 
     dataset = touchstone.connect(own.target, retry_for_s=60).dataset(**OPTIONS, batch_size=500)
     np.testing.assert_array_equal(stream(dataset, 37, own.kill), expected(server))
@@ -126,7 +116,7 @@ def test_patience_is_bounded(new_server, losses, retry_clock):
     assert retry_clock.now_s == pytest.approx(60)
 
 
-def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses, caplog, retry_clock):
+def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses, caplog, retry_clock, start_again):
     def told():
         return [record.getMessage() for record in caplog.records if record.name == "touchstone"]
 
@@ -135,7 +125,7 @@ def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses,
     batches = iter(dataset)
     next(batches)
     own.kill()
-    start_again(own, retry_clock, once=told)
+    start_again(own, once=told)
     assert sum(batch.rows for batch in batches) == OPTIONS["samples"] - 500
     assert retry_clock.now_s < 60
     lost, again = told()
