@@ -40,6 +40,8 @@ def pytest_configure(config):
     # Of pytest-xdist, which may not be there.
     config.addinivalue_line("markers", "xdist_group(name): tests that run in the same process")
     config.stash[_COUNTS] = collections.Counter()
+    # For programs that tests start, and for touchstone.connect() without an address.
+    os.environ.setdefault("TOUCHSTONE_SERVER", str(config.rootpath / "build/release/bin/touchstone-server"))
     path = os.environ.get("TOUCHSTONE_TEST_TIMES")
     if path and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Times(path))
