@@ -58,7 +58,7 @@ class Circle:
 
 
 CIRCLES = [
-    Circle("few_touches", "command line", {"tip_radius": ("radius_mm", [2])}, seed=23, speedup=40, poses=4, rounds=2,
+    Circle("few_touches", "command line", {"tip_radius": ("radius_mm", [2])}, seed=23, speedup=60, poses=4, rounds=2,
            noise_rel=0.2, near={"tip_radius": 0.4}),
     Circle("nothing", "command line", seed=11),
     # Pose.

@@ -12,7 +12,7 @@ import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor import FieldDescriptor
 
-from programs import ROOT, Result, Server, describe, emulated_rig, scratch
+from programs import PATIENCE_S, ROOT, Result, Server, describe, emulated_rig, scratch
 
 # A status goes in a header, and headers have a limit of 8 KiB together.
 MAX_STATUS_BYTES = 2048
