@@ -3,6 +3,7 @@ and extreme values: each call ends with a status that names what is wrong, and t
 
 from __future__ import annotations
 
+import contextlib
 import math
 import random
 import subprocess
@@ -108,21 +109,37 @@ def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes
         describe(channel)
 
 
-def run(calls: int = 300, seed: int = 1) -> Result:
-    """calls: how many of each method at a server; at a gateway, whose rig they may move, a tenth."""
-    result, rng, all_methods = Result(), random.Random(seed), methods()
-    at_server, at_gateway = {}, {}
-    # A crash of one call would hide the others': each method has a process of its own.
-    for method in all_methods:
-        with Server("--log-level", "off", "--max-unary-calls-per-s", "0") as server:
-            _attack(server, method, calls, rng, at_server, result)
+QUIET = ("--log-level", "off", "--max-unary-calls-per-s", "0")
+
+
+@contextlib.contextmanager
+def _servers():
+    yield lambda: Server(*QUIET)
+
+
+@contextlib.contextmanager
+def _gateways():
     with scratch() as folder, emulated_rig(folder) as emulator:
-        for method in all_methods:
-            with Server("--config", emulator.ready, "--log-level", "off", "--max-unary-calls-per-s", "0", gateway=True) as gateway:
-                _attack(gateway, method, max(2, calls // 10), rng, at_gateway, result)
-    for what, codes, count in (("server", at_server, calls), ("gateway of an emulated rig", at_gateway, max(2, calls // 10))):
-        told = ", ".join(f"{count} {code.name}" for code, count in sorted(codes.items(), key=lambda item: -item[1]))
-        result.seen.append(f"{len(all_methods)} methods of a {what}, {count} hostile calls each and one without a message: {told}")
+        yield lambda: Server("--config", emulator.ready, *QUIET, gateway=True)
+
+
+# Name: what starts one, and how many times fewer calls it gets; they may move a gateway's rig.
+SOURCES = {"server": (_servers, 1), "gateway of an emulated rig": (_gateways, 10)}
+
+
+def run(calls: int = 300, seed: int = 1, sources: tuple[str, ...] = tuple(SOURCES)) -> Result:
+    """calls: how many of each method at a server; at a gateway a tenth. sources: of SOURCES."""
+    result, rng, all_methods = Result(), random.Random(seed), methods()
+    for source in sources:
+        make, fewer = SOURCES[source]
+        count, codes = max(2, calls // fewer), {}
+        with make() as start:
+            # A crash of one call would hide the others': each method has a process of its own.
+            for method in all_methods:
+                with start() as attacked:
+                    _attack(attacked, method, count, rng, codes, result)
+        told = ", ".join(f"{number} {code.name}" for code, number in sorted(codes.items(), key=lambda item: -item[1]))
+        result.seen.append(f"{len(all_methods)} methods of a {source}, {count} hostile calls each and one without a message: {told}")
     return result
 
 
