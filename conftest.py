@@ -7,6 +7,7 @@ them. TOUCHSTONE_TEST_TIMES names a file for a line per test that ran: seconds o
 
 import collections
 import os
+import pathlib
 import re
 
 import pytest
@@ -21,17 +22,16 @@ class _Times:
     """Writes a line per test as soon as its teardown is reported, in the process that hears of all tests."""
 
     def __init__(self, path):
-        self._file = open(path, "w", buffering=1, encoding="utf-8")
+        self._path = pathlib.Path(path)
+        self._path.write_text("")
         self._seconds = collections.Counter()
 
     def pytest_runtest_logreport(self, report):
         self._seconds[report.nodeid] += report.duration
         if report.when == "teardown":
             tier = "second" if _MARKER in report.keywords else "first"
-            self._file.write(f"{self._seconds.pop(report.nodeid):.3f}\t{tier}\t{_GROUP.sub('', report.nodeid)}\n")
-
-    def pytest_unconfigure(self):
-        self._file.close()
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(f"{self._seconds.pop(report.nodeid):.3f}\t{tier}\t{_GROUP.sub('', report.nodeid)}\n")
 
 
 def pytest_configure(config):

@@ -20,7 +20,7 @@ def unit(request, bin_folder, tmp_path):
 
 @pytest.mark.parametrize("unit", UNITS, indirect=True, ids=lambda path: path.stem)
 def test_systemd_reads_it(unit):
-    done = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -28,5 +28,5 @@ def test_systemd_reads_it(unit):
 def test_its_exposure_is_low(unit):
     # In tenths of systemd's scale, whose "OK" ends at 4.0.
     done = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=25", unit], capture_output=True,
-                          text=True, timeout=60)
+                          text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout

@@ -64,9 +64,9 @@ def rig(tmp_path_factory):
 
 def touchstone(*words, server=None, code=0):
     """What the command says on stdout; its stderr is in the assertion's message."""
-    words = [BIN / "touchstone", *words, *(["--server", server] if server else [])]
-    result = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL)
-    assert result.returncode == code, (words, result.returncode, result.stderr)
+    command = [BIN / "touchstone", *words, *(["--server", server] if server else [])]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL, check=False)
+    assert result.returncode == code, (command, result.returncode, result.stderr)
     return result.stdout if code == 0 else result.stderr
 
 
@@ -165,7 +165,7 @@ def session(rig, plan, tmp_path_factory):
         assert process.returncode != 0, "it was done before it could be interrupted"
         if signal_number == signal.SIGINT:  # Ctrl-C stops the rig, which holds
             touchstone("rig", "reset", "--reason", "a test", server=rig)
-    result = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL)
+    result = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL, check=False)
     assert result.returncode == 0, result.stderr
     return journal
 

@@ -18,8 +18,7 @@ import time
 import grpc
 
 from kill_gateway import PATIENT, Client, compare, dashboard_port
-from programs import (CLIENT, PATIENCE_S, Preloaded, Result, Server, describe, emulated_rig, export_session, scratch, stream,
-                      wait_until)
+from programs import CLIENT, PATIENCE_S, Preloaded, Result, Server, describe, emulated_rig, export_session, scratch, stream, wait_until
 from touchstone.v1 import control_pb2
 
 HOUR_S, YEAR_S = 3600, 365.25 * 86400
@@ -134,11 +133,13 @@ def _rig(folder: str, jumps: int, names: tuple[str, ...], result: Result) -> Non
             client.recover()
             clock.jump(JUMPS[name])
             client.control.RenewLease(control_pb2.RenewLeaseRequest(token=client.token), timeout=PATIENCE_S)
-            result.expect(wait_until(lambda: _may_acquire(client)), f"{name}: a lease of 3 s that nobody renews still stands after {PATIENCE_S:.0f} s")
+            result.expect(wait_until(lambda: _may_acquire(client)),
+                          f"{name}: a lease of 3 s that nobody renews still stands after {PATIENCE_S:.0f} s")
         if answers:  # else there is no session, and the count below says so
             compare(export_session(channel, "killed"), answers, result)
     result.expect(len(answers) >= jumps // 4, f"only {len(answers)} touches in {made} jumps")
-    result.seen.append(f"{len(answers)} touches of an emulated rig during {made} jumps of the gateway's clock are in the session as they were answered")
+    result.seen.append(f"{len(answers)} touches of an emulated rig during {made} jumps of the gateway's clock are in the session as they "
+                       "were answered")
 
 
 def _may_acquire(client: Client) -> bool:
@@ -176,8 +177,8 @@ def _reconnecting(folder: str, result: Result) -> None:
         result.expect(client.poll() is None, "the client ended while its server was away")
         with Server(listen=target):
             try:
-                _, words = client.communicate(timeout=PATIENCE_S)
-                result.expect(client.returncode == 0, f"the client ended with {client.returncode}: {words}")
+                _, said = client.communicate(timeout=PATIENCE_S)
+                result.expect(client.returncode == 0, f"the client ended with {client.returncode}: {said}")
             except subprocess.TimeoutExpired:
                 result.failures.append(f"a client whose clock was set back an hour has not come back after {PATIENCE_S:.0f} s")
     finally:

@@ -8,6 +8,7 @@ import math
 import random
 import subprocess
 import tempfile
+from typing import Any
 
 import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
@@ -37,8 +38,9 @@ def methods():
     for each in files.file:
         pool.Add(each)
     factory = message_factory.MessageFactory(pool)
+    prototype: Any = factory.GetPrototype  # type: ignore[attr-defined]  # of protobuf before 5
     return [(f"/{each.package}.{service.name}/{method.name}",
-             factory.GetPrototype(pool.FindMessageTypeByName(method.input_type.lstrip("."))), method.client_streaming)
+             prototype(pool.FindMessageTypeByName(method.input_type.lstrip("."))), method.client_streaming)
             for each in files.file for service in each.service for method in service.method]
 
 
@@ -96,7 +98,8 @@ def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes
         call = (channel.stream_stream if client_streams else channel.unary_stream)(name)
         for k in range(calls):
             data = _hostile(request_class, rng)
-            code, words = _answer(call(iter([data]) if client_streams else data, timeout=CALL_S))
+            request: Any = iter([data]) if client_streams else data
+            code, words = _answer(call(request, timeout=CALL_S))
             codes[code] = codes.get(code, 0) + 1
             place = f"{name}, call {k}"
             # Bytes that are no message are gRPC's own to refuse: INTERNAL without a word.

@@ -7,8 +7,19 @@ import threading
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch, wait_until)
+from programs import (
+    Result,
+    Server,
+    create_model,
+    create_session,
+    export_session,
+    list_models,
+    list_sessions,
+    measurements,
+    model_yaml,
+    scratch,
+    wait_until,
+)
 
 WRITERS = 4
 MAX_WRITES = 60  # that are acknowledged before a kill: those of a fifth of a second
@@ -90,7 +101,7 @@ def run(kills: int = 500, seed: int = 1) -> Result:
                 enough = len(written.acknowledged) + rng.randrange(1, MAX_WRITES)
                 for writer in writers:
                     writer.start()
-                wait_until(lambda: len(written.acknowledged) >= enough)
+                wait_until(lambda: len(written.acknowledged) >= enough)  # noqa: B023 - not called after this round
                 server.kill()
                 for writer in writers:
                     writer.join()

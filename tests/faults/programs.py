@@ -211,8 +211,8 @@ def model_yaml(name: str, radius_mm: float) -> str:
 
 def measurements(touches: int, first: float) -> bytes:
     """A measurement file whose bytes depend on `first`, a time in us."""
-    rows = ["touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
-            "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us"]
+    rows = [("touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
+             "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us")]
     rows += [f"{k},lat00,20,60,0,0,0,0,0,-1,1,0,0,{first + k},0,{k}" for k in range(touches)]
     return ("\n".join(rows) + "\n").encode()
 

@@ -11,9 +11,9 @@ import threading
 import time
 
 import grpc
-from touchstone.v1 import source_pb2
 
 from programs import Result, Server, open_stream, own_channel
+from touchstone.v1 import source_pb2
 
 LONG_S = 600.0  # more than anything here takes
 
@@ -105,7 +105,9 @@ def run(streams: int = 20, times: int = 100, kinds: tuple[tuple[str, int], ...] 
                 each.end()
             result.expect(server.alive(), "the server ended")
         median = statistics.median(waits)
-        result.expect(median < round_s / 2, f"beside {streams} streams of {kind} a quick one waited {median:.2f} s, as long as a turn of them all ({round_s:.2f} s)")
-        result.seen.append(f"beside {streams} streams of {kind}, {batch_size} a batch, from the same address a quick stream had its first batch after {waits[0]:.3f} to "
-                           f"{waits[-1]:.3f} s (median {median:.3f}, {times} times); the slow ones had one each in {round_s:.1f} s")
+        result.expect(median < round_s / 2, f"beside {streams} streams of {kind} a quick one waited {median:.2f} s, "
+                                             f"as long as a turn of them all ({round_s:.2f} s)")
+        result.seen.append(f"beside {streams} streams of {kind}, {batch_size} a batch, from the same address a quick "
+                           f"stream had its first batch after {waits[0]:.3f} to {waits[-1]:.3f} s (median {median:.3f}, {times} "
+                           f"times); the slow ones had one each in {round_s:.1f} s")
     return result

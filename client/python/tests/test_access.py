@@ -51,7 +51,7 @@ def test_a_token_over_tls_gets_in_as_far_as_its_role_goes(secure, files):
         assert client.describe().kind == "virtual"
         assert sum(batch.rows for batch in client.dataset(["lat00"], samples=100, seed=1)) == 100
         assert len(client.samples(["lat00"], samples=10, seed=1)[2:4]["object"]) == 2
-        with pytest.raises(touchstone.Refused, match="Models.CreateModel needs the role admin; 'reader' has the role reader"):
+        with pytest.raises(touchstone.Refused, match=r"Models\.CreateModel needs the role admin; 'reader' has the role reader"):
             client.add_model("touchstone: model/1\nname: mine\neffects: []\n")
     with touchstone.connect(secure, ca=files / "ca.pem", token="changes") as client:
         client.add_model("touchstone: model/1\nname: mine\neffects: []\n")
@@ -77,7 +77,7 @@ def test_what_does_not_fit_is_said_at_once(secure, files, at_once, shown, words)
 
 
 def test_a_certificate_of_another_name_is_named(secure, files, at_once):
-    with pytest.raises(touchstone.Refused, match="is not for '127.0.0.1'"):
+    with pytest.raises(touchstone.Refused, match=r"is not for '127\.0\.0\.1'"):
         touchstone.connect(secure.replace("localhost", "127.0.0.1"), ca=files / "ca.pem", token="reads", timeout_s=120)
 
 

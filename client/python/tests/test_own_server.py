@@ -88,7 +88,7 @@ def test_a_thread_that_ends_does_not_take_it_along():
 
 def test_no_server_to_start_is_said_with_what_to_do(monkeypatch, tmp_path):
     monkeypatch.setenv("TOUCHSTONE_SERVER", str(tmp_path / "nothing"))
-    with pytest.raises(touchstone.SourceUnreachable, match="TOUCHSTONE_SERVER is .*nothing"):
+    with pytest.raises(touchstone.SourceUnreachable, match=r"TOUCHSTONE_SERVER is .*nothing"):
         touchstone.connect()
 
 

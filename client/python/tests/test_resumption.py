@@ -4,6 +4,7 @@ import os
 import random
 import threading
 import time
+from typing import Any, Optional
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import touchstone
 from touchstone import errors
 from touchstone.connection import Retry
 
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
                columns=("index", "descriptor"))
 
 
@@ -62,7 +63,7 @@ def test_a_client_that_calls_too_often_waits_and_goes_on(new_server, monkeypatch
 
 
 # Long runs: TOUCHSTONE_KILLS=100, as the step cluster of deploy/test.
-KILLS = int(os.environ.get("TOUCHSTONE_KILLS", 8))
+KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "8"))
 
 
 def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, losses):
@@ -70,7 +71,8 @@ def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, l
     options = {**OPTIONS, "samples": 2 * (KILLS + 1) * 16384, "columns": ("index", "descriptor", "pose")}
     client = touchstone.connect([each.target for each in servers], retry_for_s=60)
     dataset = client.dataset(**options, batch_size=16384)
-    chance, restarts, batches = random.Random(11), [None] * len(servers), []
+    chance, batches = random.Random(11), []
+    restarts: list[Optional[threading.Thread]] = [None] * len(servers)
     for batch in dataset:
         batches.append(batch)
         if len(batches) % 2 or len(batches) > 2 * KILLS:
@@ -81,11 +83,11 @@ def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, l
         if restarts[number]:
             restarts[number].join(60)
         servers[number].kill()
-        restarts[number] = threading.Thread(target=servers[number].start_again)
-        restarts[number].start()
-    for restart in restarts:
-        if restart:
-            restart.join(60)
+        restart = restarts[number] = threading.Thread(target=servers[number].start_again)
+        restart.start()
+    for last in restarts:
+        if last:
+            last.join(60)
     reference = list(touchstone.connect(server.target).dataset(**options))
     for column in ("index", "descriptor_us", "target_mm", "approach"):
         one, other = (np.concatenate([batch[column] for batch in each]) for each in (batches, reference))
@@ -110,8 +112,8 @@ def test_a_drained_server_hands_over(server, new_server, losses):
 def test_patience_is_bounded(new_server, losses, retry_clock):
     own = new_server()
     dataset = touchstone.connect(own.target, retry_for_s=60).dataset(**OPTIONS, batch_size=500)
-    with pytest.raises(touchstone.SourceUnreachable, match=own.target):
-        for batch in dataset:
+    with pytest.raises(touchstone.SourceUnreachable, match=own.target):  # noqa: PT012 - raised in the middle of the loop
+        for _ in dataset:
             own.kill()
     assert retry_clock.now_s == pytest.approx(60)
 

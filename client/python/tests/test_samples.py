@@ -3,13 +3,14 @@
 import concurrent.futures
 import multiprocessing
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
 
 import touchstone
 
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
                columns=("index", "object", "descriptor"))
 
 
@@ -62,7 +63,7 @@ def test_images_come_by_index(server):
     client = touchstone.connect(server.target)
     for encoding in ("raw", "png"):
         image = touchstone.image(16, 12, encoding=encoding)
-        stream = list(client.dataset(**options, image=image, batch_size=50))[0]
+        [stream] = client.dataset(**options, image=image, batch_size=50)
         some = client.samples(**options, image=image)
         batch = some[[49, 2, 2, 31]]
         for row, i in enumerate([49, 2, 2, 31]):

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.training needs it.")
 
-from touchstone.training import features, measured_sets, plans, recognisers  # noqa: E402
-from touchstone.training.context import Context  # noqa: E402
-from touchstone.training.settings import Settings  # noqa: E402
-from touchstone.training.touch_data import TouchData  # noqa: E402
+from touchstone.training import features, measured_sets, plans, recognisers
+from touchstone.training.context import Context
+from touchstone.training.settings import Settings
+from touchstone.training.touch_data import TouchData
 
 
 def made_of(objects, times_us=None, targets=None, spacing_mm=30.0):

@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("cv2", reason="opencv-python-headless is not installed (deploy/python-packages.txt)")
 
-import joint  # noqa: E402
-import photograph  # noqa: E402
-import sets  # noqa: E402
+import joint
+import photograph
+import sets
 
 PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
     "touchstone"

@@ -48,7 +48,7 @@ trial = pytest.mark.second_tier("statistical: trials of hidden effects in photog
 
 @pytest.mark.parametrize("effect", [pytest.param("focal_error", marks=trial), pytest.param("exposure", marks=trial), "vignetting"])
 def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect, tmp_path):
-    report, mark, truth = marked(tmp_path, [effect])
+    report, mark, _ = marked(tmp_path, [effect])
     assert mark.right_first and not mark.confidently_wrong, (mark.verdict, mark.claims)
     assert mark.over_floor < judge.OVER_FLOOR < report["initial"]["rmse_grey"] / report["noise_floor_grey"]
     assert all(abs(error) < 4 for error in mark.errors) and mark.errors
