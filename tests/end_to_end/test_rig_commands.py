@@ -18,6 +18,8 @@ PYTHON_CLIENT = ROOT / "client/python"
 HIDDEN_OFFSETS_MM = (0.2, 0.0, -0.2)
 HIDDEN_SIGMA_US = 2000
 SPEEDUP = 20
+# The emulated rig exists once.
+pytestmark = pytest.mark.xdist_group("rig_commands")
 DONE = 3  # stage of a touch in a journal
 PATIENCE_S = 120
 
@@ -36,8 +38,12 @@ def start_gateway(*arguments):
 
 @contextlib.contextmanager
 def emulated_rig(folder, speedup, *flags):
-    """The address of a gateway in front of an emulated rig that puts its objects down by itself."""
-    emulator = subprocess.Popen([BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(speedup), *flags],
+    """The address of a gateway in front of an emulated rig that puts its objects down by itself.
+
+    Its fingers give way without end: on its clock a gateway that waits for the processor comes late to stop the arm.
+    """
+    emulator = subprocess.Popen([BIN / "touchstone-rig-emulator", "--dir", folder, "--speedup", str(speedup), "--finger-give-mm",
+                                 "1000", *flags],
                                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     gateway = None
     try:

@@ -11,6 +11,8 @@ import pytest
 from test_rig_commands import PATIENCE_S, PYTHON_CLIENT, emulated_rig, touchstone
 
 SPEEDUP = 10
+# The emulated rig exists once.
+pytestmark = pytest.mark.xdist_group("rig_truth")
 
 
 @pytest.fixture(scope="module")

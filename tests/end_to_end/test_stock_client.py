@@ -28,7 +28,7 @@ def channel():
     with grpc.insecure_channel(address) as channel:
         yield channel
     server.terminate()
-    assert server.wait(timeout=20) == 0
+    assert server.wait(timeout=60) == 0
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_every_method_answers_an_empty_request_with_a_result_or_a_reason(channel
             make = channel.unary_stream if streams else channel.unary_unary
             try:
                 result = make(path, request_serializer=request.SerializeToString,
-                              response_deserializer=response.FromString)(request(), timeout=20)
+                              response_deserializer=response.FromString)(request(), timeout=60)
                 list(result) if streams else result
             except grpc.RpcError as error:
                 assert error.code() in (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.NOT_FOUND,

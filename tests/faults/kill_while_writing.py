@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import threading
-import time
 
 import grpc
 
@@ -23,6 +22,7 @@ from programs import (
 )
 
 WRITERS = 4
+MAX_WRITES = 60  # that are acknowledged before a kill: those of a fifth of a second
 
 
 class Written:
@@ -98,12 +98,10 @@ def run(kills: int = 500, seed: int = 1) -> Result:
             with Server(*options) as server:
                 writers = [threading.Thread(target=write, args=(server, written, round_, k, random.Random(rng.random())))
                            for k in range(WRITERS)]
-                acknowledged = len(written.acknowledged)
+                enough = len(written.acknowledged) + rng.randrange(1, MAX_WRITES)
                 for writer in writers:
                     writer.start()
-                # They write by then, however long it takes here to connect.
-                wait_until(lambda: len(written.acknowledged) > acknowledged)  # noqa: B023 - not called after this round
-                time.sleep(rng.uniform(0.0, 0.2))
+                wait_until(lambda: len(written.acknowledged) >= enough)  # noqa: B023 - not called after this round
                 server.kill()
                 for writer in writers:
                     writer.join()

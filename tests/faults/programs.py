@@ -133,11 +133,14 @@ def own_channel(target: str, *options: tuple[str, int]) -> grpc.Channel:
     return grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), *options])
 
 
-def wait_until(done: Callable[[], bool]) -> None:
-    """Until it is done, or the patience is over, which is for the caller to find out."""
+def wait_until(done: Callable[[], bool]) -> bool:
+    """True once it is done; False when the patience is over."""
     deadline = time.monotonic() + PATIENCE_S
-    while not done() and time.monotonic() < deadline:
+    while not done():
+        if time.monotonic() > deadline:
+            return False
         time.sleep(0.001)
+    return True
 
 
 def create_model(channel: grpc.Channel, yaml: str) -> models_pb2.Model:

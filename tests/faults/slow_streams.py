@@ -88,10 +88,14 @@ def _waits_s(server: Server, times: int) -> list[float]:
     return sorted(map(float, said.stdout.split()))
 
 
-def run(streams: int = 20, times: int = 100) -> Result:
-    """streams: slow ones at once. times: how often the quick one is asked for beside them."""
+KINDS = ("formulas", 4096), ("formulas", 16384), ("pictures", 64)
+
+
+def run(streams: int = 20, times: int = 100, kinds: tuple[tuple[str, int], ...] = KINDS) -> Result:
+    """streams: slow ones at once. times: how often the quick one is asked for beside them. kinds: what makes them slow, and the
+    samples of their batches."""
     result = Result()
-    for kind, batch_size in ("formulas", 4096), ("formulas", 16384), ("pictures", 64):
+    for kind, batch_size in kinds:
         with Server("--renderer", "cpu") as server:
             slow = [_Slow(server.channel(("grpc.max_receive_message_length", -1)), _request(10**9, kind, batch_size)) for _ in range(streams)]
             _round_s(slow, turns=1)

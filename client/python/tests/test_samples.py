@@ -3,7 +3,6 @@
 import concurrent.futures
 import multiprocessing
 import pickle
-import threading
 from typing import Any
 
 import numpy as np
@@ -119,17 +118,14 @@ def test_an_empty_list_is_refused(samples):
         samples[[]]
 
 
-def test_a_lost_server_is_waited_for(new_server, whole):
+def test_a_lost_server_is_waited_for(new_server, whole, start_again):
     server = new_server()
     samples = touchstone.connect(server.target).samples(**OPTIONS)
     samples[0]
+    waits = []
+    start_again(server, once=lambda: waits.append(1) or len(waits) == 3)
     server.kill()
-    back = threading.Timer(0.5, server.start_again)
-    back.start()
-    try:
-        expect_these(samples[[8, 3]], whole, [8, 3])
-    finally:
-        back.join()
+    expect_these(samples[[8, 3]], whole, [8, 3])
 
 
 def test_another_dataset_at_the_same_address_is_noticed(new_server, tmp_path):

@@ -51,8 +51,11 @@ def test_batches_are_tensors(server):
     assert first["image"].dtype == torch.uint8 and first["image"].shape == (64, 3, 10, 20)
 
 
+OTHER_WORKERS = pytest.mark.second_tier("repeated: other numbers of workers")
+
+
 @pytest.mark.parametrize("context", ["fork", "forkserver", "spawn"])
-@pytest.mark.parametrize("workers", [0, 1, 2, 3])
+@pytest.mark.parametrize("workers", [0, pytest.param(1, marks=OTHER_WORKERS), 2, pytest.param(3, marks=OTHER_WORKERS)])
 def test_the_order_does_not_depend_on_the_workers(server, values, workers, context):
     if workers == 0 and context != "fork":
         pytest.skip("no workers, no start method")

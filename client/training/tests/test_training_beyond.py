@@ -16,8 +16,6 @@ from touchstone.training.experiments import other_rigs
 from touchstone.training.prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
 from touchstone.training.touch_data import collect
 
-_REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
-
 
 def correlated(rng, n, correlation) -> tuple[np.ndarray, np.ndarray]:
     predicted = rng.normal(size=n)
@@ -223,10 +221,9 @@ def test_what_any_number_of_fingers_sees_of_a_sphere():
 
 @pytest.fixture(scope="module")
 def client():
-    program = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or _REPOSITORY / "build/release/bin/touchstone-server")
+    program = pathlib.Path(os.environ["TOUCHSTONE_SERVER"])
     if not program.exists():
         pytest.skip(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER.")
-    os.environ["TOUCHSTONE_SERVER"] = str(program)
     with touchstone.connect() as connected:
         yield connected
 

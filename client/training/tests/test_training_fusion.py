@@ -84,6 +84,7 @@ def test_a_touch_recogniser_is_validated_on_the_last_source_and_not_trained_on_t
     assert np.mean(probabilities.argmax(1) == objects) < 0.4 < np.mean(found.probabilities(measured[0]).argmax(1) == measured[1])
 
 
+@pytest.mark.second_tier("statistical: recognition rates over seeds")
 @pytest.mark.skipif(not _SQUEEZENET.exists(), reason=f"there is no backbone file {_SQUEEZENET}")
 def test_two_senses_beat_each_alone(tmp_path):
     with Context(Settings(tmp_path, quick=True, backbone=_SQUEEZENET)) as context:

@@ -21,6 +21,9 @@ POSE = {"translation_mm": (0.5, -0.3, 0.2), "rotation_deg": (0.2, -0.3, 0.4)}
 pytestmark = pytest.mark.skipif(not PROGRAM.exists(), reason=f"{PROGRAM} is not built")
 
 
+trial = pytest.mark.second_tier("statistical: trials of hidden effects in touches and photographs")
+
+
 def run(folder, command, model, out):
     subprocess.run([PROGRAM, command, folder / "set", "--model", folder / model, "--mesh-dir", folder / "meshes", "--json",
                     folder / out, *(["--save-model", folder / "better.yaml"] if command == "diagnose" else [])],
@@ -45,6 +48,7 @@ def effects(report):
     return [(step["effect"], step["shown_by"]) for step in report["steps"]]
 
 
+@trial
 def test_objects_that_lie_askew_are_found_by_both_and_tighter_than_by_either(tmp_path):
     report = diagnosed(tmp_path, POSE, POSE)
     assert effects(report) == [("object_pose", "both")], report["summary"]
@@ -63,6 +67,7 @@ def test_a_tool_is_not_told_as_the_pose_of_objects(tmp_path):
     assert effects(report) == [("tool_yaw", "touches")], report["summary"]
 
 
+@trial
 def test_objects_moved_between_touching_and_photographing_are_a_contradiction(tmp_path):
     report = diagnosed(tmp_path, {"translation_mm": (0.5, 0, 0)}, {"translation_mm": (0, 0.5, 0)})
     assert report["verdict"] == "UNEXPLAINED" and not report["steps"], report["summary"]
