@@ -70,7 +70,7 @@ function(touchstone_precompile)
     # Programs are compiled with -fPIE and libraries with -fPIC, which no precompiled header spans.
     target_link_libraries(touchstone_headers_${set} PRIVATE GTest::gmock GTest::gtest)
     set_target_properties(touchstone_headers_${set} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-    target_compile_options(touchstone_headers_${set} PRIVATE -fPIE)
+    target_compile_options(touchstone_headers_${set} PRIVATE -fPIE ${TOUCHSTONE_TEST_OPTIONS})
   endforeach()
   foreach(set protocol protocol_test)
     target_link_libraries(touchstone_headers_${set} PRIVATE touchstone_proto nlohmann_json::nlohmann_json)

@@ -13,6 +13,12 @@ set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_C_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_DEBUG "-O0 -g1 -D_GLIBCXX_ASSERTIONS")
 set(CMAKE_C_FLAGS_DEBUG "-O0 -g1")
+# Of the files of tests, and of the headers precompiled for them. What is tested lies in the libraries, which are optimised
+# and checked in full; the tests' own files compile in half the time so.
+set(TOUCHSTONE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+if(TOUCHSTONE_SANITIZE MATCHES "address")
+  list(APPEND TOUCHSTONE_TEST_OPTIONS -fno-sanitize=undefined -fno-sanitize-address-use-after-scope)
+endif()
 set(CMAKE_CXX_FLAGS_SANITIZE "-O1 -g1 -fno-omit-frame-pointer -D_GLIBCXX_ASSERTIONS")
 set(CMAKE_C_FLAGS_SANITIZE "-O1 -g1 -fno-omit-frame-pointer")
 if(TOUCHSTONE_SANITIZE)
@@ -22,6 +28,12 @@ if(TOUCHSTONE_SANITIZE)
     add_compile_options(-fno-sanitize=null,object-size,vptr)
   endif()
   add_link_options(-fsanitize=${TOUCHSTONE_SANITIZE})
+endif()
+
+# Half a hundred programs are linked with all that they test: mold takes a tenth of the time that GNU ld takes.
+find_program(MOLD mold)
+if(MOLD)
+  add_link_options(-fuse-ld=mold)
 endif()
 
 find_program(CCACHE ccache)
@@ -64,38 +76,49 @@ if(TOUCHSTONE_SANITIZE)
   set(TOUCHSTONE_TEST_TIMEOUT_S 1800)
 endif()
 
-# touchstone_test(NAME [SLOW] [SHARDS n] SOURCES a_test.cpp ... LINKS ...): one test binary per folder, NAME_test. SLOW: it takes
-# minutes without optimisation; such tests are labelled so. SHARDS: its tests run as n tests, NAME_1 to NAME_n, side by side.
-function(touchstone_test name)
-  cmake_parse_arguments(ARG "SLOW" "SHARDS" "SOURCES;LINKS" ${ARGN})
-  add_executable(${name}_test ${ARG_SOURCES})
-  set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${TOUCHSTONE_UNITY})
-  # What is tested lies in the libraries, which are checked in full. The files of the tests themselves compile in half
-  # the time without these two checks.
-  if(TOUCHSTONE_SANITIZE MATCHES "address")
-    target_compile_options(${name}_test PRIVATE -fno-sanitize=undefined -fno-sanitize-address-use-after-scope)
-  endif()
-  touchstone_link(${name}_test PRIVATE ${ARG_LINKS} touchstone_test_paths GTest::gmock GTest::gtest_main)
+# touchstone_add_test(NAME [SECOND_TIER] [SHARDS n] [ENVIRONMENT A=b ...] COMMAND program argument ...): the ctest NAME, or
+# NAME_1 to NAME_n, which run a part of its tests each, side by side. SECOND_TIER: deploy/test leaves it to deploy/test --all.
+# The time of each single test stands in test-times/NAME.xml of the build.
+function(touchstone_add_test name)
+  cmake_parse_arguments(ARG "SECOND_TIER" "SHARDS" "ENVIRONMENT;COMMAND" ${ARGN})
   set(tests ${name})
   if(ARG_SHARDS)
     set(tests)
     foreach(shard RANGE 1 ${ARG_SHARDS})
       list(APPEND tests ${name}_${shard})
     endforeach()
+  else()
+    set(ARG_SHARDS 1)
   endif()
   set(index 0)
   foreach(test ${tests})
-    add_test(NAME ${test} COMMAND ${name}_test)
-    set_tests_properties(${test} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S})
-    if(ARG_SHARDS)
-      set_tests_properties(${test} PROPERTIES ENVIRONMENT
-        "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
-    endif()
-    if(ARG_SLOW)
-      set_tests_properties(${test} PROPERTIES LABELS slow)
+    add_test(NAME ${test} COMMAND ${ARG_COMMAND})
+    # What has more shards takes longer, and begins first.
+    set_tests_properties(${test} PROPERTIES TIMEOUT ${TOUCHSTONE_TEST_TIMEOUT_S} COST ${ARG_SHARDS} ENVIRONMENT
+      "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index};GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-times/${test}.xml;${ARG_ENVIRONMENT}")
+    if(ARG_SECOND_TIER)
+      set_tests_properties(${test} PROPERTIES LABELS second_tier)
     endif()
     math(EXPR index "${index} + 1")
   endforeach()
+endfunction()
+
+# touchstone_test(NAME [SECOND_TIER] [SHARDS n] SOURCES a_test.cpp ... LINKS ...): one test program per folder, NAME_test, and
+# its ctest as of touchstone_add_test.
+function(touchstone_test name)
+  cmake_parse_arguments(ARG "SECOND_TIER" "SHARDS" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name}_test ${ARG_SOURCES})
+  set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${TOUCHSTONE_UNITY})
+  target_compile_options(${name}_test PRIVATE ${TOUCHSTONE_TEST_OPTIONS})
+  touchstone_link(${name}_test PRIVATE ${ARG_LINKS} touchstone_test_paths GTest::gmock GTest::gtest_main)
+  set(options)
+  if(ARG_SECOND_TIER)
+    list(APPEND options SECOND_TIER)
+  endif()
+  if(ARG_SHARDS)
+    list(APPEND options SHARDS ${ARG_SHARDS})
+  endif()
+  touchstone_add_test(${name} ${options} COMMAND ${name}_test)
 endfunction()
 
 # touchstone_link(TARGET PUBLIC|PRIVATE links...)

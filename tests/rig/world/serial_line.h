@@ -32,6 +32,8 @@ class SerialLine {
   std::vector<uint8_t> Exchange(double now_s);
   // When something is due next, simulated seconds; infinite if nothing is under way.
   double NextDueS() const;
+  // Bytes that have arrived for the program that has the port open, and that it has not read.
+  size_t Unread() const;
   int fd() const { return master_; }  // to wait for bytes; -1: unplugged
 
  private:
