@@ -18,9 +18,6 @@ namespace {
 
 static_assert(std::atomic<double>::is_always_lock_free && std::atomic<uint64_t>::is_always_lock_free);
 
-// A keeper that was killed while it set the course leaves it as it is.
-constexpr int kMaxTries = 1000;
-
 std::string Complaint(const std::string& what, const std::string& file) {
   return absl::StrCat("the clock of the emulated rig: cannot ", what, " ", file, ": ", std::strerror(errno));
 }
@@ -38,24 +35,22 @@ double PacedClock::Course::SinceS(double now_steady_s) const {
 }
 
 void PacedClock::Set(const Course& course) {
-  const uint64_t version = version_.load(std::memory_order_relaxed);
-  version_.store(version + 1, std::memory_order_release);
-  steady_s_.store(course.steady_s, std::memory_order_release);
-  since_s_.store(course.since_s, std::memory_order_release);
-  until_s_.store(course.until_s, std::memory_order_release);
-  began_s_.store(course.began_s, std::memory_order_release);
-  version_.store(version + 2, std::memory_order_release);
+  const uint64_t next = version_.load() + 1;
+  Slot& slot = slots_[next % 2];
+  slot.steady_s = course.steady_s;
+  slot.since_s = course.since_s;
+  slot.until_s = course.until_s;
+  slot.began_s = course.began_s;
+  version_ = next;
 }
 
 PacedClock::Course PacedClock::Get() const {
-  Course course;
-  for (int tried = 0; tried < kMaxTries; ++tried) {
-    const uint64_t version = version_.load(std::memory_order_acquire);
-    course = {steady_s_.load(std::memory_order_acquire), since_s_.load(std::memory_order_acquire),
-              until_s_.load(std::memory_order_acquire), began_s_.load(std::memory_order_acquire)};
-    if (version % 2 == 0 && version_.load(std::memory_order_acquire) == version) break;
+  for (;;) {
+    const uint64_t version = version_.load();
+    const Slot& slot = slots_[version % 2];
+    const Course course{slot.steady_s, slot.since_s, slot.until_s, slot.began_s};
+    if (version_.load() == version) return course;
   }
-  return course;
 }
 
 std::shared_ptr<PacedClock> MakePacedClock(const std::string& file) {

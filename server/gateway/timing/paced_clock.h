@@ -27,8 +27,13 @@ class PacedClock {
   Course Get() const;
 
  private:
-  std::atomic<uint64_t> version_{0};  // odd while the course is being set
-  std::atomic<double> steady_s_{0}, since_s_{0}, until_s_{0}, began_s_{0};
+  struct Slot {
+    std::atomic<double> steady_s{0}, since_s{0}, until_s{0}, began_s{0};
+  };
+  // The course of version v is in slot v % 2; the next one is written into the other, so that a keeper that is held up
+  // while it writes holds up no reader.
+  std::atomic<uint64_t> version_{0};
+  Slot slots_[2];
 };
 
 // In a file that is made, in place of one that is there; throws std::runtime_error.
