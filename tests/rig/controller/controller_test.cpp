@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/rig/controller/test_client.h"
+#include "tests/rig/controller/unread.h"
 
 namespace touchstone::rig {
 namespace {
@@ -167,6 +168,51 @@ TEST(Controller, EndsTheProgramWhoseWatchdogNobodyFeeds) {
   EXPECT_EQ(controller->Count("watchdog_stops"), 1u);
   EXPECT_EQ(controller->Count("protective_stops"), 0u);
   EXPECT_EQ(touch.safety_mode, 1);
+}
+
+// Until the clock has stood for 50 ms of the host; false: it goes on and on.
+bool WaitsForSomebody(const SimClock& clock) {
+  double since_s = HostNowS();
+  for (const double until_s = since_s + 0.7; HostNowS() < until_s;) {
+    if (!clock.Stands()) since_s = HostNowS();
+    if (HostNowS() > since_s + 0.05) return true;
+  }
+  return false;
+}
+
+TEST(Controller, LetsTimeWaitForAClientThatDoesNotReadUntilItHasHungForASecond) {
+  SimClock clock(20);
+  Faults faults;
+  const auto controller = Controller::Start(Powered(), &clock, &faults, nullptr);
+  TouchClient client(controller->ports().rtde);
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(WaitsForSomebody(clock)) << k;
+    const double stood_s = clock.NowS();
+    EXPECT_EQ(clock.NowS(), stood_s);
+    client.Until([&] { return client.timestamp_s > stood_s; });
+    EXPECT_GT(clock.NowS(), stood_s);
+  }
+  // A second later time passes without it, until it reads again.
+  const double stood_s = clock.NowS(), began_s = HostNowS();
+  while (clock.NowS() < stood_s + 100 * SimClock::kAheadHostS * clock.speedup())
+    ASSERT_LT(HostNowS(), began_s + 30);
+  EXPECT_GT(HostNowS(), began_s + 0.9 * ReaderPatience::kPatienceS);
+  const double now_s = clock.NowS();
+  client.Until([&] { return client.timestamp_s > now_s; });
+  EXPECT_TRUE(WaitsForSomebody(clock));
+}
+
+TEST(ReaderPatience, EndsAfterASecondWithoutReadingAndBeginsAnewWithIt) {
+  ReaderPatience patience;
+  EXPECT_FALSE(patience.WaitsFor(0));
+  EXPECT_TRUE(patience.WaitsFor(10));
+  EXPECT_TRUE(patience.WaitsFor(20));
+  const double began_s = HostNowS();
+  while (patience.WaitsFor(20)) ASSERT_LT(HostNowS(), began_s + 30);
+  EXPECT_FALSE(patience.WaitsFor(30)) << "more to read is nothing read";
+  EXPECT_TRUE(patience.WaitsFor(29));
+  EXPECT_FALSE(patience.WaitsFor(0));
+  EXPECT_TRUE(patience.WaitsFor(1));
 }
 
 }  // namespace
