@@ -41,6 +41,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
       {"provenance_note", "Kept with every session; an emulator says here that it is one", &o.provenance_note,
        "source_note"},
       {"time_scale", "Rig seconds in one second: 1, but with an emulator on a faster clock", &o.time_scale},
+      {"emulated_clock", "The clock of an emulated rig, a file that the emulator keeps; empty: this host's",
+       &o.emulated_clock},
       {"mount_command",
        "Program and arguments that put {object} down with its face {up_face} up; none: a person does",
        &o.mount_command},
@@ -239,6 +241,7 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
     for (const auto& [key, path] :
          {std::pair("journal", &flags.options.journal), std::pair("audit_log", &flags.options.audit_log),
           std::pair("calibration", &flags.options.calibration), std::pair("replay", &flags.options.replay),
+          std::pair("emulated_clock", &flags.options.emulated_clock),
           std::pair("camera.intrinsics", &flags.options.camera.intrinsics),
           std::pair("tls_cert", &flags.options.common.access.tls_cert),
           std::pair("tls_key", &flags.options.common.access.tls_key),
