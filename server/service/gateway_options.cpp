@@ -15,7 +15,7 @@ namespace touchstone::service {
 namespace {
 
 // Options in the units of files, and lists that become arrays, before they are checked.
-struct Raw {
+struct RawGatewayFlags {
   std::vector<std::string> mesh, mesh_dir;
   std::vector<std::string> sensor;
   int fingers = 3;
@@ -30,7 +30,7 @@ struct Raw {
       joint_max_deg, home_deg;
 };
 
-std::vector<Option> OptionsOf(GatewayFlags* flags, Raw* raw) {
+std::vector<Option> OptionsOf(GatewayFlags* flags, RawGatewayFlags* raw) {
   GatewayOptions& o = flags->options;
   std::vector<Option> options = {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.common.listen},
@@ -141,7 +141,7 @@ absl::Status TakeList(const std::vector<double>& list, double si_per_unit, const
   return absl::OkStatus();
 }
 
-absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
+absl::Status Resolve(const RawGatewayFlags& raw, GatewayFlags* flags) {
   GatewayOptions& o = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<source::MeshSpec> sources, MeshSpecsOfFolder(folder));
@@ -217,7 +217,7 @@ absl::Status Resolve(const Raw& raw, GatewayFlags* flags) {
 
 absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv) {
   GatewayFlags flags;
-  Raw raw;
+  RawGatewayFlags raw;
   const std::vector<Option> options = OptionsOf(&flags, &raw);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const CommandLine line,
