@@ -58,7 +58,7 @@ function(touchstone_precompile)
       continue()  # the firmware's core includes nothing but the standard library
     endif()
     get_target_property(type ${target} TYPE)
-    if(touchstone_proto IN_LIST links)
+    if(touchstone_proto_messages IN_LIST links)
       set(set protocol)
     else()
       set(set core)
