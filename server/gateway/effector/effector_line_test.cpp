@@ -14,9 +14,8 @@ using testing::HasSubstr;
 class EffectorLineTest : public EffectorFixture {};
 
 TEST_F(EffectorLineTest, LosesAndChangesNoContactOnABadLine) {
-  Start();
-  EffectorOptions options = Options();
-  options.reply_timeout_s = 0.05;
+  EffectorOptions options = StartQuick();
+  options.reply_timeout_s = 0.02;
   Open(options);
   FakeDevice::Line line;
   line.drop = line.corrupt = line.duplicate = 0.004;
@@ -68,8 +67,7 @@ TEST_F(EffectorLineTest, GoesOnWithATouchWhenTheLineComesBack) {
 
 TEST_F(EffectorLineTest, SaysThatATouchIsLostWithTheDevicesMemory) {
   for (const bool unplugged : {true, false}) {
-    Start();
-    Open(Options());
+    Open(StartQuick());
     ASSERT_TRUE(effector_->StartCapture(5).ok());
     device_->Press(0);
     ASSERT_TRUE(WaitForContacts(1));
@@ -142,13 +140,7 @@ TEST_F(EffectorLineTest, NoticesSilence) {
 // A touch that is final, but whose capture was not ended: the device that begins anew is not taken for one that
 // should be armed, again and again.
 TEST_F(EffectorLineTest, StaysConnectedAfterAResetBetweenTheLastContactAndTheEndOfTheCapture) {
-  FakeDevice::Options device;
-  EffectorOptions options = Options();
-  options.time_scale = 20;  // so that its statuses come 80 times a second
-  device.ticks_per_s *= options.time_scale;
-  Start(device);
-  options.port = device_->port();
-  Open(options);
+  Open(StartQuick());
   ASSERT_TRUE(effector_->StartCapture(7).ok());
   for (int i = 0; i < 3; ++i) device_->Press(i);
   ASSERT_TRUE(WaitForContacts(3));
