@@ -148,10 +148,11 @@ TEST_F(EffectorLineTest, StaysConnectedAfterAResetBetweenTheLastContactAndTheEnd
   device_->Reset(2002);
   ASSERT_TRUE(WaitFor([&] { return effector_->State().connected && effector_->State().boot_id == 2002; }));
   const int hellos = device_->hellos();
-  // Many statuses, of which three would have ended the session, and time to act on them: a request after them.
+  // Many statuses, of which three would have ended the session, and a request behind them.
   const int statuses = device_->statuses();
   ASSERT_TRUE(WaitFor([&] { return device_->statuses() > statuses + 5; }));
-  effector_->Recall(7).status().IgnoreError();
+  const absl::Status forgotten = effector_->Recall(7).status();
+  EXPECT_TRUE(absl::IsNotFound(forgotten)) << forgotten;
   EXPECT_EQ(device_->hellos(), hellos);
   EXPECT_EQ(effector_->Touch()->Contacts(), 3);
 }
