@@ -2,15 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
-
+#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
 namespace {
-
-constexpr double kFirstBackoffS = 0.1;
-constexpr double kLongestBackoffS = 3;
 
 // The stream may resume only where the same request means the same bytes.
 absl::Status CompareHeaders(const v1::DatasetHeader& before, const v1::DatasetHeader& now,
@@ -138,7 +134,7 @@ absl::Status DatasetStream::Reconnect(absl::Status lost) {
       if (clock.WaitFor(lock, cancellation_, backoff_s, [this] { return cancelled_.load(); }))
         return absl::CancelledError("the stream was cancelled");
     }
-    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+    backoff_s = NextBackoffS(backoff_s);
   }
 }
 

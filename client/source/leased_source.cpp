@@ -6,13 +6,12 @@
 #include <chrono>
 #include <thread>
 
+#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
 namespace {
 
-constexpr double kFirstBackoffS = 0.1;
-constexpr double kLongestBackoffS = 3;
 constexpr std::chrono::seconds kStopAnswer{2};
 
 }  // namespace
@@ -80,7 +79,7 @@ absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) 
       options_.log(absl::StrCat(connection_->address(), ": ", response.status().message(),
                                 "; the same touch is asked for again"));
     TOUCHSTONE_RETURN_IF_ERROR(SleepFor(backoff_s));
-    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+    backoff_s = NextBackoffS(backoff_s);
     again = true;
     const absl::Status found = FindAgain();
     if (!found.ok() && !IsLostServer(found)) return found;

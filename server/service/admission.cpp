@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/base/over_limit.h"
+#include "server/service/limits.h"
 
 namespace touchstone::service {
 namespace {
@@ -32,7 +33,6 @@ uint64_t MachineBytes() {
   return bytes;
 }
 
-constexpr uint64_t kMebibyte = 1 << 20;
 constexpr double kSavedS = 5;            // of calls that were not made
 constexpr size_t kManyClients = 10'000;  // then those who have everything saved are forgotten
 

@@ -30,6 +30,7 @@ struct GatewayOptions {
   std::string calibration = "calibration.yaml";
   std::string provenance_note;
   double time_scale = 1;
+  std::string emulated_clock;  // a file (timing/paced_clock.h); empty: this host's clock
   std::vector<std::string> mount_command;
   double mount_timeout_s = 120;
   ArmOptions arm;

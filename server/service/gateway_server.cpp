@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/rig/rig.h"
+#include "server/gateway/timing/host_time.h"
 #include "server/service/freedrive_service.h"
 #include "server/service/journal_sessions_service.h"
 #include "server/service/request_guard.h"
@@ -120,6 +121,8 @@ GatewayServer::GatewayServer() : parts_(std::make_unique<Parts>()) {}
 
 absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptions options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckServing(options.common));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      gateway::timing::FollowClock(options.replay.empty() ? options.emulated_clock : ""));
   std::unique_ptr<GatewayServer> gateway(new GatewayServer);
   Parts& parts = *gateway->parts_;
   Resources& resources = parts.resources;

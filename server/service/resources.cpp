@@ -16,8 +16,6 @@ namespace touchstone::service {
 namespace {
 
 constexpr uint64_t kMaxModelBytes = 1 << 20;
-// Nobody writes a file for so long.
-constexpr std::chrono::hours kOldDraft{1};
 
 // The model in a file, by the name of the file.
 absl::StatusOr<model::Model> ReadModel(const std::string& path) {

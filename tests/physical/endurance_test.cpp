@@ -1,12 +1,14 @@
 // A few hundred touches while things break at random. RESULTS.md tells of many more.
 #include "tests/physical/endurance/endurance.h"
+#include "server/base/test_tier.h"
 
 namespace touchstone {
 namespace {
 
 TEST(EnduranceTest, NothingIsLostDoubledOrAttributedToAnotherTouchWhateverBreaks) {
   EnduranceOptions options;
-  options.touches = 200;
+  // The rest is of the second tier: long.
+  options.touches = SecondTierRuns() ? 200 : 60;
   options.fault_share = 0.1;
   Endurance endurance(options);
   const EnduranceReport report = endurance.Run();

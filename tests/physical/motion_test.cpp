@@ -59,7 +59,7 @@ TEST_F(Motion, ForceBeyondTheLimitStopsTheTouchAndIsToldWithTheLimit) {
   EXPECT_THAT(pressed.status.error_message(),
               testing::AllOf(HasSubstr("the approach pressed with "), HasSubstr(" N on the tip"),
                              HasSubstr("at most 25.0 N (limits.max_force_n)")));
-  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  WaitForRest();
   const v1::Vector3 felt = RigState().arm().tip_force_n();
   EXPECT_GT(std::hypot(felt.x(), felt.y(), felt.z()), 20) << "the status tells what is felt";
   EXPECT_EQ(emulator_->controller().Count("protective_stops"), 0u)
@@ -103,7 +103,7 @@ TEST_F(Motion, ThereIsAWayHomeFromEveryTouchOnBothArms) {
     WaitUntilApproaching();
     Stop("a test");
     EXPECT_FALSE(touch.get().status.ok());
-    WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+    WaitForRest();
     ASSERT_TRUE(Reset().ok());
     KeptLease after(control_.get(), "afterwards", true);
     const grpc::Status home = Home(after.token());

@@ -23,7 +23,8 @@ namespace touchstone {
 
 namespace {
 
-// Limits of host time that a busy machine, or one under sanitizers, keeps too. A rig has shorter ones.
+// Limits that a busy machine, or one under sanitizers, keeps too; those of the lease are host time, the others the
+// rig's clock over its speed-up. A rig has shorter ones.
 const std::vector<std::string>& Patience() {
   static const std::vector<std::string> flags = {"--lease-window-s", "2",   "--arm-watchdog-hz",    "1",
                                                  "--arm-silence-s",  "1.5", "--effector-silence-s", "3"};
@@ -75,7 +76,7 @@ PhysicalTest::~PhysicalTest() {
 void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& change) {
   rig::EmulatorOptions options;
   options.dir = folder_.Path("rig");
-  options.speedup = 20;
+  options.speedup = 40;
   options.supershape_triangles = 2000;
   options.powered = true;
   if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller

@@ -9,7 +9,7 @@ namespace touchstone {
 
 class Safety : public PhysicalTest {
  protected:
-  // Slow enough to be interrupted in mid-approach: 50 mm in about 2 s of the host's.
+  // Slow enough to be interrupted in mid-approach: 50 mm in about 1 s of the host's.
   static constexpr double kSlow = 0.00125;
 
   void Stop(const std::string& reason) {
@@ -25,6 +25,15 @@ class Safety : public PhysicalTest {
     v1::RigState state;
     grpc::ClientContext context;
     return rig_->PowerOn(&context, request, &state);
+  }
+
+  void WaitForRest() {
+    WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  }
+  // Simulated seconds.
+  void WaitForRigTime(double seconds) {
+    const double until_s = emulator_->clock().NowS() + seconds;
+    WaitUntil([&] { return emulator_->clock().NowS() >= until_s; }, "the rig's time passes");
   }
 
   // The touch that was interrupted can be made under its id; and then is answered without motion.

@@ -25,7 +25,7 @@ TEST_F(Safety, StopDuringMotionNeedsNoLeaseAndHolds) {
   EXPECT_EQ(response.aborted_touches(), 1u);
   EXPECT_EQ(touch.get().status.error_code(), grpc::ABORTED);
   EXPECT_EQ(waiting.get().status.error_code(), grpc::ABORTED) << "what waits does not begin after a stop";
-  WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
+  WaitForRest();
   EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
   EXPECT_EQ(Touch(lease.token(), FromAbove(), "after the stop").status.error_code(), grpc::ABORTED);
   EXPECT_EQ(State(), v1::SOURCE_STATE_STOPPED);
@@ -147,8 +147,8 @@ TEST_F(Safety, AProgramThatWasJustSentDoesNotBeginAfterAStop) {
     grpc::ClientContext context;
     ASSERT_TRUE(control_->Stop(&context, {}, &response).ok());
     touch.get();
-    WaitUntil([&] { return !emulator_->controller().Moving(); }, "the arm rests");
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    WaitForRest();
+    WaitForRigTime(2);
     EXPECT_FALSE(emulator_->controller().Moving()) << "it began after the stop, try " << k;
     ASSERT_TRUE(Reset().ok());
   }

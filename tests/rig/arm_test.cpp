@@ -7,6 +7,7 @@
 #include <chrono>
 #include <thread>
 
+#include "server/base/test_folder.h"
 #include "server/gateway/arm/motion_planner.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "tests/rig/controller.h"
@@ -43,7 +44,10 @@ class Heart {
 // An arm that is powered, at home, 120 mm of tool on its flange.
 class EmulatedArm : public testing::Test {
  protected:
-  explicit EmulatedArm(double speedup = 4, const std::string& model = "ur3e") : clock_(speedup) {
+  explicit EmulatedArm(double speedup = 20, const std::string& model = "ur3e")
+      : clock_(speedup, folder_.Path("clock")) {
+    EXPECT_TRUE(gateway::timing::FollowClock(folder_.Path("clock")).ok());
+    faults_.Follow(&clock_);
     options_.model = model;
     options_.powered = true;
     controller_ = rig::Controller::Start(options_, &clock_, &faults_, nullptr);
@@ -59,19 +63,23 @@ class EmulatedArm : public testing::Test {
     arm.script.payload_cog_m = Eigen::Vector3d(0, 0.01, 0.045);
     arm.script.time_scale = speedup;
     // A busy machine's pauses are no dead gateway and no frozen controller.
-    arm.script.watchdog_hz = 0.2;
-    arm.frozen_after_s = 3;
+    arm.script.watchdog_hz = 1;
+    arm.frozen_after_s = 1;
     arm.program_start_s = 10;
     arm.connect_wait_s = kPatienceS;
     arm_options_ = arm;
     arm_ = gateway::arm::ConnectUrArm(arm, &changes_).value();
   }
+  ~EmulatedArm() override {
+    arm_ = nullptr;
+    EXPECT_TRUE(gateway::timing::FollowClock("").ok());
+  }
 
   template <typename Done>
   bool Wait(Done done) {
-    const double until_s = gateway::timing::HostNowS() + kPatienceS;
+    const double until_s = rig::HostNowS() + kPatienceS;
     while (!done()) {
-      if (gateway::timing::HostNowS() > until_s) return false;
+      if (rig::HostNowS() > until_s) return false;
       changes_.WaitForChange(changes_.count(), 0.01);
     }
     return true;
@@ -103,13 +111,18 @@ class EmulatedArm : public testing::Test {
     touch.speed_m_s = speed_m_s;
     return touch;
   }
+  void PassRigTime(double seconds) {
+    const double until_s = clock_.NowS() + seconds;
+    EXPECT_TRUE(Wait([&] { return clock_.NowS() >= until_s; }));
+  }
   void ExpectAtRestSoon() {
     EXPECT_TRUE(Wait([&] { return !controller_->Moving(); }));
     const Eigen::Vector3d here = controller_->BaseFromTip().translation();
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    PassRigTime(1);
     EXPECT_LT((controller_->BaseFromTip().translation() - here).norm(), 1e-6);
   }
 
+  const TestFolder folder_;
   rig::SimClock clock_;
   rig::Faults faults_;
   rig::ControllerOptions options_;
@@ -165,7 +178,8 @@ TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
   for (const gateway::arm::ArmState& state : arm_->History(now_s - 30, now_s))
     if (state.phase == gateway::arm::MotionPhase::kApproach)
       lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
-  EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01) << "it would have taken 40 s to the end";
+  EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01)
+      << "it would have taken 40 s of the rig's to the end";
 }
 
 TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
@@ -207,7 +221,6 @@ TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
     // Started after the stop it may run; stopped again it must not.
     ASSERT_TRUE(arm_->Stop().ok());
     ExpectAtRestSoon();
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
     EXPECT_FALSE(controller_->Moving()) << id;
   }
 }
@@ -258,12 +271,12 @@ TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
   EXPECT_THAT(std::string(arm_->Ready().message()), HasSubstr("PROTECTIVE_STOP"));
   EXPECT_EQ(arm_->StartTouch(SomeTouch(15)).code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(arm_->PowerOn([] { return absl::OkStatus(); }).code(), absl::StatusCode::kFailedPrecondition);
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  PassRigTime(2);
   EXPECT_EQ(arm_->State()->safety_mode, gateway::arm::SafetyMode::kProtectiveStop);
 }
 
 TEST_F(EmulatedArm, FrozenControllerIsToldAsSuchAndComesBack) {
-  faults_.Set("freeze", 8);
+  faults_.Set("freeze", 2);
   ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
   EXPECT_EQ(arm_->State().status().code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(std::string(arm_->State().status().message()), HasSubstr("silent"));

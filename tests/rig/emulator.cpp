@@ -158,11 +158,12 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
     base_from_object[object->name()] = FixtureOf(object->low_mm() * 1e-3, object->high_mm() * 1e-3);
     surfaces_[object->name()] = SurfaceOf(*object);
   }
+  clock_ = std::make_unique<SimClock>(options.speedup, ClockFile(options_));
+  faults_.Follow(clock_.get());
   for (const auto& [name, value] : options.faults)
     if (const std::string error = faults_.Set(name, value); !error.empty())
       throw std::invalid_argument(error);
 
-  clock_ = std::make_unique<SimClock>(options.speedup);
   DeviceOptions device;
   device.link = port_path();
   device.fingers = options.fingers, device.sensor = options.sensor, device.drift_ppm = options.drift_ppm;

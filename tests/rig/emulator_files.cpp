@@ -50,6 +50,10 @@ Eigen::Isometry3d FixtureOf(const Eigen::Vector3d& box_min_m, const Eigen::Vecto
   return Eigen::Isometry3d(Eigen::Translation3d((place * 1e6).array().round().matrix() * 1e-6));
 }
 
+std::string ClockFile(const EmulatorOptions& options) {
+  return options.dir + "/clock";
+}
+
 void WriteCalibration(const EmulatorOptions& options,
                       const std::map<std::string, Eigen::Isometry3d>& base_from_object) {
   std::string text = std::string("# ") + kNotice + ".\ntouchstone: calibration/1\n" +
@@ -76,6 +80,7 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
   text += "calibration = " + Quoted(dir + "/calibration.yaml") + "\n";
   text += "provenance_note = \"emulated rig: not a measurement of anything\"\n";
   text += absl::StrFormat("time_scale = %.9g\n", options.speedup);
+  text += "emulated_clock = " + Quoted(ClockFile(options)) + "\n";
   if (!addresses.program.empty())
     text += "mount_command = [" + Quoted(addresses.program) + ", \"tell\", " + Quoted(control) +
             ", \"mount\", \"{object}\", \"{up_face}\"]\n";

@@ -29,6 +29,8 @@ struct EmulatorAddresses {
   int camera_port = 0, control_port = 0;
   std::string program;  // for mount_command; empty: none
 };
+// Where the emulator's clock is kept for those who follow it.
+std::string ClockFile(const EmulatorOptions& options);
 // All in options.dir. Throw std::runtime_error.
 void WriteCalibration(const EmulatorOptions& options,
                       const std::map<std::string, Eigen::Isometry3d>& base_from_object);

@@ -35,7 +35,7 @@ class EmulatorTest : public testing::Test {
     off.close();
     EmulatorOptions options;
     options.dir = folder_.Path("rig"), options.meshes = {"box=" + folder_.Path("box.off")};
-    options.sigma_us = 0, options.powered = true, options.speedup = 4, options.program = "/usr/bin/true";
+    options.sigma_us = 0, options.powered = true, options.speedup = 20, options.program = "/usr/bin/true";
     options.hide = {"channel_latency.latency_us=1000,0,-1000"};
     emulator_ = Emulator::Start(options);
   }
@@ -56,8 +56,9 @@ TEST_F(EmulatorTest, WritesWhatAGatewayNeedsAndSaysThatItIsEmulated) {
     EXPECT_NE(Text(path).find("emulated rig"), std::string::npos) << path;
   const std::string config = Text(emulator_->config_path());
   for (const char* key :
-       {"journal = ", "audit_log = ", "calibration = ", "provenance_note = ", "time_scale = 4\n",
-        "mount_command = [\"/usr/bin/true\", \"tell\", ", "mesh = [\"box=", "[arm]\nmodel = \"ur3e\"",
+       {"journal = ", "audit_log = ", "calibration = ", "provenance_note = ", "time_scale = 20\n",
+        "emulated_clock = ", "mount_command = [\"/usr/bin/true\", \"tell\", ",
+        "mesh = [\"box=", "[arm]\nmodel = \"ur3e\"",
         "rtde_port = ", "[effector]\nport = ", "sensor = \"optical\"", "[camera]\nuri = \"http://"})
     EXPECT_NE(config.find(key), std::string::npos) << key << "\n" << config;
   // The box stands on the plate, 75 mm below the base.
@@ -110,7 +111,7 @@ TEST_F(EmulatorTest, TouchesTheBoxWhereItIsAsAProgramMovesTheArm) {
       } catch (const std::runtime_error&) {
       }
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
     touches = emulator_->Touches();
   }
   ASSERT_EQ(touches.size(), 1u);

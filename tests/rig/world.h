@@ -4,9 +4,11 @@
 // is called real.
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -14,21 +16,63 @@
 
 #include <Eigen/Geometry>
 
+#include "server/gateway/timing/paced_clock.h"
+
 namespace touchstone::rig {
 
-// Simulated seconds since the emulator began, `speedup` times as fast as the host's steady clock.
+// Simulated seconds since the emulator began. They pass at most `speedup` times as fast as the host's steady clock, and
+// only while every thread that takes part has done what was due until shortly before: what waits for the processor lets
+// no time pass.
 class SimClock {
  public:
-  explicit SimClock(double speedup = 1);
+  // How far time may be ahead of the part that is behind the others, host seconds.
+  static constexpr double kAheadHostS = 0.004;
+
+  // `file`: others follow it there (server/gateway/timing/paced_clock.h); empty: nobody does.
+  explicit SimClock(double speedup = 1, const std::string& file = "");
+  // Stands still but for MoveBy.
+  struct Manual {};
+  explicit SimClock(Manual, double speedup = 1);
+
   double NowS() const;
+  // The seconds of the host that have counted: those of the steady clock when it began, and NowS() / speedup since.
+  double HostS() const;
   double speedup() const { return speedup_; }
-  // Blocks the calling thread until then, or until `wake` (if given) returns true; it is asked every 0.2 ms
-  // of host time.
-  void SleepUntil(double sim_s, const std::function<bool()>& wake = nullptr) const;
+  // Time waits for a part.
+  bool Stands() const;
+
+  // Of a manual clock: lets time pass in steps, and returns when every part has done everything that was due by then.
+  void MoveBy(double sim_s, double step_s = 0.002);
+  bool manual() const { return manual_; }
+
+  // A thread of the rig, which time waits for.
+  class Part {
+   public:
+    // `wake` is called from another thread when a manual clock was moved.
+    Part(SimClock* clock, std::function<void()> wake);
+    ~Part();
+    Part(const Part&) = delete;
+    Part& operator=(const Part&) = delete;
+    // It has done everything that was due by then.
+    void Done(double sim_s);
+
+   private:
+    friend class SimClock;
+    SimClock* const clock_;
+    const std::function<void()> wake_;
+    double done_s_;
+  };
 
  private:
-  double speedup_;
-  double began_host_s_;
+  void SetUntil(double until_host_s);  // with mutex_
+  void Move();                         // likewise: as far as the parts allow
+
+  const double speedup_;
+  const bool manual_;
+  std::shared_ptr<gateway::timing::PacedClock> paced_;  // host seconds, as HostS()
+  mutable std::mutex mutex_;
+  std::condition_variable done_;
+  std::vector<Part*> parts_;
 };
 
 // One straight motion of the tip, or the end of one, as the controller plans it. Base frame,
@@ -85,17 +129,22 @@ class TipListener {
 //               camera_unplug     seconds of host time
 class Faults {
  public:
+  // Timed faults last so long on this clock (HostS); before: on the steady clock. It must live as long.
+  void Follow(const SimClock* clock) { clock_ = clock; }
   static const std::vector<std::string>& Names();
   // INVALID names and numbers: an error text; empty if it was done.
   std::string Set(const std::string& name, double value);
   double Get(const std::string& name) const;
   // Takes a one-time fault: its value, and back to 0.
   double Take(const std::string& name);
-  // Host seconds (steady clock) until which a timed fault (unplug, freeze, camera_unplug) lasts; 0:
+  // Host seconds until which a timed fault (unplug, freeze, camera_unplug) lasts; 0:
   // it does not.
   double UntilHostS(const std::string& name) const;
 
  private:
+  double HostS() const;
+
+  const SimClock* clock_ = nullptr;
   mutable std::mutex mutex_;
   std::map<std::string, double> values_;
   std::map<std::string, double> until_host_s_;

@@ -7,8 +7,8 @@
 
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
-#include <boost/math/distributions/students_t.hpp>
 
+#include "server/base/distributions.h"
 #include "server/base/random.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -221,8 +221,7 @@ void AddSteps(const BoardSet& set, const LensSearch& search, const LensChoice& f
               BoardDiagnosis* diagnosis) {
   const LensChoice& last = search.ladder.back();
   const LensVector errors = ResampledErrors(set, last, seed);
-  const double t =
-      boost::math::quantile(boost::math::students_t(static_cast<double>(set.pictures.size()) - 1), 0.975);
+  const double t = StudentQuantile(0.975, static_cast<double>(set.pictures.size()) - 1);
   for (size_t k = 0; k < last.terms.size(); ++k) {
     const LensTerm& term = LensTerms()[last.terms[k]];
     BoardStep step;

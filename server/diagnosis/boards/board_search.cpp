@@ -5,8 +5,7 @@
 #include <numeric>
 #include <optional>
 
-#include <boost/math/distributions/students_t.hpp>
-
+#include "server/base/distributions.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 
 namespace touchstone::diagnosis::boards {
@@ -86,8 +85,7 @@ bool PredictsBetter(const LensChoice& more, const LensChoice& less) {
 double LackOfFitP(const LensChoice& less, const LensChoice& more) {
   const MeanFall fall = MeanFallOf(less, more);
   if (!(fall.std_error > 0)) return fall.mean > 0 ? 0 : 1;
-  const boost::math::students_t distribution(static_cast<double>(more.unseen_px2.size()) - 1);
-  return boost::math::cdf(boost::math::complement(distribution, fall.mean / fall.std_error));
+  return StudentTail(fall.mean / fall.std_error, static_cast<double>(more.unseen_px2.size()) - 1);
 }
 
 LensSearch SearchNamed(const BoardSet& set, const BoardFit& start) {

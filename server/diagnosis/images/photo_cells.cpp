@@ -1,9 +1,9 @@
 #include "server/diagnosis/images/photo_cells.h"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
+
+#include "server/base/symmetric_eigen.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -109,11 +109,11 @@ Eigen::MatrixXf OrthonormalSpan(const Eigen::MatrixXf& columns, double tolerance
   }
   unit.conservativeResize(Eigen::NoChange, used);
   const Eigen::MatrixXd gram = (unit.transpose() * unit).cast<double>();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
+  const SymmetricEigen eigen = EigenOfSymmetric(gram);
   int kept = 0;
-  for (int i = 0; i < used; ++i) kept += eigen.eigenvalues()[i] > tolerance;
-  const Eigen::MatrixXd turned = eigen.eigenvectors().rightCols(kept) *
-                                 eigen.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  for (int i = 0; i < used; ++i) kept += eigen.values[i] > tolerance;
+  const Eigen::MatrixXd turned =
+      eigen.vectors.rightCols(kept) * eigen.values.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   return unit * turned.cast<float>();
 }
 

@@ -1,10 +1,9 @@
 #include "server/diagnosis/images/photo_covariates.h"
 
-#include <boost/math/distributions/students_t.hpp>
-
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/distributions.h"
 #include "server/base/units.h"
 
 namespace touchstone::diagnosis::images {
@@ -66,8 +65,7 @@ PhotoCovariate Judge(const std::string& name, const BinSums& bins, double low, d
     result.mean_grey.push_back(mean);
     if (error > 0) {
       const double t = std::abs(mean) / error;
-      smallest = std::min(
-          smallest, 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(with - 1), t)));
+      smallest = std::min(smallest, 2 * StudentTail(t, with - 1));
       explained += 0.5 * t * t;
     }
     // What the mean of the other folds takes from each fold.

@@ -2,11 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_candidates.h"
 #include "server/diagnosis/images/photo_covariates.h"
@@ -244,7 +244,7 @@ class PhotoLadder {
     const inference::Likelihood& likelihood = *selection_.fine.likelihood;
     const double q = likelihood.Gram(inference::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
-    const double p = boost::math::gamma_q(0.5 * freedom, 0.5 * q);
+    const double p = ChiSquaredTail(q, freedom);
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
     const bool misfit = (p < kRestP && std::sqrt(q / freedom) > kMisfitRows) ||
                         d_.final->rmse_grey > kMisfitPixels * d_.noise_floor.sigma_grey;

@@ -1,13 +1,12 @@
 #include "server/diagnosis/images/photo_quality.h"
 
-#include <boost/math/special_functions/gamma.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
 
+#include "server/base/distributions.h"
 #include "server/base/normal.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_cells.h"
@@ -109,7 +108,7 @@ double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expec
   double sum = 0;
   for (const double square : squares) sum += square;
   const double freedom = static_cast<double>(grid.size()) * p.size() - parameters;
-  return freedom > 0 ? boost::math::gamma_q(0.5 * freedom, 0.5 * sum / kVarianceKnown) : 1;
+  return ChiSquaredTail(sum / kVarianceKnown, freedom);
 }
 
 GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
@@ -124,8 +123,7 @@ void JudgeByPixels(const Photographs& p, const GreyNoiseFloor& floor, GreyQualit
   const double freedom = kEfficiency * p.width() * p.height() * p.size();
   const double ratio = quality->rmse_grey / (kContours * floor.sigma_grey);
   if (!(floor.sigma_grey > 0) || ratio <= 1) return;
-  quality->lack_of_fit_p =
-      std::min(quality->lack_of_fit_p, boost::math::gamma_q(0.5 * freedom, 0.5 * freedom * ratio * ratio));
+  quality->lack_of_fit_p = std::min(quality->lack_of_fit_p, ChiSquaredTail(freedom * ratio * ratio, freedom));
 }
 
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,

@@ -1,12 +1,12 @@
 #include "server/diagnosis/images/photo_search.h"
 
 #include <Eigen/Cholesky>
-#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
@@ -77,7 +77,7 @@ bool IsSeen(const inference::Fit& fit, int index, const Eigen::MatrixXd& covaria
   const Eigen::VectorXd scaled = scale.cwiseProduct(value);
   const Eigen::MatrixXd correlation = scale.asDiagonal() * part * scale.asDiagonal();
   const double wald = scaled.dot(correlation.ldlt().solve(scaled));
-  return wald > 0 && boost::math::gamma_q(0.5 * n, 0.5 * wald) < kStepP;
+  return ChiSquaredTail(wald, n) < kStepP;
 }
 
 absl::Status FindCompetitors(PhotoSelection* selection) {

@@ -1,11 +1,12 @@
 #include "server/diagnosis/images/photo_term_scores.h"
 
 #include <Eigen/Cholesky>
-#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "server/base/distributions.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -76,7 +77,7 @@ TermScore ScoreSums(const std::vector<PoseSums>& poses, const std::vector<int>& 
   const Eigen::MatrixXd prior = unit.asDiagonal() * (spread * precision) * unit.asDiagonal(),
                         both = unit.asDiagonal() * (all.squares + spread * precision) * unit.asDiagonal();
   score.gain_nats = 0.5 * all.cross.dot(score.values) / spread - 0.5 * (log_det(both) - log_det(prior));
-  score.p = boost::math::gamma_q(0.5 * p, std::max(0.5 * all.cross.dot(least) / spread, 0.0));
+  score.p = ChiSquaredTail(all.cross.dot(least) / spread, p);
 
   for (size_t fold = 0; fold < kUnseenFolds; ++fold) {
     PoseSums seen = all;

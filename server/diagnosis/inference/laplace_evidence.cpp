@@ -1,10 +1,11 @@
 #include "server/diagnosis/inference/laplace_evidence.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
+
+#include "server/base/symmetric_eigen.h"
 
 namespace touchstone::diagnosis::inference {
 namespace {
@@ -90,9 +91,9 @@ Eigen::MatrixXd ScaledInformation(const Eigen::MatrixXd& gram, const std::vector
 double OccamNats(const Eigen::MatrixXd& information, int rows) {
   double occam = 0;
   if (information.rows() == 0) return occam;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information, Eigen::EigenvaluesOnly);
+  const Eigen::VectorXd eigenvalues = EigenvaluesOfSymmetric(information);
   for (int i = 0; i < information.rows(); ++i) {
-    const double seen = std::max(eigen.eigenvalues()[i], 0.0);
+    const double seen = std::max(eigenvalues[i], 0.0);
     occam += 0.5 * std::log1p(rows * seen / (seen + kVisible));
   }
   return occam;

@@ -1,12 +1,12 @@
 #include "server/diagnosis/inference/likelihood.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/matern.h"
+#include "server/base/symmetric_eigen.h"
 #include "server/diagnosis/inference/support_points.h"
 
 namespace touchstone::diagnosis::inference {
@@ -38,12 +38,12 @@ Eigen::MatrixXd OrthogonalFeatures(const std::vector<SmoothErrorSite>& sites,
   }
   // raw L^-T: features of unit variance.
   const Eigen::MatrixXd z = cholesky.matrixL().solve(raw.transpose()).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z);
-  const double min_energy = 1e-7 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
+  const SymmetricEigen eigen = EigenOfSymmetric(z.transpose() * z);
+  const double min_energy = 1e-7 * std::max(eigen.values.maxCoeff(), 1e-300);
   int kept = 0;
-  for (int a = 0; a < m; ++a) kept += eigen.eigenvalues()[a] > min_energy;
-  *energies = eigen.eigenvalues().tail(kept);
-  return z * eigen.eigenvectors().rightCols(kept);
+  for (int a = 0; a < m; ++a) kept += eigen.values[a] > min_energy;
+  *energies = eigen.values.tail(kept);
+  return z * eigen.vectors.rightCols(kept);
 }
 
 }  // namespace

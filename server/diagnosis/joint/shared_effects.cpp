@@ -2,12 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Cholesky>
-#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_search.h"
@@ -42,7 +42,7 @@ double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covarianc
                           std::sqrt(covariance(known[a], known[a]) * covariance(known[b], known[b]));
   }
   const double wald = scaled.dot(correlation.ldlt().solve(scaled));
-  return wald > 0 ? boost::math::gamma_q(0.5 * n, 0.5 * wald) : 1;
+  return ChiSquaredTail(wald, n);
 }
 
 // Everything that both searches work on. The parts point to one another.

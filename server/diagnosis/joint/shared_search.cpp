@@ -1,11 +1,10 @@
 #include "server/diagnosis/joint/shared_search.h"
 
-#include <boost/math/special_functions/gamma.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 
@@ -20,10 +19,6 @@ constexpr int kMaxShared = 2;       // effects
 
 selection::SearchRules Rules() {
   return {};
-}
-
-double ChiSquaredP(double x, int freedom) {
-  return x > 0 && freedom > 0 ? boost::math::gamma_q(0.5 * freedom, 0.5 * x) : 1;
 }
 
 // A form of a shared effect with the evidence that each kind expects of it by itself, linearly.
@@ -133,7 +128,7 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
   const int added = std::max(
       static_cast<int>(after.fit.parameters.size()) - static_cast<int>(before.fit.parameters.size()), 1);
   const double ratio = 2 * (after.fit.log_likelihood - before.fit.log_likelihood);
-  if (static_cast<double>(forms) * ChiSquaredP(ratio, added) > Rules().family_wise_p) return false;
+  if (static_cast<double>(forms) * ChiSquaredTail(ratio, added) > Rules().family_wise_p) return false;
   return PredictsUnseen(sides, before, after);
 }
 

@@ -2,12 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <boost/math/distributions/chi_squared.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "server/base/distributions.h"
 #include "server/diagnosis/touches/noise_sample.h"
 #include "server/model/model.h"
 
@@ -40,8 +40,7 @@ double DifferenceP(const std::vector<Level>& levels, int fingers) {
             LogOfShare(level.expected - level.silent, level.expected, 1 - silent / expected);
   }
   if (with_readings < 2 || !(gain > 0)) return 1;
-  return boost::math::cdf(
-      boost::math::complement(boost::math::chi_squared(with_readings - 1), 2 * gain / fingers));
+  return ChiSquaredTail(2 * gain / fingers, with_readings - 1);
 }
 
 std::string InWords(const std::vector<Level>& levels) {

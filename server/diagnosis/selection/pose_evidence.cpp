@@ -1,11 +1,10 @@
 #include "server/diagnosis/selection/pose_evidence.h"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/symmetric_eigen.h"
 #include "server/effects/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {
@@ -129,10 +128,10 @@ double PoseEvidence::NatsOfOwnErrors(OwnError kind) const {
       inner += row_per_m * row_per_m * h.col(i) * h.col(i).transpose();
       mean_row_per_m += details_.inverse_speed_s_per_m[e] / (fingers * static_cast<double>(means_.size()));
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inner);
-    const Eigen::VectorXd turned = eigen.eigenvectors().transpose() * mean.mean.col(0);
+    const SymmetricEigen eigen = EigenOfSymmetric(inner);
+    const Eigen::VectorXd turned = eigen.vectors.transpose() * mean.mean.col(0);
     for (Eigen::Index j = 0; j < turned.size(); ++j) {
-      energies.push_back(std::max(eigen.eigenvalues()[j], 0.0));
+      energies.push_back(std::max(eigen.values[j], 0.0));
       squares_s2.push_back(turned[j] * turned[j]);
     }
   }

@@ -1,11 +1,9 @@
 #include "server/diagnosis/selection/quality.h"
 
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
-
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 
@@ -24,8 +22,7 @@ double RatioOf(const inference::Fit& fit, double heldout_rmse_s) {
 // Without repeats: how much better a smooth remainder explains the residuals than none.
 double SmoothRemainderP(const Workspace& workspace, const inference::Fit& fit) {
   const double gain = std::max(SurfaceErrorNats(workspace, fit), 0.0);
-  return 0.5 * boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), 2 * gain)) +
-         (gain > 0 ? 0 : 0.5);
+  return 0.5 * ChiSquaredTail(2 * gain, 1) + (gain > 0 ? 0 : 0.5);
 }
 
 }  // namespace
@@ -40,7 +37,7 @@ double LackOfFitP(const touches::Observations& o, const std::vector<double>& res
   if (!HasRepeats(pure) || dof < 1 || !(pure.sum_of_squares > 0)) return 1;
   const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / dof /
                    (pure.sum_of_squares / pure.degrees_of_freedom);
-  return boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof, pure.degrees_of_freedom), f));
+  return FisherTail(f, dof, pure.degrees_of_freedom);
 }
 
 absl::StatusOr<Quality> QualityOf(const Workspace& workspace, const inference::Fit& fit,
@@ -102,9 +99,9 @@ NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vector<double
   if (error.degrees_of_freedom > 0)
     floor.sigma_s = std::sqrt(error.sum_of_squares / error.degrees_of_freedom);
   if (error.degrees_of_freedom >= 1) {
-    const boost::math::chi_squared distribution(error.degrees_of_freedom);
     const auto bound_s = [&](double p) {
-      return floor.sigma_s * std::sqrt(error.degrees_of_freedom / boost::math::quantile(distribution, p));
+      return floor.sigma_s *
+             std::sqrt(error.degrees_of_freedom / ChiSquaredQuantile(p, error.degrees_of_freedom));
     };
     floor.lower_s = bound_s(0.975);
     floor.upper_s = bound_s(0.025);

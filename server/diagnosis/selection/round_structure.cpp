@@ -2,13 +2,12 @@
 
 #include <absl/strings/str_format.h>
 #include <Eigen/QR>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/distributions.h"
 #include "server/base/random.h"
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
@@ -159,8 +158,7 @@ double PermutedP(const Squares& squares, int fingers) {
   const double mean = sum / kPermutations;
   const double variance = (sum2 - sum * mean) / (kPermutations - 1);
   if (!(mean > 0) || !(variance > 0)) return 1;
-  const boost::math::gamma_distribution<> chance(mean * mean / variance, variance / mean);
-  return boost::math::cdf(boost::math::complement(chance, std::max(squares.explained, 0.0)));
+  return GammaTail(std::max(squares.explained, 0.0), mean, variance);
 }
 
 }  // namespace
@@ -184,8 +182,7 @@ RoundStructure FindRoundStructure(const touches::Observations& o, const touches:
   found.gain_nats = 0.5 * squares.all_dof * std::log(squares.all / rest) -
                     0.5 * squares.explained_dof * std::log(squares.all_dof);
   const double f = std::max(squares.explained / squares.explained_dof / (rest / rest_dof), 0.0);
-  found.p =
-      boost::math::cdf(boost::math::complement(boost::math::fisher_f(squares.explained_dof, rest_dof), f));
+  found.p = FisherTail(f, squares.explained_dof, rest_dof);
   // The F test takes noise of one size for granted.
   if (found.p < kPermutedBelowP) found.p = std::max(found.p, PermutedP(squares, o.fingers));
   return found;

@@ -1,11 +1,11 @@
 #include "server/diagnosis/selection/stepwise_search.h"
 
 #include <absl/strings/str_cat.h>
-#include <boost/math/special_functions/gamma.hpp>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/distributions.h"
 #include "server/base/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
@@ -33,12 +33,6 @@ bool HaveRowsForOwnValues(const inference::ObservationModel& observations,
     if (own > 0 && rows < min_rows_per_parameter * (own + 1)) return false;
   }
   return true;
-}
-
-// P(chi^2_q > x)
-double ChiSquaredTail(double x, int q) {
-  if (x <= 0 || q <= 0) return 1;
-  return boost::math::gamma_q(0.5 * q, 0.5 * x);
 }
 
 }  // namespace

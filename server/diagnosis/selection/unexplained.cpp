@@ -1,12 +1,11 @@
 // What is left when no cause of the catalogue explains it.
 #include <Eigen/QR>
 
-#include <boost/math/special_functions/gamma.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curve_competition.h"
@@ -50,7 +49,7 @@ std::string FormulaYaml(const inference::Fit& fit, int index) {
 std::vector<CovariateTest> TestCovariates(const std::vector<FormulaTerm>& terms, const std::string& first) {
   std::map<std::string, CovariateTest> tests;
   for (const FormulaTerm& term : terms) {
-    const double tail = boost::math::gamma_q(0.5 * term.degrees_of_freedom, std::max(term.log_ratio, 0.0));
+    const double tail = ChiSquaredTail(2 * term.log_ratio, term.degrees_of_freedom);
     const double p = std::min(1.0, tail * static_cast<double>(terms.size()));
     CovariateTest& test = tests[term.covariate];
     if (!test.name.empty() && test.gain_nats >= term.gain_nats) continue;

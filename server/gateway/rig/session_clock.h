@@ -19,7 +19,7 @@ namespace touchstone::gateway {
 
 struct HostClocks {
   std::string boot_id;  // of the kernel; another one after every boot
-  double boot_s = 0;    // CLOCK_BOOTTIME
+  double boot_s = 0;    // CLOCK_BOOTTIME, less what an emulated rig's clock is behind
   double unix_s = 0;    // the wall clock
 };
 HostClocks ReadHostClocks();

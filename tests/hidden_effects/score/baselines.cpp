@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/base/status.h"
+#include "server/base/symmetric_eigen.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
@@ -130,9 +131,9 @@ double GaussianProcessNats(const diagnosis::touches::Observations& observations,
     }
     features /= std::sqrt(kWaves) * sigma_s;
     part /= sigma_s;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(features.transpose() * features);
-    eigenvalues.push_back(solver.eigenvalues().cwiseMax(0));
-    loads.push_back(solver.eigenvectors().transpose() * (features.transpose() * part));
+    const SymmetricEigen solver = EigenOfSymmetric(features.transpose() * features);
+    eigenvalues.push_back(solver.values.cwiseMax(0));
+    loads.push_back(solver.vectors.transpose() * (features.transpose() * part));
   }
   double best = 0;
   for (double amplitude_s = 0.05 * sigma_s; amplitude_s < 20 * sigma_s; amplitude_s *= 1.4) {

@@ -1,10 +1,9 @@
 #include "tests/hidden_effects/score/table.h"
 
-#include <boost/math/special_functions/beta.hpp>
-
 #include <cstdio>
 #include <vector>
 
+#include "server/base/distributions.h"
 #include "tests/hidden_effects/score/verify.h"
 
 namespace touchstone::hidden {
@@ -108,8 +107,7 @@ std::string Of(const Rates& rates, const Row& row, const char* measure) {
 
 std::pair<double, double> Interval(const Rate& rate) {
   const double yes = rate.yes, no = rate.of - rate.yes;
-  return {yes == 0 ? 0 : boost::math::ibeta_inv(yes, no + 1, 0.025),
-          no == 0 ? 1 : boost::math::ibeta_inv(yes + 1, no, 0.975)};
+  return {yes == 0 ? 0 : BetaQuantile(0.025, yes, no + 1), no == 0 ? 1 : BetaQuantile(0.975, yes + 1, no)};
 }
 
 std::string Table(const Results& results) {

@@ -8,6 +8,7 @@
 #include "tests/rig/controller/net.h"
 #include "tests/rig/controller/program_reader.h"
 #include "tests/rig/controller/rtde_session.h"
+#include "tests/rig/controller/unread.h"
 
 namespace touchstone::rig {
 
@@ -38,6 +39,8 @@ struct Client {
     return rtde && rtde->started() ? 1 / rtde->rate_hz() : std::numeric_limits<double>::infinity();
   }
   bool WantsData() const { return realtime() || (rtde && rtde->started()); }
+  // Data were sent to it that it has not read yet.
+  bool HasToRead() { return WantsData() && patience.WaitsFor(UnreadByPeer(connection.fd())); }
 
   Port port;
   QueuedConnection connection;
@@ -45,6 +48,7 @@ struct Client {
   std::string received;
   ProgramReader programs;
   std::unique_ptr<RtdeSession> rtde;
+  ReaderPatience patience;
   double next_data_s = 0;    // simulated time at which the next package is due
   double data_cycle_s = -1;  // that of the last one
 };

@@ -27,7 +27,8 @@ namespace {
 
 constexpr double kStateEveryS = 0.1;  // primary and secondary, host time
 constexpr double kMinCycleS = 0.001;  // of the control loop, host time
-constexpr double kMaxIdleS = 0.005;   // between two looks at the faults, host time
+constexpr double kMaxIdleS = 0.002;   // between two looks at the faults, host time
+constexpr double kLookAgainS = 2e-4;  // whether clients have read, host time
 constexpr size_t kMaxConnections = 64, kMaxLine = 65536, kMaxCommands = 10'000;
 constexpr double kRoundingS = 1e-9;  // of the times of cycles
 constexpr int kMaxLateData = 50;     // packages that a late host makes up for
@@ -35,8 +36,7 @@ constexpr int kMaxLateData = 50;     // packages that a late host makes up for
 // One thread serves the sockets and moves the arm.
 class EmulatedController : public Controller {
  public:
-  EmulatedController(const ControllerOptions& options, const SimClock* clock, Faults* faults,
-                     TipListener* tip)
+  EmulatedController(const ControllerOptions& options, SimClock* clock, Faults* faults, TipListener* tip)
       : options_(options),
         clock_(clock),
         faults_(faults),
@@ -64,16 +64,15 @@ class EmulatedController : public Controller {
     ports_ = {
         bound[kDashboard], bound[kPrimary],         bound[kSecondary],         bound[kRealtime],
         bound[kRtde],      bound[kPrimaryReadOnly], bound[kSecondaryReadOnly], bound[kRealtimeReadOnly]};
+    part_ = std::make_unique<SimClock::Part>(clock, [this] { Wake(); });
     thread_ = std::thread([this] { Loop(); });
   }
 
   ~EmulatedController() override {
     stop_ = true;
-    const uint64_t one = 1;
-    if (write(wake_, &one, sizeof one) < 0) {
-      // The loop wakes by itself soon.
-    }
+    Wake();
     thread_.join();
+    part_.reset();
     clients_.clear();
     CloseListeners();
   }
@@ -112,6 +111,11 @@ class EmulatedController : public Controller {
   }
 
  private:
+  void Wake() {
+    const uint64_t one = 1;
+    if (write(wake_, &one, sizeof one) < 0) return;  // already awake
+  }
+
   void Take(const std::string& command) {
     if (commands_.size() < kMaxCommands) commands_.push_back(command);
   }
@@ -135,12 +139,24 @@ class EmulatedController : public Controller {
     prctl(PR_SET_TIMERSLACK, 1000, 0, 0, 0);
     while (!stop_) {
       std::vector<pollfd> polled = Polled();
-      const double wait_s = std::clamp(NextWakeHostS() - HostNowS(), 0.0, kMaxIdleS);
+      const double wait_s = std::clamp(NextWakeHostS() - clock_->HostS(), clock_->Stands() ? kLookAgainS : 0,
+                                       readers_behind_ ? kLookAgainS : kMaxIdleS);
       const timespec timeout{0, static_cast<long>(wait_s * 1e9)};
       ppoll(polled.data(), polled.size(), &timeout, nullptr);
+      if (uint64_t count; polled[0].revents != 0 && read(wake_, &count, sizeof count) < 0) continue;
       std::lock_guard<std::recursive_mutex> lock(mutex_);
-      Turn();
+      const double now_s = clock_->NowS();
+      Turn(now_s);
+      readers_behind_ = ReadersAreBehind();
+      if (!readers_behind_) part_->Done(now_s);
     }
+  }
+
+  // A manual clock is moved by who reads.
+  bool ReadersAreBehind() {
+    bool behind = false;
+    for (Client& client : clients_) behind |= !clock_->manual() && client.HasToRead();
+    return behind;
   }
 
   std::vector<pollfd> Polled() const {
@@ -156,7 +172,7 @@ class EmulatedController : public Controller {
   }
 
   double NextWakeHostS() const {
-    const double host_s = HostNowS(), sim_s = clock_->NowS();
+    const double host_s = clock_->HostS(), sim_s = clock_->NowS();
     double next = host_s + kMaxIdleS;
     if (frozen_) return std::min(next, faults_ ? faults_->UntilHostS("freeze") : next);
     next = std::min(next, next_state_s_);
@@ -180,12 +196,12 @@ class EmulatedController : public Controller {
     return (std::floor(sim_s / machine_.cycle_s()) + 1) * machine_.cycle_s() - sim_s;
   }
 
-  void Turn() {
-    last_turn_s_ = HostNowS();
+  void Turn(double now_s) {
+    last_turn_s_ = clock_->HostS();
     Accept();
     const bool freeze = faults_ && faults_->UntilHostS("freeze") > 0;
-    if (freeze && !frozen_) machine_.Freeze(clock_->NowS());
-    if (!freeze && frozen_) machine_.Thaw(clock_->NowS());
+    if (freeze && !frozen_) machine_.Freeze(now_s);
+    if (!freeze && frozen_) machine_.Thaw(now_s);
     frozen_ = freeze;
     if (faults_ && faults_->Take("disconnect") != 0) clients_.clear();
     if (frozen_) return;
@@ -194,8 +210,8 @@ class EmulatedController : public Controller {
     const auto changed = [this] {
       if (clock_->speedup() > 1) SendData(true);
     };
-    SendDueData(clock_->NowS(), changed);
-    machine_.Advance(clock_->NowS(), changed);
+    SendDueData(now_s, changed);
+    machine_.Advance(now_s, changed);
     input_came_ = false;
     for (Client& client : clients_) Receive(&client);
     machine_.Advance(machine_.now_s(), changed);
@@ -206,7 +222,7 @@ class EmulatedController : public Controller {
         if (client.GetsMessages()) client.connection.Send(packet);
     }
     SendStates();
-    const double host_s = HostNowS();
+    const double host_s = clock_->HostS();
     for (auto client = clients_.begin(); client != clients_.end();) {
       client->connection.Flush(host_s);
       client = client->connection.open() ? std::next(client) : clients_.erase(client);
@@ -293,7 +309,7 @@ class EmulatedController : public Controller {
   // `all`: to every client that wants data, beside its rate. A client that does not read gets the newest once it does.
   // No cycle is sent twice to anybody.
   void SendData(bool all) {
-    const double host_s = HostNowS(), now_s = machine_.now_s();
+    const double host_s = clock_->HostS(), now_s = machine_.now_s();
     const double cycle_s = std::floor(now_s / machine_.cycle_s() + 1e-6) * machine_.cycle_s();
     std::optional<RobotState> state;
     for (Client& client : clients_) {
@@ -321,7 +337,7 @@ class EmulatedController : public Controller {
   }
 
   void SendStates() {
-    const double host_s = HostNowS();
+    const double host_s = clock_->HostS();
     if (host_s < next_state_s_) return;
     next_state_s_ = std::max(next_state_s_ + kStateEveryS, host_s + kStateEveryS / 2);
     std::string packet;
@@ -333,7 +349,7 @@ class EmulatedController : public Controller {
   }
 
   const ControllerOptions options_;
-  const SimClock* const clock_;
+  SimClock* const clock_;
   Faults* const faults_;
   mutable std::recursive_mutex mutex_;  // a listener may ask for the pose while it is told of a motion
   Machine machine_;
@@ -344,15 +360,16 @@ class EmulatedController : public Controller {
   int listeners_[kPorts];
   int wake_ = -1;
   Ports ports_;
-  bool frozen_ = false, input_came_ = false;
+  bool frozen_ = false, input_came_ = false, readers_behind_ = false;
   double next_state_s_ = 0, last_turn_s_ = 0;
   std::atomic<bool> stop_{false};
+  std::unique_ptr<SimClock::Part> part_;
   std::thread thread_;
 };
 
 }  // namespace
 
-std::unique_ptr<Controller> Controller::Start(const ControllerOptions& options, const SimClock* clock,
+std::unique_ptr<Controller> Controller::Start(const ControllerOptions& options, SimClock* clock,
                                               Faults* faults, TipListener* tip) {
   return std::make_unique<EmulatedController>(options, clock, faults, tip);
 }

@@ -1,11 +1,10 @@
 #include "tests/rig/controller.h"
 
-#include <thread>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/rig/controller/test_client.h"
+#include "tests/rig/controller/unread.h"
 
 namespace touchstone::rig {
 namespace {
@@ -76,15 +75,15 @@ ControllerOptions Powered() {
 class TouchAtSpeedup : public testing::TestWithParam<double> {};
 
 TEST_P(TouchAtSpeedup, RunsThroughItsPhasesAndKeepsItsRegisters) {
-  SimClock clock(GetParam());
+  SimClock clock(SimClock::Manual(), GetParam());
   Faults faults;
   Surface surface(-10);
   const auto controller = Controller::Start(Powered(), &clock, &faults, &surface);
   {
-    TouchClient touch(controller->ports().rtde);
+    TouchClient touch(controller->ports().rtde, "", &clock);
     TestClient script(controller->ports().secondary);
     std::string text = kTouch;
-    // The watchdog counts simulated time: at a thousand times the speed no host beats in time.
+    // The watchdog counts simulated time, and this client beats once a package.
     if (GetParam() > 1) text.replace(text.find("10.0"), 4, "0.0001");
     touch.Beat();
     script.Send(text);
@@ -101,7 +100,7 @@ TEST_P(TouchAtSpeedup, RunsThroughItsPhasesAndKeepsItsRegisters) {
     EXPECT_NEAR(touch.pose[2], start_z, 1e-4);
     EXPECT_EQ(touch.safety_mode, 1);
   }
-  TouchClient again(controller->ports().rtde);
+  TouchClient again(controller->ports().rtde, "", &clock);
   again.Next();
   EXPECT_EQ(again.program, 7);
   EXPECT_EQ(again.phase, 5);
@@ -114,7 +113,7 @@ TEST_P(TouchAtSpeedup, RunsThroughItsPhasesAndKeepsItsRegisters) {
 INSTANTIATE_TEST_SUITE_P(Speeds, TouchAtSpeedup, testing::Values(1.0, 20.0, 1000.0));
 
 TEST(Controller, StopsProtectivelyWhereAFingerIsPushedTooFar) {
-  SimClock clock(20);
+  SimClock clock(SimClock::Manual(), 20);
   Faults faults;
   Surface surface(-10);
   auto options = Powered();
@@ -122,7 +121,7 @@ TEST(Controller, StopsProtectivelyWhereAFingerIsPushedTooFar) {
   const double z = probe->BaseFromFlange().translation().z();
   Surface near(z - 0.03);
   const auto controller = Controller::Start(options, &clock, &faults, &near);
-  TouchClient touch(controller->ports().rtde);
+  TouchClient touch(controller->ports().rtde, "", &clock);
   TestClient script(controller->ports().secondary);
   script.Send(
       "def push():\n write_output_integer_register(25, 1)\n"
@@ -137,24 +136,24 @@ TEST(Controller, StopsProtectivelyWhereAFingerIsPushedTooFar) {
   // Nothing moves until it is unlocked, which takes 5 s.
   script.Send("movel(pose_trans(get_target_tcp_pose(), p[0,0,-0.05,0,0,0]))\n");
   std::string answer;
-  const double begin_s = HostNowS();
+  const double begin_s = clock.NowS();
   while ((answer = dashboard.Ask("unlock protective stop")) != "Protective stop releasing") {
     EXPECT_EQ(answer,
               "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective "
               "stop before "
               "unlocking");
-    ASSERT_LT(HostNowS(), begin_s + 30);
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ASSERT_LT(clock.NowS(), begin_s + 6);
+    clock.MoveBy(0.1);
   }
   touch.Until([&] { return touch.safety_mode == 1; });
   EXPECT_EQ(controller->Count("programs"), 1u);
 }
 
 TEST(Controller, EndsTheProgramWhoseWatchdogNobodyFeeds) {
-  SimClock clock(10);
+  SimClock clock(SimClock::Manual(), 10);
   Faults faults;
   const auto controller = Controller::Start(Powered(), &clock, &faults, nullptr);
-  TouchClient touch(controller->ports().rtde);
+  TouchClient touch(controller->ports().rtde, "", &clock);
   TestClient script(controller->ports().secondary);
   script.Send(
       "def watched():\n rtde_set_watchdog(\"input_int_register_24\", 0.05, \"stop\")\n"
@@ -169,6 +168,51 @@ TEST(Controller, EndsTheProgramWhoseWatchdogNobodyFeeds) {
   EXPECT_EQ(controller->Count("watchdog_stops"), 1u);
   EXPECT_EQ(controller->Count("protective_stops"), 0u);
   EXPECT_EQ(touch.safety_mode, 1);
+}
+
+// Until the clock has stood for 50 ms of the host; false: it goes on and on.
+bool WaitsForSomebody(const SimClock& clock) {
+  double since_s = HostNowS();
+  for (const double until_s = since_s + 0.7; HostNowS() < until_s;) {
+    if (!clock.Stands()) since_s = HostNowS();
+    if (HostNowS() > since_s + 0.05) return true;
+  }
+  return false;
+}
+
+TEST(Controller, LetsTimeWaitForAClientThatDoesNotReadUntilItHasHungForASecond) {
+  SimClock clock(20);
+  Faults faults;
+  const auto controller = Controller::Start(Powered(), &clock, &faults, nullptr);
+  TouchClient client(controller->ports().rtde);
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(WaitsForSomebody(clock)) << k;
+    const double stood_s = clock.NowS();
+    EXPECT_EQ(clock.NowS(), stood_s);
+    client.Until([&] { return client.timestamp_s > stood_s; });
+    EXPECT_GT(clock.NowS(), stood_s);
+  }
+  // A second later time passes without it, until it reads again.
+  const double stood_s = clock.NowS(), began_s = HostNowS();
+  while (clock.NowS() < stood_s + 100 * SimClock::kAheadHostS * clock.speedup())
+    ASSERT_LT(HostNowS(), began_s + 30);
+  EXPECT_GT(HostNowS(), began_s + 0.9 * ReaderPatience::kPatienceS);
+  const double now_s = clock.NowS();
+  client.Until([&] { return client.timestamp_s > now_s; });
+  EXPECT_TRUE(WaitsForSomebody(clock));
+}
+
+TEST(ReaderPatience, EndsAfterASecondWithoutReadingAndBeginsAnewWithIt) {
+  ReaderPatience patience;
+  EXPECT_FALSE(patience.WaitsFor(0));
+  EXPECT_TRUE(patience.WaitsFor(10));
+  EXPECT_TRUE(patience.WaitsFor(20));
+  const double began_s = HostNowS();
+  while (patience.WaitsFor(20)) ASSERT_LT(HostNowS(), began_s + 30);
+  EXPECT_FALSE(patience.WaitsFor(30)) << "more to read is nothing read";
+  EXPECT_TRUE(patience.WaitsFor(29));
+  EXPECT_FALSE(patience.WaitsFor(0));
+  EXPECT_TRUE(patience.WaitsFor(1));
 }
 
 }  // namespace

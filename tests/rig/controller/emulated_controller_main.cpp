@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
     }
   }
   try {
-    const SimClock clock(speedup);
+    SimClock clock(speedup);
     Faults faults;
     const auto controller = Controller::Start(options, &clock, &faults, nullptr);
     const auto ports = controller->ports();

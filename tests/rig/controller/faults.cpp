@@ -1,6 +1,6 @@
-#include <chrono>
 #include <cmath>
 
+#include "tests/rig/controller/net.h"
 #include "tests/rig/world.h"
 
 namespace touchstone::rig {
@@ -44,10 +44,6 @@ const Row* Find(const std::string& name) {
   return nullptr;
 }
 
-double HostS() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 std::string Complaint(const Row& row, double value) {
   const std::string which = "fault '" + std::string(row.name) + "' = " + std::to_string(value) + ": ";
   if (!std::isfinite(value)) return which + "must be a finite number";
@@ -69,6 +65,10 @@ std::string Complaint(const Row& row, double value) {
 }
 
 }  // namespace
+
+double Faults::HostS() const {
+  return clock_ != nullptr ? clock_->HostS() : HostNowS();
+}
 
 const std::vector<std::string>& Faults::Names() {
   static const std::vector<std::string> names = [] {

@@ -1,9 +1,13 @@
+#include <atomic>
 #include <cmath>
+#include <stdexcept>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "tests/rig/controller/machine.h"
 #include "tests/rig/controller/motion.h"
+#include "tests/rig/controller/net.h"
 
 namespace touchstone::rig {
 namespace {
@@ -279,14 +283,71 @@ TEST(Faults, AreEachRigsOwnAndRefuseWhatMakesNoSense) {
   for (const std::string& name : Faults::Names()) EXPECT_EQ(one.Set(name, 0), "") << name;
 }
 
-TEST(SimClock, WakesEarlyWhenItIsToldTo) {
-  const SimClock clock(1000);
-  const double begin_s = clock.NowS();
-  clock.SleepUntil(begin_s + 20);
-  EXPECT_GE(clock.NowS(), begin_s + 20);
-  int asked = 0;
-  clock.SleepUntil(1e18, [&] { return ++asked > 3; });
-  EXPECT_EQ(asked, 4);
+TEST(SimClock, WaitsForThePartThatIsBehind) {
+  SimClock clock(1e9);  // what the host's clock leaves room for, it shows at once
+  EXPECT_FALSE(clock.Stands()) << "without parts nothing is waited for";
+  SimClock::Part first(&clock, nullptr);
+  {
+    SimClock::Part second(&clock, nullptr);
+    const double ahead_s = SimClock::kAheadHostS * clock.speedup();
+    first.Done(1e18);
+    while (!clock.Stands()) continue;
+    const double stood_s = clock.NowS();
+    EXPECT_EQ(clock.NowS(), stood_s);
+    second.Done(stood_s);
+    EXPECT_FALSE(clock.Stands());
+    while (!clock.Stands()) continue;
+    EXPECT_NEAR(clock.NowS(), stood_s + ahead_s, 1e-6 * ahead_s);
+  }
+  EXPECT_FALSE(clock.Stands()) << "who has left is not waited for";
+}
+
+TEST(SimClock, DoesNotMakeUpForTheTimeThatItStood) {
+  SimClock clock(1);
+  SimClock::Part part(&clock, nullptr);
+  while (!clock.Stands()) continue;
+  const double stood_s = clock.NowS(), until_s = HostNowS() + 0.02;
+  while (HostNowS() < until_s) continue;
+  part.Done(stood_s);
+  EXPECT_LT(clock.NowS(), stood_s + SimClock::kAheadHostS);
+  EXPECT_LE(clock.HostS(), HostNowS() - 0.02);
+}
+
+TEST(SimClock, OfATestMovesAsItIsTold) {
+  SimClock clock(SimClock::Manual(), 4);
+  EXPECT_EQ(clock.NowS(), 0);
+  const double host_s = clock.HostS();
+  std::atomic<int> woken{0};
+  std::atomic<bool> ending{false};
+  std::atomic<double> done_s{0};
+  SimClock::Part part(&clock, [&] { ++woken; });
+  std::thread thread([&] {
+    while (!ending) {
+      const double now_s = clock.NowS();
+      done_s = now_s;
+      part.Done(now_s);
+    }
+  });
+  clock.MoveBy(0.01, 0.004);
+  EXPECT_NEAR(done_s, 0.01, 1e-12) << "it came back before the part was done";
+  ending = true;
+  thread.join();
+  EXPECT_EQ(woken, 3);
+  EXPECT_NEAR(clock.NowS(), 0.01, 1e-12);
+  EXPECT_NEAR(clock.HostS(), host_s + 0.0025, 1e-6);
+  EXPECT_THROW(SimClock(2).MoveBy(1), std::logic_error);
+}
+
+TEST(Faults, LastAsLongOnTheClockThatTheyFollow) {
+  SimClock clock(SimClock::Manual(), 10);
+  Faults faults;
+  faults.Follow(&clock);
+  faults.Set("freeze", 2);
+  EXPECT_GT(faults.UntilHostS("freeze"), 0);
+  clock.MoveBy(19.5);
+  EXPECT_GT(faults.UntilHostS("freeze"), 0);
+  clock.MoveBy(1);
+  EXPECT_EQ(faults.UntilHostS("freeze"), 0);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "tests/rig/controller/net.h"
 #include "tests/rig/controller/rtde_session.h"
 #include "tests/rig/controller/wire.h"
+#include "tests/rig/world.h"
 
 namespace touchstone::rig {
 
@@ -57,8 +58,14 @@ class TestClient {
     Send(question + "\n");
     return Line();
   }
+  // Likewise where time stands still unless it is moved: by one package of data whenever nothing is there to be read.
+  bool More(SimClock* clock) {
+    for (pollfd polled{fd_, POLLIN, 0}; clock != nullptr && poll(&polled, 1, 0) == 0;)
+      clock->MoveBy(kPackageS * clock->speedup(), kPackageS * clock->speedup());
+    return More();
+  }
   // One RTDE message: its type and payload.
-  std::pair<char, std::string> Rtde() {
+  std::pair<char, std::string> Rtde(SimClock* clock = nullptr) {
     for (;;) {
       if (buffer.size() >= 3) {
         const size_t size = WireReader(buffer).Get<uint16_t>();
@@ -68,7 +75,7 @@ class TestClient {
           return message;
         }
       }
-      if (!More()) throw std::runtime_error("closed in the middle of a message");
+      if (!More(clock)) throw std::runtime_error("closed in the middle of a message");
     }
   }
   std::string RtdeReply(char type, const std::string& payload) {
@@ -93,13 +100,16 @@ class TestClient {
   std::string buffer;
 
  private:
+  static constexpr double kPackageS = 0.002;
   int fd_;
 };
 
-// An RTDE client that follows phase, program, runtime state and safety mode, and beats.
+// An RTDE client that follows phase, program, runtime state and safety mode, and beats. `clock`: a manual one, which it
+// moves.
 class TouchClient {
  public:
-  explicit TouchClient(int port, const std::string& more_outputs = "") : client(port) {
+  explicit TouchClient(int port, const std::string& more_outputs = "", SimClock* the_clock = nullptr)
+      : client(port), clock(the_clock) {
     client.RtdeReply('V', std::string("\0\2", 2));
     WireWriter outputs;
     outputs.Put(500.0).Text(
@@ -120,7 +130,7 @@ class TouchClient {
   }
   void Next() {
     for (;;) {
-      const auto [type, payload] = client.Rtde();
+      const auto [type, payload] = client.Rtde(clock);
       if (type != 'U') continue;
       WireReader from(payload);
       from.Get<uint8_t>();
@@ -145,6 +155,7 @@ class TouchClient {
     }
   }
   TestClient client;
+  SimClock* const clock;
   std::string types, rest;
   int32_t beats = 0, program = 0, phase = 0, safety_mode = 0, robot_mode = 0;
   uint32_t runtime_state = 0;

@@ -15,10 +15,11 @@ namespace touchstone::rig {
 namespace {
 
 constexpr double kTurnHostS = 0.001;  // OnTime wants to be called so often
+constexpr double kLookAgainS = 2e-4;  // whether the time that stood goes on
 
 }  // namespace
 
-Device::Device(const DeviceOptions& options, const SimClock* clock, Faults* faults)
+Device::Device(const DeviceOptions& options, SimClock* clock, Faults* faults)
     : options_(options), clock_(clock), faults_(faults), random_(hidden::Stream(options.seed, "device")) {
   if (options.fingers < 1 || options.fingers > firmware::kMaxFingers)
     throw std::invalid_argument("the device has " + std::to_string(options.fingers) +
@@ -35,6 +36,7 @@ Device::Device(const DeviceOptions& options, const SimClock* clock, Faults* faul
   wake_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_ < 0) throw std::runtime_error("cannot make an eventfd");
   Boot();
+  part_ = std::make_unique<SimClock::Part>(clock, [this] { Wake(); });
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -42,6 +44,7 @@ Device::~Device() {
   stopping_ = true;
   Wake();
   thread_.join();
+  part_.reset();
   close(wake_);
 }
 
@@ -135,6 +138,7 @@ void Device::Run() {
       std::lock_guard<std::mutex> lock(mutex_);
       std::swap(reset, reset_);
     }
+    const double now_s = clock_->NowS();
     if (reset) Boot();
     Plugging();
     TakeEdges();
@@ -146,13 +150,16 @@ void Device::Run() {
       if (!bytes.empty()) TakeEdges();
       for (const uint8_t byte : bytes) core_->OnByte(byte);
     }
+    // A manual clock is moved by who reads.
+    if (clock_->manual() || !patience_.WaitsFor(line_->Unread())) part_->Done(now_s);
     Wait();
   }
 }
 
 void Device::Wait() {
   const double due_s = std::min(pins_->NextDueS(), line_->NextDueS());
-  const double wait_s = std::clamp((due_s - clock_->NowS()) / clock_->speedup(), 0.0, kTurnHostS);
+  const double wait_s = std::clamp((due_s - clock_->NowS()) / clock_->speedup(),
+                                   clock_->Stands() ? kLookAgainS : 0.0, kTurnHostS);
   pollfd fds[2] = {{wake_, POLLIN, 0}, {line_->fd(), POLLIN, 0}};  // a negative one is passed over
   const timespec wait{0, static_cast<long>(wait_s * 1e9)};
   ppoll(fds, 2, &wait, nullptr);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "firmware/core/effector.h"
+#include "tests/rig/controller/unread.h"
 #include "tests/rig/world/oscillator.h"
 #include "tests/rig/world/pins.h"
 #include "tests/rig/world/serial_line.h"
@@ -34,7 +35,7 @@ struct DeviceOptions {
 class Device {
  public:
   // Throws std::runtime_error or std::invalid_argument.
-  Device(const DeviceOptions& options, const SimClock* clock, Faults* faults);
+  Device(const DeviceOptions& options, SimClock* clock, Faults* faults);
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
@@ -55,7 +56,7 @@ class Device {
   void Wake();
 
   const DeviceOptions options_;
-  const SimClock* const clock_;
+  SimClock* const clock_;
   Faults* const faults_;
 
   mutable std::mutex mutex_;  // of what other threads see
@@ -73,6 +74,8 @@ class Device {
   std::unique_ptr<firmware::Effector> core_;
   std::optional<double> frozen_s_;  // what the core takes for now
   int wake_ = -1;                   // eventfd
+  ReaderPatience patience_;
+  std::unique_ptr<SimClock::Part> part_;
   std::thread thread_;
 };
 

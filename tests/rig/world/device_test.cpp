@@ -14,7 +14,6 @@
 #include <functional>
 #include <optional>
 #include <set>
-#include <thread>
 
 #include "firmware/core/frame.h"
 #include "firmware/core/messages.h"
@@ -30,18 +29,20 @@ double HostS() {
   return std::chrono::duration_cast<Seconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-bool WaitFor(const std::function<bool()>& done) {
+// Lets time pass until then.
+bool WaitFor(SimClock* clock, const std::function<bool()>& done) {
   for (const double until = HostS() + kPatienceS; HostS() < until;) {
     if (done()) return true;
-    std::this_thread::sleep_for(Seconds(0.002));
+    clock->MoveBy(0.002);
   }
   return false;
 }
 
-// A host at the other end of the line, with the firmware's own messages.
+// A host at the other end of the line, with the firmware's own messages. It lets time pass while it waits.
 class Host {
  public:
-  explicit Host(const std::string& port) : fd_(open(port.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+  Host(const std::string& port, SimClock* clock)
+      : fd_(open(port.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK)), clock_(clock) {
     termios raw{};
     tcgetattr(fd_, &raw);
     cfmakeraw(&raw);
@@ -55,12 +56,12 @@ class Host {
     const size_t size = firmware::EncodeFrame(payload, firmware::Encode(message, payload), frame);
     EXPECT_EQ(write(fd_, frame, size), static_cast<ssize_t>(size));
   }
-  // The next message of this kind that pleases; others are passed over.
+  // The next message of this kind that pleases; others are passed over. Patience: of the rig's time.
   template <typename Message>
   std::optional<Message> Await(double patience_s, const std::function<bool(const Message&)>& pleases) {
-    for (const double until = HostS() + patience_s; HostS() < until;) {
+    for (const double until_s = clock_->NowS() + patience_s; clock_->NowS() < until_s;) {
       pollfd wait{fd_, POLLIN, 0};
-      poll(&wait, 1, 5);
+      if (poll(&wait, 1, 0) == 0) clock_->MoveBy(0.001);
       uint8_t byte;
       while (read(fd_, &byte, 1) == 1) {
         ++bytes_;
@@ -107,6 +108,7 @@ class Host {
   }
 
   int fd_;
+  SimClock* const clock_;
   uint64_t bytes_ = 0;
   firmware::FrameParser parser_;
 };
@@ -118,6 +120,7 @@ class DeviceTest : public testing::Test {
     options.link = Port();
     options.sensor = sensor, options.byte_s = byte_s, options.unplug_resets = unplug_resets;
     options.drift_ppm = 40;
+    faults_.Follow(&clock_);
     device_ = std::make_unique<Device>(options, &clock_, &faults_);
   }
   std::string Port() const { return folder_.Path("effector"); }
@@ -137,7 +140,7 @@ class DeviceTest : public testing::Test {
     return std::remainder(static_cast<double>(ticks) - device_->TicksAt(at_s), turn) / device_->tick_hz();
   }
 
-  SimClock clock_;
+  SimClock clock_{SimClock::Manual()};
   Faults faults_;
   TestFolder folder_;
   std::unique_ptr<Device> device_;
@@ -145,13 +148,13 @@ class DeviceTest : public testing::Test {
 
 TEST_F(DeviceTest, StampsContactsToTheTickHoweverLateTheyAreHandedOver) {
   Start();
-  Host host(Port());
+  Host host(Port(), &clock_);
   const auto hello = host.Begin(3, firmware::Sensor::kOptical);
   EXPECT_EQ(hello.boot_id, device_->boot_id());
   EXPECT_EQ(hello.tick_hz, 16'000'000u);
   ASSERT_TRUE(host.Arm(1));
   // What was captured before the touch began is not of it.
-  clock_.SleepUntil(clock_.NowS() + 0.05);
+  clock_.MoveBy(0.05);
   const auto at_s = Press({0.02, 0.005, -0.01}, 0.05);
   const auto contacts = host.Contacts(1, 3);
   ASSERT_TRUE(contacts);
@@ -160,7 +163,7 @@ TEST_F(DeviceTest, StampsContactsToTheTickHoweverLateTheyAreHandedOver) {
 
 TEST_F(DeviceTest, AContactComesBeforeWhatIsSentAfterIt) {
   Start();
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kOptical);
   for (uint32_t touch = 1; touch <= 400; ++touch) {
     ASSERT_TRUE(host.Arm(touch));
@@ -180,7 +183,7 @@ TEST_F(DeviceTest, AContactComesBeforeWhatIsSentAfterIt) {
 
 TEST_F(DeviceTest, AnswersClockQueriesWithItsOwnDriftingCounter) {
   Start();
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kOptical);
   const double before_s = clock_.NowS();
   const auto reply = host.Ask<firmware::ClockReply>(firmware::Clock{3});
@@ -190,7 +193,7 @@ TEST_F(DeviceTest, AnswersClockQueriesWithItsOwnDriftingCounter) {
   EXPECT_LE(ErrorS(reply->send_ticks, after_s), 0);
   EXPECT_NEAR(device_->TicksAt(11) - device_->TicksAt(10), 16e6 * (1 + 40e-6), 1e-3);
   faults_.Set("clock_drift_ppm", 100);
-  EXPECT_TRUE(WaitFor([&] {
+  EXPECT_TRUE(WaitFor(&clock_, [&] {
     const double now_s = clock_.NowS();
     return std::abs(device_->TicksAt(now_s + 1) - device_->TicksAt(now_s) - 16e6 * (1 + 140e-6)) < 1e-3;
   }));
@@ -211,7 +214,7 @@ TEST_F(DeviceTest, BouncesOnlyWhenTold) {
 TEST_F(DeviceTest, TellsTheFirstEdgeOfABouncingSwitchOnce) {
   Start("microswitch");
   faults_.Set("bounce", 1);
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kMicroswitch);
   ASSERT_TRUE(host.Arm(1));
   const auto at_s = Press({0.03, 0.01, 0.02});
@@ -222,11 +225,10 @@ TEST_F(DeviceTest, TellsTheFirstEdgeOfABouncingSwitchOnce) {
 
 TEST_F(DeviceTest, CrossesTheThresholdOfAResistorAtTheContact) {
   Start("resistor");
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kResistor);
   ASSERT_TRUE(host.Arm(1));
-  // Far enough ahead that the device is told in time, also where this thread has to wait for the processor.
-  const auto at_s = Press({1.03, 1.01, 1.0203});
+  const auto at_s = Press({0.03, 0.01, 0.0203});
   const auto contacts = host.Contacts(1, 3);
   ASSERT_TRUE(contacts);
   // The converter's steps: 40 counts a millisecond.
@@ -235,7 +237,7 @@ TEST_F(DeviceTest, CrossesTheThresholdOfAResistorAtTheContact) {
 
 TEST_F(DeviceTest, ReadsAStuckFingerAsPressed) {
   Start();
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kOptical);
   const auto pressed = [&](int mask) {
     return host
@@ -261,20 +263,21 @@ TEST_F(DeviceTest, KeepsItsRecordWhenOnlyTheLineWasUnplugged) {
   const uint32_t boot_id = device_->boot_id();
   std::vector<double> at_s;
   {
-    Host host(Port());
+    Host host(Port(), &clock_);
     host.Begin(3, firmware::Sensor::kOptical);
     ASSERT_TRUE(host.Arm(9));
     faults_.Set("unplug", 3600);
-    ASSERT_TRUE(WaitFor([&] { return !std::filesystem::exists(Port()); }));
+    ASSERT_TRUE(WaitFor(&clock_, [&] { return !std::filesystem::exists(Port()); }));
     at_s = Press({0.0, 0.001, 0.002});
     // Its end of the line has hung up.
     uint8_t byte;
     ssize_t got = 1;
-    EXPECT_TRUE(WaitFor([&] { return (got = read(host.fd_, &byte, 1)) == 0 || (got < 0 && errno == EIO); }));
+    EXPECT_TRUE(
+        WaitFor(&clock_, [&] { return (got = read(host.fd_, &byte, 1)) == 0 || (got < 0 && errno == EIO); }));
   }
   faults_.Set("unplug", 0);  // in again
-  ASSERT_TRUE(WaitFor([&] { return std::filesystem::exists(Port()); }));
-  Host host(Port());
+  ASSERT_TRUE(WaitFor(&clock_, [&] { return std::filesystem::exists(Port()); }));
+  Host host(Port(), &clock_);
   const auto contacts = host.Contacts(9, 3);
   ASSERT_TRUE(contacts);
   EXPECT_NEAR(ErrorS(contacts->ticks[1], at_s[1]), 0, 1.5 / 16e6);
@@ -285,14 +288,14 @@ TEST_F(DeviceTest, BootsAnewWhenItsPowerWasUnpluggedOrItIsReset) {
   Start("optical", 0, true);
   const uint32_t first = device_->boot_id();
   faults_.Set("unplug", 0.05);
-  ASSERT_TRUE(WaitFor([&] { return device_->boot_id() != first; }));
+  ASSERT_TRUE(WaitFor(&clock_, [&] { return device_->boot_id() != first; }));
   const uint32_t second = device_->boot_id();
   {
-    Host host(Port());
+    Host host(Port(), &clock_);
     EXPECT_EQ(host.Begin(3, firmware::Sensor::kOptical).boot_id, second);
   }
   device_->Reset();
-  EXPECT_TRUE(WaitFor([&] { return device_->boot_id() != second; }));
+  EXPECT_TRUE(WaitFor(&clock_, [&] { return device_->boot_id() != second; }));
 }
 
 TEST_F(DeviceTest, LosesAndDamagesBytesOnTheLineYetTellsEveryContactRight) {
@@ -300,14 +303,14 @@ TEST_F(DeviceTest, LosesAndDamagesBytesOnTheLineYetTellsEveryContactRight) {
   faults_.Set("drop_bytes", 0.005), faults_.Set("corrupt_bytes", 0.005),
       faults_.Set("duplicate_bytes", 0.005);
   faults_.Set("line_delay_ms", 5);
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kOptical);
   ASSERT_TRUE(host.Arm(1));
   const auto at_s = Press({0.002, 0.004, 0.006});
   const auto contacts = host.Contacts(1, 3);
   ASSERT_TRUE(contacts);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(ErrorS(contacts->ticks[i], at_s[i]), 0, 1.5 / 16e6) << i;
-  EXPECT_TRUE(WaitFor([&] {
+  EXPECT_TRUE(WaitFor(&clock_, [&] {
     host.Await<firmware::Status>(0.2, [](const firmware::Status&) { return false; });
     return host.parser_.bad_frames() > 0;
   }));
@@ -315,7 +318,7 @@ TEST_F(DeviceTest, LosesAndDamagesBytesOnTheLineYetTellsEveryContactRight) {
 
 TEST_F(DeviceTest, TakesTheLinesTimeForItsBytes) {
   Start("optical", 10.0 / 115200);
-  Host host(Port());
+  Host host(Port(), &clock_);
   host.Begin(3, firmware::Sensor::kOptical);
   const double before_s = clock_.NowS();
   const auto reply = host.Ask<firmware::ClockReply>(firmware::Clock{3});

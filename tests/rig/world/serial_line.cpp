@@ -18,7 +18,7 @@ namespace touchstone::rig {
 namespace {
 
 // A driver keeps so much for a program that does not read; older bytes go then.
-constexpr int kMaxUnreadBytes = 3000;
+constexpr size_t kMaxUnreadBytes = 3000;
 
 }  // namespace
 
@@ -99,13 +99,26 @@ std::vector<uint8_t> SerialLine::Exchange(double now_s) {
   }
   while (!from_device_.chunks.empty() && from_device_.chunks.front().due_s <= now_s) {
     const auto& bytes = from_device_.chunks.front().bytes;
-    int unread = 0;
-    if (ioctl(slave_, FIONREAD, &unread) == 0 && unread > kMaxUnreadBytes) tcflush(slave_, TCIFLUSH);
+    if (const size_t unread = Waiting(); unread > kMaxUnreadBytes) {
+      tcflush(slave_, TCIFLUSH);
+      lost_bytes_ += unread;
+    }
     if (write(master_, bytes.data(), bytes.size()) < 0 && errno != EAGAIN && errno != EIO)
       FailWithErrno("cannot write to " + link_);
     from_device_.chunks.pop_front();
   }
   return arrived;
+}
+
+size_t SerialLine::Waiting() const {
+  int unread = 0;
+  return plugged() && ioctl(slave_, FIONREAD, &unread) == 0 ? static_cast<size_t>(unread) : 0;
+}
+
+size_t SerialLine::Unread() {
+  const size_t waiting = Waiting();
+  if (waiting == 0) lost_bytes_ = 0;
+  return waiting + lost_bytes_;
 }
 
 double SerialLine::NextDueS() const {

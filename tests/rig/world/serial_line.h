@@ -32,6 +32,9 @@ class SerialLine {
   std::vector<uint8_t> Exchange(double now_s);
   // When something is due next, simulated seconds; infinite if nothing is under way.
   double NextDueS() const;
+  // Bytes that have arrived for the program that has the port open since it last read everything, also those that have
+  // been lost since because it did not.
+  size_t Unread();
   int fd() const { return master_; }  // to wait for bytes; -1: unplugged
 
  private:
@@ -44,6 +47,7 @@ class SerialLine {
     std::deque<Chunk> chunks;
     double free_s = 0;  // when the last byte has passed
   };
+  size_t Waiting() const;  // for the program that has the port open
   void Send(Way* way, const uint8_t* bytes, size_t size, double now_s);
 
   std::string link_;
@@ -51,6 +55,7 @@ class SerialLine {
   std::mt19937_64 random_;
   const Faults* faults_;
   int master_ = -1, slave_ = -1;
+  size_t lost_bytes_ = 0;
   Way to_device_, from_device_;
 };
 
