@@ -89,8 +89,11 @@ class SilentConnections {
 };
 
 grpc::Status Describe(int port) {
-  const auto stub = v1::Source::NewStub(
-      grpc::CreateChannel(absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials()));
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
+  const auto stub = v1::Source::NewStub(grpc::CreateCustomChannel(
+      absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials(), arguments));
   grpc::ClientContext context;
   context.set_wait_for_ready(true);
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
@@ -99,7 +102,7 @@ grpc::Status Describe(int port) {
 }
 
 TEST(Connections, ThatSayNothingDoNotMakeAServerDeaf) {
-  const ServerProcess server(128, "--handshake-s 1 --max-connections-per-address 100000");
+  const ServerProcess server(128, "--handshake-s 0.3 --max-connections-per-address 100000");
   ASSERT_NE(server.port(), 0);
   SilentConnections silent(server.port());
   silent.Open(400);

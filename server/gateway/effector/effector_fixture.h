@@ -18,7 +18,7 @@ class EffectorFixture : public testing::Test {
  protected:
   EffectorOptions Options(int fingers = 3) const {
     EffectorOptions options;
-    if (device_ != nullptr) options.port = device_->port();
+    options.port = device_->port();
     options.fingers = std::vector<EffectorFinger>(fingers);
     options.reply_timeout_s = 0.1;
     options.silence_s = 600;  // a device that has not had the processor is not lost
@@ -27,6 +27,16 @@ class EffectorFixture : public testing::Test {
   }
   void Start(const FakeDevice::Options& device = FakeDevice::Options()) {
     device_ = std::make_unique<FakeDevice>(device);
+  }
+  // A device that repeats itself 20 times as often as others: what waits for its statuses and repetitions takes less long.
+  EffectorOptions StartQuick() {
+    constexpr double kTimeScale = 20;
+    FakeDevice::Options device;
+    device.ticks_per_s *= kTimeScale;
+    Start(device);
+    EffectorOptions options = Options();
+    options.time_scale = kTimeScale;
+    return options;
   }
   void Open(const EffectorOptions& options) {
     absl::StatusOr<std::unique_ptr<Effector>> effector = Effector::Open(options, &changes_);

@@ -14,9 +14,8 @@ using testing::HasSubstr;
 class EffectorLineTest : public EffectorFixture {};
 
 TEST_F(EffectorLineTest, LosesAndChangesNoContactOnABadLine) {
-  Start();
-  EffectorOptions options = Options();
-  options.reply_timeout_s = 0.05;
+  EffectorOptions options = StartQuick();
+  options.reply_timeout_s = 0.02;
   Open(options);
   FakeDevice::Line line;
   line.drop = line.corrupt = line.duplicate = 0.004;
@@ -68,8 +67,7 @@ TEST_F(EffectorLineTest, GoesOnWithATouchWhenTheLineComesBack) {
 
 TEST_F(EffectorLineTest, SaysThatATouchIsLostWithTheDevicesMemory) {
   for (const bool unplugged : {true, false}) {
-    Start();
-    Open(Options());
+    Open(StartQuick());
     ASSERT_TRUE(effector_->StartCapture(5).ok());
     device_->Press(0);
     ASSERT_TRUE(WaitForContacts(1));
@@ -142,13 +140,7 @@ TEST_F(EffectorLineTest, NoticesSilence) {
 // A touch that is final, but whose capture was not ended: the device that begins anew is not taken for one that
 // should be armed, again and again.
 TEST_F(EffectorLineTest, StaysConnectedAfterAResetBetweenTheLastContactAndTheEndOfTheCapture) {
-  FakeDevice::Options device;
-  EffectorOptions options = Options();
-  options.time_scale = 20;  // so that its statuses come 80 times a second
-  device.ticks_per_s *= options.time_scale;
-  Start(device);
-  options.port = device_->port();
-  Open(options);
+  Open(StartQuick());
   ASSERT_TRUE(effector_->StartCapture(7).ok());
   for (int i = 0; i < 3; ++i) device_->Press(i);
   ASSERT_TRUE(WaitForContacts(3));
@@ -156,10 +148,11 @@ TEST_F(EffectorLineTest, StaysConnectedAfterAResetBetweenTheLastContactAndTheEnd
   device_->Reset(2002);
   ASSERT_TRUE(WaitFor([&] { return effector_->State().connected && effector_->State().boot_id == 2002; }));
   const int hellos = device_->hellos();
-  // Many statuses, of which three would have ended the session, and time to act on them: a request after them.
+  // Many statuses, of which three would have ended the session, and a request behind them.
   const int statuses = device_->statuses();
   ASSERT_TRUE(WaitFor([&] { return device_->statuses() > statuses + 5; }));
-  effector_->Recall(7).status().IgnoreError();
+  const absl::Status forgotten = effector_->Recall(7).status();
+  EXPECT_TRUE(absl::IsNotFound(forgotten)) << forgotten;
   EXPECT_EQ(device_->hellos(), hellos);
   EXPECT_EQ(effector_->Touch()->Contacts(), 3);
 }

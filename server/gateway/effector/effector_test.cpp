@@ -126,6 +126,7 @@ TEST_F(EffectorTest, TellsTheDevicesClockInHostTime) {
     Start(device);
     EffectorOptions options = Options();
     options.time_scale = time_scale;
+    options.clock_query_s = 0.001;
     Open(options);
     ASSERT_TRUE(WaitFor([&] { return effector_->Clock().round_trips >= 100; }));
     ASSERT_TRUE(effector_->StartCapture(1).ok());
