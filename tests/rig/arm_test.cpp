@@ -65,7 +65,7 @@ class EmulatedArm : public testing::Test {
     // A busy machine's pauses are no dead gateway and no frozen controller.
     arm.script.watchdog_hz = 1;
     arm.frozen_after_s = 1;
-    arm.program_start_s = 10;
+    arm.program_start_s = 1.5;
     arm.connect_wait_s = kPatienceS;
     arm_options_ = arm;
     arm_ = gateway::arm::ConnectUrArm(arm, &changes_).value();
