@@ -1,10 +1,15 @@
 # Compiler flags and the three functions that every folder's CMakeLists.txt uses.
 
 add_library(touchstone_flags INTERFACE)
-target_include_directories(touchstone_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+target_include_directories(touchstone_flags INTERFACE
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<BUILD_INTERFACE:${CMAKE_BINARY_DIR}/generated>)
+target_compile_features(touchstone_flags INTERFACE cxx_std_17)
 # Macros name files from the root of the repository: an object is the same wherever a clone lies, and ccache finds it.
-target_compile_options(touchstone_flags INTERFACE -Wall -Wextra -Wno-unused-parameter -ffp-contract=off
-  -fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=)
+# What an installed library's user inherits stands outside BUILD_INTERFACE: the instruction set, on which the alignment
+# of Eigen's types depends, and no fused multiply-add, since the linker may keep the user's copy of an inline function.
+target_compile_options(touchstone_flags INTERFACE
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wno-unused-parameter>" -ffp-contract=off
+  "$<BUILD_INTERFACE:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64" AND TOUCHSTONE_ARCH)
   target_compile_options(touchstone_flags INTERFACE -march=${TOUCHSTONE_ARCH})
 endif()
@@ -46,7 +51,7 @@ endif()
 # files' own are therefore unique within a folder, as people who read it would have them. Off, a change of one file
 # compiles that one alone; the step tsan of deploy/test shows that files stand on their own.
 option(TOUCHSTONE_UNITY "Compile the files of a folder several at a time" ON)
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 6)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 
 # touchstone_library(NAME [SEPARATE] SOURCES a.cpp ... LINKS base geometry absl::status ...)
 # makes the static library touchstone_NAME; a plain word in LINKS is a folder of this project. SEPARATE: its files
@@ -108,7 +113,8 @@ endfunction()
 function(touchstone_test name)
   cmake_parse_arguments(ARG "SECOND_TIER" "SHARDS" "SOURCES;LINKS" ${ARGN})
   add_executable(${name}_test ${ARG_SOURCES})
-  set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${TOUCHSTONE_UNITY})
+  # Fewer at a time than of a library: tests of a folder often give their data the same name.
+  set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${TOUCHSTONE_UNITY} UNITY_BUILD_BATCH_SIZE 6)
   target_compile_options(${name}_test PRIVATE ${TOUCHSTONE_TEST_OPTIONS})
   touchstone_link(${name}_test PRIVATE ${ARG_LINKS} touchstone_test_paths GTest::gmock GTest::gtest_main)
   set(options)
@@ -131,4 +137,24 @@ function(touchstone_link target visibility)
     endif()
     target_link_libraries(${target} ${visibility} ${link})
   endforeach()
+endfunction()
+
+# touchstone_links_of(RESULT TARGET): the targets that TARGET links, directly or through others, and itself.
+function(touchstone_links_of result target)
+  set(pending ${target})
+  set(seen)
+  while(pending)
+    list(POP_FRONT pending one)
+    if(one IN_LIST seen OR NOT TARGET ${one})
+      continue()
+    endif()
+    list(APPEND seen ${one})
+    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
+      get_target_property(links ${one} ${property})
+      if(links)
+        list(APPEND pending ${links})
+      endif()
+    endforeach()
+  endwhile()
+  set(${result} ${seen} PARENT_SCOPE)
 endfunction()

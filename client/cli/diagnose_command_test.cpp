@@ -300,7 +300,9 @@ TEST_F(DiagnoseCommandTest, AnInterruptEndsItSoon) {
   // Until it takes the signal; before, the signal would end it with the same status.
   while (!Catches(child, SIGINT) && !HasEnded(child))
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  std::this_thread::sleep_for(std::chrono::milliseconds(600));  // somewhere in its work
+  // Somewhere in its work.
+  while (ProcessorTimeS(child) < 0.3 && !HasEnded(child))
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   ::kill(child, SIGINT);
   const Outcome outcome = Wait(child);
   EXPECT_EQ(outcome.exit_code, 130) << outcome.err;

@@ -6,8 +6,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,6 +60,18 @@ class RealBinaryTest : public ::testing::Test {
       if (line.rfind("SigCgt:", 0) == 0)
         return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
     return false;
+  }
+
+  // Processor time that the program has taken, in seconds.
+  static double ProcessorTimeS(pid_t child) {
+    std::ifstream stat("/proc/" + std::to_string(child) + "/stat");
+    std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
+    std::istringstream fields(text.substr(std::min(text.size(), text.rfind(')') + 2)));  // behind the name
+    std::string skipped;
+    for (int k = 0; k < 11; ++k) fields >> skipped;
+    double user = 0, system = 0;
+    fields >> user >> system;
+    return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
   }
 
   Outcome Wait(pid_t child) {

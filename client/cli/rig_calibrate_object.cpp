@@ -21,9 +21,9 @@ namespace {
 constexpr double kGoldenAngleRad = 2.399963229728653;
 constexpr double kTiltsRad[] = {15 * kRadiansPerDegree, 30 * kRadiansPerDegree,
                                 40 * kRadiansPerDegree};  // from straight down; all come from above
-constexpr double kSpread = 0.5;       // targets lie within this share of the box's half sides
-constexpr double kHeight = 0.4;       // and this share of its half height above its middle
-constexpr double kBeyondBoxM = 0.03;  // every finger starts so far outside the box
+constexpr double kShareOfSides = 0.5;  // targets lie within this share of the box's half sides
+constexpr double kHeight = 0.4;        // and this share of its half height above its middle
+constexpr double kBeyondBoxM = 0.03;   // every finger starts so far outside the box
 constexpr size_t kMaxTargetsShown = 5;
 constexpr size_t kMinTouches = 6;
 constexpr uint64_t kTriangles = 20000;
@@ -65,8 +65,8 @@ v1::CommandedTouch TouchOf(int k, const Eigen::Vector3d& low, const Eigen::Vecto
   const Eigen::Vector3d across(-round.y(), round.x(), 0);
   const Eigen::Vector3d lateral = k % 2 == 0 ? across : across.cross(approach);
   const Eigen::Vector3d target =
-      (low + high) / 2 +
-      Eigen::Vector3d(kSpread * half.x() * round.x(), kSpread * half.y() * round.y(), kHeight * half.z());
+      (low + high) / 2 + Eigen::Vector3d(kShareOfSides * half.x() * round.x(),
+                                         kShareOfSides * half.y() * round.y(), kHeight * half.z());
   v1::CommandedTouch touch;
   *touch.mutable_target_m() = service::ToProto(target);
   *touch.mutable_approach() = service::ToProto(approach);

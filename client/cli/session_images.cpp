@@ -12,6 +12,7 @@
 #include "client/source/image_set_files.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/stored_session.h"
 #include "server/session/image_set_file.h"
 #include "server/session/image_set_hdf5.h"
 
@@ -19,8 +20,6 @@ namespace touchstone::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr size_t kSessionPiece = 1 << 20;
 
 using TakePiece = std::function<bool(const std::string& file, absl::string_view piece)>;
 
@@ -31,9 +30,9 @@ absl::Status ReadFileInPieces(const std::string& path, const TakePiece& take) {
   if (!file || !fs::is_regular_file(path, error))
     return absl::NotFoundError(absl::StrCat(
         path, ": cannot be read; a measurement file or the folder of an image set was expected"));
-  std::string piece(kSessionPiece, '\0');
+  std::string piece(service::kSessionPieceBytes, '\0');
   do {
-    file.read(piece.data(), kSessionPiece);
+    file.read(piece.data(), service::kSessionPieceBytes);
     if (!take("", absl::string_view(piece).substr(0, file.gcount()))) break;
   } while (file);
   return absl::OkStatus();
@@ -107,8 +106,8 @@ absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const st
     request.clear_name();
     return sent;
   };
-  const absl::Status read =
-      folder ? service::ForEachPiece(folder_bytes, kSessionPiece, send) : ReadFileInPieces(path, send);
+  const absl::Status read = folder ? service::ForEachPiece(folder_bytes, service::kSessionPieceBytes, send)
+                                   : ReadFileInPieces(path, send);
   if (!read.ok()) context.TryCancel();
   writer->WritesDone();
   const absl::Status finished = client::FromGrpc(writer->Finish());

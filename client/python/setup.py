@@ -15,7 +15,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 def generate_stubs():
     loader = importlib.machinery.SourceFileLoader("touchstone_generate", str(HERE / "generate"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    spec = importlib.util.spec_from_loader(loader.name, loader)
+    assert spec is not None  # it is, where a loader is given
+    module = importlib.util.module_from_spec(spec)
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         loader.exec_module(module)

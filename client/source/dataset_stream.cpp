@@ -2,23 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
-#include <chrono>
-#include <thread>
-
+#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr double kFirstBackoffS = 0.1;
-constexpr double kLongestBackoffS = 3;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // The stream may resume only where the same request means the same bytes.
 absl::Status CompareHeaders(const v1::DatasetHeader& before, const v1::DatasetHeader& now,
@@ -125,7 +113,8 @@ absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
 absl::Status DatasetStream::Reconnect(absl::Status lost) {
   if (connection_->embedded() || options_.reconnect_s <= 0) return lost;
   if (options_.log) options_.log(absl::StrCat("lost ", connection_->address(), ": ", lost.message()));
-  const Clock::time_point start = Clock::now();
+  const Clock& clock = *options_.clock;
+  const Clock::Time start = clock.Now();
   double backoff_s = kFirstBackoffS;
   while (true) {
     absl::Status status = connection_->ConnectToNext();
@@ -139,14 +128,13 @@ absl::Status DatasetStream::Reconnect(absl::Status lost) {
     }
     // A server that is full may have room soon; anything else will not get better by waiting.
     if (!IsLostServer(status) && !IsFullServer(status)) return status;
-    if (SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
-    const Clock::time_point wake =
-        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(backoff_s));
-    while (Clock::now() < wake) {
-      if (cancelled_) return absl::CancelledError("the stream was cancelled");
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if (clock.SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
+    {
+      std::unique_lock<std::mutex> lock(context_mutex_);
+      if (clock.WaitFor(lock, cancellation_, backoff_s, [this] { return cancelled_.load(); }))
+        return absl::CancelledError("the stream was cancelled");
     }
-    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+    backoff_s = NextBackoffS(backoff_s);
   }
 }
 
@@ -165,6 +153,7 @@ absl::Status DatasetStream::CloseReader() {
 void DatasetStream::Cancel() {
   std::lock_guard<std::mutex> lock(context_mutex_);
   cancelled_ = true;
+  cancellation_.notify_all();
   if (context_ != nullptr) context_->TryCancel();
 }
 

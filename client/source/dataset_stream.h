@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -13,6 +14,7 @@
 #include "client/source/batch.h"
 #include "client/source/connection.h"
 #include "client/source/lease_keeper.h"
+#include "server/base/clock.h"
 
 namespace touchstone::client {
 
@@ -20,6 +22,7 @@ struct DatasetStreamOptions {
   // A lost server is looked for, there and at the others, for this long since the last batch; then the stream
   // fails with UNAVAILABLE.
   double reconnect_s = 60;
+  const Clock* clock = &SteadyClock();  // outlives the stream
   // Called from the reading thread when a server was lost and when the stream resumes.
   std::function<void(const std::string&)> log;
   // Of a source that needs a lease: its token now, and what keeps it when the stream resumes
@@ -59,6 +62,7 @@ class DatasetStream {
   uint64_t batch_rows_ = 0;  // rows of a full batch, learned from the first
   std::atomic<bool> cancelled_{false};
   std::mutex context_mutex_;  // guards context_ against Cancel
+  std::condition_variable cancellation_;
   std::unique_ptr<grpc::ClientContext> context_;
   std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>> reader_;
 };

@@ -6,9 +6,12 @@
 #include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <future>
 #include <thread>
 
 #include "client/source/errors.h"
+#include "server/base/manual_clock.h"
 
 namespace touchstone::client {
 namespace {
@@ -41,8 +44,10 @@ class FakeSource : public v1::Source::Service {
     for (uint64_t i = request->start_index(); i < stop; i += request->batch_size() * stride) {
       if (batches_until_loss-- == 0) return grpc::Status(loss, "unplugged");
       if (context->IsCancelled()) return grpc::Status::CANCELLED;
-      while (endless && i > 0 && !context->IsCancelled())
+      while (endless && i > 0 && !context->IsCancelled()) {
+        ended = true;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
       message.Clear();
       v1::Batch* batch = message.mutable_batch();
       batch->set_start_index(i);
@@ -61,7 +66,8 @@ class FakeSource : public v1::Source::Service {
 
   int batches_until_loss = -1;
   grpc::StatusCode loss = grpc::StatusCode::UNAVAILABLE;
-  bool endless = false;  // after the first batch none comes
+  bool endless = false;            // after the first batch none comes
+  std::atomic<bool> ended{false};  // none comes any more
   std::vector<v1::StreamDatasetRequest> requests;
 
  private:
@@ -177,14 +183,38 @@ TEST(DatasetStream, GivesUpAfterTheTimeThatItWasGiven) {
   auto source = std::make_unique<FakeSource>();
   source->batches_until_loss = 3;
   const auto connection = Connect({source->address()});
+  ManualClock clock;
   DatasetStreamOptions options;
-  options.reconnect_s = 0.5;
+  options.clock = &clock;
   auto stream = DatasetStream::Open(connection.get(), Request(7), options);
   ASSERT_TRUE(stream.ok());
   Batch batch;
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(*(*stream)->Next(&batch));
   source.reset();
-  EXPECT_EQ((*stream)->Next(&batch).status().code(), absl::StatusCode::kUnavailable);
+  const Clock::Time lost = clock.Now();
+  auto next = std::async(std::launch::async, [&] { return (*stream)->Next(&batch).status(); });
+  clock.PassUntil([&] { return next.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
+  EXPECT_EQ(next.get().code(), absl::StatusCode::kUnavailable);
+  // It does not wait when the next wait, of 3 s by then, would be too long.
+  EXPECT_LE(clock.SecondsSince(lost), options.reconnect_s);
+  EXPECT_GT(clock.SecondsSince(lost), options.reconnect_s - 3);
+}
+
+TEST(DatasetStream, CancelEndsTheWaitForAServer) {
+  auto source = std::make_unique<FakeSource>();
+  source->batches_until_loss = 1;
+  const auto connection = Connect({source->address()});
+  const ManualClock clock;
+  DatasetStreamOptions options;
+  options.clock = &clock;
+  auto stream = DatasetStream::Open(connection.get(), Request(7), options);
+  Batch batch;
+  ASSERT_TRUE(*(*stream)->Next(&batch));
+  source.reset();
+  auto next = std::async(std::launch::async, [&] { return (*stream)->Next(&batch).status(); });
+  clock.AwaitWaiters();
+  (*stream)->Cancel();
+  EXPECT_EQ(next.get().code(), absl::StatusCode::kCancelled);
 }
 
 TEST(DatasetStream, CancelEndsItFromAnotherThread) {
@@ -195,7 +225,7 @@ TEST(DatasetStream, CancelEndsItFromAnotherThread) {
   Batch batch;
   ASSERT_TRUE(*(*stream)->Next(&batch));
   std::thread canceller([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));  // the other thread waits for a batch by then
+    while (!source.ended) std::this_thread::yield();
     (*stream)->Cancel();
   });
   const auto all = ReadAll(stream->get());

@@ -15,22 +15,16 @@
 namespace touchstone::client {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double kRenewalsAWindow = 5;
 constexpr double kShortestAnswerS = 0.5;  // what a call to a busy source gets at the least
 constexpr double kAcquireS = 10;
 // A lease that is not renewed, because its holder was killed, has ended by then.
-constexpr std::chrono::milliseconds kHolderMayBeGone{2500};
-constexpr std::chrono::milliseconds kAskAgain{100};
+constexpr double kHolderMayBeGoneS = 2.5;
+constexpr double kAskAgainS = 0.1;
 constexpr size_t kMaxHolderBytes = 256;
 
 std::mutex holder_mutex;
 std::string holder_program;  // guarded by holder_mutex; empty: not set
-
-Clock::duration Seconds(double seconds) {
-  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
 
 // The login name; "uid1000" where a user has none, as in a container.
 std::string UserName() {
@@ -88,10 +82,11 @@ absl::StatusOr<std::unique_ptr<LeaseKeeper>> LeaseKeeper::Acquire(Connection* co
   std::unique_ptr<LeaseKeeper> keeper(new LeaseKeeper(std::move(options), source.lease_required()));
   if (!keeper->required_) return keeper;
   keeper->control_ = v1::Control::NewStub(connection->channel());
-  const Clock::time_point until = Clock::now() + kHolderMayBeGone;
+  const Clock& clock = *keeper->options_.clock;
+  const Clock::Time until = clock.In(kHolderMayBeGoneS);
   absl::Status status = keeper->AcquireNow(keeper->control_.get(), keeper->options_.take);
-  while (absl::IsFailedPrecondition(status) && Clock::now() < until) {
-    std::this_thread::sleep_for(kAskAgain);
+  while (absl::IsFailedPrecondition(status) && clock.Now() < until) {
+    clock.SleepFor(kAskAgainS);
     status = keeper->AcquireNow(keeper->control_.get(), false);
   }
   TOUCHSTONE_RETURN_IF_ERROR(status);
@@ -193,7 +188,8 @@ absl::Status LeaseKeeper::Lost(v1::Control::Stub* control, const absl::Status& w
 }
 
 void LeaseKeeper::Run() {
-  Clock::time_point renewed_at = Clock::now();
+  const Clock& clock = *options_.clock;
+  Clock::Time renewed_at = clock.Now();
   std::unique_lock<std::mutex> lock(mutex_);
   while (!ending_) {
     const double window_s = std::max(lease_.window_s(), 0.01);
@@ -201,17 +197,17 @@ void LeaseKeeper::Run() {
     if (!status_.ok()) {
       // Lost: until Follow finds another one.
       changed_.wait(lock, [&] { return ending_ || status_.ok(); });
-      renewed_at = Clock::now();
+      renewed_at = clock.Now();
       continue;
     }
-    if (changed_.wait_for(lock, Seconds(window_s / kRenewalsAWindow),
-                          [&] { return ending_ || lease_.token() != token; })) {
-      renewed_at = Clock::now();
+    if (clock.WaitFor(lock, changed_, window_s / kRenewalsAWindow,
+                      [&] { return ending_ || lease_.token() != token; })) {
+      renewed_at = clock.Now();
       continue;
     }
     const std::shared_ptr<v1::Control::Stub> control = control_;
     lock.unlock();
-    const Clock::time_point asked_at = Clock::now();
+    const Clock::Time asked_at = clock.Now();
     v1::RenewLeaseRequest request;
     request.set_token(token);
     absl::Status status = CallWithin(std::max(window_s / 2, kShortestAnswerS), &v1::Control::Stub::RenewLease,
@@ -219,8 +215,7 @@ void LeaseKeeper::Run() {
                               .status();
     // A source that is not to be reached may be there again before the window is over.
     if (status.ok()) renewed_at = asked_at;
-    const bool over =
-        absl::IsAborted(status) || (!status.ok() && Clock::now() - renewed_at > Seconds(window_s));
+    const bool over = absl::IsAborted(status) || (!status.ok() && clock.SecondsSince(renewed_at) > window_s);
     if (over) status = Lost(control.get(), status);
     lock.lock();
     if (!over || ending_ || lease_.token() != token) continue;

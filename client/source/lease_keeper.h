@@ -14,6 +14,7 @@
 #include <absl/status/statusor.h>
 
 #include "client/source/connection.h"
+#include "server/base/clock.h"
 
 namespace touchstone::client {
 
@@ -24,6 +25,8 @@ struct LeaseOptions {
   bool take = false;
   // Told once, from the keeper's own thread, when the lease is lost.
   std::function<void(const absl::Status&)> on_lost;
+  // Of the renewals; outlives the keeper.
+  const Clock* clock = &SteadyClock();
 };
 
 // Person, program and process, so that two programs of one person are told apart: "ana@lab rig-run 4711". At most 256

@@ -9,8 +9,10 @@
 
 #include <atomic>
 #include <chrono>
+#include <future>
 
 #include "client/source/leased_source.h"
+#include "server/base/manual_clock.h"
 
 namespace touchstone::client {
 namespace {
@@ -31,7 +33,9 @@ bool Eventually(Done done) {
 class LeaseKeeperTest : public ::testing::Test {
  protected:
   LeaseKeeperTest() {
-    auto connection = Connection::Open({});
+    ConnectionOptions options;
+    options.embedded.clock = &clock_;
+    auto connection = Connection::Open(options);
     EXPECT_TRUE(connection.ok()) << connection.status();
     connection_ = *std::move(connection);
     needs_lease_.set_lease_required(true);
@@ -43,9 +47,11 @@ class LeaseKeeperTest : public ::testing::Test {
     LeaseOptions options;
     options.holder = holder;
     options.take = take;
+    options.clock = &clock_;
     return LeaseKeeper::Acquire(connection_.get(), needs_lease_, options);
   }
 
+  ManualClock clock_;
   std::unique_ptr<Connection> connection_;
   v1::DescribeResponse needs_lease_;
 };
@@ -94,8 +100,13 @@ TEST_F(LeaseKeeperTest, AHolderIsAPersonAProgramAndAProcess) {
 TEST_F(LeaseKeeperTest, RefusesTellWhoHoldsItAndHowToTakeIt) {
   const auto ana = Acquire("ana@bench2");
   ASSERT_TRUE(ana.ok());
-  const auto ben = Acquire("ben@desk");
+  // Who held it may be gone, and the lease is asked for until it would have run out by then; ana's is renewed.
+  const Clock::Time asked = clock_.Now();
+  auto asking = std::async(std::launch::async, [&] { return Acquire("ben@desk"); });
+  clock_.PassUntil([&] { return asking.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }, 2);
+  const auto ben = asking.get();
   EXPECT_EQ(ben.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_GT(clock_.SecondsSince(asked), service::ServerOptions().lease_window_s);
   EXPECT_THAT(std::string(ben.status().message()), AllOf(HasSubstr("ana@bench2"), HasSubstr("--take-lease")));
 }
 
@@ -104,11 +115,12 @@ TEST_F(LeaseKeeperTest, TellsItsHolderWhoTookTheLease) {
   LeaseOptions options;
   options.holder = "ana@bench2";
   options.on_lost = [&](const absl::Status&) { ++losses; };
+  options.clock = &clock_;
   const auto ana = LeaseKeeper::Acquire(connection_.get(), needs_lease_, options);
   ASSERT_TRUE(ana.ok());
   const auto ben = Acquire("ben@desk", true);
   ASSERT_TRUE(ben.ok()) << ben.status();
-  ASSERT_TRUE(Eventually([&] { return losses > 0; }));
+  clock_.PassUntil([&] { return losses > 0; });
   EXPECT_EQ((*ana)->status().code(), absl::StatusCode::kAborted);
   EXPECT_THAT(std::string((*ana)->status().message()), HasSubstr("ben@desk"));
   EXPECT_EQ(losses, 1);
@@ -126,15 +138,14 @@ TEST_F(LeaseKeeperTest, FollowsToANewLeaseOnceTheOldOneIsFree) {
   v1::ReleaseLeaseRequest release;
   release.set_token(before);
   ASSERT_TRUE(Connection::Call(&v1::Control::Stub::ReleaseLease, connection_->control(), release).ok());
-  ASSERT_TRUE(Eventually([&] { return !(*ana)->status().ok(); }));
+  clock_.PassUntil([&] { return !(*ana)->status().ok(); });
   ASSERT_TRUE((*ana)->Follow(connection_.get()).ok());
   EXPECT_TRUE((*ana)->status().ok());
   EXPECT_NE((*ana)->token(), before);
   EXPECT_EQ(State().lease_holder(), "ana@bench2");
 }
 
-// A source that wants a lease, with a window so short that renewals are many, and that fails where a
-// test wants it.
+// A source that wants a lease, and that fails where a test wants it.
 class FakeRig : public v1::Control::Service {
  public:
   class Touches : public v1::Source::Service {
@@ -211,7 +222,7 @@ class FakeRig : public v1::Control::Service {
     return *std::move(connection);
   }
 
-  double window_s = 0.05;
+  static constexpr double window_s = 2;
   std::atomic<int> acquired{0}, renewed{0}, released{0}, failures{0};
   std::atomic<bool> silent{false}, stale{false}, stopped{false}, hold{false}, touching{false};
   std::string stop_reason;
@@ -231,16 +242,27 @@ v1::TouchRequest OneTouch(const std::string& id) {
   return request;
 }
 
-TEST(LeaseKeeper, RenewsAsLongAsItLives) {
-  FakeRig rig;
-  rig.window_s = 1.5;
-  const auto connection = rig.Connect();
+std::unique_ptr<LeaseKeeper> AcquireAt(Connection* connection, const Clock& clock) {
   v1::DescribeResponse source;
   source.set_lease_required(true);
+  LeaseOptions options;
+  options.clock = &clock;
+  return *LeaseKeeper::Acquire(connection, source, options);
+}
+
+TEST(LeaseKeeper, RenewsAsLongAsItLives) {
+  FakeRig rig;
+  const auto connection = rig.Connect();
+  ManualClock clock;
   {
-    const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
-    ASSERT_TRUE(keeper.ok());
-    EXPECT_TRUE(Eventually([&] { return rig.renewed >= 10; }));
+    const auto keeper = AcquireAt(connection.get(), clock);
+    for (int renewals = 0; renewals < 10; ++renewals) {
+      clock.AwaitWaiters();
+      EXPECT_EQ(rig.renewed, renewals);
+      EXPECT_NEAR(clock.AdvanceToFirst(), rig.window_s / 5, 1e-6);
+    }
+    clock.AwaitWaiters();
+    EXPECT_TRUE(keeper->status().ok());
     EXPECT_EQ(rig.acquired, 1);
   }
   EXPECT_EQ(rig.released, 1);
@@ -249,42 +271,47 @@ TEST(LeaseKeeper, RenewsAsLongAsItLives) {
 TEST(LeaseKeeper, IsLostWhenTheSourceStaysSilentForTheWindow) {
   FakeRig rig;
   const auto connection = rig.Connect();
-  v1::DescribeResponse source;
-  source.set_lease_required(true);
-  const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
-  ASSERT_TRUE(keeper.ok());
+  ManualClock clock;
+  const auto keeper = AcquireAt(connection.get(), clock);
+  const Clock::Time acquired = clock.Now();
   rig.silent = true;
-  ASSERT_TRUE(Eventually([&] { return !(*keeper)->status().ok(); }));
-  EXPECT_THAT(std::string((*keeper)->status().message()), HasSubstr("did not answer"));
+  clock.PassUntil([&] { return !keeper->status().ok(); });
+  EXPECT_GT(clock.SecondsSince(acquired), rig.window_s);
+  EXPECT_LT(clock.SecondsSince(acquired), 1.5 * rig.window_s);
+  EXPECT_THAT(std::string(keeper->status().message()), HasSubstr("did not answer"));
   rig.silent = false;
-  EXPECT_TRUE((*keeper)->Follow(connection.get()).ok());
-  EXPECT_TRUE((*keeper)->status().ok());
+  EXPECT_TRUE(keeper->Follow(connection.get()).ok());
+  EXPECT_TRUE(keeper->status().ok());
   EXPECT_EQ(rig.acquired, 1) << "the old lease stands";
 }
 
 TEST(LeaseKeeper, NeverEndsAStopThatSomebodyElseCalled) {
   FakeRig rig;
   const auto connection = rig.Connect();
-  v1::DescribeResponse source;
-  source.set_lease_required(true);
-  const auto keeper = LeaseKeeper::Acquire(connection.get(), source);
-  ASSERT_TRUE(keeper.ok());
+  ManualClock clock;
+  const auto keeper = AcquireAt(connection.get(), clock);
   rig.stale = true;
   rig.stopped = true;
-  ASSERT_TRUE(Eventually([&] { return !(*keeper)->status().ok(); }));
-  EXPECT_EQ((*keeper)->Follow(connection.get()).code(), absl::StatusCode::kFailedPrecondition);
+  clock.PassUntil([&] { return !keeper->status().ok(); });
+  EXPECT_EQ(keeper->Follow(connection.get()).code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(rig.acquired, 1);
 }
 
 TEST(LeasedSource, AsksForTheSameTouchAgainAfterALoss) {
   FakeRig rig;
-  rig.window_s = 30;
   const auto connection = rig.Connect();
-  const auto source = LeasedSource::Open(connection.get());
+  ManualClock clock;
+  LeasedSourceOptions options;
+  options.clock = &clock;
+  const auto source = LeasedSource::Open(connection.get(), options);
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_EQ((*source)->touches_per_request(), 1u);
   rig.failures = 2;
-  const auto response = (*source)->Touch(OneTouch("monday/lat20/7"));
+  auto touching =
+      std::async(std::launch::async, [&] { return (*source)->Touch(OneTouch("monday/lat20/7")); });
+  // The touch waits between two tries, and the lease is renewed meanwhile.
+  clock.PassUntil([&] { return touching.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }, 2);
+  const auto response = touching.get();
   ASSERT_TRUE(response.ok()) << response.status();
   EXPECT_EQ(rig.touch_ids, std::vector<std::string>(3, "monday/lat20/7"));
   EXPECT_EQ(rig.touch_tokens, std::vector<std::string>(3, "token1"));
@@ -292,7 +319,6 @@ TEST(LeasedSource, AsksForTheSameTouchAgainAfterALoss) {
 
 TEST(LeasedSource, NeverRepeatsATouchWithoutAnId) {
   FakeRig rig;
-  rig.window_s = 30;
   const auto connection = rig.Connect();
   const auto source = LeasedSource::Open(connection.get());
   ASSERT_TRUE(source.ok());
@@ -303,7 +329,6 @@ TEST(LeasedSource, NeverRepeatsATouchWithoutAnId) {
 
 TEST(LeasedSource, StopsTheMotionWhenItIsInterrupted) {
   FakeRig rig;
-  rig.window_s = 30;
   rig.hold = true;
   const auto connection = rig.Connect();
   const auto source = LeasedSource::Open(connection.get());

@@ -6,15 +6,12 @@
 #include <chrono>
 #include <thread>
 
+#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr double kFirstBackoffS = 0.1;
-constexpr double kLongestBackoffS = 3;
 constexpr std::chrono::seconds kStopAnswer{2};
 
 }  // namespace
@@ -28,6 +25,7 @@ absl::StatusOr<std::unique_ptr<LeasedSource>> LeasedSource::Open(Connection* con
   source->channel_ = connection->channel();
   LeaseOptions lease;
   lease.take = source->options_.take_lease;
+  lease.clock = source->options_.clock;
   TOUCHSTONE_ASSIGN_OR_RETURN(source->lease_,
                               LeaseKeeper::Acquire(connection, source->description_, std::move(lease)));
   return source;
@@ -62,7 +60,7 @@ absl::StatusOr<Response> LeasedSource::Call(Stub& stub,
 }
 
 absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) {
-  const Clock::time_point start = Clock::now();
+  const Clock::Time start = options_.clock->Now();
   double backoff_s = kFirstBackoffS;
   bool again = false;
   while (true) {
@@ -76,12 +74,12 @@ absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) 
     const bool passing = IsLostServer(response.status()) || (again && absl::IsAborted(response.status()));
     if (response.ok() || !passing) return response;
     if (connection_->embedded() || request.touch_ids().empty()) return response;
-    if (Clock::now() - start > std::chrono::duration<double>(options_.reconnect_s)) return response;
+    if (options_.clock->SecondsSince(start) > options_.reconnect_s) return response;
     if (options_.log)
       options_.log(absl::StrCat(connection_->address(), ": ", response.status().message(),
                                 "; the same touch is asked for again"));
     TOUCHSTONE_RETURN_IF_ERROR(SleepFor(backoff_s));
-    backoff_s = std::min(2 * backoff_s, kLongestBackoffS);
+    backoff_s = NextBackoffS(backoff_s);
     again = true;
     const absl::Status found = FindAgain();
     if (!found.ok() && !IsLostServer(found)) return found;
@@ -130,15 +128,9 @@ absl::Status LeasedSource::FindAgain() {
 }
 
 absl::Status LeasedSource::SleepFor(double seconds) {
-  const Clock::time_point wake =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  while (Clock::now() < wake) {
-    {
-      std::lock_guard<std::mutex> lock(mutex_);
-      if (interrupted_) return absl::CancelledError("interrupted");
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (options_.clock->WaitFor(lock, interruption_, seconds, [this] { return interrupted_; }))
+    return absl::CancelledError("interrupted");
   return absl::OkStatus();
 }
 
@@ -149,6 +141,7 @@ void LeasedSource::Interrupt(const std::string& reason) {
     interrupted_ = true;
     channel = channel_;
   }
+  interruption_.notify_all();
   if (physical()) {
     // Before anything else: what moves stops.
     grpc::ClientContext context;

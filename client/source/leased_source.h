@@ -2,6 +2,7 @@
 // with repeated attempts when it was lost. A virtual source and a physical one look the same from here.
 #pragma once
 
+#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -11,6 +12,7 @@
 
 #include "client/source/connection.h"
 #include "client/source/lease_keeper.h"
+#include "server/base/clock.h"
 
 namespace touchstone::client {
 
@@ -18,6 +20,7 @@ struct LeasedSourceOptions {
   bool take_lease = false;
   // How long a lost source is looked for before a touch fails with UNAVAILABLE.
   double reconnect_s = 60;
+  const Clock* clock = &SteadyClock();  // outlives the source
   // Called when a source was lost, found again, or lost its lease.
   std::function<void(const std::string&)> log;
 };
@@ -62,6 +65,7 @@ class LeasedSource {
   v1::DescribeResponse description_;
   std::unique_ptr<LeaseKeeper> lease_;
   std::mutex mutex_;  // guards what Interrupt uses
+  std::condition_variable interruption_;
   bool interrupted_ = false;
   grpc::ClientContext* running_ = nullptr;
   std::shared_ptr<grpc::Channel> channel_;

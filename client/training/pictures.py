@@ -17,7 +17,7 @@ _COLOURS = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]
 _FINGERS, _NETWORKS = _COLOURS[:3], _COLOURS[3:]
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _font(size, bold=False):
     folder = "/usr/share/fonts/truetype/dejavu/"
     for name in (f"DejaVuSans{'-Bold' if bold else ''}.ttf", folder + f"DejaVuSans{'-Bold' if bold else ''}.ttf"):
@@ -180,9 +180,9 @@ def training_picture(history, confusion, objects, path):
                 canvas.text(left - 8, top + (i + 0.5) * cell, true, 11, anchor="rm")
             canvas.text(left + (i + 0.5) * cell, top + matrix + 6, true.replace("lat", "") or true, 10, _GREY, "ma")
             for j in range(len(objects)):
-                colour = tuple((255 + (ink - 255) * share[i, j]).astype(int))
+                shade = tuple((255 + (ink - 255) * share[i, j]).astype(int))
                 canvas.rectangle(left + j * cell, top + i * cell, left + (j + 1) * cell - 1, top + (i + 1) * cell - 1,
-                                 colour if share[i, j] >= 0.005 else "#f5f7fa")
+                                 shade if share[i, j] >= 0.005 else "#f5f7fa")
                 if share[i, j] >= 0.005:
                     canvas.text(left + (j + 0.5) * cell, top + (i + 0.5) * cell, f"{100 * share[i, j]:.0f}", 10,
                                 _PAPER if share[i, j] > 0.55 else _INK, "mm")

@@ -5,7 +5,8 @@
 
 One example is a few random touches of one object, of which only the finger times are known, and the photograph
 along the first of them. One network gets the touches, one the photograph, one both; each is trained several times, from
-other first weights. Every training example is new; the test set is drawn from another seed. Writes samples.png and training.png into the output folder.
+other first weights. Every training example is new; the test set is drawn from another seed. Writes samples.png and
+training.png into the output folder.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import touchstone
 from touchstone.torch import TouchstoneDataset
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import pictures  # noqa: E402
+import pictures
 
 SUPERSHAPES = ["lat00", "lat05", "lat10", "lat15", "lat20"]
 TOUCHES = 8  # an example

@@ -29,7 +29,7 @@ def write_shards(program, job, jobs, arguments):
     command = [program, "stream", *arguments, "--shards", f"{job}/{jobs}", "--quiet"]
     if "--server" not in arguments and "--threads" not in arguments:
         command += ["--threads", str(max(1, int(cores)))]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode == UNREACHABLE:
         raise SourceUnreachable(done.stderr)
     if done.returncode < 0:
@@ -54,10 +54,10 @@ def main():
         (done,), running = ray.wait(running)
         try:
             ray.get(done)
-        except Exception as error:  # a task's own, wrapped by Ray
+        except Exception as error:  # noqa: BLE001 - a task's own, of a class that Ray makes
             failed.append(getattr(error, "cause", error))
-    for error in failed:
-        print(f"ray_dataset.py: {error}", file=sys.stderr)
+    for reason in failed:
+        print(f"ray_dataset.py: {reason}", file=sys.stderr)
     return 1 if failed else 0
 
 

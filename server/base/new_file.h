@@ -18,5 +18,7 @@ absl::Status SyncFolderOf(const std::string& path);
 
 // Removes what killed writers left in the folder, if it is at least so old: younger drafts may be being written.
 void RemoveOldDrafts(const std::string& folder, std::chrono::seconds age);
+// The age for that: nobody writes a file for so long.
+inline constexpr std::chrono::hours kOldDraft{1};
 
 }  // namespace touchstone

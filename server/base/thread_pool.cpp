@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <exception>
 #include <memory>
 #include <utility>
 
+#include "server/base/clock.h"
 #include "server/base/thread_time.h"
 
 namespace touchstone {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // After which a task looks whether it is others' turn.
 constexpr double kTurnS = FairQueue::kExpectedS;
@@ -25,7 +23,7 @@ struct ThreadPool::Running {
   ThreadPool* pool;
   FairQueue::Stream* stream;
   double begin_s = ThreadTimeS();  // of what was not charged yet
-  Clock::time_point looked = Clock::now();
+  Clock::Time looked = SteadyClock().Now();
 
   double Uncharged() {
     const double now_s = ThreadTimeS();
@@ -94,9 +92,9 @@ void ThreadPool::GiveWay() {
 }
 
 void ThreadPool::LetOthersGoFirst(Running* running) {
-  const auto now = Clock::now();
-  if (std::chrono::duration<double>(now - running->looked).count() < kTurnS) return;
-  running->looked = now;
+  const Clock& clock = SteadyClock();
+  if (clock.SecondsSince(running->looked) < kTurnS) return;
+  running->looked = clock.Now();
   std::unique_lock<std::mutex> lock(mutex_);
   queue_.Charge(running->stream, running->Uncharged());
   if (stopping_ || !queue_.OthersAreNext(*running->stream) || !AddThread()) return;
@@ -113,7 +111,7 @@ void ThreadPool::LetOthersGoFirst(Running* running) {
   wake_.notify_one();
   resume.wait(lock, [&] { return resumed; });
   running->begin_s = ThreadTimeS();
-  running->looked = Clock::now();
+  running->looked = clock.Now();
 }
 
 // So that size_ threads work while those that stopped and one more wait.

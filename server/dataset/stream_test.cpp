@@ -253,7 +253,7 @@ TEST(DatasetStream, CancellingFreesThePoolWithinABatch) {
     done.notify_all();
   });
   std::unique_lock<std::mutex> lock(mutex);
-  EXPECT_TRUE(done.wait_for(lock, std::chrono::seconds(5), [&] { return free; }));
+  EXPECT_TRUE(done.wait_for(lock, std::chrono::seconds(60), [&] { return free; }));
 }
 
 TEST(DatasetStream, RefusesPartsBeyondTheEndAndBatchesBeyondAMessage) {

@@ -14,6 +14,7 @@
 namespace touchstone::service {
 namespace {
 
+constexpr double kWarnEveryS = 60;  // of what `insecure` lets in
 constexpr uint64_t kMaxFileBytes = 1 << 20;
 constexpr size_t kMaxCertificateNameBytes = 64;
 constexpr char kBearer[] = "Bearer ";
@@ -37,9 +38,10 @@ absl::Status CheckRole(const Caller& caller, Role needed, const std::string& wha
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Access>> Access::Create(const std::string& listen,
-                                                       const AccessOptions& options, Motion motion) {
+                                                       const AccessOptions& options, Motion motion,
+                                                       const Clock& clock) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckAccess(listen, options));
-  std::unique_ptr<Access> access(new Access(options, motion));
+  std::unique_ptr<Access> access(new Access(options, motion, clock));
   if (options.tls()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         access->certificates_,
@@ -71,8 +73,7 @@ void Access::WarnEvery(const std::string& words) {
   std::unique_lock<std::mutex> lock(warning_mutex_);
   while (!ending_) {
     spdlog::warn("{}", words);
-    warning_ends_.wait_for(lock, std::chrono::duration<double>(options_.warn_every_s),
-                           [this] { return ending_; });
+    clock_.WaitFor(lock, warning_ends_, kWarnEveryS, [this] { return ending_; });
   }
 }
 
@@ -158,7 +159,7 @@ absl::Status Access::Require(const grpc::ServerContext& context, Role needed, co
 
 void Access::LogRefusal(absl::string_view method, const absl::Status& why) {
   if (calls_ != nullptr) calls_->Refused(method, static_cast<int>(why.code()));
-  const auto now = std::chrono::steady_clock::now();
+  const auto now = clock_.Now();
   uint64_t unlogged = 0;
   {
     const std::lock_guard<std::mutex> lock(refusal_mutex_);

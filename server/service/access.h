@@ -1,7 +1,6 @@
 // Who may call what: the one place that decides for every method of a process, before its request is even read.
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -13,6 +12,7 @@
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server_context.h>
 
+#include "server/base/clock.h"
 #include "server/service/access_file.h"
 #include "server/service/access_options.h"
 #include "server/service/access_roles.h"
@@ -35,7 +35,8 @@ class Access {
  public:
   // Reads the files. Errors name the option, or the file and line.
   static absl::StatusOr<std::unique_ptr<Access>> Create(const std::string& listen,
-                                                        const AccessOptions& options, Motion motion);
+                                                        const AccessOptions& options, Motion motion,
+                                                        const Clock& clock = SteadyClock());
   ~Access();
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
@@ -61,13 +62,15 @@ class Access {
   ServerCertificates* certificates() { return certificates_.get(); }
 
  private:
-  Access(AccessOptions options, Motion motion) : options_(std::move(options)), motion_(motion) {}
+  Access(AccessOptions options, Motion motion, const Clock& clock)
+      : options_(std::move(options)), motion_(motion), clock_(clock) {}
   absl::StatusOr<Caller> Authenticate(const ShownCredentials& shown);
   std::shared_ptr<const AccessFile> File();  // as it is now
   void WarnEvery(const std::string& words);
 
   const AccessOptions options_;
   const Motion motion_;
+  const Clock& clock_;
   std::unique_ptr<ServerCertificates> certificates_;
 
   std::mutex file_mutex_;
@@ -76,7 +79,7 @@ class Access {
 
   CallMetrics* calls_ = nullptr;
   std::mutex refusal_mutex_;
-  std::chrono::steady_clock::time_point refusal_logged_{};
+  Clock::Time refusal_logged_{};
   uint64_t refusals_unlogged_ = 0;
 
   std::mutex warning_mutex_;

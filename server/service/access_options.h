@@ -19,7 +19,6 @@ struct AccessOptions {
   std::string token_file;                   // access_file.h; empty: no tokens
   std::string client_cert_role = "reader";  // of a client certificate that token_file does not list
   bool insecure = false;                    // whoever reaches the port may call
-  double warn_every_s = 60;                 // of what `insecure` lets in
 
   bool tls() const { return !tls_cert.empty(); }
   // Whether callers must say who they are.

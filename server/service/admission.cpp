@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/base/over_limit.h"
+#include "server/service/limits.h"
 
 namespace touchstone::service {
 namespace {
@@ -32,7 +33,6 @@ uint64_t MachineBytes() {
   return bytes;
 }
 
-constexpr uint64_t kMebibyte = 1 << 20;
 constexpr double kSavedS = 5;            // of calls that were not made
 constexpr size_t kManyClients = 10'000;  // then those who have everything saved are forgotten
 
@@ -74,16 +74,17 @@ void Places::Leave(const std::string& client) {
   if (--found->second == 0) by_client_.erase(found);
 }
 
-CallRate::CallRate(int max_per_s) : max_per_s_(max_per_s), max_saved_(kSavedS * max_per_s) {}
+CallRate::CallRate(int max_per_s, const Clock& clock)
+    : max_per_s_(max_per_s), max_saved_(kSavedS * max_per_s), clock_(clock) {}
 
-double CallRate::Grown(const Saved& saved, Clock::time_point now) const {
+double CallRate::Grown(const Saved& saved, Clock::Time now) const {
   return std::min(max_saved_,
                   saved.calls + max_per_s_ * std::chrono::duration<double>(now - saved.at).count());
 }
 
 absl::Status CallRate::Take(const std::string& client) {
   if (max_per_s_ == 0) return absl::OkStatus();
-  const auto now = Clock::now();
+  const auto now = clock_.Now();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (by_client_.size() >= kManyClients)
     for (auto each = by_client_.begin(); each != by_client_.end();)
@@ -140,7 +141,8 @@ absl::Status MemoryBudget::Reservation::Grow(uint64_t bytes) {
   return absl::OkStatus();
 }
 
-StallWatch::StallWatch(double stall_s) : stall_(stall_s), thread_([this] { Run(); }) {}
+StallWatch::StallWatch(double stall_s, const Clock& clock)
+    : stall_s_(stall_s), clock_(clock), thread_([this] { Run(); }) {}
 
 StallWatch::~StallWatch() {
   {
@@ -152,15 +154,16 @@ StallWatch::~StallWatch() {
 }
 
 void StallWatch::Run() {
-  const std::chrono::duration<double> pause = std::min(stall_ / 4, std::chrono::duration<double>(1));
+  const double pause_s = std::min(stall_s_ / 4, 1.0);
   std::unique_lock<std::mutex> lock(mutex_);
   while (!stopping_) {
-    wake_.wait_for(lock, calls_.empty() ? std::chrono::duration<double>(3600) : pause);
-    const auto now = std::chrono::steady_clock::now();
+    wake_.wait(lock, [this] { return stopping_ || !calls_.empty(); });
+    clock_.WaitFor(lock, wake_, pause_s, [this] { return stopping_; });
+    const auto now = clock_.Now();
     for (Call* call : calls_) {
-      if (!call->waiting_ || now - call->since_ <= stall_) continue;
+      if (!call->waiting_ || std::chrono::duration<double>(now - call->since_).count() <= stall_s_) continue;
       spdlog::warn("{}: nothing moved for {} s (stall_s): the call is cancelled", call->context_->peer(),
-                   stall_.count());
+                   stall_s_);
       call->context_->TryCancel();
       call->since_ = now;
     }
@@ -181,7 +184,7 @@ StallWatch::Call::~Call() {
 void StallWatch::Call::SetWaiting(bool waiting) {
   std::lock_guard<std::mutex> lock(watch_->mutex_);
   waiting_ = waiting;
-  since_ = std::chrono::steady_clock::now();
+  since_ = watch_->clock_.Now();
 }
 
 }  // namespace touchstone::service

@@ -14,6 +14,8 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/server_context.h>
 
+#include "server/base/clock.h"
+
 namespace touchstone::service {
 
 // Who calls, as limits of one client count: the address without its port, "ipv4:10.0.0.7", "inproc".
@@ -61,19 +63,19 @@ class Places {
 // So many calls a second of each client; what it did not use in the last seconds is saved up. Thread-safe.
 class CallRate {
  public:
-  explicit CallRate(int max_per_s);  // 0: any number
+  explicit CallRate(int max_per_s, const Clock& clock = SteadyClock());  // 0: any number
   // RESOURCE_EXHAUSTED names the limit; clients wait and try again.
   absl::Status Take(const std::string& client);
 
  private:
-  using Clock = std::chrono::steady_clock;
   struct Saved {
     double calls;
-    Clock::time_point at;
+    Clock::Time at;
   };
-  double Grown(const Saved& saved, Clock::time_point now) const;
+  double Grown(const Saved& saved, Clock::Time now) const;
 
   const double max_per_s_, max_saved_;
+  const Clock& clock_;
   std::mutex mutex_;
   std::map<std::string, Saved> by_client_;
 };
@@ -121,7 +123,7 @@ class MemoryBudget {
 // Cancels calls whose client has neither taken nor sent anything for too long, so that they give back what they hold.
 class StallWatch {
  public:
-  explicit StallWatch(double stall_s);
+  explicit StallWatch(double stall_s, const Clock& clock = SteadyClock());
   ~StallWatch();
 
   // One call while it lives. Not for several threads.
@@ -146,13 +148,14 @@ class StallWatch {
     StallWatch* const watch_;
     grpc::ServerContext* const context_;
     bool waiting_ = false;  // with watch_->mutex_
-    std::chrono::steady_clock::time_point since_;
+    Clock::Time since_;
   };
 
  private:
   void Run();
 
-  const std::chrono::duration<double> stall_;
+  const double stall_s_;
+  const Clock& clock_;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::set<Call*> calls_;

@@ -1,7 +1,5 @@
 #include "server/service/call_guard.h"
 
-#include <chrono>
-
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
 
@@ -18,9 +16,10 @@ source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resou
   };
 }
 
-source::MotionGuard TimeGuardOf(const Limits& limits, bool moves) {
-  return [moves, max_s = limits.max_unary_s, begin = std::chrono::steady_clock::now()]() -> absl::Status {
-    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+source::MotionGuard TimeGuardOf(const ServerOptions& options, bool moves) {
+  return [moves, max_s = options.max_unary_s, clock = options.clock,
+          begin = options.clock->Now()]() -> absl::Status {
+    const double s = clock->SecondsSince(begin);
     return moves || s <= max_s ? absl::OkStatus()
                                : OverLimit("the call is not done after seconds:", s, "max_unary_s", max_s);
   };

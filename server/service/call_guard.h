@@ -18,7 +18,7 @@ source::MotionGuard GuardOf(grpc::ServerContext* context, const Resources* resou
 
 // A call that only calculates has not taken longer than max_unary_s since the guard was made. What moves takes its time:
 // ending it halfway helps nobody.
-source::MotionGuard TimeGuardOf(const Limits& limits, bool moves);
+source::MotionGuard TimeGuardOf(const ServerOptions& options, bool moves);
 
 // Both, and that nobody has called Control.Stop since the guard was made.
 source::MotionGuard StoppableGuardOf(grpc::ServerContext* context, const Resources* resources,

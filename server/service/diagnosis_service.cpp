@@ -138,7 +138,8 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
                  Resources* resources, const std::function<bool(const v1::Progress&)>& send,
                  v1::Report* result) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources->diagnoses->Take(ClientOf(*context)));
-  const auto begin = std::chrono::steady_clock::now();
+  const Clock& clock = *resources->options.clock;
+  const auto begin = clock.Now();
   Worker worker(
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
@@ -151,9 +152,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
   v1::Progress progress = Reading();
   if (!send(progress)) worker.Cancel();
   const double max_s = resources->options.max_diagnosis_s;
-  const auto late = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > max_s;
-  };
+  const auto late = [&] { return clock.SecondsSince(begin) > max_s; };
   while (!worker.Wait(&progress)) {
     if (context->IsCancelled() || late() || !send(progress)) worker.Cancel();
   }
@@ -163,7 +162,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
   TOUCHSTONE_RETURN_IF_ERROR(worker.report().status());
   *result = *std::move(worker.report());
   result->set_version(kVersion);
-  result->set_duration_s(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  result->set_duration_s(clock.SecondsSince(begin));
   return absl::OkStatus();
 }
 

@@ -121,15 +121,17 @@ GatewayServer::GatewayServer() : parts_(std::make_unique<Parts>()) {}
 
 absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptions options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckServing(options.common));
-  TOUCHSTONE_RETURN_IF_ERROR(gateway::timing::FollowClock(options.replay.empty() ? options.emulated_clock : ""));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      gateway::timing::FollowClock(options.replay.empty() ? options.emulated_clock : ""));
   std::unique_ptr<GatewayServer> gateway(new GatewayServer);
   Parts& parts = *gateway->parts_;
   Resources& resources = parts.resources;
   resources.options = options.common;
   if (!options.common.metrics.empty()) resources.calls = std::make_unique<CallMetrics>();
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
-                              Access::Create(options.common.listen, options.common.access,
-                                             options.replay.empty() ? Motion::kRig : Motion::kSimulated));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      resources.access,
+      Access::Create(options.common.listen, options.common.access,
+                     options.replay.empty() ? Motion::kRig : Motion::kSimulated, *options.common.clock));
   resources.OpenPlaces();
   resources.access->CountRefusals(resources.calls.get());
   resources.pool = std::make_unique<ThreadPool>(0);
@@ -153,7 +155,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   const bool moves = device->moves();
   parts.source = std::make_unique<source::PhysicalSource>(&resources.objects, options.common.OfSource(),
                                                           std::move(device), gateway::camera::Rectify);
-  parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves);
+  parts.leases = std::make_unique<LeaseBook>(options.common.lease_window_s, moves, *options.common.clock);
   if (parts.rig != nullptr)
     parts.rig->audit().NameHolders([leases = parts.leases.get()] { return leases->Holder(); });
   parts.source_service = std::make_unique<SourceService>(&resources, parts.leases.get(), parts.source.get());

@@ -18,8 +18,6 @@
 namespace touchstone::service {
 namespace {
 
-constexpr size_t kPiece = 1 << 20;
-
 // What the journal knows of a session; without the size and hash of its file.
 v1::Session SessionToProto(const session::JournalSession& session) {
   v1::Session message;
@@ -124,13 +122,13 @@ grpc::Status JournalSessionsService::ExportSession(grpc::ServerContext* context,
   bool gone = false;
   StallWatch::Call call(resources_->stalls.get(), context);
   v1::ExportSessionResponse response;
-  const absl::Status status =
-      ForEachPiece(PackSession(made->files), kPiece, [&](const std::string& file, absl::string_view piece) {
-        response.set_file(file);
-        response.set_csv(std::string(piece));
-        gone = !call.Wait([&] { return writer->Write(response); });
-        return !gone;
-      });
+  const absl::Status status = ForEachPiece(PackSession(made->files), kSessionPieceBytes,
+                                           [&](const std::string& file, absl::string_view piece) {
+                                             response.set_file(file);
+                                             response.set_csv(std::string(piece));
+                                             gone = !call.Wait([&] { return writer->Write(response); });
+                                             return !gone;
+                                           });
   return ToGrpc(gone ? absl::CancelledError("the client is gone") : status);
 }
 

@@ -20,8 +20,8 @@ std::string NewToken() {
 
 }  // namespace
 
-bool LeaseBook::Held(Clock::time_point now) const {
-  return !token_.empty() && now < until_;
+bool LeaseBook::Held() const {
+  return !token_.empty() && clock_.Now() < until_;
 }
 
 v1::Lease LeaseBook::Describe() const {
@@ -33,41 +33,41 @@ v1::Lease LeaseBook::Describe() const {
   return lease;
 }
 
-absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, const Caller& caller,
-                                             Clock::time_point now) {
+absl::StatusOr<v1::Lease> LeaseBook::Acquire(const std::string& holder, bool take, const Caller& caller) {
   if (holder.empty() || holder.size() > kMaxHolderBytes || !IsPrintableLine(holder))
     return absl::InvalidArgumentError(absl::StrCat("holder: say who asks, in 1 to ", kMaxHolderBytes,
                                                    " printable bytes, for instance 'ana@bench2'"));
   std::lock_guard<std::mutex> lock(mutex_);
-  if (Held(now) && !take)
+  if (Held() && !take)
     return absl::FailedPreconditionError(
         absl::StrCat("the lease is held by '", holder_, "' (epoch ", epoch_,
                      "): ask them to release it, or take it with take = true"));
   token_ = NewToken();
   holder_ = WithCaller(holder, caller);
   ++epoch_;
-  until_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s_));
+  until_ = clock_.In(window_s_);
   return Describe();
 }
 
-absl::Status LeaseBook::CheckToken(const std::string& token, Clock::time_point now) const {
-  if (Held(now) && token == token_) return absl::OkStatus();
+absl::Status LeaseBook::CheckToken(const std::string& token) const {
+  const bool held = Held();
+  if (held && token == token_) return absl::OkStatus();
   return absl::AbortedError(
-      Held(now) ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
-                : std::string("this lease is stale: it ran out, was released, or ended with the reset of a "
-                              "stop; acquire a new one"));
+      held ? absl::StrCat("this lease is stale: '", holder_, "' holds epoch ", epoch_, " now")
+           : std::string("this lease is stale: it ran out, was released, or ended with the reset of a "
+                         "stop; acquire a new one"));
 }
 
-absl::StatusOr<v1::Lease> LeaseBook::Renew(const std::string& token, Clock::time_point now) {
+absl::StatusOr<v1::Lease> LeaseBook::Renew(const std::string& token) {
   std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token, now));
-  until_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(window_s_));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token));
+  until_ = clock_.In(window_s_);
   return Describe();
 }
 
-absl::Status LeaseBook::Release(const std::string& token, Clock::time_point now) {
+absl::Status LeaseBook::Release(const std::string& token) {
   std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token, now));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckToken(token));
   token_.clear();
   holder_.clear();
   return absl::OkStatus();
@@ -79,18 +79,18 @@ void LeaseBook::Revoke() {
   holder_.clear();
 }
 
-absl::Status LeaseBook::Check(const std::string& token, Clock::time_point now) const {
+absl::Status LeaseBook::Check(const std::string& token) const {
   if (token.empty() && !required_) return absl::OkStatus();
   if (token.empty())
     return absl::FailedPreconditionError(
         "lease_token is missing: this source moves things, so it needs a lease from Control.AcquireLease");
   std::lock_guard<std::mutex> lock(mutex_);
-  return CheckToken(token, now);
+  return CheckToken(token);
 }
 
-std::string LeaseBook::Holder(Clock::time_point now) const {
+std::string LeaseBook::Holder() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return Held(now) ? holder_ : "";
+  return Held() ? holder_ : "";
 }
 
 uint64_t LeaseBook::epoch() const {

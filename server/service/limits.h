@@ -2,6 +2,7 @@
 // Source.Describe and deploy/limits.md share.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <variant>
 
@@ -10,9 +11,11 @@
 #include <absl/types/span.h>
 
 #include "server/session/measurement_set.h"
-#include "server/source/request_checks.h"
+#include "server/source/source_limits.h"
 
 namespace touchstone::service {
+
+inline constexpr size_t kMebibyte = 1 << 20;
 
 // What each bounds stands in the table (limits.cpp). Both servers have them all; a gateway uses those that concern it.
 struct Limits {

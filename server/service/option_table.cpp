@@ -26,7 +26,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/resources.h"
+#include "server/base/version.h"
 
 namespace touchstone::service {
 namespace {

@@ -22,6 +22,7 @@
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/service/convert.h"
+#include "server/service/limits.h"
 #include "server/service/wire_count.h"
 
 namespace touchstone::service {
@@ -50,7 +51,6 @@ template struct Reach<HandlerOfMethod, &RpcServiceMethod::handler_>;
 
 // What a message or a text, and a number, take when they are decoded and made into what the program works with, about.
 constexpr uint64_t kBytesOfElement = 256, kBytesOfNumber = 16;
-constexpr size_t kMebibyte = 1 << 20;
 
 // The bytes of a message as protobuf reads them, without a copy.
 class BufferStream : public google::protobuf::io::ZeroCopyInputStream {

@@ -16,8 +16,6 @@ namespace touchstone::service {
 namespace {
 
 constexpr uint64_t kMaxModelBytes = 1 << 20;
-// Nobody writes a file for so long.
-constexpr std::chrono::hours kOldDraft{1};
 
 // The model in a file, by the name of the file.
 absl::StatusOr<model::Model> ReadModel(const std::string& path) {
@@ -150,9 +148,9 @@ void Resources::OpenPlaces() {
   uploads = std::make_unique<Places>("sessions are being sent", "max_uploads", options.max_uploads);
   diagnoses = std::make_unique<Places>("sets are being worked on", "max_diagnoses", options.max_diagnoses,
                                        "max_diagnoses_per_client", options.max_diagnoses_per_client);
-  rate = std::make_unique<CallRate>(options.max_unary_calls_per_s);
+  rate = std::make_unique<CallRate>(options.max_unary_calls_per_s, *options.clock);
   memory = std::make_unique<MemoryBudget>(options.max_memory_mib);
-  stalls = std::make_unique<StallWatch>(options.stall_s);
+  stalls = std::make_unique<StallWatch>(options.stall_s, *options.clock);
 }
 
 std::vector<std::shared_ptr<const model::Model>> ModelStore::Behind(const std::string& name) const {

@@ -35,13 +35,14 @@ std::string OwnAddress(const std::string& listen, int port) {
 }
 
 SelfProbe::SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
-                     std::function<void()> on_deaf, int unanswered)
+                     std::function<void()> on_deaf, int unanswered, const Clock& clock)
     : address_(address),
       tls_(tls),
       every_s_(every_s),
       answer_s_(answer_s),
       on_deaf_(std::move(on_deaf)),
-      unanswered_(unanswered) {
+      unanswered_(unanswered),
+      clock_(clock) {
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -59,7 +60,7 @@ void SelfProbe::Run() {
   for (int unanswered = 0; unanswered < unanswered_;) {
     {
       std::unique_lock<std::mutex> lock(mutex_);
-      if (wake_.wait_for(lock, std::chrono::duration<double>(every_s_), [this] { return stopping_; })) return;
+      if (clock_.WaitFor(lock, wake_, every_s_, [this] { return stopping_; })) return;
     }
     unanswered = Answers() ? 0 : unanswered + 1;
     if (unanswered > 0)

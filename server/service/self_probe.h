@@ -9,6 +9,8 @@
 
 #include <grpcpp/client_context.h>
 
+#include "server/base/clock.h"
+
 namespace touchstone::service {
 
 // Where others connect to the server of this machine: "0.0.0.0:50051" is "127.0.0.1:50051" from here.
@@ -21,10 +23,10 @@ std::string OwnAddress(const std::string& listen, int port);
 class SelfProbe {
  public:
   static constexpr int kUnanswered = 3;
-  // Asks every `every_s` seconds; an answer has `answer_s`. `on_deaf` is called once, from a thread of its own, after
+  // Asks every `every_s` seconds of `clock`; an answer has `answer_s`. `on_deaf` is called once, from a thread of its own, after
   // `unanswered` questions in a row, at least one.
   SelfProbe(const std::string& address, bool tls, double every_s, double answer_s,
-            std::function<void()> on_deaf, int unanswered = kUnanswered);
+            std::function<void()> on_deaf, int unanswered = kUnanswered, const Clock& clock = SteadyClock());
   ~SelfProbe();
   SelfProbe(const SelfProbe&) = delete;
   SelfProbe& operator=(const SelfProbe&) = delete;
@@ -38,6 +40,7 @@ class SelfProbe {
   const double every_s_, answer_s_;
   const std::function<void()> on_deaf_;
   const int unanswered_;
+  const Clock& clock_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;

@@ -10,9 +10,11 @@
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
+#include <future>
 #include <string>
-#include <thread>
 
+#include "server/base/manual_clock.h"
+#include "server/base/test_tier.h"
 #include "server/service/server.h"
 
 namespace touchstone::service {
@@ -46,33 +48,49 @@ class DeafListener {
 
 TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
   const DeafListener listener;
+  ManualClock clock;
   std::atomic<int> ends{0};
-  const SelfProbe probe(listener.address(), false, 0.05, 0.05, [&] { ++ends; });
-  while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::promise<void> ended;
+  const SelfProbe probe(
+      listener.address(), false, 60, 0.05,
+      [&] {
+        ++ends;
+        ended.set_value();
+      },
+      SelfProbe::kUnanswered, clock);
+  for (int question = 0; question < SelfProbe::kUnanswered; ++question) {
+    EXPECT_EQ(clock.AdvanceToFirst(), 60);
+    if (question + 1 < SelfProbe::kUnanswered) clock.AwaitWaiters();  // it was not answered
+    EXPECT_EQ(ends, 0) << "not before the last question went unanswered";
+  }
+  ended.get_future().wait();
   EXPECT_EQ(ends, 1);
 }
 
 // gRPC by itself gives up connecting after 20 s, which is no answer either.
 TEST(SelfProbe, EndsWhatIsSilentForLongerThanGrpcWouldTryToConnect) {
+  TOUCHSTONE_SECOND_TIER("long: gRPC's own limit is 20 s of the machine's time");
   const DeafListener listener;
-  std::atomic<int> ends{0};
+  std::promise<void> ended;
   const SelfProbe probe(
-      listener.address(), false, 0.05, 21, [&] { ++ends; }, 1);
-  while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(ends, 1);
+      listener.address(), false, 0.05, 21, [&] { ended.set_value(); }, 1);
+  ended.get_future().wait();
 }
 
 // A proxy of the environment says nothing about this server, here one that refuses.
 TEST(SelfProbe, AsksThisMachineAndNoProxy) {
   const DeafListener listener;
-  std::atomic<int> ends{0};
+  ManualClock clock;
+  std::promise<void> ended;
   ::setenv("http_proxy", "http://127.0.0.1:1", 1);
   {
-    const SelfProbe probe(listener.address(), false, 0.05, 0.05, [&] { ++ends; });
-    while (ends == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const SelfProbe probe(
+        listener.address(), false, 60, 0.05, [&] { ended.set_value(); }, 1, clock);
+    clock.AdvanceToFirst();
+    listener.WaitForACaller();
+    ended.get_future().wait();
   }
   ::unsetenv("http_proxy");
-  EXPECT_EQ(ends, 1);
 }
 
 TEST(SelfProbe, ThatIsOverDoesNotWaitForItsAnswer) {
@@ -94,11 +112,18 @@ TEST(SelfProbe, LeavesAServerAloneThatAnswersOrRefuses) {
   options.supershape_triangles = 500;
   options.threads = 1;
   auto server = Server::Start(options).value();
+  ManualClock clock;
   std::atomic<int> ends{0};
-  const SelfProbe probe(OwnAddress(options.listen, server->port()), false, 0.05, 600, [&] { ++ends; });
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  const SelfProbe probe(
+      OwnAddress(options.listen, server->port()), false, 60, 600, [&] { ++ends; }, SelfProbe::kUnanswered,
+      clock);
+  const auto let_it_ask = [&] {
+    for (int question = 0; question < 2 * SelfProbe::kUnanswered; ++question) clock.AdvanceToFirst();
+    clock.AwaitWaiters();  // the last one is over, and it goes on
+  };
+  let_it_ask();
   server.reset();  // nobody listens there any more
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  let_it_ask();
   EXPECT_EQ(ends, 0);
 }
 

@@ -63,8 +63,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   Resources& resources = parts.resources;
   resources.options = options;
   if (!options.metrics.empty()) resources.calls = std::make_unique<CallMetrics>();
-  TOUCHSTONE_ASSIGN_OR_RETURN(resources.access,
-                              Access::Create(options.listen, options.access, Motion::kSimulated));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      resources.access, Access::Create(options.listen, options.access, Motion::kSimulated, *options.clock));
   resources.OpenPlaces();
   resources.access->CountRefusals(resources.calls.get());
   resources.pool = std::make_unique<ThreadPool>(options.threads);
@@ -75,7 +75,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.sessions, SessionStore::Open(options));
   TOUCHSTONE_ASSIGN_OR_RETURN(resources.default_model,
                               DefaultModel(options.default_model, resources.models.get()));
-  parts.leases = std::make_unique<LeaseBook>(options.lease_window_s);
+  parts.leases = std::make_unique<LeaseBook>(options.lease_window_s, false, *options.clock);
   parts.source =
       std::make_unique<source::VirtualSource>(&resources.objects, options.OfSource(), resources.default_model,
                                               options.renderer, resources.pool.get());

@@ -14,12 +14,12 @@ namespace touchstone::service {
 namespace {
 
 // What the user says of meshes and renderers before it is checked.
-struct Raw {
+struct RawServerFlags {
   std::vector<std::string> mesh, mesh_dir;
   std::string renderer = "auto";
 };
 
-std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
+std::vector<Option> OptionsOf(ServerFlags* flags, RawServerFlags* raw) {
   ServerOptions& o = flags->options;
   std::vector<Option> options = {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.listen},
@@ -51,7 +51,7 @@ std::vector<Option> OptionsOf(ServerFlags* flags, Raw* raw) {
   return options;
 }
 
-absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
+absl::Status Resolve(const RawServerFlags& raw, ServerFlags* flags) {
   ServerOptions& options = flags->options;
   for (const std::string& folder : raw.mesh_dir) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<source::MeshSpec> sources, MeshSpecsOfFolder(folder));
@@ -75,14 +75,14 @@ absl::Status Resolve(const Raw& raw, ServerFlags* flags) {
 }  // namespace
 
 absl::Status ApplyToml(const std::string& text, const std::string& origin, ServerFlags* flags) {
-  Raw raw;
+  RawServerFlags raw;
   TOUCHSTONE_RETURN_IF_ERROR(ReadToml(text, origin, OptionsOf(flags, &raw), {}));
   return Resolve(raw, flags);
 }
 
 absl::StatusOr<ServerFlags> ParseServerFlags(int argc, const char* const* argv) {
   ServerFlags flags;
-  Raw raw;
+  RawServerFlags raw;
   const std::vector<Option> options = OptionsOf(&flags, &raw);
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const CommandLine line,

@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/base/clock.h"
 #include "server/image/renderer.h"
 #include "server/service/access_options.h"
 #include "server/service/limits.h"
@@ -34,6 +35,8 @@ struct ServerOptions : Limits {
   int threads = 0;  // that simulate; 0: one per core
   image::RendererOptions renderer;
   double lease_window_s = 2;
+  // Of leases, rates and time limits; no option of a process. It outlives the server.
+  const Clock* clock = &SteadyClock();
 };
 
 }  // namespace touchstone::service

@@ -20,10 +20,7 @@ namespace {
 
 // A measurement file under one, an image set under the other.
 constexpr char kCsvExtension[] = ".csv", kImagesExtension[] = ".images";
-constexpr size_t kPiece = 1 << 20;
 constexpr size_t kMaxSessions = 10000;
-// Nobody writes a file for so long.
-constexpr std::chrono::hours kOldDraft{1};
 
 uint64_t Mebibytes(int count) {
   return static_cast<uint64_t>(count) << 20;
@@ -225,13 +222,13 @@ absl::Status SessionStore::Export(
   if (!folder_.empty() && !Stat(name, &version, &path)) return NoSession(name);
   if (folder_.empty() || path == PathOf(name, true)) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const std::string> bytes, Bytes(name));
-    return ForEachPiece(*bytes, kPiece, take);
+    return ForEachPiece(*bytes, kSessionPieceBytes, take);
   }
   // Open, the file stays as it is although its name may be deleted.
   std::ifstream file(path, std::ios::binary);
-  std::string piece(kPiece, '\0');
+  std::string piece(kSessionPieceBytes, '\0');
   uint64_t taken = 0;
-  while (taken < version.bytes && file.read(piece.data(), kPiece).gcount() > 0) {
+  while (taken < version.bytes && file.read(piece.data(), kSessionPieceBytes).gcount() > 0) {
     taken += file.gcount();
     if (!take("", absl::string_view(piece.data(), file.gcount()))) return absl::OkStatus();
   }

@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 
 #include "server/base/status.h"
@@ -38,8 +37,9 @@ dataset::StreamShare ShareOf(const std::string& client, const Resources* resourc
 // clients go on at another server or at this one when it is back.
 class Handover {
  public:
-  Handover(const dataset::DatasetPart& part, uint64_t samples)
-      : stop_(part.stop_index > 0    ? part.stop_index
+  Handover(const dataset::DatasetPart& part, uint64_t samples, const Clock& clock)
+      : clock_(clock),
+        stop_(part.stop_index > 0    ? part.stop_index
               : part.indices.empty() ? samples
                                      : part.indices.size()),
         stride_(std::max<uint32_t>(1, part.batch_stride)),
@@ -50,13 +50,13 @@ class Handover {
     if (sent_)
       rows_ += rows;
     else
-      first_batch_ = Clock::now();
+      first_batch_ = clock_.Now();
     sent_ = true;
     next_ = start + rows;
   }
   absl::Status Check(double drain_s) const {
     if (!sent_) return absl::OkStatus();
-    const double running_s = std::chrono::duration<double>(Clock::now() - first_batch_).count();
+    const double running_s = clock_.SecondsSince(first_batch_);
     if (running_s < kMinRunningS) return absl::OkStatus();  // its speed is not known yet
     const double left = next_ < stop_ ? static_cast<double>(stop_ - next_) / stride_ : 0;
     if (left <= rows_ / running_s * drain_s) return absl::OkStatus();
@@ -66,14 +66,14 @@ class Handover {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr double kMinRunningS = 0.5;
+  const Clock& clock_;
   const uint64_t stop_;
   const uint32_t stride_;
   uint64_t next_;
   uint64_t rows_ = 0;  // after the first batch
   bool sent_ = false;
-  Clock::time_point first_batch_;  // once it was sent
+  Clock::Time first_batch_;  // once it was sent
 };
 
 }  // namespace
@@ -160,7 +160,7 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
   *response.mutable_header() = ToProto(stream->header());
   if (!call.Wait(write)) return absl::CancelledError("the client is gone");
   response.clear_header();
-  Handover handover(request.part, stream->header().samples);
+  Handover handover(request.part, stream->header().samples, *resources_->options.clock);
   for (;;) {
     if (resources_->draining) TOUCHSTONE_RETURN_IF_ERROR(handover.Check(resources_->options.drain_s));
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<dataset::DatasetBatch> batch, stream->Next(guard));

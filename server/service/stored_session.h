@@ -54,6 +54,9 @@ class SessionPieces {
   uint64_t bytes_ = 0;
 };
 
+// Of what a session's files are sent in, both ways.
+inline constexpr size_t kSessionPieceBytes = 1 << 20;
+
 // Hands the files of a session over in pieces of at most `piece_bytes`, until `take` returns false. `file` is empty for
 // a measurement file.
 absl::Status ForEachPiece(absl::string_view bytes, size_t piece_bytes,

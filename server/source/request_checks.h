@@ -9,16 +9,9 @@
 #include <absl/status/statusor.h>
 
 #include "server/dataset/specification.h"
+#include "server/source/source_limits.h"
 
 namespace touchstone::source {
-
-// The most that one request may ask for; beyond it, RESOURCE_EXHAUSTED.
-struct SourceLimits {
-  int max_touches_per_request = 20000;
-  int max_images_per_request = 1000;
-  int max_batch_size = 65536;
-  int max_indices_per_request = 100000;
-};
 
 // 1 to 64 letters, digits, '_', '-' or '.', not '.' first.
 absl::Status CheckResourceName(const std::string& name, const std::string& field);

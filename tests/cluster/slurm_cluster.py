@@ -1,4 +1,5 @@
 """A Slurm cluster on this machine: a slurmctld and several slurmd on ports of their own, each a node of one core."""
+import contextlib
 import os
 import pathlib
 import shutil
@@ -106,10 +107,8 @@ class SlurmCluster:
         pids = self._processes_of(name)
         for what in (signal.SIGSTOP, signal.SIGKILL):
             for pid in pids:
-                try:
+                with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, what)
-                except ProcessLookupError:
-                    pass
         process.kill()
         process.wait()
 
@@ -129,7 +128,7 @@ class SlurmCluster:
         return found
 
     def run(self, *command, **options):
-        return subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=120, **options)
+        return subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=120, check=False, **options)
 
     def node_states(self):
         output = self.run("sinfo", "--noheader", "--Node", "--format=%N %T").stdout

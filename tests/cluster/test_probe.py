@@ -10,7 +10,7 @@ import slurm_cluster
 @pytest.fixture
 def probe(bin_folder):
     def ask(*arguments):
-        return subprocess.run([bin_folder / "touchstone-probe", *arguments], capture_output=True, text=True, timeout=60)
+        return subprocess.run([bin_folder / "touchstone-probe", *arguments], capture_output=True, text=True, timeout=60, check=False)
 
     return ask
 

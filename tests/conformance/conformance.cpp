@@ -8,10 +8,20 @@ std::string& Target() {
   return target;
 }
 
+ManualClock*& TargetsClock() {
+  static ManualClock* clock = nullptr;
+  return clock;
+}
+
 }  // namespace
 
-void SetConformanceTarget(const std::string& address) {
+void SetConformanceTarget(const std::string& address, ManualClock* clock) {
   Target() = address;
+  TargetsClock() = clock;
+}
+
+ManualClock* Conformance::clock() {
+  return TargetsClock();
 }
 
 Conformance::Conformance() {

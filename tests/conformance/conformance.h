@@ -12,14 +12,15 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include "server/base/manual_clock.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/models.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
 namespace touchstone {
 
-// HOST:PORT of the source under test; set once, before the tests run.
-void SetConformanceTarget(const std::string& address);
+// HOST:PORT of the source under test, and the clock of its leases if it is in this process; set once, before the tests run.
+void SetConformanceTarget(const std::string& address, ManualClock* clock = nullptr);
 
 class Conformance : public testing::Test {
  protected:
@@ -38,6 +39,8 @@ class Conformance : public testing::Test {
     grpc::Status status;
   };
   Streamed Stream(v1::StreamDatasetRequest request);
+  // Null: the source's time passes by itself.
+  static ManualClock* clock();
   bool IsVirtual() const { return description_.kind() == v1::SOURCE_KIND_VIRTUAL; }
   // Where the source wants one: a lease, kept alive until the test ends, as every client has it. Else empty.
   std::string LeaseToken();

@@ -16,11 +16,14 @@
 
 namespace {
 
-std::unique_ptr<touchstone::service::GatewayServer> StartGateway(std::vector<const char*> flags) {
+std::unique_ptr<touchstone::service::GatewayServer> StartGateway(std::vector<const char*> flags,
+                                                                 const touchstone::Clock& clock) {
   flags.insert(flags.begin(),
                {"touchstone-gateway", "--listen", "127.0.0.1:0", "--supershape-triangles", "2000"});
   auto parsed = touchstone::service::ParseGatewayFlags(static_cast<int>(flags.size()), flags.data());
   if (parsed.ok()) {
+    parsed->options.common.clock = &clock;
+    parsed->options.common.max_unary_calls_per_s = 0;  // it stands still while the tests call
     auto gateway = touchstone::service::GatewayServer::Start(parsed->options);
     if (gateway.ok()) return *std::move(gateway);
     std::fprintf(stderr, "%s\n", std::string(gateway.status().message()).c_str());
@@ -40,6 +43,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[2];
+  touchstone::ManualClock clock;  // of the leases
   std::unique_ptr<touchstone::rig::Emulator> emulator;
   std::unique_ptr<touchstone::service::GatewayServer> gateway;
   if (mode == "--record") {
@@ -53,11 +57,12 @@ int main(int argc, char** argv) {
     if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller
     emulator = touchstone::rig::Emulator::Start(options);
     gateway = StartGateway({"--config", emulator->config_path().c_str(), "--arm-watchdog-hz", "0.5",
-                            "--arm-silence-s", "5", "--effector-silence-s", "5"});
+                            "--arm-silence-s", "5", "--effector-silence-s", "5"},
+                           clock);
   } else {
-    gateway = StartGateway({"--replay", (folder / "rig.db").c_str()});
+    gateway = StartGateway({"--replay", (folder / "rig.db").c_str()}, clock);
   }
   if (gateway == nullptr) return 1;
-  touchstone::SetConformanceTarget("127.0.0.1:" + std::to_string(gateway->port()));
+  touchstone::SetConformanceTarget("127.0.0.1:" + std::to_string(gateway->port()), &clock);
   return RUN_ALL_TESTS();
 }

@@ -16,12 +16,14 @@ int main(int argc, char** argv) {
   touchstone::service::ServerOptions options;
   options.listen = "127.0.0.1:0";
   options.supershape_triangles = 2000;
-  options.lease_window_s = 2;
+  touchstone::ManualClock clock;
+  options.clock = &clock;
+  options.max_unary_calls_per_s = 0;  // it stands still while the tests call
   auto server = touchstone::service::Server::Start(options);
   if (!server.ok()) {
     std::fprintf(stderr, "%s\n", std::string(server.status().message()).c_str());
     return 1;
   }
-  touchstone::SetConformanceTarget("127.0.0.1:" + std::to_string((*server)->port()));
+  touchstone::SetConformanceTarget("127.0.0.1:" + std::to_string((*server)->port()), &clock);
   return RUN_ALL_TESTS();
 }

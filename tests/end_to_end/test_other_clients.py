@@ -26,7 +26,7 @@ def needs(module):
         pytest.skip(f"{module} is not in {CLIENTS}: PyPI could not be reached, or deploy/test was not run")
 
 
-@pytest.fixture(params=["ur3e", "ur3"])
+@pytest.fixture(params=["ur3e", pytest.param("ur3", marks=pytest.mark.second_tier("repeated: the CB3 table over the same code"))])
 def controller(request):
     """Model, and a loopback address of its own: the packages insist on the standard ports."""
     pid = os.getpid()
@@ -44,7 +44,7 @@ def controller(request):
 def run(script, *arguments):
     """In a process of its own: a client that hangs or crashes is a failure like another."""
     done = subprocess.run([sys.executable, "-c", script, *map(str, arguments)], capture_output=True, text=True,
-                          timeout=PATIENCE_S, env={**os.environ, "PYTHONPATH": str(CLIENTS)})
+                          timeout=PATIENCE_S, env={**os.environ, "PYTHONPATH": str(CLIENTS)}, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -118,7 +118,7 @@ for name in names:
 assert read >= 40, (read, lacking)
 first = receive.getTimestamp()
 assert first > 40, first
-until = time.time() + 20
+until = time.time() + 60
 while receive.getTimestamp() <= first + 0.1:
     assert time.time() < until
 assert receive.getRobotMode() == 7 and receive.getSafetyMode() == 1
@@ -131,7 +131,7 @@ print(read, "getters;", "without", *lacking)
 
 def test_ur_rtde_receives(controller):
     needs("rtde_receive")
-    model, address = controller
+    _, address = controller
     lacking = run(RECEIVE, address).split("without")[1].split()
     # ur_rtde asks controllers from PolyScope 5.23 on for these, and CB3 never for the raw wrench.
     assert set(lacking) <= {"getActualCurrentAsTorque", "getActualMoment", "getFtRawWrench"}, lacking
@@ -146,7 +146,7 @@ receive = rtde_receive.RTDEReceiveInterface(address)
 assert control.isConnected() and control.isProgramRunning()
 
 def near(values, wanted, tolerance=1e-3):
-    until = time.time() + 20
+    until = time.time() + 60
     while max(abs(a - b) for a, b in zip(values(), wanted)) > tolerance:
         assert time.time() < until, (values(), wanted)
 
@@ -169,7 +169,7 @@ pose = receive.getActualTCPPose()
 before = pose[2]
 pose[2] += 0.05
 assert control.moveL(pose, 0.02, 0.5, True)
-until = time.time() + 20
+until = time.time() + 60
 while receive.getActualTCPPose()[2] < before + 0.005:
     assert time.time() < until
 control.stopL(2.0)
@@ -182,7 +182,7 @@ assert io.setSpeedSlider(0.5)
 near(lambda: [receive.getTargetSpeedFraction(), receive.getSpeedScaling()], [0.5, 1])
 assert abs(receive.getSpeedScalingCombined() - 0.5) < 1e-9
 control.stopScript()
-until = time.time() + 20
+until = time.time() + 60
 while receive.getRuntimeState() != 1:
     assert time.time() < until, "the program goes on"
 '''
@@ -225,7 +225,7 @@ robot = urx.Robot(sys.argv[1])
 try:
     z = robot.secmon.get_cartesian_info(True)["Z"]
     robot.send_program("movel(pose_trans(get_target_tcp_pose(), p[0,0,0.02,0,0,0]), a=1.2, v=0.1)")
-    until = time.time() + 20
+    until = time.time() + 60
     while abs(robot.secmon.get_cartesian_info(True)["Z"] - (z - 0.02)) > 1e-4:
         assert time.time() < until, "did not arrive"
     assert len(robot.getj()) == 6

@@ -8,6 +8,8 @@ import pytest
 from test_rig_commands import ROOT, emulated_rig, touchstone
 
 SPEEDUP = 20
+# The emulated rig exists once.
+pytestmark = pytest.mark.xdist_group("rig_photographs")
 HIDDEN_K1 = -0.2
 RIM = 0.3  # of the object in the pictures, over the focal length
 SIZE = (160, 120)

@@ -13,7 +13,7 @@ try:  # protobuf 4.22 and later
     from google.protobuf.message_factory import GetMessageClass
 except ImportError:
     from google.protobuf.message_factory import MessageFactory
-    GetMessageClass = MessageFactory().GetPrototype
+    GetMessageClass = MessageFactory().GetPrototype  # type: ignore[attr-defined]  # of protobuf before 4.22
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SERVER = os.environ.get("TOUCHSTONE_SERVER", str(ROOT / "build/release/bin/touchstone-server"))
@@ -28,7 +28,7 @@ def channel():
     with grpc.insecure_channel(address) as channel:
         yield channel
     server.terminate()
-    assert server.wait(timeout=20) == 0
+    assert server.wait(timeout=60) == 0
 
 
 @pytest.fixture(scope="module")
@@ -93,11 +93,11 @@ def test_every_method_answers_an_empty_request_with_a_result_or_a_reason(channel
             make = channel.unary_stream if streams else channel.unary_unary
             try:
                 result = make(path, request_serializer=request.SerializeToString,
-                              response_deserializer=response.FromString)(request(), timeout=20)
+                              response_deserializer=response.FromString)(request(), timeout=60)
                 list(result) if streams else result
             except grpc.RpcError as error:
                 assert error.code() in (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.NOT_FOUND,
                                         grpc.StatusCode.ABORTED), (path, error.code(), error.details())
-                assert len(error.details()) > 20, (path, error.details())
+                assert len(error.details() or "") > 20, (path, error.details())
             called += 1
     assert called >= 14

@@ -9,14 +9,13 @@ import subprocess
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch)
+from programs import Result, Server, create_model, create_session, export_session, list_models, list_sessions, measurements, model_yaml, scratch
 
 
 @contextlib.contextmanager
 def small_disk(folder: str, kibibytes: int):
     """A file system of that size in the folder; PermissionError where this user may not mount one."""
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kibibytes}k", "tmpfs", folder], capture_output=True, text=True)
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kibibytes}k", "tmpfs", folder], capture_output=True, text=True, check=False)
     if mounted.returncode:
         raise PermissionError(f"mounting a small disk takes root: {mounted.stderr.strip()}")
     try:
@@ -42,14 +41,14 @@ def run(kibibytes: int = 2048) -> Result:
                     refused.append(error)
                     if len(refused) > 14:
                         break
-            for error in refused:
-                result.expect(error.code() in (grpc.StatusCode.RESOURCE_EXHAUSTED, grpc.StatusCode.UNAVAILABLE)
-                              and "space" in error.details(), f"a full disk is told as {error.code()}: {error.details()}")
+            for refusal in refused:
+                result.expect(refusal.code() in (grpc.StatusCode.RESOURCE_EXHAUSTED, grpc.StatusCode.UNAVAILABLE)
+                              and "space" in (refusal.details() or ""), f"a full disk is told as {refusal.code()}: {refusal.details()}")
             try:
                 create_model(channel, model_yaml("late", 2))
                 result.failures.append("a model was acknowledged on a full disk")
             except grpc.RpcError as error:
-                result.expect("space" in error.details(), f"a full disk is told as {error.code()}: {error.details()}")
+                result.expect("space" in (error.details() or ""), f"a full disk is told as {error.code()}: {error.details()}")
             result.expect(bool(kept) and len(refused) > 14, f"the disk never ran full: {len(kept)} sessions")
             _compare(channel, kept, result)
             # Room again: it goes on without being started anew.

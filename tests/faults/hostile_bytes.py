@@ -3,16 +3,18 @@ and extreme values: each call ends with a status that names what is wrong, and t
 
 from __future__ import annotations
 
+import contextlib
 import math
 import random
 import subprocess
 import tempfile
+from typing import Any
 
 import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor import FieldDescriptor
 
-from programs import ROOT, Result, Server, describe, emulated_rig, scratch
+from programs import PATIENCE_S, ROOT, Result, Server, describe, emulated_rig, scratch
 
 # A status goes in a header, and headers have a limit of 8 KiB together.
 MAX_STATUS_BYTES = 2048
@@ -36,8 +38,9 @@ def methods():
     for each in files.file:
         pool.Add(each)
     factory = message_factory.MessageFactory(pool)
+    prototype: Any = factory.GetPrototype  # type: ignore[attr-defined]  # of protobuf before 5
     return [(f"/{each.package}.{service.name}/{method.name}",
-             factory.GetPrototype(pool.FindMessageTypeByName(method.input_type.lstrip("."))), method.client_streaming)
+             prototype(pool.FindMessageTypeByName(method.input_type.lstrip("."))), method.client_streaming)
             for each in files.file for service in each.service for method in service.method]
 
 
@@ -90,12 +93,13 @@ def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes
     """Hostile calls of one method. codes: how often each status came; counted up."""
     name, request_class, client_streams = method
     with server.channel(("grpc.max_metadata_size", 1 << 20)) as channel:
-        code, words = _answer(channel.stream_stream(name)(iter(()), timeout=CALL_S))
+        code, words = _answer(channel.stream_stream(name)(iter(()), timeout=PATIENCE_S))
         result.expect(code in NO_MESSAGE and (words or code == grpc.StatusCode.UNIMPLEMENTED), f"{name} without a message: {code.name} {words!r}")
         call = (channel.stream_stream if client_streams else channel.unary_stream)(name)
         for k in range(calls):
             data = _hostile(request_class, rng)
-            code, words = _answer(call(iter([data]) if client_streams else data, timeout=CALL_S))
+            request: Any = iter([data]) if client_streams else data
+            code, words = _answer(call(request, timeout=CALL_S))
             codes[code] = codes.get(code, 0) + 1
             place = f"{name}, call {k}"
             # Bytes that are no message are gRPC's own to refuse: INTERNAL without a word.
@@ -108,21 +112,37 @@ def _attack(server: Server, method: tuple, calls: int, rng: random.Random, codes
         describe(channel)
 
 
-def run(calls: int = 300, seed: int = 1) -> Result:
-    """calls: how many of each method at a server; at a gateway, whose rig they may move, a tenth."""
-    result, rng, all_methods = Result(), random.Random(seed), methods()
-    at_server, at_gateway = {}, {}
-    # A crash of one call would hide the others': each method has a process of its own.
-    for method in all_methods:
-        with Server("--log-level", "off", "--max-unary-calls-per-s", "0") as server:
-            _attack(server, method, calls, rng, at_server, result)
+QUIET = ("--log-level", "off", "--max-unary-calls-per-s", "0")
+
+
+@contextlib.contextmanager
+def _servers():
+    yield lambda: Server(*QUIET)
+
+
+@contextlib.contextmanager
+def _gateways():
     with scratch() as folder, emulated_rig(folder) as emulator:
-        for method in all_methods:
-            with Server("--config", emulator.ready, "--log-level", "off", "--max-unary-calls-per-s", "0", gateway=True) as gateway:
-                _attack(gateway, method, max(2, calls // 10), rng, at_gateway, result)
-    for what, codes, count in (("server", at_server, calls), ("gateway of an emulated rig", at_gateway, max(2, calls // 10))):
-        told = ", ".join(f"{count} {code.name}" for code, count in sorted(codes.items(), key=lambda item: -item[1]))
-        result.seen.append(f"{len(all_methods)} methods of a {what}, {count} hostile calls each and one without a message: {told}")
+        yield lambda: Server("--config", emulator.ready, *QUIET, gateway=True)
+
+
+# Name: what starts one, and how many times fewer calls it gets; they may move a gateway's rig.
+SOURCES = {"server": (_servers, 1), "gateway of an emulated rig": (_gateways, 10)}
+
+
+def run(calls: int = 300, seed: int = 1, sources: tuple[str, ...] = tuple(SOURCES)) -> Result:
+    """calls: how many of each method at a server; at a gateway a tenth. sources: of SOURCES."""
+    result, rng, all_methods = Result(), random.Random(seed), methods()
+    for source in sources:
+        make, fewer = SOURCES[source]
+        count, codes = max(2, calls // fewer), {}
+        with make() as start:
+            # A crash of one call would hide the others': each method has a process of its own.
+            for method in all_methods:
+                with start() as attacked:
+                    _attack(attacked, method, count, rng, codes, result)
+        told = ", ".join(f"{number} {code.name}" for code, number in sorted(codes.items(), key=lambda item: -item[1]))
+        result.seen.append(f"{len(all_methods)} methods of a {source}, {count} hostile calls each and one without a message: {told}")
     return result
 
 

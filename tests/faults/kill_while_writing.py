@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import random
 import threading
-import time
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch, wait_until)
+from programs import (
+    Result,
+    Server,
+    create_model,
+    create_session,
+    export_session,
+    list_models,
+    list_sessions,
+    measurements,
+    model_yaml,
+    scratch,
+    wait_until,
+)
 
 WRITERS = 4
+MAX_WRITES = 60  # that are acknowledged before a kill: those of a fifth of a second
 
 
 class Written:
@@ -87,12 +98,10 @@ def run(kills: int = 500, seed: int = 1) -> Result:
             with Server(*options) as server:
                 writers = [threading.Thread(target=write, args=(server, written, round_, k, random.Random(rng.random())))
                            for k in range(WRITERS)]
-                acknowledged = len(written.acknowledged)
+                enough = len(written.acknowledged) + rng.randrange(1, MAX_WRITES)
                 for writer in writers:
                     writer.start()
-                # They write by then, however long it takes here to connect.
-                wait_until(lambda: len(written.acknowledged) > acknowledged)
-                time.sleep(rng.uniform(0.0, 0.2))
+                wait_until(lambda: len(written.acknowledged) >= enough)  # noqa: B023 - not called after this round
                 server.kill()
                 for writer in writers:
                     writer.join()

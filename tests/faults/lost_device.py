@@ -30,14 +30,19 @@ class Device(Preloaded):
         self.state[4:] = struct.pack("<i", gone)
 
 
+SHARDS = 6
+
+
 def _draw(server: Server, pictures: int, out: pathlib.Path) -> subprocess.Popen:
-    words = ["stream", "--server", server.target, "--objects", "lat00,lat20", "--samples", str(pictures), "--shard-size", "1000", "--image",
+    words = ["stream", "--server", server.target, "--objects", "lat00,lat20", "--samples", str(pictures),
+             "--shard-size", str(pictures // SHARDS), "--image",
              "128x128"]
     return subprocess.Popen([CLIENT, *words, "--out", out, "--quiet"], stderr=subprocess.PIPE, text=True)
 
 
 def run(pictures: int = 30_000, resets: int = 50, absences: int = 10, seed: int = 1) -> Result:
-    """pictures: of the dataset. resets: while it is drawn, or a few more. absences: how often the device stays away for a moment."""
+    """pictures: of the dataset, a multiple of SHARDS. resets: while it is drawn, or a few more. absences: how often the device
+    stays away for a moment."""
     result, rng, told, away = Result(), random.Random(seed), 0, 0
     with scratch() as folder:
         device, whole, made = Device(folder), pathlib.Path(folder) / "whole", pathlib.Path(folder) / "made"
@@ -66,8 +71,9 @@ def run(pictures: int = 30_000, resets: int = 50, absences: int = 10, seed: int 
             result.expect(client.returncode == 0, f"the client ended with {client.returncode}: {words}")
             result.expect(server.alive(), "the server ended")
         shards = {path.name: path.read_bytes() for path in whole.glob("shard-*.tar")}
-        result.expect({path.name: path.read_bytes() for path in made.glob("shard-*.tar")} == shards, "the dataset has other bytes than without losses")
-        result.expect(len(shards) == pictures // 1000, f"{len(shards)} shards of {pictures // 1000}")
+        result.expect({path.name: path.read_bytes() for path in made.glob("shard-*.tar")} == shards,
+                      "the dataset has other bytes than without losses")
+        result.expect(len(shards) == SHARDS, f"{len(shards)} shards of {SHARDS}")
     result.expect(told >= resets // 2 and away >= min(absences, 1), f"only {told} resets and {away} absences while {pictures:,} pictures were drawn")
     kept = "the dataset has the bytes that it has without" if not result.failures else "not all was kept"
     result.seen.append(f"{told} resets, after {away} of which the device stayed away for a moment, while {pictures:,} pictures were drawn: {kept} "

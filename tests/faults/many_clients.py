@@ -8,9 +8,8 @@ import random
 
 import grpc
 
-from touchstone.v1 import source_pb2
-
 from programs import Result, Server, describe
+from touchstone.v1 import source_pb2
 
 SAMPLES = 20_000
 
@@ -34,7 +33,7 @@ async def _read(target: str, refusals: list[str]) -> str:
                 # Over the limit of streams: a client comes again.
                 if error.code() != grpc.StatusCode.RESOURCE_EXHAUSTED:
                     raise
-                refusals.append(error.details())
+                refusals.append(error.details() or "")
                 await asyncio.sleep(random.uniform(0.2, 1.0))
 
 

@@ -133,11 +133,14 @@ def own_channel(target: str, *options: tuple[str, int]) -> grpc.Channel:
     return grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), *options])
 
 
-def wait_until(done: Callable[[], bool]) -> None:
-    """Until it is done, or the patience is over, which is for the caller to find out."""
+def wait_until(done: Callable[[], bool]) -> bool:
+    """True once it is done; False when the patience is over."""
     deadline = time.monotonic() + PATIENCE_S
-    while not done() and time.monotonic() < deadline:
+    while not done():
+        if time.monotonic() > deadline:
+            return False
         time.sleep(0.001)
+    return True
 
 
 def create_model(channel: grpc.Channel, yaml: str) -> models_pb2.Model:
@@ -208,8 +211,8 @@ def model_yaml(name: str, radius_mm: float) -> str:
 
 def measurements(touches: int, first: float) -> bytes:
     """A measurement file whose bytes depend on `first`, a time in us."""
-    rows = ["touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
-            "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us"]
+    rows = [("touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_z,"
+             "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us")]
     rows += [f"{k},lat00,20,60,0,0,0,0,0,-1,1,0,0,{first + k},0,{k}" for k in range(touches)]
     return ("\n".join(rows) + "\n").encode()
 

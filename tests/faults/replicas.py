@@ -6,8 +6,7 @@ import concurrent.futures
 
 import grpc
 
-from programs import (Result, Server, create_model, create_session, export_session, list_models, measurements, model_yaml,
-                      scratch)
+from programs import Result, Server, create_model, create_session, export_session, list_models, measurements, model_yaml, scratch
 
 
 def _outcome(call, *arguments):

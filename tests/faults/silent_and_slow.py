@@ -43,18 +43,19 @@ def _served(server: Server, result: Result, beside: str) -> None:
                            + ("" if server.alive() else f"; the server ended with {server.process.returncode}"))
 
 
-def run(connections: int = 600) -> Result:
-    """connections: how many of each kind, to a server that may have 256 open files."""
+def run(connections: int = 600, handshake_s: float = 10) -> Result:
+    """connections: how many of each kind, to a server that may have 256 open files. handshake_s: after which it closes them."""
     result = Result()
     for name, says in (("silent connections", b""), ("connections with half a greeting", PREFACE[:10]),
-                       ("connections with a greeting and no more", PREFACE), ("connections of nonsense", b"GET / HTTP/1.1\r\n\r\n" + os.urandom(300))):
-        with Server(max_files=MAX_FILES) as server, contextlib.ExitStack() as open_:
+                       ("connections with a greeting and no more", PREFACE),
+                       ("connections of nonsense", b"GET / HTTP/1.1\r\n\r\n" + os.urandom(300))):
+        with Server("--handshake-s", str(handshake_s), max_files=MAX_FILES) as server, contextlib.ExitStack() as open_:
             for connection in _connect(server.target, connections, says):
                 open_.callback(connection.close)
             _served(server, result, name)
     _slow_readers(result, 40)
-    result.seen.append(f"beside {connections} silent, half greeting, greeting or nonsensical connections to a server of {MAX_FILES} files, and beside 40 "
-                       "streams that nobody reads, another client was served")
+    result.seen.append(f"beside {connections} silent, half greeting, greeting or nonsensical connections to a server of {MAX_FILES} files, and "
+                       "beside 40 streams that nobody reads, another client was served")
     return result
 
 

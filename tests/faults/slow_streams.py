@@ -11,9 +11,9 @@ import threading
 import time
 
 import grpc
-from touchstone.v1 import source_pb2
 
 from programs import Result, Server, open_stream, own_channel
+from touchstone.v1 import source_pb2
 
 LONG_S = 600.0  # more than anything here takes
 
@@ -88,10 +88,14 @@ def _waits_s(server: Server, times: int) -> list[float]:
     return sorted(map(float, said.stdout.split()))
 
 
-def run(streams: int = 20, times: int = 100) -> Result:
-    """streams: slow ones at once. times: how often the quick one is asked for beside them."""
+KINDS = ("formulas", 4096), ("formulas", 16384), ("pictures", 64)
+
+
+def run(streams: int = 20, times: int = 100, kinds: tuple[tuple[str, int], ...] = KINDS) -> Result:
+    """streams: slow ones at once. times: how often the quick one is asked for beside them. kinds: what makes them slow, and the
+    samples of their batches."""
     result = Result()
-    for kind, batch_size in ("formulas", 4096), ("formulas", 16384), ("pictures", 64):
+    for kind, batch_size in kinds:
         with Server("--renderer", "cpu") as server:
             slow = [_Slow(server.channel(("grpc.max_receive_message_length", -1)), _request(10**9, kind, batch_size)) for _ in range(streams)]
             _round_s(slow, turns=1)
@@ -101,7 +105,9 @@ def run(streams: int = 20, times: int = 100) -> Result:
                 each.end()
             result.expect(server.alive(), "the server ended")
         median = statistics.median(waits)
-        result.expect(median < round_s / 2, f"beside {streams} streams of {kind} a quick one waited {median:.2f} s, as long as a turn of them all ({round_s:.2f} s)")
-        result.seen.append(f"beside {streams} streams of {kind}, {batch_size} a batch, from the same address a quick stream had its first batch after {waits[0]:.3f} to "
-                           f"{waits[-1]:.3f} s (median {median:.3f}, {times} times); the slow ones had one each in {round_s:.1f} s")
+        result.expect(median < round_s / 2, f"beside {streams} streams of {kind} a quick one waited {median:.2f} s, "
+                                             f"as long as a turn of them all ({round_s:.2f} s)")
+        result.seen.append(f"beside {streams} streams of {kind}, {batch_size} a batch, from the same address a quick "
+                           f"stream had its first batch after {waits[0]:.3f} to {waits[-1]:.3f} s (median {median:.3f}, {times} "
+                           f"times); the slow ones had one each in {round_s:.1f} s")
     return result

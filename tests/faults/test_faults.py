@@ -41,8 +41,9 @@ def test_a_full_disk_loses_nothing_that_was_acknowledged():
         pytest.skip(str(error))
 
 
-def test_every_method_answers_hostile_bytes():
-    passes(hostile_bytes.run(calls=8))
+@pytest.mark.parametrize("source", hostile_bytes.SOURCES, ids=["server", "gateway"])
+def test_every_method_answers_hostile_bytes(source):
+    passes(hostile_bytes.run(calls=8, sources=(source,)))
 
 
 def test_many_clients_get_the_same_bytes():
@@ -53,20 +54,32 @@ def test_memory_is_flat_over_a_long_stream():
     passes(flat_memory.run(samples=5_000_000))
 
 
-def test_silent_and_slow_clients_do_not_shut_others_out():
-    passes(silent_and_slow.run())
+@pytest.mark.parametrize("handshake_s", [1, pytest.param(10, marks=pytest.mark.second_tier(
+    "long: limits of a server as they are by default"))])
+def test_silent_and_slow_clients_do_not_shut_others_out(handshake_s):
+    passes(silent_and_slow.run(handshake_s=handshake_s))
 
 
-def test_a_clock_that_is_set_changes_no_limit_and_no_byte():
+@pytest.mark.parametrize("part", clock_jumps.PARTS)
+def test_a_clock_that_is_set_changes_no_limit_and_no_byte(part):
+    passes(clock_jumps.run(jumps=8, names=("an hour back",), parts=(part,)))
+
+
+@pytest.mark.second_tier("repeated: more jumps of the host's clock")
+def test_clocks_that_are_set_by_years_change_no_limit_and_no_byte():
     passes(clock_jumps.run(jumps=20, names=("an hour back", "fifteen years ahead")))
 
 
-def test_a_graphics_device_that_is_lost_changes_no_picture():
-    passes(lost_device.run(pictures=6000, resets=10, absences=2))
+@pytest.mark.parametrize("pictures, resets, absences", [(600, 4, 1), pytest.param(6000, 10, 2, marks=pytest.mark.second_tier(
+    "repeated: more losses of a graphics device"))])
+def test_a_graphics_device_that_is_lost_changes_no_picture(pictures, resets, absences):
+    passes(lost_device.run(pictures, resets, absences))
 
 
-def test_a_quick_stream_does_not_wait_for_slow_ones_of_its_address():
-    passes(slow_streams.run(streams=4, times=3))
+@pytest.mark.parametrize("kinds", [slow_streams.KINDS[:1], pytest.param(slow_streams.KINDS, marks=pytest.mark.second_tier(
+    "repeated: streams that are slow for other reasons"))], ids=["one", "all"])
+def test_a_quick_stream_does_not_wait_for_slow_ones_of_its_address(kinds):
+    passes(slow_streams.run(streams=4, times=3, kinds=kinds))
 
 
 def test_a_loss_and_a_tear_are_seen():

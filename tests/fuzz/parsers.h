@@ -15,7 +15,7 @@ enum class Answer {
 };
 
 struct Parser {
-  std::string name;  // also of its folder in corpus/
+  std::string name;  // also of its archive, corpus/NAME.tar.xz
   Answer (*read)(absl::string_view bytes);
 };
 

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <random>
 
-#include "server/base/test_paths.h"
 #include "server/base/text.h"
 
 namespace touchstone::fuzz {
@@ -17,10 +16,14 @@ namespace {
 
 constexpr int kMutationsOfEach = 60;
 
+// Where the build unpacks the archives of tests/fuzz/corpus (CMakeLists.txt): a folder for each reader.
+std::filesystem::path Corpus() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "tests/fuzz/corpus";
+}
+
 std::vector<std::string> FilesOf(const Parser& parser) {
   std::vector<std::string> paths;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(SourceDir() + "/tests/fuzz/corpus/" + parser.name))
+  for (const auto& entry : std::filesystem::directory_iterator(Corpus() / parser.name))
     paths.push_back(entry.path().string());
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -76,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(All, ParserTest, testing::ValuesIn(Parsers()),
 
 TEST(Parsers, HaveACorpusEach) {
   std::vector<std::string> folders, names;
-  for (const auto& entry : std::filesystem::directory_iterator(SourceDir() + "/tests/fuzz/corpus"))
+  for (const auto& entry : std::filesystem::directory_iterator(Corpus()))
     folders.push_back(entry.path().filename().string());
   for (const Parser& parser : Parsers()) names.push_back(parser.name);
   EXPECT_THAT(folders, testing::UnorderedElementsAreArray(names));

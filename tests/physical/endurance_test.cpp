@@ -1,6 +1,6 @@
 // A few hundred touches while things break at random. RESULTS.md tells of many more.
-#include "server/base/test_tier.h"
 #include "tests/physical/endurance/endurance.h"
+#include "server/base/test_tier.h"
 
 namespace touchstone {
 namespace {

@@ -178,7 +178,8 @@ TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
   for (const gateway::arm::ArmState& state : arm_->History(now_s - 30, now_s))
     if (state.phase == gateway::arm::MotionPhase::kApproach)
       lowest_m = std::min(lowest_m, state.base_from_tip.translation().z());
-  EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01) << "it would have taken 40 s of the rig's to the end";
+  EXPECT_GT(lowest_m, touch.end.translation().z() + 0.01)
+      << "it would have taken 40 s of the rig's to the end";
 }
 
 TEST_F(EmulatedArm, MovesThroughPosesToJoints) {

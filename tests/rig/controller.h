@@ -36,8 +36,8 @@ class Controller {
     int primary_read_only = 0, secondary_read_only = 0, realtime_read_only = 0;
   };
   // Listens and runs threads until it is destroyed. Throws std::runtime_error if a port is taken.
-  static std::unique_ptr<Controller> Start(const ControllerOptions& options, SimClock* clock,
-                                           Faults* faults, TipListener* tip);
+  static std::unique_ptr<Controller> Start(const ControllerOptions& options, SimClock* clock, Faults* faults,
+                                           TipListener* tip);
   virtual ~Controller() = default;
   virtual Ports ports() const = 0;
   // For the truth of tests, not for clients: base_from_tip without noise, now.

@@ -50,7 +50,7 @@ def read_images(batch):
 
 def parallel(make, streams, seconds, consume):
     """The sum over streams that run at the same time, each in a thread with a connection of its own."""
-    rates = [None] * streams
+    rates = [(0.0, 0.0)] * streams  # per second, and the first batch's ms
     def run(k):
         rates[k] = measure(make(k), seconds, consume)
     threads = [threading.Thread(target=run, args=(k,)) for k in range(streams)]
@@ -79,7 +79,7 @@ def main():
         print(f"{what:48} {rate:14,.0f} {unit}/s   first batch after {first_ms:6.1f} ms", flush=True)
 
     for batch_size in [arguments.batch_size] if arguments.batch_size else [4096, 65536]:
-        touches = lambda k=0, units="lab": client.dataset(
+        touches = lambda k=0, units="lab", batch_size=batch_size: client.dataset(
             arguments.object, samples=endless, seed=k, batch_size=batch_size, units=units)
         name = f"touches, batches of {batch_size}"
         report(name, "touches", *measure(touches(), arguments.seconds, read_touches))

@@ -12,7 +12,7 @@ import argparse
 import gymnasium
 import numpy as np
 
-import touchstone.gym  # registers touchstone/Recognise-v0
+import touchstone.gym  # noqa: F401 - makes the environments known to Gymnasium
 
 MODEL = "touchstone: model/1\nname: noisy\neffects:\n  - gaussian_noise: {sigma_us: 47790}\n"
 
@@ -51,7 +51,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     environments = gymnasium.make_vec("touchstone/Recognise-v0", num_envs=options.environments, targets=options.targets, model=MODEL)
-    touches, _ = environments.single_observation_space.shape
+    touches, _ = environments.single_observation_space.shape or (0, 0)
     objects = list(environments.unwrapped.objects)
     agent = Agent(touches, len(objects), np.random.default_rng(options.seed))
     observations, info = environments.reset(seed=options.seed)

@@ -4,13 +4,14 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import threading
 
 import pytest
 
 import touchstone
-from touchstone import connection
+from touchstone import connection, credentials
 from touchstone.dataset import Dataset
 
 _REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
@@ -57,7 +58,7 @@ class Server:
     def stop(self):
         self.process.terminate()
         try:
-            self.process.wait(timeout=20)
+            self.process.wait(timeout=60)
         except subprocess.TimeoutExpired:
             self.kill()
             raise
@@ -74,7 +75,8 @@ def server_program():
 @pytest.fixture(scope="session")
 def server(server_program):
     """One server for all tests that leave it as it is."""
-    running = Server(server_program)
+    # It limits nobody, and when it ends it does not wait until the idle channels of this process look.
+    running = Server(server_program, "--max-unary-calls-per-s", "0", "--drain-s", "0.1")
     yield running
     running.stop()
 
@@ -98,6 +100,62 @@ def new_server(server_program):
 def client(server):
     with touchstone.connect(server.target) as connected:
         yield connected
+
+
+@pytest.fixture
+def nobody():
+    """An address of this machine at which nobody listens, for as long as the test runs."""
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        yield f"127.0.0.1:{bound.getsockname()[1]}"
+
+
+class Clock:
+    """Stands in for the module `time`: its time passes where it is waited for, and at no other moment.
+
+    Attributes:
+      during: called in every wait.
+    """
+
+    def __init__(self):
+        self.now_s, self.during = 0.0, lambda: None
+
+    def monotonic(self):
+        return self.now_s
+
+    def sleep(self, seconds):
+        self.now_s += seconds
+        self.during()
+
+
+@pytest.fixture
+def retry_clock(monkeypatch):
+    """The clock of connections of this process that try a lost source again."""
+    clock = Clock()
+    monkeypatch.setattr(connection, "time", clock)
+    return clock
+
+
+@pytest.fixture
+def start_again(retry_clock):
+    """A function that has a server started again in the client's first wait in which `once()` is true. Where that never comes,
+    the client's patience ends the test."""
+
+    def arrange(server, once):
+        def start():
+            if once() and server.process.poll() is not None:
+                server.start_again()
+
+        retry_clock.during = start
+
+    return arrange
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """What is refused is refused at the first attempt, however slow the machine is to find out why."""
+    monkeypatch.setattr(connection.Retry, "lost", lambda *_: pytest.fail("tried again although nothing could change"))
+    monkeypatch.setattr(credentials, "_PROBE_S", 60.0)
 
 
 @pytest.fixture

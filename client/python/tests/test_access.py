@@ -4,7 +4,6 @@ import hashlib
 import pickle
 import socket
 import subprocess
-import time
 
 import pytest
 
@@ -52,7 +51,7 @@ def test_a_token_over_tls_gets_in_as_far_as_its_role_goes(secure, files):
         assert client.describe().kind == "virtual"
         assert sum(batch.rows for batch in client.dataset(["lat00"], samples=100, seed=1)) == 100
         assert len(client.samples(["lat00"], samples=10, seed=1)[2:4]["object"]) == 2
-        with pytest.raises(touchstone.Refused, match="Models.CreateModel needs the role admin; 'reader' has the role reader"):
+        with pytest.raises(touchstone.Refused, match=r"Models\.CreateModel needs the role admin; 'reader' has the role reader"):
             client.add_model("touchstone: model/1\nname: mine\neffects: []\n")
     with touchstone.connect(secure, ca=files / "ca.pem", token="changes") as client:
         client.add_model("touchstone: model/1\nname: mine\neffects: []\n")
@@ -70,21 +69,19 @@ def test_a_client_certificate_gets_in(secure, files):
     ({}, "speaks TLS: give the CA"),
     ({"ca": "ca.pem", "cert": "stranger.pem", "key": "stranger.key"}, "hangs up when it is shown the client certificate"),
 ])
-def test_what_does_not_fit_is_said_at_once(secure, files, shown, words):
+def test_what_does_not_fit_is_said_at_once(secure, files, at_once, shown, words):
     shown = {name: value if name == "token" else str(files / value) for name, value in shown.items()}
-    begin = time.monotonic()
     with pytest.raises(touchstone.Refused, match=words) as raised:
         touchstone.connect(secure, timeout_s=120, **shown)
-    assert time.monotonic() - begin < 60, "tried again although nothing could change"
     assert "guessed" not in str(raised.value)
 
 
-def test_a_certificate_of_another_name_is_named(secure, files):
-    with pytest.raises(touchstone.Refused, match="is not for '127.0.0.1'"):
+def test_a_certificate_of_another_name_is_named(secure, files, at_once):
+    with pytest.raises(touchstone.Refused, match=r"is not for '127\.0\.0\.1'"):
         touchstone.connect(secure.replace("localhost", "127.0.0.1"), ca=files / "ca.pem", token="reads", timeout_s=120)
 
 
-def test_tls_to_a_source_that_speaks_plain_text(server, files):
+def test_tls_to_a_source_that_speaks_plain_text(server, files, at_once):
     with pytest.raises(touchstone.Refused, match="speaks plain text"):
         touchstone.connect(f"localhost:{server.port}", ca=files / "ca.pem", timeout_s=120)
 

@@ -121,5 +121,5 @@ def test_a_model_takes_its_surface_map_along(tmp_path):
         "effects:\n  - surface_map:\n      file: map.csv\n      csv: |\n          object,x_mm\n          lat00,1\n"
         "  - tip_radius: {radius_mm: 1}\n")
     (tmp_path / "map.csv").unlink()
-    with pytest.raises(InvalidRequest, match="map.csv"):
+    with pytest.raises(InvalidRequest, match=r"map\.csv"):
         model_ref(path)

@@ -3,13 +3,14 @@
 import hashlib
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
 import touchstone
 
 NAME = "servers.touchstone.test"
-DATASET = dict(objects=["lat00", "lat20"], samples=200_000, seed=5, columns=("index", "descriptor"))
+DATASET: dict[str, Any] = dict(objects=["lat00", "lat20"], samples=200_000, seed=5, columns=("index", "descriptor"))
 
 # Runs where NAME has the addresses of both servers. Opens streams until each server has one, says so, waits until one of the
 # servers is gone, and prints a digest of every stream and how often one was lost. Arguments: options of gRPC, port, addresses.
@@ -52,7 +53,7 @@ def test_streams_to_a_name_spread_over_its_servers_and_outlive_one(new_server, l
     hosts = tmp_path / "hosts"
     hosts.write_text(f"127.0.0.1 localhost\n127.0.0.1 {NAME}\n127.0.0.2 {NAME}\n")
     own_hosts = ["unshare", "--mount", "sh", "-c", 'mount --bind "$0" /etc/hosts && exec "$@"', str(hosts)]
-    if subprocess.run([*own_hosts, "true"], capture_output=True).returncode:
+    if subprocess.run([*own_hosts, "true"], capture_output=True, check=False).returncode:
         pytest.skip("only root may give a process names of its own (unshare --mount)")
     with subprocess.Popen([*own_hosts, sys.executable, "-c", CLIENT, repr(little_ahead), str(first.port), first.target,
                            second.target], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:

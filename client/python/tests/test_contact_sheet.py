@@ -11,7 +11,7 @@ import touchstone
 pytest.importorskip("PIL", reason="Pillow is not installed; the demo draws with it.")
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "training"))
 
-import pictures  # noqa: E402
+import pictures
 
 PLAN = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
 

@@ -66,6 +66,7 @@ def test_a_touch_is_seen_as_the_source_gives_it(make, client):
     touches = touchstone.gym.default_touches(client, ("lat00", "lat20"))
     times_us = client.touch("lat20", touches[4], model=touchstone_without_noise())["descriptor_us"][0]
     met = np.isfinite(times_us)
+    assert touches.stroke_mm is not None
     stroke_us = touches.stroke_mm[4] / 20 * 1e6
     assert observation[4, 0] == 1 and observation[:4].sum() == 0 and observation[5:].sum() == 0
     np.testing.assert_array_equal(observation[4, 4:], met)

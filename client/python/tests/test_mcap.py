@@ -86,7 +86,7 @@ def _decoded(schema, data):
     if hasattr(message_factory, "GetMessageClass"):
         made = message_factory.GetMessageClass(descriptor)
     else:  # protobuf before 4.22
-        made = message_factory.MessageFactory(pool).GetPrototype(descriptor)
+        made = message_factory.MessageFactory(pool).GetPrototype(descriptor)  # type: ignore[attr-defined]  # as said
     return made.FromString(data)
 
 

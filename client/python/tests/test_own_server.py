@@ -31,10 +31,10 @@ def listens(target):
 
 
 def expect_gone(target):
-    give_up = time.monotonic() + 30
+    give_up = time.monotonic() + 60
     while listens(target):
         assert time.monotonic() < give_up, "the server outlives what it belongs to"
-        time.sleep(0.1)
+        time.sleep(0.01)
 
 
 def test_it_serves_and_ends_with_the_client():
@@ -49,7 +49,7 @@ def test_it_serves_and_ends_with_the_client():
 def script(*lines):
     """A process that prints the address of its server and then does what these lines say."""
     package = os.path.dirname(os.path.dirname(touchstone.__file__))
-    text = "\n".join(["import sys, threading, time, touchstone", "client = touchstone.connect()",
+    text = "\n".join(["import os, sys, threading, time, touchstone", "client = touchstone.connect()",
                       "print(client.target, flush=True)", *lines])
     return subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True,
                             env={**os.environ, "PYTHONPATH": package})
@@ -76,23 +76,25 @@ def test_a_thread_that_ends_does_not_take_it_along():
     process = script(
         "clients = []",
         "thread = threading.Thread(target=lambda: clients.append(touchstone.connect()))",
-        "thread.start(); thread.join(); time.sleep(0.5)",
-        "print(clients[0].describe().kind, flush=True)",
+        "thread.start(); thread.join()",
+        # By then the kernel has sent what it sends when a thread ends; a server that was told to end cuts the stream.
+        "while os.path.exists(f'/proc/self/task/{thread.native_id}'): pass",
+        "print(sum(batch.rows for batch in clients[0].dataset(['lat20'], samples=300_000)), flush=True)",
     )
     process.stdout.readline()
-    assert process.stdout.readline().strip() == "virtual"
+    assert process.stdout.readline().strip() == "300000"
     assert process.wait(timeout=60) == 0
 
 
 def test_no_server_to_start_is_said_with_what_to_do(monkeypatch, tmp_path):
     monkeypatch.setenv("TOUCHSTONE_SERVER", str(tmp_path / "nothing"))
-    with pytest.raises(touchstone.SourceUnreachable, match="TOUCHSTONE_SERVER is .*nothing"):
+    with pytest.raises(touchstone.SourceUnreachable, match=r"TOUCHSTONE_SERVER is .*nothing"):
         touchstone.connect()
 
 
 @pytest.mark.parametrize("says", ["echo no disk left >&2",
                                   # Written by another process that still has the pipe, after this one has ended.
-                                  "{ sleep 0.5; echo no disk left >&2; } &"])
+                                  "{ while kill -0 $PPID; do sleep 0.01; done 2>/dev/null; echo no disk left >&2; } &"])
 def test_a_server_that_does_not_start_is_quoted(monkeypatch, tmp_path, says):
     program = tmp_path / "touchstone-server"
     program.write_text(f"#!/bin/sh\n{says}\nexit 4\n")

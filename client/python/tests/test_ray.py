@@ -42,6 +42,7 @@ def run(tmp_path_factory, target, body):
     return done.stdout
 
 
+@pytest.mark.second_tier("repeated: read without a loss, by the same workers")
 def test_two_workers_read_every_sample_once_with_the_bytes_of_the_stream(server, tmp_path_factory):
     run(tmp_path_factory, server.target, """
 dataset = ray.data.read_datasource(TouchstoneDatasource(made, rows_per_block=100), override_num_blocks=4)

@@ -4,6 +4,7 @@ import os
 import random
 import threading
 import time
+from typing import Any, Optional
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import touchstone
 from touchstone import errors
 from touchstone.connection import Retry
 
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
                columns=("index", "descriptor"))
 
 
@@ -32,17 +33,6 @@ def stream(dataset, at, disturb):
     return np.concatenate([b["descriptor_us"] for b in batches])
 
 
-def start_again(server, once):
-    """Starts it as soon as `once()` is true; where that never comes, the client's patience ends the test."""
-
-    def start():
-        while not once():
-            time.sleep(0.01)
-        server.start_again()
-
-    threading.Thread(target=start, daemon=True).start()
-
-
 def test_another_server_goes_on_where_the_first_was_killed(server, new_server, losses):
     first, second = new_server(), new_server()
     client = touchstone.connect([first.target, second.target], retry_for_s=20)
@@ -52,15 +42,12 @@ def test_another_server_goes_on_where_the_first_was_killed(server, new_server, l
     np.testing.assert_array_equal(values, expected(server))
 
 
-def test_the_same_server_started_again_goes_on(server, new_server, losses):
+def test_the_same_server_started_again_goes_on(server, new_server, losses, start_again):
     own = new_server()
-
-    def crash():
-        own.kill()
-        start_again(own, once=lambda: len(losses) >= 3)
+    start_again(own, once=lambda: len(losses) >= 3)
 
     dataset = touchstone.connect(own.target, retry_for_s=60).dataset(**OPTIONS, batch_size=500)
-    np.testing.assert_array_equal(stream(dataset, 37, crash), expected(server))
+    np.testing.assert_array_equal(stream(dataset, 37, own.kill), expected(server))
     assert len(losses) >= 3
 
 
@@ -69,12 +56,14 @@ def test_a_client_that_calls_too_often_waits_and_goes_on(new_server, monkeypatch
     monkeypatch.setattr(errors, "is_too_fast", lambda error: refused.append(is_too_fast(error)) or refused[-1])
     # Five at once, then one a second.
     with touchstone.connect(new_server("--max-unary-calls-per-s", "1").target, retry_for_s=0) as client:
-        assert len({client.describe().version for _ in range(8)}) == 1
-    assert any(refused)
+        versions = {client.describe().version}
+        while not any(refused):
+            versions.add(client.describe().version)
+        assert len(versions) == 1
 
 
 # Long runs: TOUCHSTONE_KILLS=100, as the step cluster of deploy/test.
-KILLS = int(os.environ.get("TOUCHSTONE_KILLS", 8))
+KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "8"))
 
 
 def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, losses):
@@ -82,7 +71,8 @@ def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, l
     options = {**OPTIONS, "samples": 2 * (KILLS + 1) * 16384, "columns": ("index", "descriptor", "pose")}
     client = touchstone.connect([each.target for each in servers], retry_for_s=60)
     dataset = client.dataset(**options, batch_size=16384)
-    chance, restarts, batches = random.Random(11), [None] * len(servers), []
+    chance, batches = random.Random(11), []
+    restarts: list[Optional[threading.Thread]] = [None] * len(servers)
     for batch in dataset:
         batches.append(batch)
         if len(batches) % 2 or len(batches) > 2 * KILLS:
@@ -93,11 +83,11 @@ def test_servers_killed_at_random_all_along_change_no_byte(server, new_server, l
         if restarts[number]:
             restarts[number].join(60)
         servers[number].kill()
-        restarts[number] = threading.Thread(target=servers[number].start_again)
-        restarts[number].start()
-    for restart in restarts:
-        if restart:
-            restart.join(60)
+        restart = restarts[number] = threading.Thread(target=servers[number].start_again)
+        restart.start()
+    for last in restarts:
+        if last:
+            last.join(60)
     reference = list(touchstone.connect(server.target).dataset(**options))
     for column in ("index", "descriptor_us", "target_mm", "approach"):
         one, other = (np.concatenate([batch[column] for batch in each]) for each in (batches, reference))
@@ -119,19 +109,16 @@ def test_a_drained_server_hands_over(server, new_server, losses):
     np.testing.assert_array_equal(values, expected(server))
 
 
-def test_patience_is_bounded(new_server, losses):
+def test_patience_is_bounded(new_server, losses, retry_clock):
     own = new_server()
-    dataset = touchstone.connect(own.target, retry_for_s=1.0).dataset(**OPTIONS, batch_size=500)
-    begin = None
-    with pytest.raises(touchstone.SourceUnreachable, match=own.target):
-        for batch in dataset:
-            if begin is None:
-                begin = time.monotonic()
-                own.kill()
-    assert 0.9 < time.monotonic() - begin < 10
+    dataset = touchstone.connect(own.target, retry_for_s=60).dataset(**OPTIONS, batch_size=500)
+    with pytest.raises(touchstone.SourceUnreachable, match=own.target):  # noqa: PT012 - raised in the middle of the loop
+        for _ in dataset:
+            own.kill()
+    assert retry_clock.now_s == pytest.approx(60)
 
 
-def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses, caplog):
+def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses, caplog, retry_clock, start_again):
     def told():
         return [record.getMessage() for record in caplog.records if record.name == "touchstone"]
 
@@ -141,9 +128,8 @@ def test_a_lost_source_is_named_long_before_patience_is_over(new_server, losses,
     next(batches)
     own.kill()
     start_again(own, once=told)
-    begin = time.monotonic()
     assert sum(batch.rows for batch in batches) == OPTIONS["samples"] - 500
-    assert time.monotonic() - begin < 300
+    assert retry_clock.now_s < 60
     lost, again = told()
     assert own.target in lost and "Start touchstone-server" in lost and "Trying again for" in lost
     assert "answers again" in again
@@ -163,8 +149,8 @@ def test_a_server_with_another_model_is_refused(new_server, losses, tmp_path):
         stream(client.dataset(**OPTIONS, model="rig", batch_size=500), 5, first.kill)
 
 
-def test_unary_calls_find_the_server_that_is_there(server):
-    client = touchstone.connect(["127.0.0.1:9", server.target])
+def test_unary_calls_find_the_server_that_is_there(server, nobody):
+    client = touchstone.connect([nobody, server.target])
     assert client.target == server.target and client.objects()
 
 

@@ -3,14 +3,14 @@
 import concurrent.futures
 import multiprocessing
 import pickle
-import threading
+from typing import Any
 
 import numpy as np
 import pytest
 
 import touchstone
 
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
                columns=("index", "object", "descriptor"))
 
 
@@ -63,7 +63,7 @@ def test_images_come_by_index(server):
     client = touchstone.connect(server.target)
     for encoding in ("raw", "png"):
         image = touchstone.image(16, 12, encoding=encoding)
-        stream = list(client.dataset(**options, image=image, batch_size=50))[0]
+        [stream] = client.dataset(**options, image=image, batch_size=50)
         some = client.samples(**options, image=image)
         batch = some[[49, 2, 2, 31]]
         for row, i in enumerate([49, 2, 2, 31]):
@@ -118,17 +118,14 @@ def test_an_empty_list_is_refused(samples):
         samples[[]]
 
 
-def test_a_lost_server_is_waited_for(new_server, whole):
+def test_a_lost_server_is_waited_for(new_server, whole, start_again):
     server = new_server()
     samples = touchstone.connect(server.target).samples(**OPTIONS)
     samples[0]
+    waits = []
+    start_again(server, once=lambda: waits.append(1) or len(waits) == 3)
     server.kill()
-    back = threading.Timer(0.5, server.start_again)
-    back.start()
-    try:
-        expect_these(samples[[8, 3]], whole, [8, 3])
-    finally:
-        back.join()
+    expect_these(samples[[8, 3]], whole, [8, 3])
 
 
 def test_another_dataset_at_the_same_address_is_noticed(new_server, tmp_path):

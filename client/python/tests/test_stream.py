@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 
 import numpy as np
 import pytest
@@ -176,11 +175,10 @@ def test_the_sources_own_words_reach_the_caller(client, kind, change, says):
     assert caught.value.__cause__ is None and caught.value.__suppress_context__
 
 
-def test_nobody_listening_is_said_at_once():
-    begin = time.monotonic()
-    with pytest.raises(touchstone.SourceUnreachable, match="127.0.0.1:9: no source answers.*Start touchstone-server"):
-        touchstone.connect("127.0.0.1:9", timeout_s=0.5)
-    assert time.monotonic() - begin < 5
+def test_nobody_listening_is_said_when_the_time_is_over(nobody, retry_clock):
+    with pytest.raises(touchstone.SourceUnreachable, match=f"{nobody}: no source answers.*Start touchstone-server"):
+        touchstone.connect(nobody, timeout_s=60)
+    assert retry_clock.now_s == pytest.approx(60)
 
 
 def test_an_interrupt_ends_a_stream_at_once(server):
@@ -201,7 +199,7 @@ def test_an_interrupt_ends_a_stream_at_once(server):
                                text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
     assert process.stdout.readline().strip() == "streaming"
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=10)
+    out, err = process.communicate(timeout=60)
     assert "interrupted" in out and "Traceback" not in err and process.returncode == 0
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from touchstone.v1 import control_pb2, control_pb2_grpc  # noqa: E402
 pytestmark = pytest.mark.filterwarnings("ignore:This DataLoader will create")
 
 # 1000 samples in batches of 64: 15 whole ones and one of 40.
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
                columns=("index", "object", "descriptor"), batch_size=64)
 
 
@@ -50,8 +51,11 @@ def test_batches_are_tensors(server):
     assert first["image"].dtype == torch.uint8 and first["image"].shape == (64, 3, 10, 20)
 
 
+OTHER_WORKERS = pytest.mark.second_tier("repeated: other numbers of workers")
+
+
 @pytest.mark.parametrize("context", ["fork", "forkserver", "spawn"])
-@pytest.mark.parametrize("workers", [0, 1, 2, 3])
+@pytest.mark.parametrize("workers", [0, pytest.param(1, marks=OTHER_WORKERS), 2, pytest.param(3, marks=OTHER_WORKERS)])
 def test_the_order_does_not_depend_on_the_workers(server, values, workers, context):
     if workers == 0 and context != "fork":
         pytest.skip("no workers, no start method")
@@ -79,8 +83,8 @@ def run_alone(server, body, values=None):
         "import numpy as np, torch, touchstone",
         "from touchstone.torch import TouchstoneDataset",
         f"in_order = {in_order()!r}",
-        f"dataset = TouchstoneDataset({server.target!r}, ['lat00', 'lat20'], touchstone.sphere(step_angle_deg=5), "
-        "samples=1000, seed=5, columns=('index', 'object', 'descriptor'), batch_size=64)",
+        (f"dataset = TouchstoneDataset({server.target!r}, ['lat00', 'lat20'], touchstone.sphere(step_angle_deg=5), "
+         "samples=1000, seed=5, columns=('index', 'object', 'descriptor'), batch_size=64)"),
         "if __name__ == '__main__':",
         textwrap.indent(textwrap.dedent(body), "    "),
     ])
@@ -91,7 +95,7 @@ def run_alone(server, body, values=None):
         # The package of this process, however it was found.
         package = os.path.dirname(os.path.dirname(touchstone.__file__))
         done = subprocess.run([sys.executable, path, saved], capture_output=True, text=True, timeout=120,
-                              env={**os.environ, "PYTHONPATH": package})
+                              env={**os.environ, "PYTHONPATH": package}, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         if values is not None:
             np.testing.assert_array_equal(np.load(saved), values)

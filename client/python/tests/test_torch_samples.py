@@ -1,6 +1,7 @@
 """Map-style access in real DataLoaders: order, shuffling, ranks; StatefulDataLoader resumes exactly."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from touchstone.torch import KeyedShuffle, TouchstoneDataset, TouchstoneSamples 
 
 pytestmark = pytest.mark.filterwarnings("ignore:This DataLoader will create")
 
-OPTIONS = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
+OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=1000, seed=5,
                columns=("index", "object", "descriptor"))
 WORKERS = [0, 1, 2, 4]
 
@@ -125,13 +126,13 @@ def test_stateful_dataloader_resumes_within_a_batch_of_the_stream(server, statef
 
 
 @pytest.mark.parametrize("workers", WORKERS)
-def test_stateful_dataloader_resumes_samples(server, stateful, workers, after=5):
+def test_stateful_dataloader_resumes_samples(server, stateful, workers):
     def make():
         dataset = samples(server)
         return stateful(dataset, batch_size=64, sampler=KeyedShuffle(dataset, seed=3), num_workers=workers,
                         multiprocessing_context="forkserver" if workers else None)
 
-    before, rest = resumed(make, after)
+    before, rest = resumed(make, 5)
     assert before + rest == in_batches(touchstone.Permutation(1000, 3)[np.arange(1000)].tolist())
 
 
@@ -154,5 +155,5 @@ def test_the_epoch_after_a_resumed_one_is_whole(server, stateful, workers):
 def test_a_state_of_workers_is_not_taken_by_others(server):
     dataset = TouchstoneDataset(server.target, **OPTIONS, batch_size=64, rank=0, ranks=1)
     state = dict(dataset.state_dict(), worker="worker 1 of 2")
-    with pytest.raises(touchstone.InvalidRequest, match="worker 1 of 2.*as many workers"):
+    with pytest.raises(touchstone.InvalidRequest, match=r"worker 1 of 2.*as many workers"):
         dataset.load_state_dict(state)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Iterator, Mapping, Sequence, Union
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Union, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import errors, units
 from .v1 import types_pb2
 
-_DTYPES: dict[int, np.dtype] = {
+_DTYPES: dict[int, np.dtype[Any]] = {
     types_pb2.DATA_TYPE_FLOAT32: np.dtype("<f4"),
     types_pb2.DATA_TYPE_FLOAT64: np.dtype("<f8"),
     types_pb2.DATA_TYPE_UINT8: np.dtype("u1"),
@@ -19,7 +21,7 @@ _DTYPES: dict[int, np.dtype] = {
 }
 
 
-class EncodedImages(Sequence):
+class EncodedImages(Sequence[bytes]):
     """PNG or JPEG files of a batch; `images[i]` is a file as bytes, `images[a:b]` a list of them."""
 
     __slots__ = ("_data", "_offsets")
@@ -31,7 +33,13 @@ class EncodedImages(Sequence):
     def __len__(self) -> int:
         return len(self._offsets) - 1
 
-    def __getitem__(self, index):
+    @overload
+    def __getitem__(self, index: int) -> bytes: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[bytes]: ...
+
+    def __getitem__(self, index: int | slice) -> bytes | list[bytes]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         count = len(self)
@@ -51,7 +59,7 @@ class EncodedImages(Sequence):
         return f"EncodedImages({len(self)} images, {len(self._data)} bytes)"
 
 
-Column = Union[np.ndarray, EncodedImages]
+Column = Union[NDArray[Any], EncodedImages]
 
 
 def decode_column(column: types_pb2.Column, rows: int) -> Column:
@@ -90,7 +98,7 @@ class Batch(Mapping[str, Any]):
       measured: what a physical source measured of each touch of Client.touch(); empty otherwise.
     """
 
-    __slots__ = ("start_index", "rows", "model_hash", "measured", "_indices", "_columns", "_wire_names")
+    __slots__ = ("_columns", "_indices", "_wire_names", "measured", "model_hash", "rows", "start_index")
 
     def __init__(self, start_index: int, rows: int, columns: Mapping[str, Column], *, model_hash: str = "",
                  si: bool = False):
@@ -98,23 +106,24 @@ class Batch(Mapping[str, Any]):
         self.rows = rows
         self.model_hash = model_hash
         self.measured: Sequence[types_pb2.Measured] = ()
-        self._indices: np.ndarray | None = None
+        self._indices: NDArray[np.int64] | None = None
         # Public name -> name on the wire, as long as the column is not converted yet.
         self._wire_names = {} if si else {units.lab_name(name): name for name in columns}
         self._columns = {name if si else units.lab_name(name): values for name, values in columns.items()}
 
     @classmethod
-    def from_columns(cls, start_index: int, rows: int, columns: Sequence[types_pb2.Column], **more) -> Batch:
-        return cls(start_index, rows, {c.name: decode_column(c, rows) for c in columns}, **more)
+    def from_columns(cls, start_index: int, rows: int, columns: Iterable[types_pb2.Column], *, model_hash: str = "",
+                     si: bool = False) -> Batch:
+        return cls(start_index, rows, {c.name: decode_column(c, rows) for c in columns}, model_hash=model_hash, si=si)
 
     @property
-    def indices(self) -> np.ndarray:
+    def indices(self) -> NDArray[np.int64]:
         if self._indices is None:
             self._indices = np.arange(self.start_index, self.start_index + self.rows, dtype=np.int64)
         return self._indices
 
     @indices.setter
-    def indices(self, values: np.ndarray) -> None:
+    def indices(self, values: NDArray[np.int64]) -> None:
         self._indices = values
 
     def __getitem__(self, name: str) -> Any:

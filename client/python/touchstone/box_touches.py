@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import checks
 from .errors import InvalidRequest
@@ -43,12 +45,13 @@ def box_touches(min_mm: Sequence[float], max_mm: Sequence[float], samples_per_fa
     rng = np.random.default_rng(checks.uint64("seed", seed))
     parts = [_of_face(rng, face, count, (low + high) / 2, (high - low) / 2, np.radians(tilt), share) for face in range(6)]
     target, approach, lateral = (np.concatenate(columns) for columns in zip(*parts))
-    limit = {} if stroke_mm is None else {"stroke_mm": checks.positive("stroke_mm", stroke_mm)}
+    limit: dict[str, Any] = {} if stroke_mm is None else {"stroke_mm": checks.positive("stroke_mm", stroke_mm)}
     return touches(target_mm=target, approach=approach, lateral=lateral, standoff_mm=checks.positive("standoff_mm", standoff_mm),
                    speed_mm_s=checks.positive("speed_mm_s", speed_mm_s), **limit)
 
 
-def _of_face(rng, face, count, centre, half, tilt, spread):
+def _of_face(rng: np.random.Generator, face: int, count: int, centre: NDArray[np.float64], half: NDArray[np.float64], tilt: float,
+             spread: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """(count, 3) targets, approaches and laterals: directions uniform over a cone about the inward normal, any roll."""
     axis, side = face // 2, 1 if face % 2 == 0 else -1
     u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -68,7 +71,7 @@ def _of_face(rng, face, count, centre, half, tilt, spread):
     return target, approach, np.cos(roll) * right + np.sin(roll) * np.cross(approach, right)
 
 
-def _corner(name: str, values: Sequence[float]) -> np.ndarray:
+def _corner(name: str, values: Sequence[float]) -> NDArray[np.float64]:
     try:
         corner = np.asarray(values, float)
     except (TypeError, ValueError):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import math
 import operator
-from typing import Any, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from .errors import InvalidRequest
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import warnings
-from typing import Any, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from . import checks, models, units
+from . import checks, units
 from .batch import Batch
 from .connection import Connection, Retry, Targets
 from .credentials import Credentials
@@ -48,11 +49,13 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
       token: that the source asks for. Default: TOUCHSTONE_TOKEN.
       token_file: file with it, read for every call, so that it may be replaced. Default: TOUCHSTONE_TOKEN_FILE.
     """
-    own = OwnServer() if targets is None else None
-    # A source of our own asks for nothing, whatever the environment has for others.
-    credentials = Credentials() if own else Credentials.of(ca, cert, key, token, token_file)
-    client = Client(own.target if own else targets, retry_for_s=retry_for_s, credentials=credentials)
-    client.own_server = own
+    if targets is None:
+        own = OwnServer()
+        # A source of our own asks for nothing, whatever the environment has for others.
+        client = Client(own.target, retry_for_s=retry_for_s, credentials=Credentials())
+        client.own_server = own
+    else:
+        client = Client(targets, retry_for_s=retry_for_s, credentials=Credentials.of(ca, cert, key, token, token_file))
     client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
     return client
 
@@ -125,8 +128,7 @@ class Client(Diagnosis):
           take: from whoever holds it; agree with them first.
         """
         needed = (self._description or self.describe()).lease_required
-        lease = _Held(self._connection, needed, take, self._leases)
-        return lease
+        return _Held(self._connection, needed, take, self._leases)
 
     @contextlib.contextmanager
     def holding_lease(self) -> Iterator[str]:
@@ -146,7 +148,8 @@ class Client(Diagnosis):
     def stop(self, reason: str = "") -> int:
         """Ends every motion now; needs no lease. Not safety-rated. Returns how many touches were under way."""
         request = control_pb2.StopRequest(reason=reason or "client.stop()", holder=lease_holder())
-        return self._connection.call(_CONTROL, "Stop", request, timeout_s=5.0, repeat=False).aborted_touches
+        answer: control_pb2.StopResponse = self._connection.call(_CONTROL, "Stop", request, timeout_s=5.0, repeat=False)
+        return answer.aborted_touches
 
     def call(self, stub: type, method: str, request: Any, **how: Any) -> Any:
         """One call of the generated stubs, with this package's errors and retries."""
@@ -256,13 +259,16 @@ class Client(Diagnosis):
     def _touch(self, request: source_pb2.TouchRequest, lease: Lease | None) -> source_pb2.TouchResponse:
         if lease is not None:
             request.lease_token = lease.token
+        reply: source_pb2.TouchResponse
         if not request.lease_token:
-            return self._connection.call(_SOURCE, "Touch", request)
+            reply = self._connection.call(_SOURCE, "Touch", request)
+            return reply
         retry = Retry(len(self.targets), self.retry_for_s)
         again = False
         while True:
             try:
-                return self._connection.call(_SOURCE, "Touch", request, repeat=False)
+                reply = self._connection.call(_SOURCE, "Touch", request, repeat=False)
+                return reply
             except TouchstoneError as error:
                 # A touch of a real arm is not repeated without its id. Asked for again, it may still be under way, or
                 # the lease be that of the process before.

@@ -6,7 +6,8 @@ import logging
 import os
 import random
 import time
-from typing import Any, Sequence, Union
+from collections.abc import Sequence
+from typing import Any, Union
 
 import grpc
 
@@ -76,15 +77,16 @@ class Retry:
         self._targets = targets
         self._retry_for_s = retry_for_s
         self._told = False
+        self._since: float | None = None  # the first loss since something arrived
         self.succeeded()
 
     def succeeded(self) -> None:
         """Something arrived: the time allowed for retries starts again."""
-        if self._told:
+        if self._told and self._since is not None:
             _log.warning("A source answers again after %.0f s.", time.monotonic() - self._since)
         self._told = False
         self._losses = 0
-        self._since: float | None = None
+        self._since = None
 
     def lost(self, error: errors.TouchstoneError) -> None:
         """Returns when to try again, or raises `error` when the patience is over."""

@@ -8,7 +8,7 @@ import os
 import pathlib
 import socket
 import ssl
-from typing import Any
+from typing import Any, Callable
 
 import grpc
 
@@ -112,11 +112,15 @@ class _ShowToken(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterce
     def __init__(self, credentials: Credentials):
         self._credentials = credentials
 
-    def _show(self, continuation, details, request):
+    def _show(self, continuation: Callable[[Any, Any], Any], details: grpc.ClientCallDetails, request: Any) -> Any:
         token = self._credentials.read_token()
         return continuation(_Details(details, token), request)
 
-    intercept_unary_unary = intercept_unary_stream = intercept_stream_unary = intercept_stream_stream = _show
+    # One for all four: each gets a request or an iterator of them, and returns what `continuation` makes of it.
+    intercept_unary_unary = _show  # type: ignore[assignment]  # narrower in its types than gRPC's generic method
+    intercept_unary_stream = _show  # type: ignore[assignment]  # likewise
+    intercept_stream_unary = _show  # type: ignore[assignment]  # likewise
+    intercept_stream_stream = _show  # type: ignore[assignment]  # likewise
 
 
 class _Details(grpc.ClientCallDetails):

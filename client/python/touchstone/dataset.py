@@ -6,7 +6,8 @@ import contextlib
 import dataclasses
 import hashlib
 import warnings
-from typing import Callable, ContextManager, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Callable
 
 import grpc
 
@@ -26,7 +27,7 @@ class Header:
       model_name, model_hash, model_yaml: the model; `model_yaml` is the whole file.
       mesh_hashes: SHA-256 of each object's mesh.
       fingers, spacing_mm: of the end effector.
-      columns: {name: shape of one sample}, None for encoded images.
+      columns: {name: shape of one sample}; of an encoded image that of its pixels.
       renderer: "egl", "cpu", or "" without images.
       version: of the program that makes it.
     """
@@ -43,7 +44,7 @@ class Header:
     version: str
 
     @classmethod
-    def from_proto(cls, m: source_pb2.DatasetHeader, objects, si: bool) -> Header:
+    def from_proto(cls, m: source_pb2.DatasetHeader, objects: Iterable[str], si: bool) -> Header:
         name = (lambda n: n) if si else units.lab_name
         return cls(
             samples=m.samples, model_name=m.model_name, model_hash=m.model_hash, model_yaml=m.model_yaml,
@@ -88,7 +89,7 @@ class Dataset:
 
     def __init__(self, connection: Connection, spec: source_pb2.DatasetSpec, *, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, stride: int = 1, si: bool = False,
-                 hold_lease: Callable[[], ContextManager[str]] = lambda: contextlib.nullcontext(""),
+                 hold_lease: Callable[[], contextlib.AbstractContextManager[str]] = lambda: contextlib.nullcontext(""),
                  session: str = "", indices: Sequence[int] | None = None,
                  known_header: source_pb2.DatasetHeader | None = None):
         """
@@ -185,15 +186,15 @@ class Dataset:
     def _retry(self) -> Retry:
         return Retry(len(self._connection.targets), self._connection.retry_for_s)
 
-    def _open(self, index: int, token: str):
+    def _open(self, index: int, token: str) -> Any:
+        """gRPC's call, an iterator of StreamDatasetResponse."""
         request = source_pb2.StreamDatasetRequest(
             spec=self.spec, start_index=index, stop_index=self.stop, batch_size=self.batch_size,
             batch_stride=self.stride, lease_token=token, session=self._session, indices=self._indices or (),
         )
-        if self._header is not None:
-            # The source's own choice of a renderer must not change in mid-stream.
-            if request.spec.HasField("image"):
-                request.spec.image.renderer = self._header.renderer
+        # The source's own choice of a renderer must not change in mid-stream.
+        if self._header is not None and request.spec.HasField("image"):
+            request.spec.image.renderer = self._header.renderer
         return source_pb2_grpc.SourceStub(self._connection.channel()).StreamDataset(request)
 
     def _lost(self, error: grpc.RpcError, retry: Retry) -> None:

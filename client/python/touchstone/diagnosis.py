@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import Any, Callable, Sequence
+from collections.abc import Sequence
+from typing import Any, Callable
 
 import grpc
 
@@ -30,14 +31,14 @@ class Diagnosis:
     def __init__(self, connection: Connection):
         self._connection = connection
 
-    def compare(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
+    def compare(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
                 on_progress: OnProgress | None = None) -> Report:
         """How wrong the model is, and where; changes nothing."""
         request = diagnosis_pb2.CompareRequest(evidence=evidence(measurements, model, meshes, (), 0))
         return self._report("Compare", request, on_progress)
 
-    def diagnose(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
-                 also: Sequence[str | os.PathLike] = (), seed: int = 0, with_surface_map: bool = False,
+    def diagnose(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
+                 also: Sequence[str | os.PathLike[str]] = (), seed: int = 0, with_surface_map: bool = False,
                  on_progress: OnProgress | None = None) -> Report:
         """Also why, what to add, and what the error becomes. The same arguments give the same report.
 
@@ -53,7 +54,7 @@ class Diagnosis:
         )
         return self._report("Diagnose", request, on_progress)
 
-    def propose(self, measurements: str | os.PathLike, model: ModelLike = None, *, meshes: MeshesLike = None,
+    def propose(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
                 touches: int | None = None, photographs: int | None = None, seed: int = 0,
                 on_progress: OnProgress | None = None) -> Report:
         """The touches (or photographs) to make next to tell the explanations that are left apart: report.next_touches.

@@ -7,7 +7,8 @@ import dataclasses
 import io
 import os
 import pathlib
-from typing import Mapping, Sequence, Union
+from collections.abc import Mapping, Sequence
+from typing import Union
 
 from . import checks
 from .errors import InvalidRequest
@@ -28,17 +29,17 @@ class Mesh:
       scale: applied after the unit; 1: as is.
     """
 
-    path: str | os.PathLike
+    path: str | os.PathLike[str]
     unit: str = "mm"
     up: str = "z"
     scale: float = 1.0
 
 
-MeshLike = Union[Mesh, str, os.PathLike]
-MeshesLike = Union[Mapping[str, MeshLike], str, os.PathLike, None]
+MeshLike = Union[Mesh, str, os.PathLike[str]]
+MeshesLike = Union[Mapping[str, MeshLike], str, os.PathLike[str], None]
 
 
-def evidence(measurements: str | os.PathLike, model: ModelLike, meshes: MeshesLike, also: Sequence[str | os.PathLike],
+def evidence(measurements: str | os.PathLike[str], model: ModelLike, meshes: MeshesLike, also: Sequence[str | os.PathLike[str]],
              seed: int) -> diagnosis_pb2.Evidence:
     """The message; arguments as in Client.diagnose()."""
     message = diagnosis_pb2.Evidence(

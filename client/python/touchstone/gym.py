@@ -30,9 +30,11 @@ Needs Gymnasium: pip install 'client/python[gym]'.
 from __future__ import annotations
 
 import weakref
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 try:
     import gymnasium
@@ -84,13 +86,12 @@ class _Table:
         self.repeats = checks.whole_number("repeats", repeats, 1, 10_000)
         self.max_touches = checks.whole_number("max_touches", max_touches, 1, 1_000_000)
         self.touch_cost = checks.number("touch_cost", touch_cost)
-        self._owned = not isinstance(targets, Client)
-        self.client = connect(targets) if self._owned else targets
+        owned = not isinstance(targets, Client)
+        self.client = targets if isinstance(targets, Client) else connect(targets)
         # An environment that nobody closes, as Gymnasium's own checker leaves some, must not leave a server behind.
-        self._finalizer = weakref.finalize(self, Client.close if self._owned else (lambda _: None), self.client)
-        self._samples: Samples | None = None
+        self._finalizer = weakref.finalize(self, Client.close if owned else (lambda _: None), self.client)
         if self.client.is_physical:
-            self.close()
+            self._finalizer()
             raise InvalidRequest(f"{self.client.target} moves a rig, where an episode would wait for a person at every other object; "
                                  "give a touchstone-server, or an address of none for one of this process.")
         touches = default_touches(self.client, self.objects) if touches is None else touches
@@ -102,26 +103,28 @@ class _Table:
         self._stroke_us = touches.stroke_mm / touches.speed_mm_s * 1e6
         # A touch has as many noises as it stands in the list.
         copies = touches[np.tile(np.arange(self.touches), self.repeats)]
-        self._samples = self.client.samples(self.objects, copies, seed=source_seed, model=model, columns=["descriptor_us"])
+        self._samples: Samples = self.client.samples(self.objects, copies, seed=source_seed, model=model, columns=["descriptor_us"])
         self.fingers = self._samples.header.fingers
         self.observation_space = spaces.Box(0.0, 1.0, (self.touches, 1 + 2 * self.fingers), np.float32)
-        self.action_space = spaces.Discrete(self.touches + len(self.objects))
+        self.actions = self.touches + len(self.objects)
+        self.action_space: spaces.Discrete[np.int64] = spaces.Discrete(self.actions)
 
     def close(self) -> None:
-        if self._samples is not None:
-            self._samples.close()
+        self._samples.close()
         self._finalizer()
 
-    def touch(self, objects: np.ndarray, touches: np.ndarray, repeats: np.ndarray) -> np.ndarray:
+    def touch(self, objects: NDArray[np.integer[Any]], touches: NDArray[np.integer[Any]],
+              repeats: NDArray[np.integer[Any]]) -> NDArray[np.float32]:
         """(N, 1 + 2 * fingers) rows of observations for one request, for (N,) positions of objects, touches and noises."""
         index = (repeats * self.touches + touches) * len(self.objects) + objects
         times_us = self._samples[index]["descriptor_us"]
         met = np.isfinite(times_us)
         share = np.clip(np.nan_to_num(times_us) / self._stroke_us[touches][:, None], 0, 1)
-        return np.concatenate([np.ones((len(index), 1)), share, met], 1).astype(np.float32)
+        seen: NDArray[np.float32] = np.concatenate([np.ones((len(index), 1)), share, met], 1).astype(np.float32)
+        return seen
 
 
-class RecogniseEnv(gymnasium.Env):
+class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
     """One object in an episode. See the module for actions, observations and rewards.
 
     Args:
@@ -136,7 +139,9 @@ class RecogniseEnv(gymnasium.Env):
       source_seed: of the noise at the source.
     """
 
-    metadata = {"render_modes": []}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}  # type: ignore[misc]  # an attribute of each in Gymnasium
+    observation_space: spaces.Box
+    action_space: spaces.Discrete[np.int64]
 
     def __init__(self, targets: Targets | Client | None = None, objects: Sequence[str] = _OBJECTS, touches: Touches | None = None, *,
                  model: ModelLike = None, repeats: int = 16, max_touches: int = 12, touch_cost: float = 0.05, source_seed: int = 0,
@@ -152,27 +157,27 @@ class RecogniseEnv(gymnasium.Env):
     def objects(self) -> tuple[str, ...]:
         return tuple(self._table.objects)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
         super().reset(seed=seed)
         self._object = _drawn(self._table, self.np_random, options)
         self._made = 0
         self._seen[:] = 0
         return self._seen.copy(), {"touches": 0}
 
-    def step(self, action: int) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: int | np.integer[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if self._object is None:
             raise InvalidRequest("The episode is over, or none has begun; call reset().")
         if not self.action_space.contains(action):
             raise InvalidRequest(f"action is {action!r}; give 0 to {self._table.touches - 1} to touch, {self._table.touches} to "
-                                 f"{self.action_space.n - 1} to answer.")
-        table, action = self._table, int(action)
-        if action >= table.touches:
+                                 f"{self._table.actions - 1} to answer.")
+        table, number = self._table, int(action)
+        if number >= table.touches:
             true, self._object = self._object, None
-            right = action - table.touches == true
+            right = number - table.touches == true
             return self._seen.copy(), 1.0 if right else -1.0, True, False, {
                 "touches": self._made, "object": table.objects[true], "right": right}
         repeat = self.np_random.integers(table.repeats)
-        self._seen[action] = table.touch(np.array([self._object]), np.array([action]), np.array([repeat]))[0]
+        self._seen[number] = table.touch(np.array([self._object]), np.array([number]), np.array([repeat]))[0]
         self._made += 1
         truncated = self._made >= table.max_touches
         if truncated:
@@ -183,14 +188,17 @@ class RecogniseEnv(gymnasium.Env):
         self._table.close()
 
 
-class RecogniseVectorEnv(VectorEnv):
+class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[Any]]", "NDArray[Any]"]):
     """num_envs environments whose touches of a step are one request to one source. Arguments as of RecogniseEnv.
 
     Environment k draws from a generator of its own, of seed + k or of the k-th seed, and so has the episodes that RecogniseEnv
     has with that seed. An environment that ended is reset by the next step, whatever its action (AutoresetMode.NEXT_STEP).
     """
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]  # an attribute of each in Gymnasium
+        "render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    single_observation_space: spaces.Box
+    single_action_space: spaces.Discrete[np.int64]
 
     def __init__(self, num_envs: int = 1, targets: Targets | Client | None = None, objects: Sequence[str] = _OBJECTS,
                  touches: Touches | None = None, *, model: ModelLike = None, repeats: int = 16, max_touches: int = 12,
@@ -204,16 +212,20 @@ class RecogniseVectorEnv(VectorEnv):
         self._generators = [np.random.default_rng(bits) for bits in np.random.SeedSequence().spawn(self.num_envs)]
         self._object = np.zeros(self.num_envs, int)
         self._made = np.zeros(self.num_envs, int)
-        self._ended: np.ndarray | None = None  # None: reset() was not called
-        self._seen = np.zeros(self.observation_space.shape, np.float32)
+        self._ended: NDArray[np.bool_] | None = None  # None: reset() was not called
+        self._seen = np.zeros((self.num_envs, *self.single_observation_space.shape), np.float32)
 
     @property
     def objects(self) -> tuple[str, ...]:
         return tuple(self._table.objects)
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
-              options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
-        seeds = [None if seed is None else seed + k for k in range(self.num_envs)] if seed is None or np.ndim(seed) == 0 else list(seed)
+              options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        seeds: list[int | None] = [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            seeds = [int(seed) + k for k in range(self.num_envs)]
+        elif seed is not None:
+            seeds = list(seed)
         if len(seeds) != self.num_envs:
             raise InvalidRequest(f"seed has {len(seeds)} entries for {self.num_envs} environments; give one each, or one number.")
         for k, each in enumerate(seeds):
@@ -223,13 +235,14 @@ class RecogniseVectorEnv(VectorEnv):
         self._ended = np.zeros(self.num_envs, bool)
         return self._seen.copy(), {"touches": self._made.copy(), "_touches": np.ones(self.num_envs, bool)}
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: NDArray[np.integer[Any]]) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_],
+                                                               NDArray[np.bool_], dict[str, Any]]:
         if self._ended is None:
             raise InvalidRequest("No episode has begun; call reset().")
         actions = np.asarray(actions)
         if actions.shape != (self.num_envs,) or actions.dtype.kind not in "iu" or not (
-                (0 <= actions) & (actions < self.single_action_space.n)).all():
-            raise InvalidRequest(f"actions must be {self.num_envs} whole numbers from 0 to {self.single_action_space.n - 1}.")
+                (0 <= actions) & (actions < self._table.actions)).all():
+            raise InvalidRequest(f"actions must be {self.num_envs} whole numbers from 0 to {self._table.actions - 1}.")
         table, begun = self._table, self._ended.copy()
         self._begin(np.flatnonzero(begun), None)
         touching = np.flatnonzero(~begun & (actions < table.touches))
@@ -245,14 +258,16 @@ class RecogniseVectorEnv(VectorEnv):
         self._ended = answered | truncated
         info = {"touches": self._made.copy(), "_touches": np.ones(self.num_envs, bool)}
         if answered.any():
-            info |= {"object": np.where(answered, np.array(table.objects, object)[self._object], None), "_object": answered,
+            names = np.array(table.objects, object)[self._object]
+            names[~answered] = None
+            info |= {"object": names, "_object": answered,
                      "right": right, "_right": answered}
         return self._seen.copy(), reward, answered, truncated, info
 
     def close_extras(self, **_: Any) -> None:
         self._table.close()
 
-    def _begin(self, places: np.ndarray, options: dict[str, Any] | None) -> None:
+    def _begin(self, places: NDArray[np.integer[Any]], options: dict[str, Any] | None) -> None:
         for k in places:
             self._object[k] = _drawn(self._table, self._generators[k], options)
         self._made[places] = 0

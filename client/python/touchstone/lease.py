@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import getpass
 import os
 import socket
@@ -136,13 +137,11 @@ class Lease:
         """Gives it back; the second time it does nothing."""
         if self._end_renewing():
             if self._lost is None:
-                try:
+                with contextlib.suppress(grpc.RpcError):  # it runs out by itself
                     self._stub().ReleaseLease(
                         control_pb2.ReleaseLeaseRequest(token=self.token),
                         timeout=max(self._window_s, _SHORTEST_ANSWER_S),
                     )
-                except grpc.RpcError:
-                    pass  # it runs out by itself
             self._own.close()
 
     def _end_renewing(self) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, Iterator
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch.utils.data import DataLoader
@@ -23,7 +24,7 @@ class TouchstoneLoader:
     off begins its epoch again, unless a state is loaded.
     """
 
-    def __init__(self, dataset: TouchstoneDataset, num_workers: int, options: Dict[str, Any]):
+    def __init__(self, dataset: TouchstoneDataset, num_workers: int, options: dict[str, Any]):
         for name in ("batch_size", "shuffle", "sampler", "batch_sampler", "drop_last"):
             if name in options:
                 raise InvalidRequest(f"{name} is the dataset's; leave it out here.")
@@ -48,10 +49,10 @@ class TouchstoneLoader:
         self.dataset.set_epoch(epoch)
         self._fresh = True
 
-    def state_dict(self) -> Dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         return self.dataset.state_dict()
 
-    def load_state_dict(self, state: Dict[str, Any]) -> None:
+    def load_state_dict(self, state: dict[str, Any]) -> None:
         self.dataset.load_state_dict(state)
         self._fresh = True
 

@@ -23,7 +23,8 @@ import math
 import os
 import pathlib
 import sys
-from typing import Any, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 from .v1 import types_pb2
 
@@ -95,7 +96,7 @@ def _file_descriptor_set(message: Any) -> bytes:
             seen.add(file.name)
             file.CopyToProto(files.file.add())
             wanted.extend(file.dependencies)
-    return files.SerializeToString()
+    return bytes(files.SerializeToString())
 
 
 def _texts(dataset: Any) -> list[str]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
 import os
-from typing import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from .batch import Batch
 from .errors import InvalidRequest
 from .plans import Touches, touches as make_touches
 
@@ -36,10 +39,10 @@ class Row:
     command: Touches
     time_us: tuple[float, ...] = ()
     session_time_s: float | None = None
-    result: object = None
+    result: Batch | None = None
 
 
-def read_plan(path: str | os.PathLike) -> list[Row]:
+def read_plan(path: str | os.PathLike[str]) -> list[Row]:
     """The rows of a plan or measurement file that has poses. Errors name file, line and column."""
     try:
         with open(path, newline="", encoding="utf-8") as file:
@@ -55,19 +58,13 @@ def read_plan(path: str | os.PathLike) -> list[Row]:
             raise InvalidRequest(f"{os.fspath(path)}:1: column '{name}' is missing; a plan needs the poses.")
     times = [name for name in header if name.startswith("t_") and name.endswith("_us")]
     covariates = [name for name in header if name.startswith("cov_")]
-    rows = []
+    rows: list[Row] = []
     for line, cells in lines:
         if len(cells) != len(header):
             raise InvalidRequest(f"{os.fspath(path)}:{line}: {len(cells)} fields, but the header has {len(header)}.")
         row = dict(zip(header, cells))
-
-        def number(name: str, empty: float | None = None) -> float:
-            try:
-                return float(row[name]) if row[name] or empty is None else empty
-            except ValueError:
-                raise InvalidRequest(f"{os.fspath(path)}:{line}: {name} is '{row[name]}', not a number.") from None
-
-        columns = {name: [number(part) for part in parts] for name, parts in _VECTORS.items()}
+        number = functools.partial(_number, f"{os.fspath(path)}:{line}", row)
+        columns: dict[str, Any] = {name: [number(part) for part in parts] for name, parts in _VECTORS.items()}
         columns.update({name: number(name) for name in covariates if row[name]})
         session_time_s = number("session_time_s") if row.get("session_time_s") else None
         if session_time_s is not None:
@@ -79,7 +76,16 @@ def read_plan(path: str | os.PathLike) -> list[Row]:
     return rows
 
 
-def write_measurements(path: str | os.PathLike, rows: Sequence[Row]) -> None:
+def _number(place: str, row: Mapping[str, str], name: str, empty: float | None = None) -> float:
+    """The number in a row's column; `empty` where nothing is written, if that may be."""
+    text = row[name]
+    try:
+        return empty if not text and empty is not None else float(text)
+    except ValueError:
+        raise InvalidRequest(f"{place}: {name} is '{text}', not a number.") from None
+
+
+def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row]) -> None:
     """Writes a measurement file atomically: it is written beside the path and renamed."""
     rows = list(rows)
     fingers = len(rows[0].time_us) if rows else 0
@@ -103,7 +109,9 @@ def write_measurements(path: str | os.PathLike, rows: Sequence[Row]) -> None:
 
 def _cells(row: Row, has_time: bool, covariates: Sequence[str]) -> Iterator[str]:
     # Three units in the last place of a double are lost in converting; 15 digits are what was meant.
-    text = lambda value: "" if np.isnan(value) else repr(float(f"{value:.15g}"))
+    def text(value: float) -> str:
+        return "" if np.isnan(value) else repr(float(f"{value:.15g}"))
+
     yield str(row.touch)
     yield row.object
     yield text(row.command.speed_mm_s[0])

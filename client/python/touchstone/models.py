@@ -12,8 +12,7 @@ from . import images, units
 from .errors import InvalidRequest
 from .v1 import models_pb2, source_pb2, types_pb2
 
-
-_SOURCE_KINDS = {source_pb2.SOURCE_KIND_VIRTUAL: "virtual", source_pb2.SOURCE_KIND_PHYSICAL: "physical"}
+_SOURCE_KINDS: dict[int, str] = {source_pb2.SOURCE_KIND_VIRTUAL: "virtual", source_pb2.SOURCE_KIND_PHYSICAL: "physical"}
 
 
 def source_kind(kind: int) -> str:
@@ -73,7 +72,7 @@ class ObjectInfo:
 
 
 def _corner_mm(v: types_pb2.Vector3) -> tuple[float, float, float]:
-    return tuple(units.lab_value("_m", c) for c in (v.x, v.y, v.z))  # type: ignore[return-value]
+    return units.lab_value("_m", v.x), units.lab_value("_m", v.y), units.lab_value("_m", v.z)
 
 
 _ARITIES = {
@@ -149,7 +148,7 @@ class Model:
         return cls(m.name, m.hash, m.yaml, m.fingers, units.lab_value("spacing_m", m.spacing_m))
 
 
-ModelLike = Union[None, str, os.PathLike, Model]
+ModelLike = Union[None, str, os.PathLike[str], Model]
 
 
 def model_ref(model: ModelLike) -> types_pb2.ModelRef:
@@ -179,7 +178,7 @@ _SURFACE_MAP = re.compile(
     r"^([ \t]*)- surface_map:[ \t]*\{[ \t]*file:[ \t]*(\"[^\"]*\"|[^,}\"]+?)[ \t]*\}[ \t]*$", re.MULTILINE)
 
 
-def _with_content(found: re.Match, folder: pathlib.Path) -> str:
+def _with_content(found: re.Match[str], folder: pathlib.Path) -> str:
     """The same effect with the text of the map in it: a server cannot read the files that a model names."""
     indent, name = found.groups()
     path = folder / name.strip('"')
@@ -191,7 +190,7 @@ def _with_content(found: re.Match, folder: pathlib.Path) -> str:
     return f"{indent}- surface_map:\n{indent}    file: {name}\n{indent}    csv: |\n{body}".rstrip("\n")
 
 
-def read_model_file(path: str | os.PathLike) -> str:
+def read_model_file(path: str | os.PathLike[str]) -> str:
     try:
         text = pathlib.Path(path).read_text(encoding="utf-8")
         return re.sub(_SURFACE_MAP, lambda found: _with_content(found, pathlib.Path(path).parent), text)

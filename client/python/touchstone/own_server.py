@@ -12,7 +12,8 @@ import signal
 import subprocess
 import threading
 import time
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import IO, Any
 
 from .errors import SourceUnreachable
 
@@ -47,7 +48,7 @@ def find_server() -> str:
     )
 
 
-def start_bound(command: Sequence[str], stderr: Any) -> subprocess.Popen:
+def start_bound(command: Sequence[str | os.PathLike[str]], stderr: int | IO[Any] | None) -> subprocess.Popen[str]:
     """A program whose output can be read and that does not outlive this process, even if that is killed.
 
     Closing its standard input ends it (SIGTERM). In a session of its own: Ctrl-C at a terminal is for this process, which
@@ -99,7 +100,7 @@ class OwnServer:
         self.stop()
         raise SourceUnreachable(f"{program} {what}: {said}")
 
-    def _read(self, pipe, targets: queue.Queue[str]) -> None:
+    def _read(self, pipe: IO[str], targets: queue.Queue[str]) -> None:
         with pipe:
             for line in pipe:
                 found = _READY.search(line)
@@ -110,7 +111,8 @@ class OwnServer:
     def stop(self) -> None:
         """Ends it; nothing if it has ended."""
         atexit.unregister(self.stop)
-        self._process.stdin.close()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
         try:
             self._process.wait(timeout=_STOP_WITHIN_S)
         except subprocess.TimeoutExpired:

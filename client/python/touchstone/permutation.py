@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import operator
-from typing import Iterator, Union
+from collections.abc import Iterator
+from typing import Any, Callable, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import checks
 
@@ -46,29 +48,41 @@ class Permutation:
         for begin in range(0, self.size, 4096):
             yield from self[np.arange(begin, min(begin + 4096, self.size))].tolist()
 
-    def __getitem__(self, place: Union[int, slice, np.ndarray]) -> Union[int, np.ndarray]:
+    @overload
+    def __getitem__(self, place: int | np.integer[Any]) -> int: ...
+
+    @overload
+    def __getitem__(self, place: slice | NDArray[np.integer[Any]]) -> NDArray[np.int64]: ...
+
+    def __getitem__(self, place: int | np.integer[Any] | slice | NDArray[np.integer[Any]]) -> int | NDArray[np.int64]:
         if isinstance(place, slice):
             return self[np.arange(*place.indices(self.size))]
         if isinstance(place, np.ndarray):
             return self._walk(self._within(place), self._forward)
-        place = operator.index(place)
-        if not -self.size <= place < self.size:
-            raise IndexError(f"place {place} of {self.size}")
-        return int(self[np.array([place % self.size])][0])
+        number = operator.index(place)
+        if not -self.size <= number < self.size:
+            raise IndexError(f"place {number} of {self.size}")
+        return int(self[np.array([number % self.size])][0])
 
-    def place_of(self, number: Union[int, np.ndarray]) -> Union[int, np.ndarray]:
+    @overload
+    def place_of(self, number: int | np.integer[Any]) -> int: ...
+
+    @overload
+    def place_of(self, number: NDArray[np.integer[Any]]) -> NDArray[np.int64]: ...
+
+    def place_of(self, number: int | np.integer[Any] | NDArray[np.integer[Any]]) -> int | NDArray[np.int64]:
         """Where a number stands: place_of(order[k]) is k."""
         if isinstance(number, np.ndarray):
             return self._walk(self._within(number), self._backward)
-        number = checks.whole_number("number", number, 0, self.size - 1)
-        return int(self.place_of(np.array([number]))[0])
+        checked = checks.whole_number("number", number, 0, self.size - 1)
+        return int(self.place_of(np.array([checked]))[0])
 
-    def _within(self, values: np.ndarray) -> np.ndarray:
+    def _within(self, values: NDArray[np.integer[Any]]) -> NDArray[np.uint64]:
         if values.size and not (0 <= int(values.min()) and int(values.max()) < self.size):
             raise IndexError(f"places {values.min()} to {values.max()} of {self.size}")
         return values.astype(np.uint64)
 
-    def _walk(self, values: np.ndarray, once) -> np.ndarray:
+    def _walk(self, values: NDArray[np.uint64], once: Callable[[NDArray[np.uint64]], NDArray[np.uint64]]) -> NDArray[np.int64]:
         """Again and again what lies beyond `size`: as the network is a permutation, that ends within it."""
         result = once(values)
         beyond = result >= self.size
@@ -77,19 +91,19 @@ class Permutation:
             beyond = result >= self.size
         return result.astype(np.int64)
 
-    def _forward(self, values: np.ndarray) -> np.ndarray:
+    def _forward(self, values: NDArray[np.uint64]) -> NDArray[np.uint64]:
         left, right = values >> self._shift, values & self._mask
         for key in self._keys:
             left, right = right, left ^ self._mixed(right, key)
         return (left << self._shift) | right
 
-    def _backward(self, values: np.ndarray) -> np.ndarray:
+    def _backward(self, values: NDArray[np.uint64]) -> NDArray[np.uint64]:
         left, right = values >> self._shift, values & self._mask
         for key in self._keys[::-1]:
             left, right = right ^ self._mixed(left, key), left
         return (left << self._shift) | right
 
-    def _mixed(self, values: np.ndarray, key: np.uint64) -> np.ndarray:
+    def _mixed(self, values: NDArray[np.uint64], key: np.uint64) -> NDArray[np.uint64]:
         """The finaliser of SplitMix64 (Steele, Lea and Flood 2014) of value and key."""
         x = values + key
         x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Mapping, Sequence, Union
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import checks, units
 from .errors import InvalidRequest
@@ -91,20 +93,20 @@ class Touches:
       draws: how many draws a generator took for them, those that were rejected included; 0: explicit touches.
     """
 
-    target_mm: np.ndarray
-    approach: np.ndarray
-    lateral: np.ndarray
-    standoff_mm: np.ndarray
-    speed_mm_s: np.ndarray
-    stroke_mm: np.ndarray | None = None
-    session_time_s: np.ndarray | None = None
-    covariates: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    target_mm: NDArray[np.float64]
+    approach: NDArray[np.float64]
+    lateral: NDArray[np.float64]
+    standoff_mm: NDArray[np.float64]
+    speed_mm_s: NDArray[np.float64]
+    stroke_mm: NDArray[np.float64] | None = None
+    session_time_s: NDArray[np.float64] | None = None
+    covariates: Mapping[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
     draws: int = 0
 
     def __len__(self) -> int:
         return len(self.target_mm)
 
-    def __getitem__(self, rows: Union[int, slice, np.ndarray]) -> Touches:
+    def __getitem__(self, rows: int | slice | NDArray[Any]) -> Touches:
         """Those rows; a single number gives one touch, still as an array of one row."""
         if isinstance(rows, (int, np.integer)):
             rows = slice(rows, rows + 1 or None)
@@ -140,11 +142,15 @@ class Touches:
 
     @classmethod
     def from_messages(cls, messages: Sequence[types_pb2.CommandedTouch], draws: int = 0) -> Touches:
-        vectors = lambda name: np.array(
-            [(v.x, v.y, v.z) for v in (getattr(message, name) for message in messages)], float
-        ).reshape(-1, 3)
-        numbers = lambda name: np.array([getattr(message, name) for message in messages], float)
-        given = lambda name: bool(messages) and all(message.HasField(name) for message in messages)
+        def vectors(name: str) -> NDArray[np.float64]:
+            return np.array([(v.x, v.y, v.z) for v in (getattr(message, name) for message in messages)], float).reshape(-1, 3)
+
+        def numbers(name: str) -> NDArray[np.float64]:
+            return np.array([getattr(message, name) for message in messages], float)
+
+        def given(name: Literal["stroke_m", "session_time_s"]) -> bool:
+            return bool(messages) and all(message.HasField(name) for message in messages)
+
         return cls(
             target_mm=units.lab_array("target_m", vectors("target_m")),
             approach=vectors("approach"),
@@ -226,10 +232,14 @@ def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> 
             raise InvalidRequest(f"{name} has {len(values)} rows, but other columns have {count}.")
         arrays[name] = np.broadcast_to(values, (count, *values.shape[1:]))
     covariates = {name: arrays.pop(name) for name in list(arrays) if name.startswith("cov_")}
-    return Touches(**arrays, covariates=covariates)
+    return Touches(
+        target_mm=arrays["target_mm"], approach=arrays["approach"], lateral=arrays["lateral"], standoff_mm=arrays["standoff_mm"],
+        speed_mm_s=arrays["speed_mm_s"], stroke_mm=arrays.get("stroke_mm"), session_time_s=arrays.get("session_time_s"),
+        covariates=covariates,
+    )
 
 
-def _array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _array(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """As float64 (rows, *shape), a single entry as one row."""
     try:
         array = np.asarray(values, float)
@@ -248,5 +258,5 @@ def _incidence_rad(max_incidence_deg: float) -> float:
     return units.si_value("max_incidence_rad", checks.positive("max_incidence_deg", max_incidence_deg))
 
 
-def _vector(values: np.ndarray) -> types_pb2.Vector3:
+def _vector(values: NDArray[np.float64]) -> types_pb2.Vector3:
     return types_pb2.Vector3(x=values[0], y=values[1], z=values[2])

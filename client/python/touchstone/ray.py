@@ -12,7 +12,8 @@ Imported on its own, since Ray is optional: pip install touchstone[ray].
 
 from __future__ import annotations
 
-from typing import Any, Iterable, Optional
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from ray.data import Datasource, ReadTask
@@ -48,17 +49,17 @@ class TouchstoneDatasource(Datasource):
     def get_name(self) -> str:
         return "Touchstone"
 
-    def estimate_inmemory_data_size(self) -> Optional[int]:
-        return self._bytes_per_row * len(self._samples)
+    def estimate_inmemory_data_size(self) -> int | None:
+        return int(self._bytes_per_row * len(self._samples))
 
-    def get_read_tasks(self, parallelism: int, per_task_row_limit: Optional[int] = None, *_: Any, **__: Any) -> list[ReadTask]:
+    def get_read_tasks(self, parallelism: int, per_task_row_limit: int | None = None, *_: Any, **__: Any) -> list[ReadTask]:
         """At most `parallelism` tasks, each of which reads samples that follow one another."""
         blocks = -(-len(self._samples) // self._rows)
         tasks = max(1, min(parallelism, blocks))
         edges = [len(self._samples) * k // tasks for k in range(tasks + 1)]
         return [self._task(range(begin, end), per_task_row_limit) for begin, end in zip(edges, edges[1:])]
 
-    def _task(self, indices: range, row_limit: Optional[int]) -> ReadTask:
+    def _task(self, indices: range, row_limit: int | None) -> ReadTask:
         samples, rows = self._samples, self._rows
 
         def read() -> Iterable[Block]:

@@ -6,7 +6,8 @@ import dataclasses
 import json
 import math
 import os
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from google.protobuf import json_format
 
@@ -139,17 +140,17 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them."""
-        names = dict(preserving_proto_field_name=True)
         try:
-            return json_format.MessageToDict(self.message, always_print_fields_with_no_presence=True, **names)
+            return json_format.MessageToDict(self.message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
         except TypeError:  # protobuf before 5
-            return json_format.MessageToDict(self.message, including_default_value_fields=True, **names)
+            old_name: dict[str, Any] = {"including_default_value_fields": True}
+            return json_format.MessageToDict(self.message, preserving_proto_field_name=True, **old_name)
 
-    def save(self, path: str | os.PathLike) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes it as JSON."""
         _write(path, json.dumps(self.to_dict(), indent=1) + "\n")
 
-    def save_model(self, path: str | os.PathLike) -> None:
+    def save_model(self, path: str | os.PathLike[str]) -> None:
         """Writes the improved model as a model file."""
         if not self.improved_model:
             raise InvalidRequest("The report has no improved model: nothing is to be added or changed.")
@@ -168,7 +169,7 @@ def _value(p: diagnosis_pb2.ParameterValue) -> Value:
     return Value(name, p.value, p.std_error, (p.lower, p.upper))
 
 
-def _write(path: str | os.PathLike, text: str) -> None:
+def _write(path: str | os.PathLike[str], text: str) -> None:
     part = os.fspath(path) + ".part"
     with open(part, "w", encoding="utf-8") as file:
         file.write(text)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Callable, Sequence
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Callable
 
 from . import checks
 from .lease import holder
@@ -46,7 +47,7 @@ class Rig:
 
     def status(self) -> rig_pb2.RigState:
         """How every part is, now: the message of proto/touchstone/v1/rig.proto, SI units."""
-        return self._client.call(_RIG, "GetRig", rig_pb2.GetRigRequest())
+        return self._state("GetRig", rig_pb2.GetRigRequest(), repeat=True)
 
     def stop(self, reason: str = "") -> int:
         """Stops every motion now, until reset(); needs no lease. A software stop: not safety-rated.
@@ -58,24 +59,29 @@ class Rig:
     def reset(self, reason: str) -> control_pb2.State:
         """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease."""
         request = control_pb2.ResetRequest(holder=holder(), reason=reason)
-        return self._client.call(_CONTROL, "Reset", request, repeat=False)
+        state: control_pb2.State = self._client.call(_CONTROL, "Reset", request, repeat=False)
+        return state
 
     def power_on(self) -> rig_pb2.RigState:
         """Powers the arm on and releases its brakes; never unlocks a protective stop."""
         with self._client.holding_lease() as token:
-            return self._client.call(_RIG, "PowerOn", rig_pb2.PowerOnRequest(lease_token=token), repeat=False)
+            return self._state("PowerOn", rig_pb2.PowerOnRequest(lease_token=token))
 
     def home(self) -> rig_pb2.RigState:
         """Backs the tool out along its own axis and goes to the home joints."""
         with self._client.holding_lease() as token:
-            return self._client.call(_RIG, "Home", rig_pb2.HomeRequest(lease_token=token), repeat=False)
+            return self._state("Home", rig_pb2.HomeRequest(lease_token=token))
 
     def mount(self, object: str, up_face: str = "+z") -> rig_pb2.RigState:
         """Says which object lies on the fixture with which face up; where the rig changes it by itself, it does."""
         checks.choice("up_face", up_face, _FACES)
         with self._client.holding_lease() as token:
             request = rig_pb2.MountObjectRequest(object=object, up_face=_FACES[up_face], lease_token=token)
-            return self._client.call(_RIG, "MountObject", request, repeat=False)
+            return self._state("MountObject", request)
+
+    def _state(self, method: str, request: Any, repeat: bool = False) -> rig_pb2.RigState:
+        state: rig_pb2.RigState = self._client.call(_RIG, method, request, repeat=repeat)
+        return state
 
     def prepare(self, object: str, up_face: str, ask: Callable[[str, str], None] = _ask) -> None:
         """mount(), if it does not lie so; where a person must put it down, ask(object, up_face) first."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import threading
-from typing import Any, Callable, ContextManager, Iterator, Mapping, Sequence, Union
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Callable, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .batch import Batch, Column, EncodedImages
 from .connection import Connection
@@ -19,7 +22,7 @@ from .v1 import source_pb2
 _SAMPLES_PER_REQUEST = 50_000
 
 
-class Samples(Sequence):
+class Samples(Sequence[Mapping[str, Any]]):
     """Samples of a dataset by their index. Made by Client.samples().
 
     `samples[i]` is one sample, {column: value}; `samples[[3, 1, 7]]`, `samples[10:20]` and `samples[array]` are Batches
@@ -31,7 +34,7 @@ class Samples(Sequence):
     """
 
     def __init__(self, connection: Connection, spec: source_pb2.DatasetSpec, *, si: bool = False,
-                 hold_lease: Callable[[], ContextManager[str]] | None = None, session: str = ""):
+                 hold_lease: Callable[[], contextlib.AbstractContextManager[str]] | None = None, session: str = ""):
         self.spec = spec
         self._si = si
         self._hold_lease = hold_lease
@@ -50,7 +53,13 @@ class Samples(Sequence):
     def __len__(self) -> int:
         return self.spec.samples
 
-    def __getitem__(self, index: Union[int, slice, Sequence[int], np.ndarray]) -> Any:
+    @overload  # type: ignore[override]  # a slice of a Sequence is a Sequence; here it is a Batch, one request
+    def __getitem__(self, index: int | np.integer[Any]) -> Mapping[str, Any]: ...
+
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[np.integer[Any]]) -> Batch: ...
+
+    def __getitem__(self, index: int | np.integer[Any] | slice | Sequence[int] | NDArray[np.integer[Any]]) -> Mapping[str, Any] | Batch:
         if isinstance(index, slice):
             return self._batch(range(*index.indices(len(self))))
         if isinstance(index, (Sequence, np.ndarray)) and getattr(index, "ndim", 1) == 1:
@@ -88,8 +97,8 @@ class Samples(Sequence):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _own=threading.local(), _parent=Connection(*state["_parent"]),
                              spec=source_pb2.DatasetSpec.FromString(state["spec"]))
-        if self._header:
-            self._header = source_pb2.DatasetHeader.FromString(self._header)
+        if state["_header"]:
+            self._header = source_pb2.DatasetHeader.FromString(state["_header"])
 
     def _checked(self, index: Any) -> int:
         try:
@@ -108,7 +117,7 @@ class Samples(Sequence):
             self._header = dataset.known_header or self._header
         if not parts:
             raise InvalidRequest("The list of indices is empty; give at least one.")
-        return joined(parts, indices, self._si)
+        return joined(parts, indices)
 
     def _dataset(self, indices: list[int] | None) -> Dataset:
         more: dict[str, Any] = {} if self._hold_lease is None else {"hold_lease": self._hold_lease}
@@ -116,9 +125,10 @@ class Samples(Sequence):
                        known_header=self._header, **more)
 
     def _connection(self) -> Connection:
-        if getattr(self._own, "connection", None) is None:
-            self._own.connection = self._parent.another()
-        return self._own.connection
+        connection: Connection | None = getattr(self._own, "connection", None)
+        if connection is None:
+            connection = self._own.connection = self._parent.another()
+        return connection
 
 
 def sample_of(batch: Mapping[str, Any], row: int) -> Mapping[str, Any]:
@@ -126,7 +136,7 @@ def sample_of(batch: Mapping[str, Any], row: int) -> Mapping[str, Any]:
     return {name: values[row] for name, values in batch.items()}
 
 
-def joined(parts: Sequence[Batch], indices: Sequence[int], si: bool) -> Batch:
+def joined(parts: Sequence[Batch], indices: Sequence[int]) -> Batch:
     """Batches one after the other as one."""
     if len(parts) == 1:
         whole = parts[0]

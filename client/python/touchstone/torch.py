@@ -28,7 +28,8 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from typing import Any, Dict, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import torch
 from torch.utils.data import IterableDataset, get_worker_info
@@ -149,7 +150,7 @@ class TouchstoneDataset(IterableDataset):
         last = self.start + (self.rank + self.ranks * (batches - 1)) * self.batch_size
         return (batches - 1) * self.batch_size + min(self.batch_size, self._stop(self.start) - last)
 
-    def __iter__(self) -> Iterator[Dict[str, Any]]:
+    def __iter__(self) -> Iterator[dict[str, Any]]:
         info = get_worker_info()
         worker, workers = (info.id, info.num_workers) if info is not None else (0, 1)
         if self._loader_counts:
@@ -186,7 +187,7 @@ class TouchstoneDataset(IterableDataset):
         """
         return TouchstoneLoader(self, num_workers, options)
 
-    def state_dict(self) -> Dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         """The position of the next batch; plain numbers and text.
 
         In a worker it is that of its own share: torchdata's StatefulDataLoader puts those together. With workers of
@@ -203,7 +204,7 @@ class TouchstoneDataset(IterableDataset):
             "worker": _worker_in_words(),
         }
 
-    def load_state_dict(self, state: Dict[str, Any]) -> None:
+    def load_state_dict(self, state: dict[str, Any]) -> None:
         """Goes on there at the next iteration. The number of workers may differ, and, if all ranks had been given
         equally many batches, the number of ranks too."""
         if state.get("version") != 1:
@@ -260,7 +261,7 @@ class TouchstoneDataset(IterableDataset):
         batches = max(0, -(-(self._stop(base) - base) // self.batch_size))
         return max(0, -(-(batches - self.rank) // self.ranks))
 
-    def _batches(self, worker: int, workers: int) -> Iterator[Dict[str, Any]]:
+    def _batches(self, worker: int, workers: int) -> Iterator[dict[str, Any]]:
         """The share of one worker, from where the iteration begins."""
         epoch, base, skip = self._begin.tolist()
         if skip and workers > 1 and self._worker_begin is None:

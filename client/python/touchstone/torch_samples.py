@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterator, List, Sequence, Sized
+from collections.abc import Iterator, Sequence, Sized
+from typing import Any
 
 import torch
 from torch.utils.data import Dataset, Sampler
@@ -44,7 +45,7 @@ class TouchstoneSamples(Dataset):
           target: "host:port", several of them, or a Client, whose lease then counts in this process.
           retry_for_s: how long a lost source is tried again.
         """
-        given = dict(samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s, touch_interval_s=touch_interval_s,
+        given: dict[str, Any] = dict(samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s, touch_interval_s=touch_interval_s,
                      columns=columns, image=image, max_draws=max_draws)
         if isinstance(target, Client):
             self.samples = target.samples(objects, plan, **given)
@@ -54,10 +55,10 @@ class TouchstoneSamples(Dataset):
     def __len__(self) -> int:
         return len(self.samples)
 
-    def __getitem__(self, index: int) -> Dict[str, Any]:
+    def __getitem__(self, index: int) -> dict[str, Any]:
         return self.__getitems__([index])[0]
 
-    def __getitems__(self, indices: Sequence[int]) -> List[Dict[str, Any]]:
+    def __getitems__(self, indices: Sequence[int]) -> list[dict[str, Any]]:
         return list(rows(tensors(self.samples[list(indices)])))
 
 

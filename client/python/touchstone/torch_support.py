@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from typing import Any, Dict, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import torch
@@ -17,9 +18,9 @@ from .v1 import source_pb2
 _IMAGE_COLUMNS = ("image", "depth_mm", "mask")
 
 
-def tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
+def tensors(batch: Batch, skip: int = 0) -> dict[str, Any]:
     """The batch as tensors, without its first `skip` samples; images with the channels first."""
-    result: Dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name, values in batch.items():
         if isinstance(values, EncodedImages):
             result[name] = values[skip:]
@@ -34,7 +35,7 @@ def tensors(batch: Batch, skip: int = 0) -> Dict[str, Any]:
     return result
 
 
-def rows(batch: Dict[str, Any]) -> Iterator[Dict[str, Any]]:
+def rows(batch: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for k in range(len(next(iter(batch.values())))):
         yield {name: values[k] for name, values in batch.items()}
 

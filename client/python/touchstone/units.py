@@ -8,8 +8,10 @@ and values are what labs write: mm, us, deg, mm/s, again with the unit in every 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 # End of the SI name, end of the lab name, factor. The first match counts, so "_m_s" comes before "_s".
 _RULES = (
@@ -47,7 +49,7 @@ def si_value(si_name: str, value: float) -> float:
     return value / _rule(si_name)[1]
 
 
-def lab_array(si_name: str, values: np.ndarray) -> np.ndarray:
+def lab_array(si_name: str, values: NDArray[Any]) -> NDArray[Any]:
     """The array in the lab's unit and in the same dtype; one pass, or none if there is nothing to convert."""
     factor = _rule(si_name)[1]
     return values if factor == 1.0 else np.multiply(values, values.dtype.type(factor))

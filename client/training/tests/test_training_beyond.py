@@ -3,22 +3,21 @@
 import os
 import pathlib
 import types
+from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.training needs it.")
 
-import touchstone  # noqa: E402
-from touchstone.training import calibration, ladder, plans, recognisers, sequential  # noqa: E402
-from touchstone.training.experiments import other_rigs  # noqa: E402
-from touchstone.training.prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured  # noqa: E402
-from touchstone.training.touch_data import collect  # noqa: E402
-
-_REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
+import touchstone
+from touchstone.training import calibration, ladder, plans, recognisers, sequential
+from touchstone.training.experiments import other_rigs
+from touchstone.training.prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
+from touchstone.training.touch_data import collect
 
 
-def correlated(rng, n, correlation):
+def correlated(rng, n, correlation) -> tuple[np.ndarray, np.ndarray]:
     predicted = rng.normal(size=n)
     return 2 + correlation * predicted + np.sqrt(1 - correlation**2) * rng.normal(size=n), predicted
 
@@ -73,7 +72,7 @@ def test_the_bootstrap_interval_holds_the_closed_form_and_the_worth_follows():
     closed = 1 / (1 - 0.8**2 * 10 / 11)
     held = 0
     for _ in range(40):
-        value, low, high = bootstrap_gain(*correlated(rng, 200, 0.8), rng.normal(size=2000), rng, 200)
+        _, low, high = bootstrap_gain(*correlated(rng, 200, 0.8), rng.normal(size=2000), rng, 200)
         assert low <= high
         held += low <= closed <= high
     assert held >= 33  # of 40 at 95 %: fewer than 33 has a probability below 0.1 %
@@ -133,9 +132,9 @@ def test_answers_at_95_percent_are_right_as_often_and_information_needs_fewest_t
     went = {policy: [] for policy in ("information", "random", "fixed")}
     for number in range(300):
         observed = expected.times_us[:, number % 5] + rng.normal(0, 1, (20, 3))
-        for policy in went:
+        for policy, values in went.items():
             episode = sequential.recognise(expected, observed, np.arange(20), policy, rng, outcomes=outcomes)
-            went[policy].append((episode.touches, episode.sure, episode.answer == number % 5))
+            values.append((episode.touches, episode.sure, episode.answer == number % 5))
     for policy, values in went.items():
         _, sure, right = np.transpose(values)
         assert right[sure > 0].mean() > 0.92, policy
@@ -198,7 +197,7 @@ def test_the_ladder_adds_one_effect_of_the_report_after_the_other():
     report = types.SimpleNamespace(
         improved_model=improved, steps=[types.SimpleNamespace(effect="tip_radius"), types.SimpleNamespace(effect="object_push")],
         message=types.SimpleNamespace(unexplained=types.SimpleNamespace(lookup_yaml=lookup)))
-    names, models = zip(*ladder.models(report))
+    names, models = zip(*ladder.models(report))  # type: ignore[arg-type]  # a stand-in
     assert names == ("nominal", "+ tip_radius", "+ object_push", "+ lookup")
     assert [("tip_radius" in m, "object_push" in m, "lookup" in m) for m in models] == [
         (False, False, False), (True, False, False), (True, True, False), (True, True, True)]
@@ -213,9 +212,7 @@ def test_what_any_number_of_fingers_sees_of_a_sphere():
         x = (np.arange(fingers) - (fingers - 1) / 2) * spacing
         travel = standoff + radius - np.sqrt(radius**2 - x**2)
         values, _, _ = other_rigs.seen(travel[None] / other_rigs.SPEED_MM_S * 1e6, spacing)
-        if fingers == 1:
-            np.testing.assert_allclose(values, [[0.0]], atol=1e-9)
-        elif fingers == 2:
+        if fingers == 1 or fingers == 2:
             np.testing.assert_allclose(values, [[0.0]], atol=1e-9)
         else:  # 1 / radius, up to the sphere's departure from a parabola
             assert values.shape == (1, fingers - 2)
@@ -224,10 +221,9 @@ def test_what_any_number_of_fingers_sees_of_a_sphere():
 
 @pytest.fixture(scope="module")
 def client():
-    program = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or _REPOSITORY / "build/release/bin/touchstone-server")
+    program = pathlib.Path(os.environ["TOUCHSTONE_SERVER"])
     if not program.exists():
         pytest.skip(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER.")
-    os.environ["TOUCHSTONE_SERVER"] = str(program)
     with touchstone.connect() as connected:
         yield connected
 
@@ -264,7 +260,8 @@ def test_simulated_touches_come_from_all_sides_alike(client):
 
 def test_a_touch_is_simulated_again_as_it_was(client):
     data = collect(client, plans.OBJECTS, plans.simulated(100), 100, model=ladder.with_noise(ladder.NOMINAL, 0), seed=3)
-    again = ladder.simulate_again(types.SimpleNamespace(simulator=client), data, ladder.with_noise(ladder.NOMINAL, 0), 1)
+    context: Any = types.SimpleNamespace(simulator=client)
+    again = ladder.simulate_again(context, data, ladder.with_noise(ladder.NOMINAL, 0), 1)
     # Directions and targets came as float32: near an edge that is another triangle.
     assert np.nanmedian(np.abs(again - data.times_us)) < 50
     assert np.mean(np.abs(again - data.times_us) < 1000) > 0.95

@@ -25,7 +25,7 @@ def test_weighted_sum_by_hand():
     touch, image = np.array([[0.6, 0.4]]), np.array([[0.1, 0.9]])
     np.testing.assert_allclose(fusion_rules.weighted_sum(touch, image, 0.75), [[0.475, 0.525]])
     assert np.array_equal(fusion_rules.weighted_sum(touch, image, 1.0), touch)
-    with pytest.raises(ValueError, match="1.5 is not from 0 to 1"):
+    with pytest.raises(ValueError, match=r"1\.5 is not from 0 to 1"):
         fusion_rules.weighted_sum(touch, image, 1.5)
 
 
@@ -53,8 +53,9 @@ def test_the_weight_is_chosen_on_validation_data_alone():
 
 def _touches(count):
     rng = np.random.default_rng(1)
-    vectors = rng.normal(size=(3, count, 3))
-    return TouchData(("lat00", "lat05", "lat10", "lat15", "lat20"), np.arange(count) % 5, rng.normal(size=(count, 3)), *vectors, None, 20.0, 30.0)
+    target, approach, lateral = rng.normal(size=(3, count, 3))
+    return TouchData(("lat00", "lat05", "lat10", "lat15", "lat20"), np.arange(count) % 5, rng.normal(size=(count, 3)), target, approach, lateral,
+                     None, 20.0, 30.0)
 
 
 def test_no_measured_touch_is_in_training_and_testing():
@@ -83,6 +84,7 @@ def test_a_touch_recogniser_is_validated_on_the_last_source_and_not_trained_on_t
     assert np.mean(probabilities.argmax(1) == objects) < 0.4 < np.mean(found.probabilities(measured[0]).argmax(1) == measured[1])
 
 
+@pytest.mark.second_tier("statistical: recognition rates over seeds")
 @pytest.mark.skipif(not _SQUEEZENET.exists(), reason=f"there is no backbone file {_SQUEEZENET}")
 def test_two_senses_beat_each_alone(tmp_path):
     with Context(Settings(tmp_path, quick=True, backbone=_SQUEEZENET)) as context:

@@ -3,6 +3,7 @@
 import pathlib
 import subprocess
 import types
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +14,7 @@ from torch import nn
 import touchstone
 from touchstone.own_server import find_server
 from touchstone.training import image_head, onnx_file, picture_data, streaming
-from touchstone.training.backbone import Backbone, NoNetwork, prepare, CAFFE, TORCHVISION
+from touchstone.training.backbone import CAFFE, TORCHVISION, Backbone, NoNetwork, prepare
 from touchstone.training.context import Context
 from touchstone.training.experiments.image_augmentation import COPIES, MeasuredFeatures
 from touchstone.training.experiments.image_recognition import measured_split, sizes
@@ -101,7 +102,7 @@ def test_a_network_of_something_else_is_refused_with_its_input(tmp_path):
         Backbone(path)
     cut = tmp_path / "cut.onnx"
     cut.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.raises(NoNetwork, match="cut.onnx"):
+    with pytest.raises(NoNetwork, match=r"cut\.onnx"):
         Backbone(cut)
 
 
@@ -115,7 +116,8 @@ def test_squeezenet_gives_its_raw_scores_and_knows_a_picture_again():
 
 
 def test_features_are_computed_once(small, tmp_path, monkeypatch):
-    cache = FeatureCache(types.SimpleNamespace(settings=Settings(tmp_path, backbone=small[1])))
+    context: Any = types.SimpleNamespace(settings=Settings(tmp_path, backbone=small[1]))
+    cache = FeatureCache(context)
     pictures = Pictures(_noise(5), np.zeros(5, int), "noise")
     first = cache(pictures)
     monkeypatch.setattr(cache.backbone, "features", lambda _: pytest.fail("computed again"))
@@ -159,7 +161,8 @@ def test_no_measured_picture_is_in_training_and_testing(tmp_path, monkeypatch):
     monkeypatch.setattr("touchstone.training.experiments.image_augmentation.measured", lambda *_: pool)
     # The mean of a picture stands for its features: copies are told by their row, whose number is the picture's first pixel.
     pool.image[:, :] = np.arange(count)[:, None, None, None]
-    real = MeasuredFeatures(context, lambda pictures: pictures.image.reshape(len(pictures), -1).mean(1, keepdims=True))
+    features: Any = lambda pictures: pictures.image.reshape(len(pictures), -1).mean(1, keepdims=True)
+    real = MeasuredFeatures(context, features)
     for seed in range(20):
         training, testing = measured_split(context, pool, seed)
         assert len(testing) == sizes(context).measured_test and len(training) == sizes(context).measured_train

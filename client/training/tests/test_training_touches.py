@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.training needs it.")
 
-from touchstone.training import features, measured_sets, plans, recognisers  # noqa: E402
-from touchstone.training.context import Context  # noqa: E402
-from touchstone.training.settings import Settings  # noqa: E402
-from touchstone.training.touch_data import TouchData  # noqa: E402
+from touchstone.training import features, measured_sets, plans, recognisers
+from touchstone.training.context import Context
+from touchstone.training.settings import Settings
+from touchstone.training.touch_data import TouchData
 
 
 def made_of(objects, times_us=None, targets=None, spacing_mm=30.0):
@@ -77,6 +77,11 @@ def pools(tmp_path_factory):
                context.measured(plans.measured(context.settings), options=(*plans.RIG, "--speedup", "60")))
 
 
+def rates(test):
+    """Marks what trains on touches of the emulated rig, which exists once."""
+    return pytest.mark.second_tier("statistical: recognition rates over seeds")(pytest.mark.xdist_group("training_touches")(test))
+
+
 def accuracies(pool, rig, touches, shuffle=False):
     """Of XGBoost on 400 emulated sets, one for each of three seeds."""
     found = []
@@ -89,18 +94,21 @@ def accuracies(pool, rig, touches, shuffle=False):
     return np.array(found)
 
 
+@rates
 def test_noise_in_training_helps_on_emulated_touches(pools):
     ideal, noisy, rig = pools
     gain = accuracies(noisy, rig, 15) - accuracies(ideal, rig, 15)
     assert gain.min() > 0.05, gain
 
 
+@rates
 def test_more_touches_help(pools):
     _, noisy, rig = pools
     gain = accuracies(noisy, rig, 20) - accuracies(noisy, rig, 3)
     assert gain.min() > 0.05, gain
 
 
+@rates
 def test_shuffled_labels_give_chance(pools):
     _, noisy, rig = pools
     # Twelve hundred sets of few touches are not independent: twice the spread of as many independent ones, at 4 sigma.

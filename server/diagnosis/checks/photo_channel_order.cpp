@@ -9,10 +9,10 @@ namespace {
 
 constexpr int kDark = 24, kBright = 250;  // grey levels between which a pixel tells its colour
 constexpr int kMinPixels = 50;
-constexpr double kMinTint = 0.05;   // mean log(red / blue) that is a colour
-constexpr double kMaxSpread = 0.5;  // of the tints of one order, relative to their mean
-constexpr int kMinPart = 2;         // pictures of either order
-constexpr size_t kMaxRanges = 24;   // that a command can list
+constexpr double kMinTint = 0.05;         // mean log(red / blue) that is a colour
+constexpr double kMaxTintSpread = 0.5;    // of the tints of one order, relative to their mean
+constexpr int kMinPictures = 2;           // pictures of either order
+constexpr size_t kMaxPictureRanges = 24;  // that a command can list
 
 // Mean log(red / blue) of what is neither dark nor clipped; NaN: grey, or too little of it.
 double Tint(const session::PhotographRow& row) {
@@ -36,9 +36,9 @@ double TintOf(const std::vector<double>& tints, bool red) {
     if (std::isnan(tint) || (tint > 0) != red) continue;
     sum += std::abs(tint), squares += tint * tint, ++count;
   }
-  if (count < kMinPart) return NAN;
+  if (count < kMinPictures) return NAN;
   const double mean = sum / count, spread = std::sqrt(std::max(0.0, squares / count - mean * mean));
-  return mean >= kMinTint && spread <= kMaxSpread * mean ? mean : NAN;
+  return mean >= kMinTint && spread <= kMaxTintSpread * mean ? mean : NAN;
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set) 
     else
       ranges.emplace_back(image, image);
   }
-  if (mistake.fix.images.size() > kMaxRanges) return std::nullopt;
+  if (mistake.fix.images.size() > kMaxPictureRanges) return std::nullopt;
   mistake.detail = absl::StrCat(std::min(reddish, bluish), " of ", set.size(), " pictures");
   mistake.words = absl::StrCat(std::min(reddish, bluish), " of the ", set.size(),
                                " pictures have red and blue the other way round than the others (RGB and BGR "

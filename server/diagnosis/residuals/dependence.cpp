@@ -11,7 +11,7 @@ namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kMaxPosesPermuted = 20000;
-constexpr int kPermutations = 200;
+constexpr int kRowPermutations = 200;
 constexpr double kVariesWithinPoses = 0.25;  // share of the covariate's variation that lies within poses
 
 // What changes places as a whole: a pose with all of its repeats, or one touch. Bin (-1: none) and residual
@@ -151,7 +151,7 @@ double DependenceP(const std::vector<ResidualCell>& cells, const std::vector<dou
   std::vector<double> sums;
   const double observed = BetweenBinSquares(units, source, fingers, bins, &sums);
   RandomStream random(seed, RandomDomain::kDiagnosis, number, 3);
-  std::vector<double> permuted(kPermutations);
+  std::vector<double> permuted(kRowPermutations);
   for (double& value : permuted) {
     for (const auto& [begin, end] : blocks)
       for (int u = end - 1; u > begin; --u) std::swap(source[u], source[begin + random.Below(u - begin + 1)]);

@@ -12,7 +12,7 @@ namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr int kCurveBins = 12;
-constexpr int kPermutations = 499;
+constexpr int kSignPermutations = 499;
 constexpr int kSampledPixels = 4000;  // of each picture, to place the bins
 constexpr int kMinIndependent = 6;    // poses, below which nothing is tested
 
@@ -70,7 +70,7 @@ double SignP(const PoseBins& poses, uint64_t seed, uint64_t number) {
   const double observed = total(nullptr);
   std::vector<double> permuted;
   RandomStream random(seed, RandomDomain::kDiagnosis, 70000 + number);
-  for (int p = 0; p < kPermutations; ++p) permuted.push_back(total(&random));
+  for (int p = 0; p < kSignPermutations; ++p) permuted.push_back(total(&random));
   return PermutationP(observed, permuted);
 }
 
@@ -103,7 +103,7 @@ double OrderP(const std::vector<double>& mean, const std::vector<int>& bin, cons
   RandomStream random(seed, RandomDomain::kDiagnosis, 80000 + number);
   std::vector<std::vector<int>> members(within ? poses : 1);
   for (size_t k = 0; k < mean.size(); ++k) members[group[k]].push_back(static_cast<int>(k));
-  for (int p = 0; p < kPermutations; ++p) {
+  for (int p = 0; p < kSignPermutations; ++p) {
     std::vector<double> shuffled = centred;
     for (const std::vector<int>& all : members)
       for (size_t k = all.size(); k > 1; --k) std::swap(shuffled[all[k - 1]], shuffled[all[random.Below(k)]]);

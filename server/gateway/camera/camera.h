@@ -33,6 +33,7 @@ struct CameraOptions {
   std::string intrinsics;     // file; empty: the field of view below, no distortion
   double vertical_fov_rad = 0.7853981633974483;
   double timeout_s = 2;
+  const Clock* clock = &timing::HostClock();  // outlives the camera
 };
 
 class CameraDevice {

@@ -14,9 +14,25 @@ class Mat;
 
 namespace touchstone::gateway::camera {
 
+// Pictures as a driver hands them over, one after the other. For one thread. Grab and Retrieve may throw cv::Exception,
+// which counts as a stream that broke.
+class PictureStream {
+ public:
+  virtual ~PictureStream() = default;
+  // Also again, after it broke.
+  virtual bool Open() = 0;
+  // Waits for the next picture; false if the stream broke.
+  virtual bool Grab() = 0;
+  // What was grabbed last; false if it cannot be decoded.
+  virtual bool Retrieve(cv::Mat* picture) = 0;
+};
+
 // A camera that delivers frames all the time: UVC, or pictures over HTTP. Opened again when it was unplugged.
 // Real pictures are never equal bit by bit (but for a covered lens), so equal ones mean that it froze.
 absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options);
+// The same of any stream.
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options,
+                                                               std::unique_ptr<PictureStream> stream);
 
 // A folder into which another program puts pictures (whole: written under another name, then renamed). A
 // picture's time is that of its file's last change, and equal pictures are legitimate.

@@ -1,8 +1,6 @@
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <mutex>
-#include <thread>
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
@@ -11,7 +9,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "server/gateway/camera/camera_kinds.h"
-#include "server/gateway/timing/host_time.h"
 
 namespace touchstone::gateway::camera {
 namespace {
@@ -47,13 +44,14 @@ class FolderCamera : public CameraDevice {
 
   absl::StatusOr<image::Frame> Take(double after_host_s) override {
     std::lock_guard<std::mutex> lock(mutex_);
-    const double until_s = timing::HostNowS() + options_.timeout_s;
+    const Clock& clock = *options_.clock;
+    const double until_s = clock.NowS() + options_.timeout_s;
     while (true) {
       const std::string name = Newest();
       std::string why = "it has no picture";
       if (!name.empty()) {
         const Stamp stamp = StampOf(name);
-        const double ahead_s = stamp.unix_s - timing::UnixNowS(), changed_s = timing::HostNowS() + ahead_s;
+        const double ahead_s = stamp.unix_s - clock.UnixNowS(), changed_s = clock.NowS() + ahead_s;
         if (ahead_s > kCoarseS) of_the_future_ = stamp;
         if (stamp == of_the_future_) {
           why = absl::StrCat(
@@ -73,10 +71,10 @@ class FolderCamera : public CameraDevice {
           why = absl::StrCat(std::filesystem::path(name).filename().string(), " cannot be read");
         }
       }
-      if (timing::HostNowS() >= until_s)
+      if (clock.NowS() >= until_s)
         return absl::UnavailableError(
             absl::StrCat("camera folder ", path_, ": no picture in ", options_.timeout_s, " s: ", why));
-      std::this_thread::sleep_for(std::chrono::duration<double>(kLookS));
+      clock.SleepFor(kLookS);
     }
   }
   CameraKind kind() const override { return CameraKind::kFolder; }

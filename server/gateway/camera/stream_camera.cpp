@@ -2,7 +2,6 @@
 // only those that somebody waits for are decoded where the driver leaves a choice.
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <mutex>
@@ -26,9 +25,44 @@ bool IsNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+// Of OpenCV.
+class OpenCvStream final : public PictureStream {
+ public:
+  explicit OpenCvStream(CameraOptions options) : options_(std::move(options)) {}
+
+  bool Open() override {
+    try {
+      stream_.release();
+      const std::string& uri = options_.uri;
+      if (CameraKindOf(uri) == CameraKind::kStream) {
+        const int timeout_ms = static_cast<int>(options_.timeout_s * 1000);
+        if (!stream_.open(
+                uri, cv::CAP_FFMPEG,
+                {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, timeout_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC, timeout_ms}))
+          return false;
+      } else if (!(IsNumber(uri) ? stream_.open(std::stoi(uri), cv::CAP_V4L2)
+                                 : stream_.open(uri, cv::CAP_V4L2))) {
+        return false;
+      }
+      if (options_.width > 0) stream_.set(cv::CAP_PROP_FRAME_WIDTH, options_.width);
+      if (options_.height > 0) stream_.set(cv::CAP_PROP_FRAME_HEIGHT, options_.height);
+      return true;
+    } catch (const cv::Exception&) {
+      return false;
+    }
+  }
+  bool Grab() override { return stream_.grab(); }
+  bool Retrieve(cv::Mat* picture) override { return stream_.retrieve(*picture) && !picture->empty(); }
+
+ private:
+  const CameraOptions options_;
+  cv::VideoCapture stream_;
+};
+
 class StreamCamera : public CameraDevice {
  public:
-  explicit StreamCamera(CameraOptions options) : options_(std::move(options)) {}
+  StreamCamera(CameraOptions options, std::unique_ptr<PictureStream> stream)
+      : options_(std::move(options)), stream_(std::move(stream)) {}
   ~StreamCamera() override {
     {
       std::lock_guard<std::mutex> lock(mutex_);
@@ -39,7 +73,7 @@ class StreamCamera : public CameraDevice {
   }
 
   absl::Status Start() {
-    if (!OpenStream())
+    if (!stream_->Open())
       return absl::UnavailableError(
           absl::StrCat("camera: ", options_.uri,
                        " cannot be opened; is it there, is it a camera, and does nobody else use it?"));
@@ -55,8 +89,9 @@ class StreamCamera : public CameraDevice {
     repeated_ = false;
     has_result_ = false;
     // Of what is asked for ahead of time, the time until then does not count.
-    const double patience_s = options_.timeout_s + std::clamp(after_host_s - timing::HostNowS(), 0.0, 60.0);
-    changed_.wait_for(lock, std::chrono::duration<double>(patience_s), [this] { return has_result_; });
+    const double patience_s =
+        options_.timeout_s + std::clamp(after_host_s - options_.clock->NowS(), 0.0, 60.0);
+    options_.clock->WaitFor(lock, changed_, patience_s, [this] { return has_result_; });
     wanted_ = false;
     if (has_result_) return std::move(result_);
     if (repeated_)
@@ -78,28 +113,6 @@ class StreamCamera : public CameraDevice {
   }
 
  private:
-  bool OpenStream() {
-    try {
-      stream_.release();
-      const std::string& uri = options_.uri;
-      if (kind() == CameraKind::kStream) {
-        const int timeout_ms = static_cast<int>(options_.timeout_s * 1000);
-        if (!stream_.open(
-                uri, cv::CAP_FFMPEG,
-                {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, timeout_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC, timeout_ms}))
-          return false;
-      } else if (!(IsNumber(uri) ? stream_.open(std::stoi(uri), cv::CAP_V4L2)
-                                 : stream_.open(uri, cv::CAP_V4L2))) {
-        return false;
-      }
-      if (options_.width > 0) stream_.set(cv::CAP_PROP_FRAME_WIDTH, options_.width);
-      if (options_.height > 0) stream_.set(cv::CAP_PROP_FRAME_HEIGHT, options_.height);
-      return true;
-    } catch (const cv::Exception&) {
-      return false;
-    }
-  }
-
   void Run() {
     bool open = true;
     while (true) {
@@ -107,11 +120,11 @@ class StreamCamera : public CameraDevice {
         std::unique_lock<std::mutex> lock(mutex_);
         if (stopping_) return;
         if (!open) {
-          changed_.wait_for(lock, std::chrono::duration<double>(kReopenS), [this] { return stopping_; });
+          options_.clock->WaitFor(lock, changed_, kReopenS, [this] { return stopping_; });
           if (stopping_) return;
         }
       }
-      if (!open) open = OpenStream();
+      if (!open) open = stream_->Open();
       if (open) open = Next();
       if (!open) {
         std::lock_guard<std::mutex> lock(mutex_);
@@ -123,9 +136,9 @@ class StreamCamera : public CameraDevice {
   // The next picture off the queue; false if the stream broke.
   bool Next() {
     try {
-      const double began_s = timing::HostNowS();
-      if (!stream_.grab()) return false;
-      const double came_s = timing::HostNowS();
+      const double began_s = options_.clock->NowS();
+      if (!stream_->Grab()) return false;
+      const double came_s = options_.clock->NowS();
       bool decode;
       {
         std::lock_guard<std::mutex> lock(mutex_);
@@ -139,7 +152,7 @@ class StreamCamera : public CameraDevice {
       }
       cv::Mat picture;
       if (!decode) return true;
-      if (!stream_.retrieve(picture) || picture.empty()) return false;
+      if (!stream_->Retrieve(&picture)) return false;
       const bool first = last_.empty();
       const bool same = !first && picture.size() == last_.size() && picture.type() == last_.type() &&
                         picture.isContinuous() &&
@@ -163,8 +176,8 @@ class StreamCamera : public CameraDevice {
 
   const CameraOptions options_;
   std::thread thread_;
-  cv::VideoCapture stream_;  // of the thread, once it runs
-  cv::Mat last_;             // what was decoded last
+  const std::unique_ptr<PictureStream> stream_;  // of the thread, once it runs
+  cv::Mat last_;                                 // what was decoded last
 
   std::mutex take_mutex_;     // one Take at a time
   mutable std::mutex mutex_;  // guards what follows
@@ -180,7 +193,12 @@ class StreamCamera : public CameraDevice {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options) {
-  auto camera = std::make_unique<StreamCamera>(options);
+  return OpenStreamCamera(options, std::make_unique<OpenCvStream>(options));
+}
+
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenStreamCamera(const CameraOptions& options,
+                                                               std::unique_ptr<PictureStream> stream) {
+  auto camera = std::make_unique<StreamCamera>(options, std::move(stream));
   if (absl::Status status = camera->Start(); !status.ok()) return status;
   return camera;
 }

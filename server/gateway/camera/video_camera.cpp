@@ -12,7 +12,7 @@ namespace {
 
 class VideoCamera : public CameraDevice {
  public:
-  explicit VideoCamera(std::string path) : path_(std::move(path)) {}
+  VideoCamera(std::string path, const Clock& clock) : path_(std::move(path)), clock_(clock) {}
 
   absl::Status Start() {
     try {
@@ -31,7 +31,7 @@ class VideoCamera : public CameraDevice {
         if (!video_.open(path_) || !video_.read(picture))
           return absl::UnavailableError(absl::StrCat("camera: video ", path_, " cannot be read any more"));
       }
-      return FrameOf(picture, timing::HostNowS(), ++frames_);
+      return FrameOf(picture, clock_.NowS(), ++frames_);
     } catch (const cv::Exception& problem) {
       return absl::UnavailableError(absl::StrCat("camera: video ", path_, ": ", problem.err));
     }
@@ -46,6 +46,7 @@ class VideoCamera : public CameraDevice {
 
  private:
   const std::string path_;
+  const Clock& clock_;
   mutable std::mutex mutex_;
   cv::VideoCapture video_;
   uint64_t frames_ = 0;
@@ -53,12 +54,12 @@ class VideoCamera : public CameraDevice {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOptions& /*options*/,
+absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOptions& options,
                                                               const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
     return absl::NotFoundError(absl::StrCat("camera: there is no video ", path));
-  auto camera = std::make_unique<VideoCamera>(path);
+  auto camera = std::make_unique<VideoCamera>(path, *options.clock);
   if (absl::Status status = camera->Start(); !status.ok()) return status;
   return camera;
 }

@@ -18,9 +18,10 @@ class EffectorFixture : public testing::Test {
  protected:
   EffectorOptions Options(int fingers = 3) const {
     EffectorOptions options;
-    options.port = device_->port();
+    if (device_ != nullptr) options.port = device_->port();
     options.fingers = std::vector<EffectorFinger>(fingers);
     options.reply_timeout_s = 0.1;
+    options.silence_s = 600;  // a device that has not had the processor is not lost
     options.clock_query_s = 0.01;
     return options;
   }

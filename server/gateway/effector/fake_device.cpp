@@ -112,6 +112,11 @@ int FakeDevice::hellos() const {
   return hellos_;
 }
 
+int FakeDevice::statuses() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return statuses_;
+}
+
 void FakeDevice::Run() {
   while (true) {
     {
@@ -142,6 +147,10 @@ void FakeDevice::Hear(uint8_t byte) {
 }
 
 void FakeDevice::WriteFrame(const uint8_t* frame, size_t size) {
+  firmware::FrameParser sent;
+  firmware::Status status;
+  for (size_t i = 0; i < size; ++i)
+    if (sent.Push(frame[i]) && firmware::Decode(sent.payload(), sent.size(), &status)) ++statuses_;
   // A firmware of another release.
   if (options_.answers_with_version != 0) {
     firmware::FrameParser parser;

@@ -61,6 +61,8 @@ class FakeDevice {
   // How often the host acknowledged this event, and armed.
   int Acknowledged(uint32_t number) const;
   int hellos() const;
+  // How many statuses it sent.
+  int statuses() const;
 
  private:
   uint64_t Edge(int finger, bool level);
@@ -82,7 +84,7 @@ class FakeDevice {
   std::unique_ptr<firmware::Effector> core_;
   firmware::FrameParser heard_;
   std::vector<uint32_t> acknowledged_;
-  int hellos_ = 0;
+  int hellos_ = 0, statuses_ = 0;
   std::thread thread_;
 };
 

@@ -1,13 +1,11 @@
 #include "server/gateway/rig/heartbeats.h"
 
-#include <chrono>
 #include <utility>
-
-#include "server/gateway/timing/host_time.h"
 
 namespace touchstone::gateway {
 
-Heartbeats::Heartbeats(std::function<void()> send) : send_(std::move(send)), thread_([this] { Run(); }) {}
+Heartbeats::Heartbeats(std::function<void()> send, const Clock& clock)
+    : send_(std::move(send)), clock_(clock), thread_([this] { Run(); }) {}
 
 Heartbeats::~Heartbeats() {
   {
@@ -19,32 +17,32 @@ Heartbeats::~Heartbeats() {
 }
 
 void Heartbeats::Permit() {
-  const double now_s = timing::HostNowS();
+  const Clock::Time now = clock_.Now(), until = clock_.In(kPermitS);
   bool idle;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    idle = until_s_ <= now_s;
-    until_s_ = now_s + kPermitS;
+    idle = until_ <= now;
+    until_ = until;
   }
   if (idle) changed_.notify_all();
 }
 
 void Heartbeats::End() {
   std::lock_guard<std::mutex> lock(mutex_);
-  until_s_ = 0;
+  until_ = {};
 }
 
 void Heartbeats::Run() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (!ending_) {
-    if (until_s_ <= timing::HostNowS()) {
-      changed_.wait(lock, [this] { return ending_ || until_s_ > timing::HostNowS(); });
+    if (until_ <= clock_.Now()) {
+      clock_.WaitFor(lock, changed_, Clock::kLongestS, [this] { return ending_ || until_ > clock_.Now(); });
       continue;
     }
     lock.unlock();
     send_();
     lock.lock();
-    changed_.wait_for(lock, std::chrono::duration<double>(kPeriodS), [this] { return ending_; });
+    clock_.WaitFor(lock, changed_, kPeriodS, [this] { return ending_; });
   }
 }
 

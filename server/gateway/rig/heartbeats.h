@@ -10,6 +10,8 @@
 #include <mutex>
 #include <thread>
 
+#include "server/gateway/timing/host_time.h"
+
 namespace touchstone::gateway {
 
 class Heartbeats {
@@ -20,7 +22,7 @@ class Heartbeats {
   static constexpr double kPermitS = 0.25;
 
   // `send` is called from the thread.
-  explicit Heartbeats(std::function<void()> send);
+  explicit Heartbeats(std::function<void()> send, const Clock& clock = timing::HostClock());
   ~Heartbeats();
   Heartbeats(const Heartbeats&) = delete;
   Heartbeats& operator=(const Heartbeats&) = delete;
@@ -34,9 +36,10 @@ class Heartbeats {
   void Run();
 
   const std::function<void()> send_;
+  const Clock& clock_;
   std::mutex mutex_;  // of what follows
   std::condition_variable changed_;
-  double until_s_ = 0;  // host time
+  Clock::Time until_{};
   bool ending_ = false;
   std::thread thread_;  // last
 };

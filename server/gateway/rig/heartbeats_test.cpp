@@ -3,73 +3,75 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <chrono>
-#include <functional>
 
-#include "server/gateway/timing/host_time.h"
+#include "server/base/manual_clock.h"
 
 namespace touchstone::gateway {
 namespace {
 
-using timing::HostNowS;
-
 class HeartbeatsTest : public testing::Test {
  protected:
-  bool WaitFor(const std::function<bool()>& done) {
-    for (const double until_s = HostNowS() + 30; HostNowS() < until_s;) {
-      if (done()) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return false;
-  }
+  HeartbeatsTest() { clock_.AwaitWaiters(); }
 
-  // But for one that was on its way already, in a thread that may not get the processor for long.
-  void ExpectNoMoreAfter(double end_s) {
-    ASSERT_TRUE(WaitFor([&] { return HostNowS() > end_s; }));
+  // What the thread does at once, now and after so much time, is done.
+  int SentAfter(double seconds) {
+    clock_.Advance(seconds);
+    clock_.AwaitWaiters();
+    return sent_;
+  }
+  // The permit wakes the thread: until it has sent and waits again.
+  void PermitAndSend() {
     const int sent = sent_;
-    ASSERT_TRUE(WaitFor([&] { return HostNowS() > end_s + 2 * Heartbeats::kPermitS; }));
-    EXPECT_LE(sent_, sent + 1);
+    heartbeats_.Permit();
+    while (sent_ == sent) std::this_thread::yield();
+    clock_.AwaitWaiters();
+  }
+  // Whenever one could come within two permits.
+  void ExpectNoMore() {
+    const int sent = sent_;
+    for (double passed_s = 0; passed_s < 2 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS)
+      EXPECT_EQ(SentAfter(Heartbeats::kPeriodS), sent) << passed_s << " s later";
   }
 
+  ManualClock clock_;
   std::atomic<int> sent_{0};
-  std::atomic<double> last_s_{0};
-  Heartbeats heartbeats_{[this] {
-    last_s_ = HostNowS();
-    ++sent_;
-  }};
+  Heartbeats heartbeats_{[this] { ++sent_; }, clock_};
 };
 
 TEST_F(HeartbeatsTest, NobodyWhoSupervisesMeansNoHeartbeat) {
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ExpectNoMore();
   EXPECT_EQ(sent_, 0);
 }
 
 TEST_F(HeartbeatsTest, TheyGoOnWhileThePermitIsRenewedWhateverTheSupervisorWaitsFor) {
-  const double began_s = HostNowS();
-  EXPECT_TRUE(WaitFor([&] {
+  PermitAndSend();
+  for (double passed_s = 0; passed_s < 3 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS) {
+    const int sent = sent_;
     heartbeats_.Permit();
-    return sent_ >= 10 && last_s_ > began_s + 3 * Heartbeats::kPermitS;
-  }));
+    EXPECT_EQ(SentAfter(Heartbeats::kPeriodS), sent + 1) << passed_s << " s later";
+  }
 }
 
 TEST_F(HeartbeatsTest, ASupervisorThatHangsHasNoneAfterItsPermit) {
-  ASSERT_TRUE(WaitFor([&] {
-    heartbeats_.Permit();
-    return sent_ > 0;
-  }));
-  // The supervisor hangs from here on.
-  ExpectNoMoreAfter(HostNowS() + Heartbeats::kPermitS);
+  PermitAndSend();
+  // The supervisor hangs from here on. One heartbeat was at the time of the permit.
+  const auto permitted = clock_.Now();
+  while (clock_.SecondsSince(permitted) < Heartbeats::kPermitS - 1.5 * Heartbeats::kPeriodS) {
+    const int sent = sent_;
+    EXPECT_EQ(SentAfter(Heartbeats::kPeriodS), sent + 1);
+  }
+  SentAfter(2 * Heartbeats::kPeriodS);
+  ExpectNoMore();
+  PermitAndSend();  // and again, once the supervisor goes on
 }
 
 TEST_F(HeartbeatsTest, TheEndOfAMotionEndsThem) {
   {
     const HeartbeatScope scope(&heartbeats_);
-    ASSERT_TRUE(WaitFor([&] {
-      heartbeats_.Permit();
-      return sent_ > 0;
-    }));
+    while (sent_ == 0) std::this_thread::yield();
+    clock_.AwaitWaiters();
   }
-  ExpectNoMoreAfter(HostNowS());
+  ExpectNoMore();
 }
 
 }  // namespace

@@ -41,9 +41,9 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const session::Jour
     return journal().Failed(session, touch.id, "interrupted before anything moved");
 
   // Its program must not run any more: the arm's own watchdog has ended it, or this does.
-  const double give_up_s = timing::HostNowS() + kPatienceS;
+  const double give_up_s = NowS() + kPatienceS;
   absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
-  while ((!arm.ok() || !parts_.effector->State().connected) && timing::HostNowS() < give_up_s) {
+  while ((!arm.ok() || !parts_.effector->State().connected) && NowS() < give_up_s) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     arm = parts_.arm->State();
   }

@@ -47,7 +47,8 @@ absl::StatusOr<std::unique_ptr<Rig>> Rig::Create(RigOptions options, RigParts pa
   TOUCHSTONE_ASSIGN_OR_RETURN(rig->stop_reason_, journal.Metadata(kStopKey));
   rig->stopped_ = !rig->stop_reason_.empty();
   if (rig->stopped_) spdlog::warn("still stopped {}; touchstone rig reset releases it", rig->stop_reason_);
-  rig->heartbeats_ = std::make_unique<Heartbeats>([arm = rig->parts_.arm.get()] { arm->SendHeartbeat(); });
+  rig->heartbeats_ = std::make_unique<Heartbeats>([arm = rig->parts_.arm.get()] { arm->SendHeartbeat(); },
+                                                  *rig->options_.clock);
   TOUCHSTONE_RETURN_IF_ERROR(rig->LatchInterruption());
   TOUCHSTONE_RETURN_IF_ERROR(rig->Reconcile());
   rig->safety_thread_ = std::thread([&rig = *rig] { rig.WatchSafety(); });
@@ -159,7 +160,7 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
                               parts_.planner->Plan(from, command.object, command.bounds, up_face,
                                                    command.touch, "touch '" + command.id + "'"));
 
-  const double began_s = timing::HostNowS(), began_unix_s = timing::UnixNowS();
+  const double began_s = NowS(), began_unix_s = timing::UnixNowS();
   // Whatever else is written for it goes before: once it is executing, only its end is left to write.
   TOUCHSTONE_ASSIGN_OR_RETURN(const double session_time_s, session_clock_.NowS(command.session));
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
@@ -192,7 +193,7 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
       unwritten_.Done(command.session, command.id, *result, series.has_value() ? &*series : nullptr));
   {
     std::lock_guard<std::mutex> status_lock(status_mutex_);
-    const double took_s = timing::HostNowS() - began_s;
+    const double took_s = NowS() - began_s;
     status_.touch_duration_s = status_.touches == 0 ? took_s : 0.9 * status_.touch_duration_s + 0.1 * took_s;
     ++status_.touches;
   }

@@ -45,7 +45,8 @@ struct RigOptions {
   double mount_timeout_s = 120;
   std::string provenance_note;  // who made the data; an emulator says here that it is one
   std::string effector_port;
-  CameraPoseTolerance camera_tolerance;  // of photographs
+  CameraPoseTolerance camera_tolerance;       // of photographs
+  const Clock* clock = &timing::HostClock();  // outlives the rig
   // The box of an object by its name, object frame; none: not known. Null: none is.
   std::function<std::optional<geometry::Bounds>(const std::string&)> bounds_of;
 };
@@ -200,6 +201,8 @@ class Rig : public source::RigDevice {
   static constexpr char kStopKey[] = "stop";
   // Of the last motion that is no touch: its program's id and what it was; "" once it has failed.
   static constexpr char kMotionKey[] = "motion_under_way";
+
+  double NowS() const { return options_.clock->NowS(); }  // host time
 
   const RigOptions options_;
   RigParts parts_;

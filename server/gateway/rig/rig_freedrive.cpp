@@ -32,7 +32,7 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
     status = Supervise(
         program_id, kLongestGuideS, "freedrive", guard,
         [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
-          const double now_s = timing::HostNowS();
+          const double now_s = NowS();
           if (state.phase == arm::MotionPhase::kReady && now_s - reported_s >= kGuideReportS) {
             reported_s = now_s;
             report(state);

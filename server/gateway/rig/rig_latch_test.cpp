@@ -6,6 +6,7 @@
 #include <atomic>
 #include <future>
 
+#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
 #include "server/gateway/arm/kinematics.h"
 #include "server/gateway/rig/rig.h"
@@ -54,7 +55,6 @@ class FakeArm final : public arm::Arm {
 
   absl::StatusOr<ArmState> State() const override {
     std::lock_guard<std::mutex> lock(mutex_);
-    ++looks;
     return state_;
   }
   std::vector<ArmState> History(double from_s, double to_s) const override {
@@ -84,10 +84,7 @@ class FakeArm final : public arm::Arm {
     return absl::OkStatus();
   }
   absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
-  void SendHeartbeat() override {
-    heartbeat_s = timing::HostNowS();
-    ++heartbeats;
-  }
+  void SendHeartbeat() override { ++heartbeats; }
   timing::ClockEstimate ControllerClock() const override { return {}; }
   double StateRateHz() const override { return 500; }
   std::string Model() const override { return "ur3e"; }
@@ -96,8 +93,6 @@ class FakeArm final : public arm::Arm {
 
   std::function<void()> before_send;
   std::atomic<int> programs{0}, stops{0}, heartbeats{0};
-  mutable std::atomic<int> looks{0};
-  std::atomic<double> heartbeat_s{0};
 
  private:
   timing::ChangeNotifier* const changes_;
@@ -140,7 +135,9 @@ class RigLatch : public testing::Test {
   }
   void Start() {
     if (arm_ == nullptr) MakeParts();
-    absl::StatusOr<std::unique_ptr<Rig>> rig = Rig::Create(RigOptions(), std::move(parts_));
+    RigOptions options;
+    options.clock = &clock_;
+    absl::StatusOr<std::unique_ptr<Rig>> rig = Rig::Create(options, std::move(parts_));
     ASSERT_TRUE(rig.ok()) << rig.status();
     rig_ = *std::move(rig);
   }
@@ -158,29 +155,49 @@ class RigLatch : public testing::Test {
     ASSERT_TRUE(parts_.journal->Executing("monday", "touch 7", program_id, 1).ok());
   }
 
+  // What another thread does at once: the machine may be busy.
   static bool WaitFor(const std::function<bool()>& done) {
-    for (const double until_s = timing::HostNowS() + 30; timing::HostNowS() < until_s;) {
+    for (const double until_s = SteadyClock().NowS() + 60; SteadyClock().NowS() < until_s;) {
       if (done()) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
   }
-  bool WaitForLatch() {
-    return WaitFor([&] { return !rig_->StopReason().empty(); });
-  }
-  // Two whole looks of the safety watch, where nobody else looks.
+  // Heartbeats and safety watch wait for the time: what they do now is done.
+  void AwaitThreads() { clock_.AwaitWaiters(2); }
+  // A whole look of the safety watch, where nobody else looks.
   void LetTheWatchLook() {
-    const int begun = arm_->looks;
-    EXPECT_TRUE(WaitFor([&] { return arm_->looks >= begun + 3; }));
+    AwaitThreads();
+    clock_.AdvanceToFirst();
+    AwaitThreads();
+  }
+  bool LatchedByTheWatch() {
+    LetTheWatchLook();
+    return !rig_->StopReason().empty();
+  }
+  // Lets time pass while a motion is under way whose supervisor asks this guard.
+  absl::Status CountLook() {
+    ++guards_;
+    return absl::OkStatus();
+  }
+  void PassUnderSupervision(double seconds, const std::function<bool()>& over) {
+    constexpr double kStepS = 0.1;  // far below what counts as a hang
+    for (double passed_s = 0; passed_s < seconds && !over(); passed_s += kStepS) {
+      const int guards = guards_;
+      clock_.Advance(kStepS);
+      ASSERT_TRUE(WaitFor([&] { return guards_ > guards + 1 || over(); }));
+    }
   }
   absl::Status Home() {
-    return rig_->Home([] { return absl::OkStatus(); });
+    return rig_->Home([this] { return CountLook(); });
   }
   std::future<absl::Status> HomeLater() {
     return std::async(std::launch::async, [this] { return Home(); });
   }
 
   const TestFolder folder_;
+  ManualClock clock_;
+  std::atomic<int> guards_{0};
   RigParts parts_;
   FakeArm* arm_ = nullptr;
   std::unique_ptr<Rig> rig_;
@@ -191,7 +208,7 @@ TEST_F(RigLatch, AProtectiveStopLatchesHoweverShortItWas) {
   LetTheWatchLook();
   arm_->SetSafety(SafetyMode::kProtectiveStop);
   arm_->SetSafety(SafetyMode::kNormal);
-  ASSERT_TRUE(WaitForLatch());
+  ASSERT_TRUE(LatchedByTheWatch());
   EXPECT_THAT(rig_->StopReason(), HasSubstr("PROTECTIVE_STOP between motions"));
   const absl::Status refused = Home();
   EXPECT_EQ(refused.code(), absl::StatusCode::kAborted);
@@ -201,7 +218,7 @@ TEST_F(RigLatch, AProtectiveStopLatchesHoweverShortItWas) {
   EXPECT_EQ(rig_->StopReason(), "");
   // Once more is another stop.
   arm_->SetSafety(SafetyMode::kProtectiveStop);
-  EXPECT_TRUE(WaitForLatch());
+  EXPECT_TRUE(LatchedByTheWatch());
 }
 
 TEST_F(RigLatch, WhatIsFoundAtTheStartLatchesAndOutlivesTheProcess) {
@@ -211,7 +228,7 @@ TEST_F(RigLatch, WhatIsFoundAtTheStartLatchesAndOutlivesTheProcess) {
     MakeParts();
     arm_->SetSafety(mode);
     Start();
-    ASSERT_TRUE(WaitForLatch());
+    ASSERT_TRUE(LatchedByTheWatch());
     EXPECT_EQ(rig_->Reset("too early", "ana").code(), absl::StatusCode::kFailedPrecondition);
     End();
     Start();
@@ -252,6 +269,10 @@ TEST_F(RigLatch, AProgramThatSomethingElseEndedLatches) {
   ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
   // As after a trip of the watchdog, or "stop" at the teach pendant.
   arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
+  PassUnderSupervision(0.85, [] { return false; });
+  EXPECT_EQ(rig_->StopReason(), "") << "its end is not certain yet";
+  PassUnderSupervision(60,
+                       [&] { return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
   EXPECT_EQ(homing.get().code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(rig_->StopReason(), AllOf(HasSubstr("ended during a motion"), HasSubstr("phase 'transit'")));
   EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
@@ -275,27 +296,32 @@ TEST_F(RigLatch, NothingGoesOutForAMotionFromBeforeAStopEvenIfItWasReset) {
 
 TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
   Start();
-  std::atomic<bool> hang{false};
-  std::atomic<double> hangs_since_s{0};
+  std::atomic<bool> hang{false}, hangs{false};
   auto homing = std::async(std::launch::async, [&] {
     return rig_->Home([&] {
-      if (hang && hangs_since_s == 0) {
-        hangs_since_s = timing::HostNowS();
-        while (hang) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
+      hangs = hang.load();
+      while (hang) std::this_thread::sleep_for(std::chrono::milliseconds(1));
       return absl::OkStatus();
     });
   });
   ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
   // They come while it moves, for longer than one permit.
-  const double began_s = timing::HostNowS();
-  EXPECT_TRUE(WaitFor([&] { return arm_->heartbeat_s > began_s + 2 * Heartbeats::kPermitS; }));
+  for (double passed_s = 0; passed_s < 2 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS) {
+    const int heartbeats = arm_->heartbeats;
+    clock_.Advance(Heartbeats::kPeriodS);
+    ASSERT_TRUE(WaitFor([&] { return arm_->heartbeats > heartbeats; })) << passed_s << " s later";
+  }
   hang = true;
-  ASSERT_TRUE(WaitFor([&] { return hangs_since_s > 0; }));
-  ASSERT_TRUE(WaitFor([&] { return timing::HostNowS() > hangs_since_s + Heartbeats::kPermitS; }));
+  ASSERT_TRUE(WaitFor([&] { return hangs.load(); }));
+  AwaitThreads();
+  clock_.Advance(Heartbeats::kPermitS);
+  AwaitThreads();
   const int heartbeats = arm_->heartbeats;
-  ASSERT_TRUE(WaitFor([&] { return timing::HostNowS() > hangs_since_s + 3 * Heartbeats::kPermitS; }));
-  EXPECT_LE(arm_->heartbeats, heartbeats + 1);  // one may have been on its way
+  for (double passed_s = 0; passed_s < 2 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS) {
+    clock_.Advance(Heartbeats::kPeriodS);
+    AwaitThreads();
+    EXPECT_EQ(arm_->heartbeats, heartbeats) << passed_s << " s later";
+  }
   hang = false;
   rig_->Stop("enough", "ana");
   EXPECT_FALSE(homing.get().ok());
@@ -303,18 +329,18 @@ TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
 
 TEST_F(RigLatch, AMotionThatFailedAfterAHangLatchesAndOneThatFailedInTimeDoesNot) {
   Start();
-  for (const int hang_ms : {0, 600}) {
+  for (const double hang_s : {0.0, 0.3, 0.6}) {
     const int programs = arm_->programs;
     const absl::Status lost = rig_->Home([&]() -> absl::Status {
       if (arm_->programs == programs) return absl::OkStatus();
-      std::this_thread::sleep_for(std::chrono::milliseconds(hang_ms));
+      clock_.Advance(hang_s);
       return absl::AbortedError("the lease was lost");
     });
     EXPECT_EQ(lost.code(), absl::StatusCode::kAborted);
-    if (hang_ms == 0)
+    if (hang_s < 0.5)
       EXPECT_EQ(rig_->StopReason(), "");
     else
-      EXPECT_THAT(rig_->StopReason(), testing::ContainsRegex("it hung for [0-9.]+ s during a motion"));
+      EXPECT_THAT(rig_->StopReason(), HasSubstr("it hung for 0.6 s during a motion"));
   }
 }
 

@@ -45,8 +45,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   audit().Write("power_on", {{"robot_mode", arm::RobotModeName(state.robot_mode)}}).IgnoreError();
   TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn(guard));
   // The states report it a little later than the dashboard.
-  for (const double until_s = timing::HostNowS() + kPatienceS;
-       !parts_.arm->Ready().ok() && timing::HostNowS() < until_s;) {
+  for (const double until_s = NowS() + kPatienceS; !parts_.arm->Ready().ok() && NowS() < until_s;) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
@@ -83,10 +82,10 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
       parts_.planner->PlanView(from, base_from_camera, command.object, command.bounds, up_face, "view"));
   // Whatever the session's beginning writes goes before the motion, as with a touch.
   TOUCHSTONE_RETURN_IF_ERROR(EnsureSession(command.session));
-  const double began_s = timing::HostNowS();
+  const double began_s = NowS();
   TOUCHSTONE_ASSIGN_OR_RETURN(const double session_time_s, session_clock_.NowS(command.session));
   TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
-  const double asked_s = timing::HostNowS();
+  const double asked_s = NowS();
   const absl::StatusOr<image::Frame> frame = parts_.camera->Take(asked_s);
   if (!frame.ok()) {
     Remember(frame.status());
@@ -104,7 +103,7 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   image.id = source::ViewId(command);
   image.object = command.object, image.up_face = calibration::UpFaceName(up_face);
   image.base_from_camera = geometry::PoseVectorOf(base_from_camera);
-  image.unix_s = timing::UnixNowS() - (timing::HostNowS() - frame->host_time_s);
+  image.unix_s = timing::UnixNowS() - (NowS() - frame->host_time_s);
   image.measured_base_from_camera = geometry::PoseVectorOf(measured->base_from_camera);
   image.measured_unix_s = image.unix_s;
   image.width = frame->width, image.height = frame->height;
@@ -131,16 +130,16 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
 
 std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
   constexpr double kNextStateS = 0.5;  // host time
-  const double called_s = timing::HostNowS();
+  const double called_s = NowS();
   uint64_t changes = parts_.changes->count();
   absl::StatusOr<arm::ArmState> now = parts_.arm->State();
-  while (now.ok() && now->host_time_s < called_s && timing::HostNowS() < called_s + kNextStateS) {
+  while (now.ok() && now->host_time_s < called_s && NowS() < called_s + kNextStateS) {
     parts_.changes->WaitForChange(changes, 0.01);
     changes = parts_.changes->count();
     now = parts_.arm->State();
   }
   if (!now.ok()) return {};
-  const double since_rig_s = (timing::HostNowS() - host_s + 1) * options_.time_scale;
+  const double since_rig_s = (NowS() - host_s + 1) * options_.time_scale;
   std::vector<arm::ArmState> states =
       parts_.arm->History(now->controller_time_s - since_rig_s, now->controller_time_s);
   const auto first = std::find_if(states.begin(), states.end(),

@@ -126,7 +126,7 @@ void Rig::WatchSafety() {
     lock.unlock();
     LookAtSafety();
     lock.lock();
-    watch_ends_.wait_for(lock, std::chrono::duration<double>(kSafetyLookS), [this] { return ending_; });
+    options_.clock->WaitFor(lock, watch_ends_, kSafetyLookS, [this] { return ending_; });
   }
 }
 
@@ -153,8 +153,8 @@ absl::Status Rig::LatchInterruption() {
 absl::Status Rig::LatchUnlessItEnded(uint32_t program_id, const std::string& what) {
   const auto state_once = [&](double patience_s, const std::function<bool(const arm::ArmState&)>& good) {
     absl::StatusOr<arm::ArmState> state = parts_.arm->State();
-    for (const double until_s = timing::HostNowS() + patience_s;
-         (!state.ok() || !good(*state)) && timing::HostNowS() < until_s; state = parts_.arm->State())
+    for (const double until_s = NowS() + patience_s; (!state.ok() || !good(*state)) && NowS() < until_s;
+         state = parts_.arm->State())
       parts_.changes->WaitForChange(parts_.changes->count(), 0.02);
     return state;
   };

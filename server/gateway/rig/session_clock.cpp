@@ -28,7 +28,8 @@ HostClocks ReadHostClocks() {
   std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), clocks.boot_id);
   timespec boot{};
   clock_gettime(CLOCK_BOOTTIME, &boot);
-  clocks.boot_s = static_cast<double>(boot.tv_sec) + 1e-9 * static_cast<double>(boot.tv_nsec) - timing::HostLagS();
+  clocks.boot_s =
+      static_cast<double>(boot.tv_sec) + 1e-9 * static_cast<double>(boot.tv_nsec) - timing::HostLagS();
   clocks.unix_s = timing::UnixNowS();
   return clocks;
 }

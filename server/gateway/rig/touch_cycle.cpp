@@ -28,7 +28,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
                             const source::MotionGuard& guard,
                             const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
                             std::optional<double> max_force_n) {
-  const double began_s = timing::HostNowS();
+  const double began_s = NowS();
   double at_rest_since_s = 0;
   bool seen = false;  // the program's phase was reported
   double looked_s = began_s, hung_s = 0, hung_at_s = 0;
@@ -39,10 +39,10 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   ForceGuard force(*parts_.arm, max_force_n.value_or(parts_.planner->limits().max_force_n), what);
   // Whatever ends the watch before it is done stops the arm first.
   const auto give_up = [&](absl::Status status) {
-    look_for_hang(timing::HostNowS());
+    look_for_hang(NowS());
     const absl::Status stop = parts_.arm->Stop();
     // Whether the watchdog had ended the program before cannot be told any more.
-    if (hung_s > 0 && timing::HostNowS() - hung_at_s < kAfterHangS)
+    if (hung_s > 0 && NowS() - hung_at_s < kAfterHangS)
       Latch(absl::StrCat("by the gateway (it hung for ", ShortestNumber(std::round(10 * hung_s) / 10),
                          " s during ", what, ", program ", program_id, ")"));
     if (!stop.ok())
@@ -51,7 +51,7 @@ absl::Status Rig::Supervise(uint32_t program_id, double limit_s, const char* wha
   };
   for (;;) {
     const uint64_t changes = parts_.changes->count();
-    const double now_s = timing::HostNowS();
+    const double now_s = NowS();
     look_for_hang(now_s);
     if (const absl::Status may = MayGoOn(guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
@@ -160,7 +160,7 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
-  record.unix_minus_host_s = timing::UnixNowS() - timing::HostNowS();
+  record.unix_minus_host_s = timing::UnixNowS() - NowS();
   if (command.series) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchSeries states, SeriesOf(record));
     *series = session::JournalSeries{session::kSeriesEncoding, states.SerializeAsString()};

@@ -14,7 +14,7 @@ namespace touchstone::gateway::timing {
 namespace {
 
 double SteadyNowS() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return SteadyClock().NowS();
 }
 
 // What HostNowS follows. It stays: a thread may be reading it.
@@ -36,7 +36,26 @@ struct Followed {
 };
 std::atomic<Followed*> followed{nullptr};
 
+class Host final : public Clock {
+ public:
+  Time Now() const override {
+    return Time(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(HostNowS())));
+  }
+  double UnixNowS() const override { return SteadyClock().UnixNowS(); }
+
+ private:
+  void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
+                Time until) const override {
+    changed.wait_for(lock, until - Now());
+  }
+};
+
 }  // namespace
+
+const Clock& HostClock() {
+  static const Host clock;
+  return clock;
+}
 
 double HostNowS() {
   Followed* const clock = followed.load(std::memory_order_acquire);
@@ -48,7 +67,7 @@ double HostLagS() {
 }
 
 double UnixNowS() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return SteadyClock().UnixNowS();
 }
 
 absl::Status FollowClock(const std::string& file) {

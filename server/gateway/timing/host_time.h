@@ -5,6 +5,8 @@
 
 #include <absl/status/status.h>
 
+#include "server/base/clock.h"
+
 namespace touchstone::gateway::timing {
 
 // Seconds of the steady clock: the time base of everything in the gateway. In front of an emulated rig it is the rig's
@@ -12,6 +14,8 @@ namespace touchstone::gateway::timing {
 double HostNowS();
 // Seconds since 1970 (UTC), for records; it may step.
 double UnixNowS();
+// HostNowS as a clock to wait by: the default of everything in the gateway that waits.
+const Clock& HostClock();
 // By how much HostNowS is behind the steady clock.
 double HostLagS();
 

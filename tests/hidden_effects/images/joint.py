@@ -3,6 +3,7 @@ both, or in one. Contact of a point finger by brute force over triangles; shares
 """
 import copy
 import dataclasses
+from typing import Optional
 
 import cv2
 import numpy as np
@@ -18,7 +19,7 @@ SIGMA_US = 3000.0
 class Askew(solids.Solid):
     """The solid as it lies; light is placed round where it is believed to lie."""
 
-    nominal: solids.Solid = None
+    nominal: Optional[solids.Solid] = None
 
     @property
     def centre(self):
@@ -102,9 +103,9 @@ def write_touches(path, seed, pose=None, yaw_deg=0.0, length_mm=(0, 0, 0), poses
                 times = travels(real, target, approach, lateral, yaw_deg, length_mm) / SPEED_MM_S * 1e6
                 times += SIGMA_US * noise.standard_normal(3)
                 times -= np.nanmin(times)
-                cells = ["" if np.isnan(t) else "%.1f" % t for t in times]
-                vectors = ["%.9g" % x for vector in (target, approach, lateral) for x in vector]
-                lines.append(",".join([str(number), solid.name, "%g" % SPEED_MM_S, "%g" % STANDOFF_MM, *vectors, *cells,
+                cells = ["" if np.isnan(t) else f"{t:.1f}" for t in times]
+                vectors = [f"{x:.9g}" for vector in (target, approach, lateral) for x in vector]
+                lines.append(",".join([str(number), solid.name, f"{SPEED_MM_S:g}", f"{STANDOFF_MM:g}", *vectors, *cells,
                                        "%g" % (9 * number), str(round_)]))
                 number += 1
     path.write_text("\n".join(lines) + "\n")

@@ -137,8 +137,8 @@ def judge(report, truth, seconds):
             or all(true_step(s) for s in steps))
     else:
         mark.false_claim = bool(steps) or bool(wrong_values) or \
-            mark.verdict in ("WRONG_VALUES", "UNEXPLAINED", "CHECK_DATA", "MISSING_EFFECTS") and \
-            not (mark.verdict == "MISSING_EFFECTS" and not steps)
+            (mark.verdict in ("WRONG_VALUES", "UNEXPLAINED", "CHECK_DATA", "MISSING_EFFECTS") and \
+            not (mark.verdict == "MISSING_EFFECTS" and not steps))
         mark.right = mark.honest = not mark.false_claim
     return mark
 

@@ -2,6 +2,7 @@
 shading (the words of server/image/shading.h) alone. One ray per pixel centre; lens, blurs and turns by OpenCV.
 """
 import dataclasses
+from typing import Optional
 
 import cv2
 import numpy as np
@@ -57,8 +58,8 @@ class Physics:
     image_noise: tuple = (2, 0)  # sigma_grey, gain
     # Not in any catalogue.
     albedo: object = None  # points (n x 3, mm) -> factor of the surface's light
-    dirt: np.ndarray = None  # height x width, factor of the light that falls on the image sensor
-    reflection: np.ndarray = None  # height x width, light added on the image sensor
+    dirt: Optional[np.ndarray] = None  # height x width, factor of the light that falls on the image sensor
+    reflection: Optional[np.ndarray] = None  # height x width, light added on the image sensor
     shutter_px: tuple = (0, 0)  # how far the picture moves (right, down) while its rows are read from top to bottom
     flicker_stops: float = 0
 

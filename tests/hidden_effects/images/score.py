@@ -17,9 +17,9 @@ import time
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import arms as all_arms  # noqa: E402
-import judge  # noqa: E402
-import sets  # noqa: E402
+import arms as all_arms
+import judge
+import sets
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 LIMIT_S = 600
@@ -32,7 +32,7 @@ def diagnose(program, folder, model, meshes, out):
                str(report), "--save-model", str(report.with_suffix(".better.yaml"))]
     began, used = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
         said = done.stderr[-2000:]
     except subprocess.TimeoutExpired:
         said = f"no answer after {LIMIT_S} s"
@@ -51,7 +51,7 @@ def falls_as_said(program, folder, report, meshes, out):
         return True
     found = pathlib.Path(out).with_suffix(".compared.json")
     subprocess.run([str(program), "compare", str(folder), "--model", str(better), "--mesh-dir", str(meshes), "--json",
-                    str(found)], capture_output=True, timeout=LIMIT_S)
+                    str(found)], capture_output=True, timeout=LIMIT_S, check=False)
     if not found.exists():
         return False
     rmse = float(json.loads(found.read_text()).get("initial", {}).get("rmse_grey", math.inf))
@@ -83,7 +83,7 @@ def run_one(job):
     return arm.name, arm.group, seed, truth, mark, "" if report is not None else said
 
 
-TARGETS = {  # group -> (figure, target in %, whether at most)
+TARGETS: dict[str, list[tuple]] = {  # group -> (figure, target in %, whether at most)
     "nothing": [("false claim", 1, True)],
     "noise": [("false claim", None, True)],
     "weak": [("right first", 88, False), ("none added", None, False), ("confidently wrong", None, True)],
@@ -192,23 +192,23 @@ def main():
     common = options.keep or tempfile.mkdtemp()
     sets.write_meshes(pathlib.Path(common) / "meshes")
     sets.write_model(pathlib.Path(common) / "nominal.yaml")
-    jobs = []  # (share of its arm that stands before it, job)
+    placed = []  # (share of its arm that stands before it, job)
     for index, arm in enumerate(all_arms.ARMS):
         if options.arm and not any(text in arm.name or text == arm.group for text in options.arm):
             continue
         count = max(1, round(arm.sets * options.share))
         if options.first + count > all_arms.SETS_PER_ARM:
             parser.error(f"--first {options.first}: {arm.name} would share seeds with the next arm")
-        jobs += [((k + 0.5) / count, (index, options.first + k, options.seeds, str(options.program), options.keep, common))
-                 for k in range(count)]
+        placed += [((k + 0.5) / count, (index, options.first + k, options.seeds, str(options.program), options.keep, common))
+                   for k in range(count)]
     if options.minutes is not None:  # so that no kind of arm stands last where the time ends early
-        random.Random(0).shuffle(jobs)
-        jobs.sort(key=lambda job: job[0])
-    jobs = [job for _, job in jobs]
+        random.Random(0).shuffle(placed)
+        placed.sort(key=lambda job: job[0])
+    jobs = [job for _, job in placed]
     results, began = earlier(options.results) if options.resume else [], time.monotonic()
     asked, done = len(jobs), {(r[0], r[2]) for r in results}
     jobs = [job for job in jobs
-            if (all_arms.ARMS[job[0]].name, all_arms.seed_of(all_arms.ARMS[job[0]], *job[1:3])) not in done]
+            if (all_arms.ARMS[job[0]].name, all_arms.seed_of(all_arms.ARMS[job[0]], job[1], job[2])) not in done]
     with concurrent.futures.ProcessPoolExecutor(options.threads) as pool:
         for result in map(run_one, jobs) if options.threads == 1 else pool.map(run_one, jobs):
             results.append(result)
@@ -221,7 +221,8 @@ def main():
                 print(f"{'ok   ' if mark.right else 'WRONG' if mark.confidently_wrong else 'not  '} {name} seed {seed}: "
                       f"{truth['effects'] or truth['unlisted'] or truth['blunder']} -> {mark.verdict} {mark.claims} "
                       f"p {mark.probability:.3f} errors {[round(float(e), 1) for e in mark.errors]} "
-                      f"floor x {mark.over_floor:.3f} {mark.seconds:.1f} s ({mark.cpu_seconds:.1f} of processors) {said}", file=sys.stderr, flush=True)
+                      f"floor x {mark.over_floor:.3f} {mark.seconds:.1f} s ({mark.cpu_seconds:.1f} of processors) {said}",
+                      file=sys.stderr, flush=True)
             if options.minutes is not None and time.monotonic() - began > 60 * options.minutes:
                 pool.shutdown(cancel_futures=True)
                 break

@@ -2,6 +2,7 @@
 truth beside it, where the diagnosis does not look.
 """
 import dataclasses
+import functools
 import json
 import pathlib
 import zlib
@@ -21,16 +22,11 @@ def stream(seed, purpose):
     return np.random.Generator(np.random.PCG64([seed, zlib.crc32(purpose.encode())]))
 
 
-_objects = None
-
-
+@functools.cache
 def objects():
     """Five solids: two of the repository's, three that are hollow, sharp, or shade themselves."""
-    global _objects
-    if _objects is None:
-        _objects = [solids.read_off(ROOT / "meshes/lat10.off"), solids.read_off(ROOT / "meshes/lat20.off"),
-                    solids.torus(), solids.bracket(), solids.star()]
-    return _objects
+    return [solids.read_off(ROOT / "meshes/lat10.off"), solids.read_off(ROOT / "meshes/lat20.off"),
+            solids.torus(), solids.bracket(), solids.star()]
 
 
 @dataclasses.dataclass
@@ -68,7 +64,7 @@ def make_scene(seed, pictures=20, repeats=None):
     if repeats is None:
         repeats = 5 if seed % 2 == 0 else 0
     random = stream(seed, "poses")
-    shots = []
+    shots: list[Shot] = []
     for number in range(len(objects())):
         poses = [draw_pose(random) for _ in range(pictures - repeats)]
         again = random.choice(len(poses), repeats, replace=False)
@@ -162,9 +158,9 @@ def write_set(files, folder):
     folder.mkdir(parents=True, exist_ok=True)
     lines = [HEADER]
     for row in files.rows:
-        numbers = ["%.6g" % x for part in ("eye", "at", "up") for x in row[part]]
+        numbers = [f"{x:.6g}" for part in ("eye", "at", "up") for x in row[part]]
         lines.append(",".join([str(row["image"]), row["file"], row["object"], *numbers,
-                               "%g" % row["session_time_s"], str(row["round"])]))
+                               "{:g}".format(row["session_time_s"]), str(row["round"])]))
     (folder / "images.csv").write_text("\n".join(lines) + "\n")
     c = files.camera
     (folder / "camera.yaml").write_text(

@@ -94,8 +94,8 @@ def read_off(path):
 def write_off(solid, path):
     with open(path, "w") as out:
         out.write(f"OFF\n{len(solid.vertices)} {len(solid.triangles)} 0\n")
-        out.writelines("%.9g %.9g %.9g\n" % tuple(p) for p in solid.vertices)
-        out.writelines("3 %d %d %d\n" % tuple(t) for t in solid.triangles)
+        out.writelines("{:.9g} {:.9g} {:.9g}\n".format(*tuple(p)) for p in solid.vertices)
+        out.writelines(f"3 {a} {b} {c}\n" for a, b, c in solid.triangles)
 
 
 def _grid_triangles(rows, columns):

@@ -2,9 +2,9 @@
 
 Signal of one picture: sqrt(sum (with - without)^2) / sigma over its pixels; of effects that move something in the picture
 only over those that are two pixels clear of every edge, with and without: of silhouettes, and of places where the nominal
-picture jumps (one pixel that flips there is worth fifty standard errors, at a shift that nobody could see). Weak: 10 to 15 in the root mean square over pictures, which a careful person who lays each picture
-beside its rendering would just notice. Realistic: drawn from the ranges below, made stronger where that leaves less
-than 25.
+picture jumps (one pixel that flips there is worth fifty standard errors, at a shift that nobody could see). Weak: 10 to 15 in the
+root mean square over pictures, which a careful person who lays each picture beside its rendering would just notice.
+Realistic: drawn from the ranges below, made stronger where that leaves less than 25.
 """
 import cv2
 import numpy as np
@@ -133,7 +133,7 @@ def weak(effect, scene, signal=None):
     wanted = random.uniform(*WEAK)
     low, high, factor = np.log(1e-4), np.log(30.0), 0.0
     # Regula falsi in logarithms: signals grow as a power of the strength.
-    at, got = None, None
+    at, got = factor, None
     for _ in range(12):
         now = signal.of({effect: scaled(effect, value, np.exp(factor))})
         if abs(now / wanted - 1) < 0.03:

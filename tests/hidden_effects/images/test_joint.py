@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("cv2", reason="opencv-python-headless is not installed (deploy/python-packages.txt)")
 
-import joint  # noqa: E402
-import photograph  # noqa: E402
-import sets  # noqa: E402
+import joint
+import photograph
+import sets
 
 PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
     "touchstone"
@@ -19,6 +19,9 @@ SEED = 1_950_000
 POSE = {"translation_mm": (0.5, -0.3, 0.2), "rotation_deg": (0.2, -0.3, 0.4)}
 
 pytestmark = pytest.mark.skipif(not PROGRAM.exists(), reason=f"{PROGRAM} is not built")
+
+
+trial = pytest.mark.second_tier("statistical: trials of hidden effects in touches and photographs")
 
 
 def run(folder, command, model, out):
@@ -45,6 +48,7 @@ def effects(report):
     return [(step["effect"], step["shown_by"]) for step in report["steps"]]
 
 
+@trial
 def test_objects_that_lie_askew_are_found_by_both_and_tighter_than_by_either(tmp_path):
     report = diagnosed(tmp_path, POSE, POSE)
     assert effects(report) == [("object_pose", "both")], report["summary"]
@@ -63,6 +67,7 @@ def test_a_tool_is_not_told_as_the_pose_of_objects(tmp_path):
     assert effects(report) == [("tool_yaw", "touches")], report["summary"]
 
 
+@trial
 def test_objects_moved_between_touching_and_photographing_are_a_contradiction(tmp_path):
     report = diagnosed(tmp_path, {"translation_mm": (0.5, 0, 0)}, {"translation_mm": (0, 0.5, 0)})
     assert report["verdict"] == "UNEXPLAINED" and not report["steps"], report["summary"]

@@ -43,15 +43,18 @@ def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path):
     assert report["final"]["rmse_grey"] == pytest.approx(report["initial"]["rmse_grey"], rel=0.01)
 
 
-@pytest.mark.parametrize("effect", ["focal_error", "exposure", "vignetting"])
+trial = pytest.mark.second_tier("statistical: trials of hidden effects in photographs")
+
+
+@pytest.mark.parametrize("effect", [pytest.param("focal_error", marks=trial), pytest.param("exposure", marks=trial), "vignetting"])
 def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect, tmp_path):
-    report, mark, truth = marked(tmp_path, [effect])
+    report, mark, _ = marked(tmp_path, [effect])
     assert mark.right_first and not mark.confidently_wrong, (mark.verdict, mark.claims)
     assert mark.over_floor < judge.OVER_FLOOR < report["initial"]["rmse_grey"] / report["noise_floor_grey"]
     assert all(abs(error) < 4 for error in mark.errors) and mark.errors
 
 
-@pytest.mark.parametrize("blunder", ["mirrored", "focal_factor"])
+@pytest.mark.parametrize("blunder", ["mirrored", pytest.param("focal_factor", marks=trial)])
 def test_a_mistake_in_the_files_is_found_before_any_physics(blunder, tmp_path):
     report, mark, _ = marked(tmp_path, blunder=blunder)
     assert mark.right, (mark.verdict, report["data_problems"])

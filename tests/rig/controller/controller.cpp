@@ -36,8 +36,7 @@ constexpr int kMaxLateData = 50;     // packages that a late host makes up for
 // One thread serves the sockets and moves the arm.
 class EmulatedController : public Controller {
  public:
-  EmulatedController(const ControllerOptions& options, SimClock* clock, Faults* faults,
-                     TipListener* tip)
+  EmulatedController(const ControllerOptions& options, SimClock* clock, Faults* faults, TipListener* tip)
       : options_(options),
         clock_(clock),
         faults_(faults),

@@ -158,7 +158,8 @@ void Device::Run() {
 
 void Device::Wait() {
   const double due_s = std::min(pins_->NextDueS(), line_->NextDueS());
-  const double wait_s = std::clamp((due_s - clock_->NowS()) / clock_->speedup(), clock_->Stands() ? kLookAgainS : 0.0, kTurnHostS);
+  const double wait_s = std::clamp((due_s - clock_->NowS()) / clock_->speedup(),
+                                   clock_->Stands() ? kLookAgainS : 0.0, kTurnHostS);
   pollfd fds[2] = {{wake_, POLLIN, 0}, {line_->fd(), POLLIN, 0}};  // a negative one is passed over
   const timespec wait{0, static_cast<long>(wait_s * 1e9)};
   ppoll(fds, 2, &wait, nullptr);

@@ -272,7 +272,8 @@ TEST_F(DeviceTest, KeepsItsRecordWhenOnlyTheLineWasUnplugged) {
     // Its end of the line has hung up.
     uint8_t byte;
     ssize_t got = 1;
-    EXPECT_TRUE(WaitFor(&clock_, [&] { return (got = read(host.fd_, &byte, 1)) == 0 || (got < 0 && errno == EIO); }));
+    EXPECT_TRUE(
+        WaitFor(&clock_, [&] { return (got = read(host.fd_, &byte, 1)) == 0 || (got < 0 && errno == EIO); }));
   }
   faults_.Set("unplug", 0);  // in again
   ASSERT_TRUE(WaitFor(&clock_, [&] { return std::filesystem::exists(Port()); }));

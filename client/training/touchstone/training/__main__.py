@@ -44,7 +44,8 @@ def main() -> int:
     now = {each.name: result for each, result in done}
     shown = [(each, now.get(each.name) or _finished(each, settings)) for each in known]
     command = "python -m touchstone.training " + shlex.join(sys.argv[1:])
-    page = report.write(settings, [(each, result) for each, result in shown if result is not None], left_out, command, datetime.date.today().isoformat())
+    page = report.write(settings, [(each, result) for each, result in shown if result is not None], left_out, command,
+                        datetime.date.today().isoformat())
     for each, result in done:
         print(f"{each.title}: {result.words[0]}")
     for each, why in left_out:

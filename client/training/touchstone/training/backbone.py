@@ -36,8 +36,8 @@ class NoNetwork(ValueError):
 class Preparation:
     """(pixel - mean) / deviation for each channel in `order`, "rgb" or "bgr"; pixels 0 to 255."""
 
-    mean: tuple[float, float, float]
-    deviation: tuple[float, float, float]
+    mean: tuple[float, ...]
+    deviation: tuple[float, ...]
     order: str
 
 
@@ -101,7 +101,7 @@ def prepare(picture: np.ndarray, side_px: int, preparation: Preparation) -> np.n
     resized = cv2.resize(np.broadcast_to(picture, (*picture.shape[:2], 3)).astype(np.float32), (side_px, side_px),
                          interpolation=cv2.INTER_AREA if picture.shape[0] > side_px else cv2.INTER_LINEAR)
     ordered = resized if preparation.order == "rgb" else resized[:, :, ::-1]
-    scaled = (ordered - np.float32(preparation.mean)) / np.float32(preparation.deviation)
+    scaled = (ordered - np.array(preparation.mean, np.float32)) / np.array(preparation.deviation, np.float32)
     return np.ascontiguousarray(scaled.transpose(2, 0, 1)[None], np.float32)
 
 

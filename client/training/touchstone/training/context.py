@@ -7,7 +7,8 @@ import json
 import pathlib
 import sys
 import time
-from typing import Any, Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, Callable
 
 import numpy as np
 

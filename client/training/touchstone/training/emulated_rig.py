@@ -6,7 +6,7 @@ import pathlib
 import subprocess
 import tempfile
 import threading
-from typing import Sequence
+from collections.abc import Sequence
 
 import touchstone
 from touchstone.own_server import find_server, start_bound

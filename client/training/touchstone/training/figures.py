@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib
 
 matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
+import matplotlib.pyplot as plt
+import numpy as np
 
-from .result import Estimate, Figure  # noqa: E402
+from .result import Estimate, Figure
 
 # Okabe and Ito: the colour-blind can tell them apart. One colour a thing, in every figure.
 COLOURS = {
@@ -56,7 +56,7 @@ def curves(path: pathlib.Path, caption: str, x: Sequence[float], lines: Mapping[
         look = colour(name, place)
         axes.plot(x, [scale * p.value for p in points], color=look, marker=_MARKERS[place % len(_MARKERS)], markersize=4, label=name)
         axes.fill_between(x, [scale * p.low for p in points], [scale * p.high for p in points], color=look, alpha=0.2, linewidth=0)
-    for place, (name, height) in enumerate((marks or {}).items()):
+    for name, height in (marks or {}).items():
         axes.axhline(scale * height, color=_INK, linestyle="--", linewidth=1)
         axes.annotate(name, (1, scale * height), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8)
     if chance is not None:

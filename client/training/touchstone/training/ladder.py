@@ -14,7 +14,6 @@ import numpy as np
 
 import touchstone
 
-from . import plans
 from .context import Context
 from .touch_data import TouchData
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,7 +13,7 @@ from .ladder import Rung
 from .result import Estimate, Figure
 
 
-def draw_ladder(context: Context, rungs: Sequence[Rung], shown: Mapping[str, Sequence[Estimate]],
+def draw_ladder(context: Context, rungs: Sequence[Rung], shown: Mapping[str, Sequence[Estimate | None]],
                 alone: Mapping[str, tuple[float, Estimate]]) -> Figure:
     """Accuracy at each rung, `shown` on the "rig" and "simulated"; and of single effects (RMSE in us, accuracy lost)."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4), width_ratios=[1.25, 1])

@@ -6,7 +6,8 @@ An ONNX file is a protobuf message; these fields are read without its schema, wh
 from __future__ import annotations
 
 import pathlib
-from typing import Any, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 # Field numbers of onnx.proto: ModelProto, GraphProto, TensorProto; ValueInfoProto down to a dimension's value.
 _GRAPH, _INITIALIZER, _INPUT, _TENSOR_NAME = 7, 5, 11, 8
@@ -33,12 +34,13 @@ def input_shape(path: pathlib.Path) -> tuple[int, ...]:
 
 def _last(message: bytes, wanted: int) -> bytes:
     """The field's last value, which counts; KeyError if there is none."""
-    return {number: value for number, value in _fields(message)}[wanted]
+    return dict(_fields(message))[wanted]
 
 
 def _fields(message: bytes) -> Iterator[tuple[int, Any]]:
     """(number, value): int, or bytes for whatever has a length. KeyError for what is no protobuf message."""
     view, place = memoryview(message), 0
+    value: int | bytes | None
     while place < len(view):
         key, place = _varint(view, place)
         kind = key & 7

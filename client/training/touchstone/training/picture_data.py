@@ -116,10 +116,9 @@ def _photograph(context, per_object, normalize):
 
 def split(pictures: Pictures, test: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows for training and `test` rows for testing, of every object as many; no row is in both."""
-    rng, chosen = np.random.default_rng([seed, 75]), []
-    classes = len(SUPERSHAPES)
-    for k in range(classes):
-        chosen.append(rng.permutation(np.flatnonzero(pictures.object == k))[: test // classes + (k < test % classes)])
+    rng, classes = np.random.default_rng([seed, 75]), len(SUPERSHAPES)
+    chosen = [rng.permutation(np.flatnonzero(pictures.object == k))[: test // classes + (k < test % classes)]
+              for k in range(classes)]
     testing = np.sort(np.concatenate(chosen))
     return np.setdiff1d(np.arange(len(pictures)), testing), testing
 
@@ -130,7 +129,8 @@ def scaled(pictures: Pictures, copies: int, rng: np.random.Generator, reach: tup
     found = []
     for picture in pictures.image:
         height, width = picture.shape[:2]
-        for factor in np.exp(rng.uniform(*np.log(reach), copies)):
+        low, high = np.log(reach)
+        for factor in np.exp(rng.uniform(low, high, copies)):
             matrix = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), 0, factor)
             found.append(cv2.warpAffine(picture, matrix, (width, height), flags=cv2.INTER_LINEAR,
                                         borderMode=cv2.BORDER_REPLICATE)[:, :, None])
@@ -155,6 +155,8 @@ class FeatureCache:
     """
 
     def __init__(self, context: Context):
+        if context.settings.backbone is None:
+            raise ValueError("an experiment on pictures needs Settings.backbone")
         self.backbone = Backbone(context.settings.backbone)
         self._folder: pathlib.Path = context.settings.out / "features"
         self.pictures, self.seconds = 0, 0.0

@@ -6,8 +6,7 @@ from typing import Any, Callable
 
 import numpy as np
 import xgboost
-from sklearn import (discriminant_analysis, ensemble, linear_model, naive_bayes, neighbors, neural_network, pipeline,
-                     preprocessing, svm)
+from sklearn import discriminant_analysis, ensemble, linear_model, naive_bayes, neighbors, neural_network, pipeline, preprocessing, svm
 
 
 def _scaled(recogniser: Any) -> Any:

@@ -9,7 +9,7 @@ import math
 import pathlib
 import platform
 import re
-from typing import Sequence
+from collections.abc import Sequence
 
 from .experiment import Experiment
 from .result import Result
@@ -48,8 +48,8 @@ def write(settings: Settings, done: Sequence[tuple[Experiment, Result]], left_ou
 def _about(settings, command, date):
     rig = ("a real rig's, through its gateway" if settings.rig_is_real else
            "made by an emulated rig, through its gateway: nothing here was measured on anything")
-    return [f"Made by: {command}", f"{date}, {platform.machine()}, Python {platform.python_version()}. Seeds {settings.runs[0]} to "
-            f"{settings.runs[-1]}; intervals are 95 % over seeds. {'A quick run: small sets, wide intervals.' if settings.quick else ''}",
+    return [f"Made by: {command}", (f"{date}, {platform.machine()}, Python {platform.python_version()}. Seeds {settings.runs[0]} to "
+             f"{settings.runs[-1]}; intervals are 95 % over seeds. {'A quick run: small sets, wide intervals.' if settings.quick else ''}"),
             f"What is called {settings.measured_kind} is {rig}. Everything else is simulated."]
 
 
@@ -77,7 +77,8 @@ def _difference(comparison) -> str:
 
 def _table(title, columns, rows) -> list[str]:
     # A number and its interval stay in one line, if there is room for it.
-    begin = lambda cell, kind: "td class=number" if kind == "td" and len(columns) <= 6 and re.match(r"[+-]?\d\S*( %| points)?( \(|$)", str(cell)) else kind
+    number = re.compile(r"[+-]?\d\S*( %| points)?( \(|$)")
+    begin = lambda cell, kind: "td class=number" if kind == "td" and len(columns) <= 6 and number.match(str(cell)) else kind
     cells = lambda row, kind: "<tr>" + "".join(f"<{begin(cell, kind)}>{_text(cell)}</{kind}>" for cell in row) + "</tr>"
     return ["<div class=wide><table>", f"<caption>{_text(title)}</caption>", cells(columns, "th"),
             *(cells(row, "td") for row in rows), "</table></div>"]

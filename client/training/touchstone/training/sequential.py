@@ -95,7 +95,10 @@ def recognise(expected: Expected, observed_us: np.ndarray, reachable: np.ndarray
         now = posterior(log_posterior)
         if now.max() >= certainty or not left:
             return Episode(int(now.argmax()), float(now.max()), bool(now.max() >= certainty), made)
-        place = int(expected_information(log_posterior, outcomes[left]).argmax()) if policy == "information" else 0
+        place = 0
+        if policy == "information":
+            assert outcomes is not None, "this policy needs them"
+            place = int(expected_information(log_posterior, outcomes[left]).argmax())
         chosen = left.pop(place)
         log_posterior = log_posterior + expected.log_likelihood(chosen, observed_us[chosen])
         made += 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import stats
@@ -10,17 +10,17 @@ from scipy import stats
 from .result import Estimate
 
 
-def estimate(values: Sequence[float]) -> Estimate:
+def estimate(values: Sequence[float] | np.ndarray) -> Estimate:
     """Mean of one value a seed, with Student's 95 % interval; of a single value the interval is unknown: nan."""
-    values = np.asarray(values, float)
-    mean = float(values.mean())
-    if len(values) < 2:
+    sample = np.asarray(values, float)
+    mean = float(sample.mean())
+    if len(sample) < 2:
         return Estimate(mean, float("nan"), float("nan"))
-    half = float(stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
+    half = float(stats.t.ppf(0.975, len(sample) - 1) * sample.std(ddof=1) / np.sqrt(len(sample)))
     return Estimate(mean, mean - half, mean + half)
 
 
-def estimate_share(values: Sequence[float]) -> Estimate:
+def estimate_share(values: Sequence[float] | np.ndarray) -> Estimate:
     """The same of shares: Student's interval may leave 0 to 1, which no share can."""
     found = estimate(values)
     return Estimate(found.value, *(float(np.clip(bound, 0, 1)) for bound in (found.low, found.high)))

@@ -10,7 +10,8 @@ import os
 import pathlib
 import tarfile
 import time
-from typing import Any, Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Callable
 
 import numpy as np
 import torch
@@ -93,13 +94,15 @@ def feed(batches: Iterable[dict[str, Any]], samples: int, side_px: int, classes:
     parts = [[(b[0] - a[0]) / (b[1] - a[1]), (b[2] - a[2]) / (b[1] - a[1])] for a, b in zip(edges, edges[1:])]
     busy = sum(after.core_busy_s) - sum(before.core_busy_s)
     return Feeding(seen, seconds, waited / seconds,
-                   float(np.quantile(waits[1:] or [0.0], 0.1)) * len(waits) / seconds, parts, start_s, memory, (after.cpu_s - before.cpu_s) / seconds, busy / seconds,
+                   float(np.quantile(waits[1:] or [0.0], 0.1)) * len(waits) / seconds, parts, start_s, memory,
+                    (after.cpu_s - before.cpu_s) / seconds, busy / seconds,
                    (after.written_bytes - before.written_bytes) / 1e6, [mark[3] for mark in marks])
 
 
 def _timed(first: dict[str, Any], iterator: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """The batches, each with the time that was waited for it; none for the first."""
-    batch, waited = first, 0.0
+    batch: dict[str, Any] | None = first
+    waited = 0.0
     while batch is not None:
         yield {**batch, "_waited_s": waited}
         begin = time.monotonic()
@@ -149,7 +152,7 @@ def _batch(images, places):
 
 
 @contextlib.contextmanager
-def on_cores(cores: Sequence[int]) -> Iterator[None]:
+def on_cores(cores: Iterable[int]) -> Iterator[None]:
     """This thread, and processes that are started meanwhile, run on these cores only."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, cores)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -57,8 +58,8 @@ class TouchData:
     def load(cls, path: pathlib.Path) -> TouchData:
         with np.load(path) as found:
             speed, spacing = map(float, found["hand"])
-            return cls(tuple(map(str, found["objects"])), *(found[name] for name in _ARRAYS),
-                       found["image"] if "image" in found else None, speed, spacing)
+            return cls(objects=tuple(map(str, found["objects"])), image=found.get("image"), speed_mm_s=speed, spacing_mm=spacing,
+                       **{name: found[name] for name in _ARRAYS})
 
 
 _ARRAYS = ("object", "times_us", "target_mm", "approach", "lateral")
@@ -75,6 +76,6 @@ def collect(client: touchstone.Client, objects: Sequence[str], plan: Any, sample
     joined = {name: np.concatenate([batch[name] for batch in batches]) for name in columns}
     whole = np.isfinite(joined["descriptor_us"]).all(1)
     pixels = np.concatenate([batch["image"] for batch in batches])[whole] if image is not None else None
+    target_mm, approach, lateral = (joined[name][whole].astype(float) for name in ("target_mm", "approach", "lateral"))
     return TouchData(tuple(objects), joined["object"][whole].astype(int), joined["descriptor_us"][whole].astype(float),
-                     *(joined[name][whole].astype(float) for name in ("target_mm", "approach", "lateral")), pixels,
-                     float(joined["speed_mm_s"][0]), spacing_mm)
+                     target_mm, approach, lateral, pixels, float(joined["speed_mm_s"][0]), spacing_mm)

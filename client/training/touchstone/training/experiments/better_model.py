@@ -63,7 +63,7 @@ def _seed(context, seed, rungs, rig):
         all_ten = not settings.quick or k == len(rungs) - 1
         again = histogram(_curvature(rig, ladder.simulate_again(context, rig, rung.model, 100 + seed))[groups]), objects
         scores = []
-        for name, new in (TEN if all_ten else {"XGBoost": SEEDS["XGBoost"]}).items():
+        for new in (TEN if all_ten else {"XGBoost": SEEDS["XGBoost"]}).values():
             with warnings.catch_warnings():  # the perceptron's steps are limited on purpose
                 warnings.simplefilter("ignore", exceptions.ConvergenceWarning)
                 recogniser = new(seed).fit(*train)
@@ -89,7 +89,7 @@ def _alone(context):
         losses = []
         for seed in settings.runs:
             recogniser = SEEDS["XGBoost"](seed).fit(*_simulated(context, ladder.NOMINAL, 1000 + seed, sets))
-            of = lambda planted: np.mean(recogniser.predict(planted[0]) == planted[1])
+            of = lambda planted, recogniser=recogniser: np.mean(recogniser.predict(planted[0]) == planted[1])
             # The same poses with and without the effect.
             losses.append(float(of(_simulated(context, ladder.NOMINAL, 3000 + seed, sets)) -
                                 of(_simulated(context, model, 3000 + seed, sets))))
@@ -161,7 +161,8 @@ def _covers(y, f, rng, repeats=400):
 def _result(context, rungs, diagnosed, rig, found, alone, worth):
     kind = context.settings.measured_kind
     accuracy = {key: np.array([each[key] for each in found]) for key in ("rig", "simulated", "again", "ranks")}
-    shown = {key: [(estimate if key == "ranks" else estimate_share)(column[np.isfinite(column)]) if np.isfinite(column).any() else None for column in values.T]
+    shown = {key: [(estimate if key == "ranks" else estimate_share)(column[np.isfinite(column)]) if np.isfinite(column).any() else None
+                   for column in values.T]
              for key, values in accuracy.items()}
     for rank in filter(None, shown["ranks"]):  # Student's interval of a few seeds may leave the range
         rank.low, rank.high = max(rank.low, -1.0), min(rank.high, 1.0)
@@ -169,11 +170,11 @@ def _result(context, rungs, diagnosed, rig, found, alone, worth):
     whole = estimate(accuracy["rig"][:, -1] - accuracy["rig"][:, 0])
     result = Result("", "", made_on=[
         f"diagnosed: {len(diagnosed):,} {kind} touches of {' and '.join(ladder.DIAGNOSED)}",
-        f"tested on {len(rig):,} other {kind} touches of {len(rig.objects)} objects, made once; intervals of accuracy are over "
-        "the simulated touches, the dealing into sets and the training of each seed, not over other touches of the rig",
+        (f"tested on {len(rig):,} other {kind} touches of {len(rig.objects)} objects, made once; intervals of accuracy are over "
+         "the simulated touches, the dealing into sets and the training of each seed, not over other touches of the rig"),
         f"trained on touches simulated by each model; sets of {TOUCHES} touches"])
     result.words = [_answer(rungs, shown["rig"], whole, kind), *_step_words(rungs, steps), _gap_words(accuracy, kind),
-                    _rank_words(accuracy["ranks"]), _alone_words(alone), _worth_words(rungs, worth, kind)]
+                    _rank_words(accuracy["ranks"]), _alone_words(alone), _worth_words(worth, kind)]
     result.tables = [_ladder_table(rungs, shown, steps, kind), _alone_table(alone), _worth_table(rungs, worth)]
     result.figures = [ladder_figures.draw_ladder(context, rungs, shown, {name: (rmse, estimate(loss)) for name, (rmse, loss) in alone.items()}),
                       ladder_figures.draw_worth(context, rungs, worth, shown["ranks"])]
@@ -241,7 +242,7 @@ def _alone_words(alone):
             "that is added to every touch cancels in the curvature, which these recognisers see; what one finger adds does not.")
 
 
-def _worth_words(rungs, worth, kind):
+def _worth_words(worth, kind):
     first, last = (worth["mean curvature"][k] for k in (0, -1))
     separate = last["gain"][1] > first["gain"][2]
     return (f"With {MORE} simulated touches per {kind} one, the mean curvature is as certain as from "

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from .. import figures, ladder, plans
-from ..calibration import (Novelty, conformal_sets, conformal_threshold, expected_calibration_error, reliability)
+from ..calibration import Novelty, conformal_sets, conformal_threshold, expected_calibration_error, reliability
 from ..context import Context
 from ..experiment import Experiment
 from ..features import feature_sets
@@ -72,7 +72,7 @@ def _novel(context, model, seed, rig):
         novelty = Novelty(train[0][train[1] != left_out])
         limits = [conformal_threshold(novelty.distance(a[b != left_out]), 1 - FALSE_ALARMS)
                   for a, b in (calibrate, (x[first], y[first]))]
-        rate = lambda features, limit: float(np.mean(novelty.distance(features) > limit))
+        rate = lambda features, limit, novelty=novelty: float(np.mean(novelty.distance(features) > limit))
         rest, rest_y = x[~first], y[~first]
         found[name] = {
             "simulated": (rate(test[0][test[1] == left_out], limits[0]), rate(test[0][test[1] != left_out], limits[0])),
@@ -84,8 +84,8 @@ def _novel(context, model, seed, rig):
 def _result(context, rungs, rig, found):
     kind = context.settings.measured_kind
     result = Result("", "", made_on=[
-        f"{len(rig):,} {kind} touches of {len(rig.objects)} objects, made once, in sets of {TOUCHES} ({NOVEL_TOUCHES} for objects not "
-        "trained on); one half of the sets calibrates, the other is tested",
+        (f"{len(rig):,} {kind} touches of {len(rig.objects)} objects, made once, in sets of {TOUCHES} ({NOVEL_TOUCHES} for objects not "
+         "trained on); one half of the sets calibrates, the other is tested"),
         f"touches simulated by the nominal model and by the last of the ladder ({rungs[-1].name}) train, calibrate and are tested",
         "intervals are over the simulated touches, the dealing into sets and halves and the training of each seed"])
     pick = lambda *path: [_at(each, path) for each in found]

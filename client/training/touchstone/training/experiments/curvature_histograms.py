@@ -6,8 +6,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 
-import touchstone
-
 from .. import figures, plans
 from ..context import Context
 from ..experiment import Experiment
@@ -30,8 +28,8 @@ def run(context: Context) -> Result:
     result = Result("", "", made_on=[f"{name}: {len(data):,} touches of {len(objects)} objects" for name, data in sources.items()])
     closer = np.mean([row["noisy"] < row["ideal"] for row in distances.values()])
     result.words = [
-        f"With noise in the simulation its histograms come closer to the {settings.measured_kind} ones for "
-        f"{closer:.0%} of the objects (Wasserstein distance, 1/m)."]
+        (f"With noise in the simulation its histograms come closer to the {settings.measured_kind} ones for "
+         f"{closer:.0%} of the objects (Wasserstein distance, 1/m).")]
     result.tables = [Table(f"Wasserstein distance to the {settings.measured_kind} histogram, 1/m", ["object", "ideal", "noisy"],
                            [[name, f"{row['ideal']:.2f}", f"{row['noisy']:.2f}"] for name, row in distances.items()])]
     result.figures = [_draw(context, objects, values)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def run(context: Context) -> Result:
     settings = context.settings
     files = sorted(settings.everyday.glob("*.off")) if settings.everyday else []
     counts = settings.pick([5, 15], [5, 10, 15, 20, 25, 30])
-    groups = {"shipped shapes": (context.simulator, plans.OBJECTS)}
+    groups: dict[str, tuple[touchstone.Client, Sequence[str]]] = {"shipped shapes": (context.simulator, plans.OBJECTS)}
     with contextlib.ExitStack() as stack:
         if files:
             groups["everyday models"] = (_serve(files, stack), [file.stem for file in files])
@@ -47,7 +48,7 @@ def _serve(files: list[pathlib.Path], stack: contextlib.ExitStack) -> touchstone
 
 def _recognise(context, name, client, objects, counts):
     """((training model, seeds, counts) accuracies on noisy sets, confusions of training without noise at TOUCHES)."""
-    settings, confusion = context.settings, 0
+    settings, confusion = context.settings, np.zeros((len(objects), len(objects)), int)
     models = {"ideal": plans.IDEAL, "noisy": plans.NOISY}
     accuracies = np.zeros((len(models), settings.seeds, len(counts)))
     for step, seed in enumerate(settings.runs):
@@ -69,21 +70,21 @@ def _recognise(context, name, client, objects, counts):
 def _result(context, counts, objects, found, confusions):
     place = counts.index(TOUCHES)
     result = Result("", "", made_on=[
-        f"simulated touches alone, from all sides (sphere), new for every seed: {TRAINING_SETS} sets in training, {TEST_SETS} with the "
-        f"seed's noise in testing; XGBoost", *(f"{name}: {', '.join(names)}" for name, names in objects.items())])
+        (f"simulated touches alone, from all sides (sphere), new for every seed: {TRAINING_SETS} sets in training, {TEST_SETS} with the "
+         f"seed's noise in testing; XGBoost"), *(f"{name}: {', '.join(names)}" for name, names in objects.items())])
     if "everyday models" in objects:
         result.made_on.append(f"the everyday models have no unit: their longest side is {SIZE_MM} mm")
         everyday, shipped = (found[name][0, :, place] for name in ("everyday models", "shipped shapes"))
         chance = {name: 1 / len(names) for name, names in objects.items()}
         result.words = [
-            f"Trained without noise, with {TOUCHES} touches a set, {estimate_share(everyday).words()} of the noisy sets of ten everyday models "
-            f"are recognised (chance {chance['everyday models']:.0%}) and {estimate_share(shipped).words()} of five shipped shapes (chance "
-            f"{chance['shipped shapes']:.0%}): {paired.order('the former', everyday, 'the latter', shipped)}. The seed found them comparable."]
+            (f"Trained without noise, with {TOUCHES} touches a set, {estimate_share(everyday).words()} of the noisy sets of ten everyday models "
+             f"are recognised (chance {chance['everyday models']:.0%}) and {estimate_share(shipped).words()} of five shipped shapes (chance "
+             f"{chance['shipped shapes']:.0%}): {paired.order('the former', everyday, 'the latter', shipped)}. The seed found them comparable.")]
         result.comparisons = [Comparison(f"ten everyday models, {TOUCHES} touches a set", estimate_share(everyday), None,
                                          "trained on ideal, tested on noisy simulated sets", "the seed shows a figure without numbers")]
     else:
-        result.words = [f"The everyday models are not here (--everyday FOLDER): the shipped shapes take their place, of whose noisy sets "
-                        f"{estimate_share(found['shipped shapes'][0, :, place]).words()} are recognised after training without noise."]
+        result.words = [(f"The everyday models are not here (--everyday FOLDER): the shipped shapes take their place, of whose noisy sets "
+                         f"{estimate_share(found['shipped shapes'][0, :, place]).words()} are recognised after training without noise.")]
     for name in objects:
         ideal, noisy = (found[name][k, :, place] for k in (0, 1))
         result.words.append(f"{name[0].upper() + name[1:]}: {paired.order('training with noise', noisy, 'training without', ideal)}.")

@@ -150,13 +150,13 @@ def _result(context, cache, found, virtual_only):
     rows = [[*key.split(" x "), kind, *_row(runs)] for key, runs in cells.items()] + [["virtual", "virtual", "virtual", *_row(virtual_only)]]
     best = list(cells.values())[-1]
     made_on = [
-        f"touch: {_SETS} sets of {_per_set(context)} virtual touches, others for every seed; half (by poses) of the "
-        f"{plans.measured(settings).samples(CLASSES):,} {kind} touches in training where they are, the other half in testing, divided "
-        "anew for every seed, made once",
-        f"image: {size.train_per_object * CLASSES:,} virtual pictures, others for every seed; {size.measured_train} {kind} ones with "
-        f"{COPIES} scaled copies in training where they are, {size.measured_test} others in testing, drawn anew for every seed, made once",
-        "pairs: every set of touches for testing with every picture for testing of the same object; 20 % of each training set "
-        f"({kind} ones alone where there are any), paired in the same way, chose the weight", f"features of {cache.backbone}, frozen"]
+        (f"touch: {_SETS} sets of {_per_set(context)} virtual touches, others for every seed; half (by poses) of the "
+         f"{plans.measured(settings).samples(CLASSES):,} {kind} touches in training where they are, the other half in testing, divided "
+         "anew for every seed, made once"),
+        (f"image: {size.train_per_object * CLASSES:,} virtual pictures, others for every seed; {size.measured_train} {kind} ones with "
+         f"{COPIES} scaled copies in training where they are, {size.measured_test} others in testing, drawn anew for every seed, made once"),
+        ("pairs: every set of touches for testing with every picture for testing of the same object; 20 % of each training set "
+         f"({kind} ones alone where there are any), paired in the same way, chose the weight"), f"features of {cache.backbone}, frozen"]
     result = Result("", "", made_on=made_on)
     result.words = [
         f"Trained on virtual and {kind} data, fusion by product recognises {estimate_share(column(best, 'product')).words()} of the {kind} "
@@ -175,7 +175,7 @@ def _result(context, cache, found, virtual_only):
                    f"{more_touch}; {more_image}", why),
         Comparison(f"touch alone, virtual + {kind} in training", estimate_share(column(best, "touch")), 0.933, more_touch, why),
         Comparison(f"image alone, virtual + {kind} in training", estimate_share(column(best, "image")), 0.806, more_image, why),
-        Comparison(f"fusion by product, virtual in training, tested on {kind}", estimate_share(column(list(cells.values())[0], "product")), 0.893,
+        Comparison(f"fusion by product, virtual in training, tested on {kind}", estimate_share(column(next(iter(cells.values())), "product")), 0.893,
                    f"{touch}; {image}", why)]
     result.tables = [Table("Accuracy of pairs of a touch set and a picture", ["touch trained on", "image trained on", "tested on",
                                                                             *METHODS, "weight of touch"], rows,

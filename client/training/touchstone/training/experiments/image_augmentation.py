@@ -61,18 +61,18 @@ def run(context: Context) -> Result:
 
 
 def _result(context, cache, accuracies):
-    settings, size, kind = context.settings, sizes(context), context.settings.measured_kind
+    size, kind = sizes(context), context.settings.measured_kind
     names = ["virtual alone", f"+ {kind}", *(f"+ {kind} and {k} scaled {'copy' if k == 1 else 'copies'} of each"
                                              for k in range(1, COPIES + 1))]
     all_estimates = [estimate_share(column) for column in accuracies.T]
     made_on = [f"{size.train_per_object * CLASSES:,} virtual pictures, others for every seed",
-               f"{size.measured_train} {kind} pictures in training and {size.measured_test} others in testing, drawn anew for every "
-               f"seed from {size.measured_per_object * CLASSES} that were photographed, and scaled (by 0.75 to 1.3), once",
+               (f"{size.measured_train} {kind} pictures in training and {size.measured_test} others in testing, drawn anew for every "
+                f"seed from {size.measured_per_object * CLASSES} that were photographed, and scaled (by 0.75 to 1.3), once"),
                f"features of {cache.backbone}, frozen; the head is trained anew for every seed"]
     result = Result("", "", made_on=made_on, words=[
-        f"With {size.measured_train} {kind} pictures and {COPIES} scaled copies of each in training, "
-        f"{all_estimates[-1].words()} of the {kind} test pictures are recognised, without them {all_estimates[0].words()}: "
-        f"{paired.order('training with them', accuracies[:, -1], 'training without', accuracies[:, 0])}.",
+        (f"With {size.measured_train} {kind} pictures and {COPIES} scaled copies of each in training, "
+         f"{all_estimates[-1].words()} of the {kind} test pictures are recognised, without them {all_estimates[0].words()}: "
+         f"{paired.order('training with them', accuracies[:, -1], 'training without', accuracies[:, 0])}."),
         f"Of the copies alone: {paired.order(f'training with {COPIES} copies', accuracies[:, -1], 'training without copies', accuracies[:, 1])}.",
         cache.rate()])
     result.comparisons = [Comparison(

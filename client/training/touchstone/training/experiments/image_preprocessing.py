@@ -41,19 +41,19 @@ def run(context: Context) -> Result:
 
 
 def _result(context, cache, accuracies, train, test, per_object, test_per_object):
-    settings, kind = context.settings, context.settings.measured_kind
+    kind = context.settings.measured_kind
     best = max(KINDS, key=lambda name: np.mean(accuracies[name]))
     orders = [paired.order(f"'{name}'", accuracies[name], "'as it is'", accuracies["as it is"]) for name in KINDS[1:]]
     empty = {name: int((pictures.image.reshape(len(pictures), -1).min(1) == 255).sum()) for name, pictures in
              (("virtual", train["normalised"]), (kind, test["normalised"]))}
     result = Result("", "", made_on=[
-        f"{per_object * CLASSES} virtual pictures for training, others for every seed, and {test_per_object * CLASSES} {kind} ones for "
-        "testing, the same for all seeds; both prepared in the same way",
+        (f"{per_object * CLASSES} virtual pictures for training, others for every seed, and {test_per_object * CLASSES} {kind} ones for "
+         "testing, the same for all seeds; both prepared in the same way"),
         f"features of {cache.backbone}, frozen; the head is trained anew for every seed"], words=[
         f"On {kind} pictures '{best}' is recognised best on average, {estimate_share(accuracies[best]).words()}. Against pictures as they are: "
         + "; ".join(orders) + ".",
-        f"Normalisation found no object in {empty['virtual']} of {len(train['normalised'])} virtual and {empty[kind]} of "
-        f"{len(test['normalised'])} {kind} pictures, which then are white."])
+        (f"Normalisation found no object in {empty['virtual']} of {len(train['normalised'])} virtual and {empty[kind]} of "
+         f"{len(test['normalised'])} {kind} pictures, which then are white.")])
     result.tables = [Table(f"Accuracy on {kind} pictures, trained on virtual ones", ["preparation", "accuracy (95 % interval)"],
                            [[name, estimate_share(accuracies[name]).words()] for name in KINDS])]
     result.figures = [_sheet(context, train, test, per_object, test_per_object)]

@@ -68,17 +68,17 @@ def _result(context, cache, found, confused):
     on_virtual, on_measured, shuffled = estimate_share(found["virtual"]), estimate_share(found[kind]), estimate_share(found["shuffled"])
     chance = 1 / CLASSES
     made_on = [
-        f"{size.train_per_object * CLASSES:,} virtual pictures for training (20 % of them for validation) and "
-        f"{size.test_per_object * CLASSES:,} for testing, other poses for every seed",
-        f"{size.measured_test} of {size.measured_per_object * CLASSES} {kind} pictures for testing, drawn anew for every seed; "
-        "the pool is photographed once, so the intervals hold for these pictures",
+        (f"{size.train_per_object * CLASSES:,} virtual pictures for training (20 % of them for validation) and "
+         f"{size.test_per_object * CLASSES:,} for testing, other poses for every seed"),
+        (f"{size.measured_test} of {size.measured_per_object * CLASSES} {kind} pictures for testing, drawn anew for every seed; "
+         "the pool is photographed once, so the intervals hold for these pictures"),
         f"features of {cache.backbone}, frozen; the head is trained anew for every seed"]
     why = (f"the backbone is {cache.backbone.path.name}, the seed's a ResNet-50; views, light and camera are ours; "
            f"the pictures for testing are {kind}")
     told = "so the labels are what it learns from" if shuffled.low <= chance <= shuffled.high else "which is not what chance gives"
     result = Result("", "", made_on=made_on, words=[
-        f"A head on a frozen image network recognises {on_virtual.words()} of the virtual and {on_measured.words()} of the {kind} "
-        f"pictures; {paired.order('the virtual test', found['virtual'], f'the {kind} one', found[kind])}.",
+        (f"A head on a frozen image network recognises {on_virtual.words()} of the virtual and {on_measured.words()} of the {kind} "
+         f"pictures; {paired.order('the virtual test', found['virtual'], f'the {kind} one', found[kind])}."),
         f"With shuffled labels it recognises {shuffled.words()} of the virtual pictures, chance is {chance:.0%}: {told}.",
         cache.rate()])
     result.comparisons = [

@@ -59,10 +59,10 @@ def _result(context, names, trained, found, confusions, rig_touches):
     ideal, noisy, mixed, real = found[:, 0].T
     result = Result("", "", made_on=[
         f"simulated touches, without noise and with a standard deviation of {plans.SIGMA_US / 1e6:g} s, new for every seed",
-        f"{rig_touches} {kind} touches that were made once; {TEST_SHARE:.0%} of the poses of each object are for testing, others for "
-        "every seed, and no round of them is trained on",
-        f"sets of {TOUCHES} touches; {TEST_SETS} in testing. {kind.capitalize()} sets are drawn from fewer touches than they have "
-        "together: a touch is in several of them"])
+        (f"{rig_touches} {kind} touches that were made once; {TEST_SHARE:.0%} of the poses of each object are for testing, others for "
+         "every seed, and no round of them is trained on"),
+        (f"sets of {TOUCHES} touches; {TEST_SETS} in testing. {kind.capitalize()} sets are drawn from fewer touches than they have "
+         "together: a touch is in several of them")])
     result.words = [
         f"On {kind} sets, XGBoost: {paired.order('training with noise', noisy, 'training without', ideal)}.",
         f"{paired.order(f'80:20 virtual and {kind}', mixed, f'{REAL_ALONE} {kind} sets alone', real)}; the seed found the former better.",

@@ -19,7 +19,7 @@ from ..experiment import Experiment
 from ..features import BINS
 from ..recognisers import SEEDS
 from ..result import Result, Table
-from ..statistics import estimate, estimate_share
+from ..statistics import estimate_share
 
 SIGMA_US = 5000.0
 HIDDEN = ("--hide", "tip_radius.radius_mm=2")
@@ -148,11 +148,11 @@ def _result(context, rigs, found):
     asked = len(lines(context.settings.pick(3, 16), 31)) * len(plans.OBJECTS)
     missed = 1 - np.mean([each["touches"] for each in found.values()]) / asked
     result = Result("", "", made_on=[
-        f"each rig: {min(f['touches'] for f in found.values())} to {max(f['touches'] for f in found.values())} {kind} touches of "
-        f"{len(plans.OBJECTS)} objects, made once; the emulator hides round tips of 2 mm",
+        (f"each rig: {min(f['touches'] for f in found.values())} to {max(f['touches'] for f in found.values())} {kind} touches of "
+         f"{len(plans.OBJECTS)} objects, made once; the emulator hides round tips of 2 mm"),
         f"trained on touches simulated by the nominal model of the same hand, sets of {TOUCHES} touches",
-        f"every hand touches along the same lines whatever lies there; touches of which a finger met nothing are left out "
-        f"({missed:.0%} of the {kind} ones)",
+        (f"every hand touches along the same lines whatever lies there; touches of which a finger met nothing are left out "
+         f"({missed:.0%} of the {kind} ones)"),
         "intervals are over the simulated touches, the dealing into sets and the training of each seed"])
     chance = 1 / len(plans.OBJECTS)
     above, rows = [], []

@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import time
 import warnings
-from typing import Iterator
+from collections.abc import Iterator
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -131,21 +131,21 @@ def _result(context, found, whole, best, shards, own_core) -> Result:
     others = max(0.0, whole.machine_cores - whole.cores)
     shared = "a core of its own" if own_core else "no core of its own"
     result = Result("", "", made_on=[
-        f"{whole.samples:,} samples, each a touch and a {SIDE_PX} x {SIDE_PX} grey picture of one of {len(SUPERSHAPES)} objects, "
-        f"simulated while the learner learned, {best} loader {_workers(best)}",
+        (f"{whole.samples:,} samples, each a touch and a {SIDE_PX} x {SIDE_PX} grey picture of one of {len(SUPERSHAPES)} objects, "
+         f"simulated while the learner learned, {best} loader {_workers(best)}"),
         f"{next(iter(found.values())).samples:,} samples for each of the short runs",
-        f"{os.cpu_count()} cores, {torch.__version__} of PyTorch; the learner had {shared}; intervals are over {PARTS} equal parts of "
-        "the one run: a million samples are streamed once, and not for every seed"])
+        (f"{os.cpu_count()} cores, {torch.__version__} of PyTorch; the learner had {shared}; intervals are over {PARTS} equal parts of "
+         "the one run: a million samples are streamed once, and not for every seed")])
     result.words = [
-        f"{whole.samples:,} samples were learned from in {whole.seconds / 60:.1f} min, {_rate(rate)} samples a second; the learner "
-        f"waited for data {share.words()} of the time, which {'keeps to' if whole.wait_share <= MAX_WAIT_SHARE else 'misses'} the "
-        f"{MAX_WAIT_SHARE:.0%} that are asked for.",
+        (f"{whole.samples:,} samples were learned from in {whole.seconds / 60:.1f} min, {_rate(rate)} samples a second; the learner "
+         f"waited for data {share.words()} of the time, which {'keeps to' if whole.wait_share <= MAX_WAIT_SHARE else 'misses'} the "
+         f"{MAX_WAIT_SHARE:.0%} that are asked for."),
         _why(whole, others, own_core),
-        f"Memory of all processes was {whole.memory_mb[1]:.0f} MB after {2 / PARTS:.0%} of the run and {whole.memory_mb[-1]:.0f} MB at its "
-        f"end ({growth:+.1%}), {'flat' if abs(growth) <= FLAT else 'not flat'}. They sent {whole.written_mb:.1f} MB to the disk; the "
-        f"samples themselves are {whole.samples * SIDE_PX**2 / 1e6:,.0f} MB.",
-        f"Every sample is new, so each is judged before it is learned from: {whole.accuracy[0]:.1%} were recognised in the first part of "
-        f"the run and {whole.accuracy[-1]:.1%} in its last.",
+        (f"Memory of all processes was {whole.memory_mb[1]:.0f} MB after {2 / PARTS:.0%} of the run and {whole.memory_mb[-1]:.0f} MB at its "
+         f"end ({growth:+.1%}), {'flat' if abs(growth) <= FLAT else 'not flat'}. They sent {whole.written_mb:.1f} MB to the disk; the "
+         f"samples themselves are {whole.samples * SIDE_PX**2 / 1e6:,.0f} MB."),
+        (f"Every sample is new, so each is judged before it is learned from: {whole.accuracy[0]:.1%} were recognised in the first part of "
+         f"the run and {whole.accuracy[-1]:.1%} in its last."),
         f"From shards: writing {shards['samples']:,} samples took {shards['written_s']:.1f} s ({shards['size_mb']:.0f} MB)."]
     rows = [[name, _row(fed)] for name, fed in [*found.items(), (f"the long run, {best} {_workers(best)}", whole)]]
     result.tables = [Table("A learner fed in several ways", ["fed by", "samples", "samples a second", "time waiting",
@@ -194,7 +194,8 @@ def _draw(context, found, whole, best):
         left.barh(place, share.value, 0.6, color=figures.colour("virtual"), xerr=[[share.value - share.low], [share.high - share.value]],
                   error_kw={"ecolor": "#1f2933", "elinewidth": 1, "capsize": 2})
     left.axvline(100 * MAX_WAIT_SHARE, color="#1f2933", linestyle="--", linewidth=1)
-    left.annotate(f"at most {MAX_WAIT_SHARE:.0%}", (100 * MAX_WAIT_SHARE, 1.0), xycoords=("data", "axes fraction"), ha="left", va="bottom", fontsize=8)
+    left.annotate(f"at most {MAX_WAIT_SHARE:.0%}", (100 * MAX_WAIT_SHARE, 1.0), xycoords=("data", "axes fraction"),
+                  ha="left", va="bottom", fontsize=8)
     left.set_yticks(range(len(names)), names)
     left.invert_yaxis()
     left.set_xlim(left=0)

@@ -67,8 +67,8 @@ def run(context: Context) -> Result:
     signed = lambda d: f"{100 * d.value:+.1f} ({100 * d.low:+.1f} to {100 * d.high:+.1f})"
     clear = [f"{name} ({100 * d.value:+.1f} points)" for name, d in list(zip(table, differences))[1:] if d.low > 0 or d.high < 0]
     result = Result("", "", made_on=[
-        f"XGBoost, trained on {VIRTUAL} simulated sets of {TOUCHES} touches (new for every seed) and {REAL} {kind} ones, tested on "
-        f"{TEST_SETS} {kind} sets; the {len(rig)} {kind} touches were made once"])
+        (f"XGBoost, trained on {VIRTUAL} simulated sets of {TOUCHES} touches (new for every seed) and {REAL} {kind} ones, tested on "
+         f"{TEST_SETS} {kind} sets; the {len(rig)} {kind} touches were made once")])
     result.words = [("Of the choices that the seed leaves open these change the accuracy by more than the seeds do: " +
                      ", ".join(clear) + ".") if clear else "None of these choices changes the accuracy by more than the seeds do.",
                     f"{len(table) - 1} rows are compared, each at 95 %: one in twenty may stand out by chance."]

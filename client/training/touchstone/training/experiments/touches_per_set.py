@@ -38,20 +38,20 @@ def run(context: Context) -> Result:
 
 
 def _result(context, counts, names, found, rig_touches):
-    settings, kind = context.settings, context.settings.measured_kind
+    kind = context.settings.measured_kind
     best = {where: names[int(np.argmax(values[:, :, -1].mean(1)))] for where, values in found.items()}
     others = lambda where: [paired.order(best[where], found[where][names.index(best[where]), :, -1], name, values[:, -1])
                             for name, values in zip(names, found[where]) if name != best[where]]
     more = found[kind].mean(0)
     result = Result("", "", made_on=[
         f"{TRAINING_SETS} simulated sets in training and {TEST_SETS} others in testing, with the seed's noise, new for every seed",
-        f"{TEST_SETS} {kind} sets, drawn for every seed from {rig_touches} touches that were made once: the intervals on them do "
-        "not hold the chance of another measurement"])
+        (f"{TEST_SETS} {kind} sets, drawn for every seed from {rig_touches} touches that were made once: the intervals on them do "
+         "not hold the chance of another measurement")])
     result.words = [
         f"With {counts[-1]} touches a set {best[kind]} recognises most of the {kind} sets: {'; '.join(others(kind))}.",
         f"Of simulated sets {best['simulated']} recognises most: {'; '.join(others('simulated'))}. The seed found XGBoost best.",
-        f"More touches: {paired.order(f'{counts[-1]} touches a set', more[:, -1], f'{counts[0]} touches', more[:, 0])} on {kind} sets, "
-        "all recognisers together."]
+        (f"More touches: {paired.order(f'{counts[-1]} touches a set', more[:, -1], f'{counts[0]} touches', more[:, 0])} on {kind} sets, "
+         "all recognisers together.")]
     for where, values in found.items():
         lines = {name: estimates(each) for name, each in zip(names, values)}
         result.figures.append(figures.curves(

@@ -46,7 +46,7 @@ def run(context: Context) -> Result:
         found[name] = _case(context, name, expected, observed)
         context.progress(0.4 + 0.6 * len(found) / len(cases), name)
     noise = {times: _noisier(context, candidates, rungs[-1], last[0], times) for times in NOISES}
-    return _result(context, candidates, rungs, rig[0], cases, found, noise)
+    return _result(context, candidates, rig[0], cases, found, noise)
 
 
 def _candidates(context) -> touchstone.Touches:
@@ -106,14 +106,14 @@ def _noisier(context, candidates, rung, expected, times):
     return _case(context, f"noise {times}", Expected(expected.times_us, sigma), observed)
 
 
-def _result(context, candidates, rungs, rig, cases, found, noise):
+def _result(context, candidates, rig, cases, found, noise):
     kind = context.settings.measured_kind
     result = Result("", "", made_on=[
         f"{len(candidates)} candidate touches, each simulated once for each of {len(plans.OBJECTS)} objects by the models of the ladder",
-        f"{rig.shape[0] * rig.shape[1]} {kind} touches, each made once: the rig of the ladder with the seed's noise "
-        f"({plans.SIGMA_US / 1e3:.1f} ms), {np.isnan(rig).any(-1).mean():.0%} of them with a finger that met nothing",
-        f"an episode may make {REACHABLE} of the candidates, drawn at random; intervals are over the episodes of each seed, not over "
-        "other touches of the rig"])
+        (f"{rig.shape[0] * rig.shape[1]} {kind} touches, each made once: the rig of the ladder with the seed's noise "
+         f"({plans.SIGMA_US / 1e3:.1f} ms), {np.isnan(rig).any(-1).mean():.0%} of them with a finger that met nothing"),
+        (f"an episode may make {REACHABLE} of the candidates, drawn at random; intervals are over the episodes of each seed, not over "
+         "other touches of the rig")])
     result.words = [_policy_words(name, found[name]) for name in (*list(found)[:1], list(found)[3])]
     result.words += [_calibration_words(found), _free_space_words(found), _noise_words(noise)]
     rows = []

@@ -41,8 +41,8 @@ def run(context: Context) -> Result:
     result = Result("", "", made_on=[
         f"{SETS} sets of {TOUCHES} touches in training, simulated with the seed's noise (new for every seed) or {kind}",
         f"{len(rig)} {kind} touches, made once; {TEST_SHARE:.0%} of the poses are for testing, others for every seed"])
-    result.words = [f"XGBoost is best on average with {best} % {kind} sets in training; seed by seed the best share lies between "
-                    f"{min(each_best)} and {max(each_best)} %. The seed chose 20 %."]
+    result.words = [(f"XGBoost is best on average with {best} % {kind} sets in training; seed by seed the best share lies between "
+                     f"{min(each_best)} and {max(each_best)} %. The seed chose 20 %.")]
     result.figures = [figures.curves(
         context.figure_path("curve"), f"Accuracy on {kind} sets against the share of {kind} sets among {SETS} in training. Bands: 95 % "
         "over seeds.", shares, lines, x_label=f"{kind} sets in training, %", chance=1 / len(plans.OBJECTS))]
