@@ -65,7 +65,7 @@ class EmulatedArm : public testing::Test {
     // A busy machine's pauses are no dead gateway and no frozen controller.
     arm.script.watchdog_hz = 1;
     arm.frozen_after_s = 1;
-    arm.program_start_s = 10;
+    arm.program_start_s = 1.5;
     arm.connect_wait_s = kPatienceS;
     arm_options_ = arm;
     arm_ = gateway::arm::ConnectUrArm(arm, &changes_).value();
@@ -276,7 +276,7 @@ TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
 }
 
 TEST_F(EmulatedArm, FrozenControllerIsToldAsSuchAndComesBack) {
-  faults_.Set("freeze", 2);
+  faults_.Set("freeze", 1.3);
   ASSERT_TRUE(Wait([&] { return !arm_->State().ok(); }));
   EXPECT_EQ(arm_->State().status().code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(std::string(arm_->State().status().message()), HasSubstr("silent"));
@@ -299,7 +299,7 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
 }
 
 TEST_F(EmulatedArm, ClockOfTheControllerIsToldInHostTime) {
-  ASSERT_TRUE(Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 50; }));
+  ASSERT_TRUE(Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 200 / clock_.speedup(); }));
   const gateway::arm::ArmState state = *arm_->State();
   const double told_s = arm_->ControllerClock().RemoteOf(state.host_time_s);
   EXPECT_NEAR(told_s, state.controller_time_s, 1.0) << "not later than a busy machine delivers it";

@@ -13,6 +13,8 @@
 namespace touchstone::gateway::timing {
 namespace {
 
+constexpr std::chrono::microseconds kLookAgain{200};
+
 double SteadyNowS() {
   return SteadyClock().NowS();
 }
@@ -46,7 +48,8 @@ class Host final : public Clock {
  private:
   void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
                 Time until) const override {
-    changed.wait_for(lock, until - Now());
+    // A clock that stands just before `until` is not asked all the time.
+    changed.wait_for(lock, std::max<Duration>(until - Now(), followed.load() == nullptr ? Duration(0) : kLookAgain));
   }
 };
 
