@@ -299,7 +299,8 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
 }
 
 TEST_F(EmulatedArm, ClockOfTheControllerIsToldInHostTime) {
-  ASSERT_TRUE(Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 200 / clock_.speedup(); }));
+  ASSERT_TRUE(
+      Wait([&] { return arm_->ControllerClock().valid && arm_->StateRateHz() > 200 / clock_.speedup(); }));
   const gateway::arm::ArmState state = *arm_->State();
   const double told_s = arm_->ControllerClock().RemoteOf(state.host_time_s);
   EXPECT_NEAR(told_s, state.controller_time_s, 1.0) << "not later than a busy machine delivers it";

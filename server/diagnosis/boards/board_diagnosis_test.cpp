@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/boards/board_test_set.h"
 #include "server/effects/all_effects.h"
 
@@ -92,6 +93,7 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
 }
 
 TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {
+  TOUCHSTONE_SECOND_TIER("statistical: coverage over many sets");
   if (kUnderSanitizers) GTEST_SKIP() << "statistics over many sets";
   int covered = 0, count = 0;
   for (uint64_t seed = 0; seed < 25; ++seed) {

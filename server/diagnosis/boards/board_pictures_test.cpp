@@ -15,6 +15,7 @@
 
 #include "server/base/test_folder.h"
 #include "server/base/test_paths.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 
 namespace touchstone::diagnosis::boards {
@@ -164,6 +165,7 @@ double OpenCvUnseenSquares(const BoardSet& set, const OpenCvLens& lens, size_t p
 
 // The only pictures here that a real camera took.
 TEST(BoardPictures, RealPicturesNameRadialDistortionAndAgreeWithOpenCvsCalibration) {
+  TOUCHSTONE_SECOND_TIER("long: corners of a set of large pictures");
   const std::string folder = ChessboardFolder();
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there: OpenCV's chessboard pictures are needed";
   const absl::StatusOr<BoardSet> set = ReadBoardPictures(folder, {9, 6, 0.025});

@@ -58,8 +58,8 @@ double RmseAfter(const DiagnosisInput& input, const session::MeasurementFix& fix
 }
 
 // The command that fixes the file. The server may not know the file's name.
-std::string FixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set,
-                       const std::string& output = kFixedFile) {
+std::string TouchFixCommand(const session::MeasurementFix& fix, const session::MeasurementSet& set,
+                            const std::string& output = kFixedFile) {
   const bool plain = absl::EndsWith(set.origin, ".csv") &&
                      set.origin.find_first_of(" '\"$\\`;&|<>()*?!") == std::string::npos;
   return absl::StrCat("touchstone session fix ", plain ? set.origin : "SET.csv", " ",
@@ -126,7 +126,7 @@ class ProblemList {
     // Touches too scattered to be listed in a command.
     const bool in_part = mistake.part && fix.touches.empty();
     if (!in_part) {
-      problem.fix = FixCommand(fix, *input.set, output);
+      problem.fix = TouchFixCommand(fix, *input.set, output);
       problem.rmse_after_s = RmseAfter(input, fix, pool_);
       absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
                       TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
@@ -168,7 +168,7 @@ void ProblemList::AddDuplicates(const touches::Observations& o) {
            "touch %d); no rig repeats like that. Taken for repeats they make the noise look smaller and "
            "everything else too certain.",
            duplicates.rows, set.size(), set.touch[duplicates.example]),
-       FixCommand(fix, set), BeforeS(), RmseAfter(input_, fix, pool_)});
+       TouchFixCommand(fix, set), BeforeS(), RmseAfter(input_, fix, pool_)});
 }
 
 void ProblemList::AddSortedColumn(const TrialResult& before) {

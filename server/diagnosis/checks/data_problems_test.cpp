@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/spoilt_test_file.h"
 
@@ -179,6 +180,7 @@ TEST(DataProblems, AColumnThatWasSortedAloneIsTold) {
 }
 
 TEST(DataProblems, StrongPhysicsIsNoMistake) {
+  TOUCHSTONE_SECOND_TIER("statistical: every effect, several strengths");
   const std::vector<std::vector<std::pair<std::string, std::vector<std::string>>>> rigs = {
       {},
       {{"tip_radius", {"radius_mm=5"}}},

@@ -11,7 +11,7 @@ constexpr int kDark = 24, kBright = 250;  // grey levels between which a pixel t
 constexpr int kMinPixels = 50;
 constexpr double kMinTint = 0.05;         // mean log(red / blue) that is a colour
 constexpr double kMaxTintSpread = 0.5;    // of the tints of one order, relative to their mean
-constexpr int kMinPictures = 2;           // pictures of either order
+constexpr int kMinPicturesOfOrder = 2;    // pictures of either order
 constexpr size_t kMaxPictureRanges = 24;  // that a command can list
 
 // Mean log(red / blue) of what is neither dark nor clipped; NaN: grey, or too little of it.
@@ -36,7 +36,7 @@ double TintOf(const std::vector<double>& tints, bool red) {
     if (std::isnan(tint) || (tint > 0) != red) continue;
     sum += std::abs(tint), squares += tint * tint, ++count;
   }
-  if (count < kMinPictures) return NAN;
+  if (count < kMinPicturesOfOrder) return NAN;
   const double mean = sum / count, spread = std::sqrt(std::max(0.0, squares / count - mean * mean));
   return mean >= kMinTint && spread <= kMaxTintSpread * mean ? mean : NAN;
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/images/photo_test_set.h"
 #include "server/session/measurement_fix.h"
 
@@ -64,6 +65,7 @@ TEST(PhotoMistakes, MirroredAndTurnedPicturesAreFound) {
 }
 
 TEST(PhotoMistakes, AnotherCameraAndOtherLengthsAreFound) {
+  TOUCHSTONE_SECOND_TIER("repeated: five factors of lengths and of focal lengths");
   for (const double factor : {0.5, 2.0, 1.5}) {
     ImageSetFix focal;
     focal.scale_focal = factor;
@@ -129,6 +131,7 @@ TEST(PhotoMistakes, RadiansInTheModelAreFound) {
 }
 
 TEST(PhotoMistakes, StrongPhysicsIsNoMistake) {
+  TOUCHSTONE_SECOND_TIER("statistical: every effect of photographs");
   for (const images::NamedValues& hidden :
        std::vector<images::NamedValues>{{},
                                         {{"exposure", {"stops=1"}}},

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/design/view_candidates.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photo_test_set.h"
@@ -112,6 +113,7 @@ bool IsSureOf(const images::PhotographDiagnosis& diagnosis, const std::string& e
 }
 
 TEST(ProposePhotographs, FromAnotherDistanceTellFocalLengthFromCameraTranslation) {
+  TOUCHSTONE_SECOND_TIER("long: a proposal over many camera poses");
   if (kUnderSanitizers) GTEST_SKIP() << "two whole diagnoses";
   // The camera stands nearer than commanded: from one distance that looks like a longer lens, which takes fewer values.
   const NamedValues hidden = {{"camera_translation", {"offset_mm=0,0,6"}}};

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/distributions/pose_free_test_set.h"
 
 namespace touchstone::diagnosis::distributions {
@@ -15,6 +16,7 @@ std::vector<std::string> NamesOf(const std::vector<CompatibleEffect>& effects) {
 }
 
 TEST(PoseFree, UnderTheRightModelEveryPIsEquallyProbable) {
+  TOUCHSTONE_SECOND_TIER("statistical: a distribution over many sets");
   int below_tenth = 0, below_half = 0, energy_below_tenth = 0;
   const int sets = 40;
   for (int seed = 0; seed < sets; ++seed) {
@@ -49,6 +51,7 @@ TEST(PoseFree, ARightModelIsCompatible) {
 }
 
 TEST(PoseFree, AGrossErrorIsFoundWithWhatIsCompatibleAndNoCulpritIsNamed) {
+  TOUCHSTONE_SECOND_TIER("long: all permutations of a large set");
   const auto wrong =
       WedgeModel(std::string(kWedgeNoise) + "  - finger_length: {offset_mm: [1, -0.5, -0.5]}\n");
   int calls = 0;
@@ -70,6 +73,7 @@ TEST(PoseFree, AGrossErrorIsFoundWithWhatIsCompatibleAndNoCulpritIsNamed) {
 }
 
 TEST(PoseFree, PosesThatAreNotTheUsualOnesAreFittedNeitherBlamedNorInTheWayOfAnError) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   DiagnosisInput input = MakePoseFreeInput(WedgeModel(kWedgeNoise), 16, 2, 11, kWedgeNoise, 2, {0.6, 0.8});
   auto comparison = ComparePoseFree(input, {}, true);
   ASSERT_TRUE(comparison.ok()) << comparison.status();
@@ -133,6 +137,7 @@ TEST(PoseFree, AnObjectWithoutAMeshAndAWrongNumberOfFingersAreErrors) {
 }
 
 TEST(PoseFree, IsCancelledAtEveryStageAndGivesTheSameOnAnyNumberOfThreads) {
+  TOUCHSTONE_SECOND_TIER("long: a diagnosis per number of threads");
   const auto wrong = WedgeModel(std::string(kWedgeNoise) + "  - finger_length: {offset_mm: [2, -1, -1]}\n");
   const DiagnosisInput input = MakePoseFreeInput(wrong, 6, 3, 9);
   for (const char* at : {"simulating sets", "fitting the poses' spread", "trying effects"}) {

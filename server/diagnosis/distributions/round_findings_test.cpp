@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/distributions/pose_free_test_set.h"
 
 namespace touchstone::diagnosis::distributions {
@@ -44,6 +45,7 @@ DiagnosisInput Moved(DiagnosisInput input, const std::function<double(int row, i
 }
 
 TEST(FindInRounds, FindsNothingInNoise) {
+  TOUCHSTONE_SECOND_TIER("statistical: the rate of false findings over many sets");
   for (uint64_t seed = 0; seed < 60; ++seed) EXPECT_THAT(Found(InputWith("", seed)), IsEmpty()) << seed;
 }
 

@@ -49,7 +49,8 @@ class Host final : public Clock {
   void WaitOnce(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
                 Time until) const override {
     // A clock that stands just before `until` is not asked all the time.
-    changed.wait_for(lock, std::max<Duration>(until - Now(), followed.load() == nullptr ? Duration(0) : kLookAgain));
+    changed.wait_for(
+        lock, std::max<Duration>(until - Now(), followed.load() == nullptr ? Duration(0) : kLookAgain));
   }
 };
 
