@@ -122,7 +122,7 @@ TEST(ThreadPool, RunsNoMoreAtOnceWhenTasksWaitInTheirMiddle) {
   std::atomic<int> at_once{0}, most{0}, ended{0};
   {
     ThreadPool pool(2);
-    for (uint64_t stream = 0; stream < 20; ++stream)
+    for (uint64_t stream = 0; stream < 10; ++stream)
       for (int k = 0; k < 2; ++k)
         pool.Submit(
             [&] {
@@ -140,7 +140,7 @@ TEST(ThreadPool, RunsNoMoreAtOnceWhenTasksWaitInTheirMiddle) {
     // Most are in their middle when the pool is to end.
     while (ended == 0) std::this_thread::yield();
   }
-  EXPECT_EQ(ended, 40) << "a pool ends when all tasks have";
+  EXPECT_EQ(ended, 20) << "a pool ends when all tasks have";
   EXPECT_LE(most, 2);
 }
 
