@@ -16,6 +16,7 @@
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
 #include "client/source/dataset_manifest.h"
+#include "server/base/test_tier.h"
 #include "server/base/text.h"
 
 namespace touchstone::cli {
@@ -56,6 +57,7 @@ class ResumeTest : public RealBinaryTest, public ::testing::WithParamInterface<s
 };
 
 TEST_P(ResumeTest, KilledAtAnyMomentTheResultIsTheSameByteForByte) {
+  TOUCHSTONE_SECOND_TIER("repeated: kills at many moments");
   const Outcome whole = Run(Stream("whole"));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   const auto expected = Snapshot("whole");

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/diagnosis/checks/sampled_set.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
@@ -228,6 +229,7 @@ TEST(Diagnose, FindsTheTicksOfAPollingLoop) {
 }
 
 TEST(Diagnose, FindsHeavyTails) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of a large set");
   touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.rounds = 4;
@@ -238,6 +240,7 @@ TEST(Diagnose, FindsHeavyTails) {
 }
 
 TEST(Diagnose, FindsNoiseThatGrowsOnSlopes) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of a large set");
   touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.rounds = 4;
@@ -270,6 +273,7 @@ TEST(Diagnose, KeepsNoiseOfTheModelThatIsThere) {
 }
 
 TEST(Diagnose, ALoudFingerIsNoHeavyTail) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of a large set");
   touches::HiddenRig rig;
   rig.samples_per_face = 8;
   rig.rounds = 4;

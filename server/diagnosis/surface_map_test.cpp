@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/diagnosis/diagnose.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 #include "server/effects/surface_map.h"
 
@@ -101,6 +102,7 @@ TEST(SurfaceMapOfADiagnosis, KnowsTheSurfaceWithinItsStandardDeviation) {
 }
 
 TEST(SurfaceMapOfADiagnosis, LeavesNothingToFindOnItsOwnTouches) {
+  TOUCHSTONE_SECOND_TIER("long: two whole diagnoses");
   DiagnosisInput input = touches::MakeTestInput(BumpyRig());
   const report::Diagnosis report = DiagnoseWithMap(input);
   input.model = std::make_shared<const model::Model>(

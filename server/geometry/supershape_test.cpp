@@ -7,6 +7,7 @@
 #include <set>
 
 #include "server/base/test_paths.h"
+#include "server/base/test_tier.h"
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::geometry {
@@ -120,6 +121,7 @@ TEST(Supershape, AnyTessellationIsWellMade) {
 }
 
 TEST(Supershape, FourMillionTrianglesAreWellMade) {
+  TOUCHSTONE_SECOND_TIER("long: four million triangles");
   for (const char* name : {"lat00", "lat20"}) {
     SCOPED_TRACE(name);
     const TriangleMesh mesh = Named(name, kMaxSupershapeTriangles);

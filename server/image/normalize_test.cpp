@@ -16,6 +16,7 @@
 #include "server/base/random.h"
 #include "server/base/sanitizers.h"
 #include "server/base/test_paths.h"
+#include "server/base/test_tier.h"
 #include "server/geometry/mesh_file.h"
 #include "server/image/emulated_photograph.h"
 #include "server/image/encode.h"
@@ -117,6 +118,7 @@ void ExpectMasks(const EmulatedPlace& place, bool with_background) {
 }
 
 TEST_P(NormalizeEverywhere, FindsTheObjectAndNotItsShadow) {
+  TOUCHSTONE_SECOND_TIER("repeated: every object from every side");
   ExpectMasks(GetParam(), false);
 }
 

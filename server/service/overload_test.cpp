@@ -10,6 +10,7 @@
 
 #include "server/base/manual_clock.h"
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/image/encode.h"
 #include "server/service/server.h"
 #include "touchstone/v1/control.grpc.pb.h"
@@ -204,6 +205,7 @@ TEST_F(OverloadTest, WhatIsNoMessageIsRefusedAsSuch) {
 }
 
 TEST_F(OverloadTest, FilesOfEmptyLinesAndOfCommasTakeNoMemory) {
+  TOUCHSTONE_SECOND_TIER("long: files as large as a server takes");
   Start();
   const std::string header =
       "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,"

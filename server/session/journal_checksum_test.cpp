@@ -9,6 +9,7 @@
 
 #include "server/base/nan.h"
 #include "server/base/test_folder.h"
+#include "server/base/test_tier.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
 #include "server/session/journal.h"
@@ -154,6 +155,7 @@ class JournalChecksum : public ::testing::Test {
 };
 
 TEST_F(JournalChecksum, AFlippedBitGivesAnErrorThatNamesTheFileOrTheSameData) {
+  TOUCHSTONE_SECOND_TIER("repeated: every byte of a journal");
   Make(60);
   const auto whole = Everything(path_);
   ASSERT_TRUE(whole.ok()) << whole.status();

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "server/base/test_folder.h"
+#include "server/base/test_tier.h"
 #include "server/session/journal.h"
 
 namespace touchstone::session {
@@ -95,6 +96,7 @@ class JournalDamage : public ::testing::Test {
 }
 
 TEST_F(JournalDamage, NothingAcknowledgedIsLostOrDoubledByKillsAtRandomMoments) {
+  TOUCHSTONE_SECOND_TIER("repeated: kills at many moments");
   std::mt19937 random(20260131);
   std::map<std::string, TouchStage> acknowledged;  // the least that each touch must have reached
   int interrupted = 0;

@@ -39,6 +39,7 @@ const inference::ParameterEstimate* Find(const BoardDiagnosis& diagnosis, const 
 }
 
 TEST(BoardDiagnosis, ClaimsNothingWhereTheLensIsTheNominalOne) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   int claims = 0;
   for (uint64_t seed = 0; seed < (kUnderSanitizers ? 3 : 30); ++seed) {
     const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensVector::Zero(), 12, 0.2, 100 + seed));

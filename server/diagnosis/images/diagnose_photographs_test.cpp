@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/images/photo_test_set.h"
 
 namespace touchstone::diagnosis::images {
@@ -64,6 +65,7 @@ TEST(DiagnosePhotographs, DISABLED_FindsNothingInManySetsWhereNothingIsMissing) 
 }
 
 TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.unlisted = [](int, int column, int row, const image::Photo& photo, size_t) {
     const double x = (column - 0.65 * photo.width) / (0.12 * photo.width),
@@ -76,6 +78,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
 }
 
 TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.unlisted = [](int, int, int, const image::Photo& photo, size_t pixel) {
     if (!photo.mask[pixel]) return 0.0;
@@ -89,6 +92,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
 }
 
 TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.unlisted = [](int photograph, int, int, const image::Photo& photo, size_t pixel) {
     RandomStream random(5, RandomDomain::kTest, photograph);
@@ -100,6 +104,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
 }
 
 TEST(DiagnosePhotographs, NamesBothOfAPair) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.hidden = {{"camera_rotation", {"rotation_deg=0.3,-0.2,0.4"}}, {"exposure", {"stops=0.15"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
@@ -118,6 +123,7 @@ TEST(DiagnosePhotographs, NamesBothOfAPair) {
 // Smooth albedo holds nearly all of an exposure: beside it the lens's share of the error is small, and the whole
 // set of both was once called UNEXPLAINED.
 TEST(DiagnosePhotographs, NamesALensBesideAnExposureThatAlbedoCouldHold) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.photographs = 6;
   rig.side_px = 112;
@@ -135,6 +141,7 @@ TEST(DiagnosePhotographs, NamesALensBesideAnExposureThatAlbedoCouldHold) {
 }
 
 TEST(DiagnosePhotographs, TellsAnExposureFromAlbedoWhereTheGroundIsLitOrSurfacesShine) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   const std::vector<NamedValues> grounds = {{{"background_level", {"grey=40"}}},
                                             {{"specular", {"strength=0.4", "exponent=20"}}}};
   for (const auto& known : grounds) {
@@ -152,6 +159,7 @@ TEST(DiagnosePhotographs, TellsAnExposureFromAlbedoWhereTheGroundIsLitOrSurfaces
 
 // Black is 0.8 grey levels of clipped and rounded noise, not light of the ground.
 TEST(DiagnosePhotographs, FindsTheFaintLightOfABlackGround) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.hidden = {{"background_level", {"grey=0.2"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
@@ -163,6 +171,7 @@ TEST(DiagnosePhotographs, FindsTheFaintLightOfABlackGround) {
 }
 
 TEST(DiagnosePhotographs, NamesAPoseThatDiffersFromObjectToObject) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.hidden_on["lat00"] = {{"object_pose", {"translation_mm=1,0.5,0", "rotation_deg=0,0,1"}}};
   rig.hidden_on["lat10"] = {{"object_pose", {"translation_mm=-0.5,1,0", "rotation_deg=0,0,-0.5"}}};
@@ -172,6 +181,7 @@ TEST(DiagnosePhotographs, NamesAPoseThatDiffersFromObjectToObject) {
 }
 
 TEST(DiagnosePhotographs, GivesAnEffectOfTheModelItsRightValue) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
   rig.known = {{"exposure", {"stops=0.2"}}};
   DiagnosisInput input = MakePhotoInput(rig);

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photo_term_scores.h"
 #include "server/diagnosis/images/photo_test_set.h"
@@ -65,6 +66,7 @@ TEST(SuggestForRest, FindsBandsAcrossThePicture) {
 }
 
 TEST(SuggestForRest, GivesACurveForARing) {
+  TOUCHSTONE_SECOND_TIER("long: every curve and formula over all pixels");
   HiddenCamera rig = SmallRig();
   rig.unlisted = [&](int, int column, int row, const image::Photo&, size_t) {
     const double radius = std::hypot(column + 0.5 - 0.5 * rig.side_px, row + 0.5 - 0.5 * rig.side_px) /
@@ -82,6 +84,7 @@ TEST(SuggestForRest, GivesACurveForARing) {
 }
 
 TEST(SuggestForRest, NamesNoFormulaForDirtOnTheLens) {
+  TOUCHSTONE_SECOND_TIER("long: every curve and formula over all pixels");
   HiddenCamera rig = SmallRig();
   rig.unlisted = [&](int, int column, int row, const image::Photo& photo, size_t pixel) {
     double shade = 0;
@@ -127,6 +130,7 @@ TEST(ScoreSums, SeeWhereOneObjectDisagrees) {
 }
 
 TEST(RankPhotoCandidates, PutTheHiddenEffectFirst) {
+  TOUCHSTONE_SECOND_TIER("repeated: every effect of photographs");
   HiddenCamera rig = SmallRig();
   rig.hidden = {{"exposure", {"stops=0.2"}}};
   const DiagnosisInput input = MakePhotoInput(rig);

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/joint/joint_test_set.h"
 
 namespace touchstone::diagnosis::joint {
@@ -55,6 +56,7 @@ const images::NamedValues kAskew = {
     {"object_pose", {"translation_mm=0.4,-0.3,0.2", "rotation_deg=0.3,0.2,-0.4"}}};
 
 TEST(SharedEffects, ObjectPutDownAskewIsFoundByBothAndTighterThanByEither) {
+  TOUCHSTONE_SECOND_TIER("long: three whole diagnoses of pictures");
   const SharedEffects found = Found(WithHidden(kAskew));
   ASSERT_EQ(found.steps.size(), 1u);
   EXPECT_TRUE(found.conflicts.empty());
@@ -107,6 +109,7 @@ TEST(SharedEffects, SagOfTheToolIsNotToldAsAShiftOfTheObjects) {
 }
 
 TEST(SharedEffects, ShiftOfTheObjectsIsNotToldAsASagAndACamera) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures and touches");
   const SharedEffects of_objects = Found(WithHidden({{"object_pose", {"translation_mm=0,0,0.5"}}}));
   // A camera that stands lower shows nearly the same: a sag and a camera may be named beside, and no sag alone.
   ASSERT_EQ(of_objects.steps.size() + of_objects.undecided.size(), 1u);
@@ -115,6 +118,7 @@ TEST(SharedEffects, ShiftOfTheObjectsIsNotToldAsASagAndACamera) {
 }
 
 TEST(SharedEffects, SagAndACameraOfAnotherSizeAreNoShiftOfTheObjects) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures and touches");
   if (kUnderSanitizers) GTEST_SKIP() << kSamePath;
   HiddenSession session = WithHidden({});
   session.rig.hidden = {{"gravity_sag", {"drop_mm=0.5"}}};
@@ -123,6 +127,7 @@ TEST(SharedEffects, SagAndACameraOfAnotherSizeAreNoShiftOfTheObjects) {
 }
 
 TEST(SharedEffects, ScaleOfTheModelIsPutRightByBoth) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures and touches");
   if (kUnderSanitizers) GTEST_SKIP() << kSamePath;
   HiddenSession session = WithHidden({});
   JointInputs inputs = MakeInputs(session);
@@ -138,6 +143,7 @@ TEST(SharedEffects, ScaleOfTheModelIsPutRightByBoth) {
 }
 
 TEST(SharedEffects, ConflictIsSaidAndNotAveraged) {
+  TOUCHSTONE_SECOND_TIER("long: three whole diagnoses of pictures");
   HiddenSession session = WithHidden({});
   session.rig.hidden = {{"object_pose", {"translation_mm=0.8,0,0"}}};
   session.camera.hidden = {{"object_pose", {"translation_mm=0,0.8,0"}}};

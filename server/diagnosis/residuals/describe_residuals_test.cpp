@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
@@ -80,6 +81,7 @@ TEST(DescribeResiduals, SaysTheSameTwice) {
 }
 
 TEST(DescribeResiduals, ShowsAPartOfManyTouches) {
+  TOUCHSTONE_SECOND_TIER("long: a hundred thousand touches");
   const touches::SyntheticSet set(5, 1000, 12, touches::kSyntheticSigmaS, 8);
   const ResidualSummary summary = Describe(set);
   EXPECT_EQ(summary.parity.size(), 2000u);

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis::selection {
@@ -29,6 +30,7 @@ TEST(CurveCompetition, ADriftKeepsItsName) {
 }
 
 TEST(CurveCompetition, AStepOfOneFingerIsNoDriftAndNoLength) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   for (const char* mm : {"0,0.06", "0,0.2"}) {
     const SelectionResult result =
         ResultFor("lookup", {"name=step", "adds=travel_mm", "covariate=session_time_s", "knots=1199,1200",
@@ -47,6 +49,7 @@ TEST(CurveCompetition, ALengthKeepsItsName) {
 }
 
 TEST(CurveCompetition, AWanderIsNoiseWithMemory) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   const SelectionResult result = ResultFor("correlated_noise", {"sigma_us=6000", "time_s=200"});
   ASSERT_TRUE(result.memory);
   EXPECT_NEAR(result.memory->sigma_s.value, 0.006, 5 * result.memory->sigma_s.std_error);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis::selection {
@@ -38,6 +39,7 @@ TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
 
 // More touches than the search takes in: what fewer of them show must not be lost.
 TEST(SelectExplanation, FindsADriftInAnyNumberOfRepeats) {
+  TOUCHSTONE_SECOND_TIER("repeated: one to many repeats");
   double std_error = INFINITY;
   for (const int rounds : {14, 50}) {  // 1,008 and 3,600 touches
     SCOPED_TRACE(rounds);

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "server/base/random.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis::selection {
@@ -64,6 +65,7 @@ TEST(SurfaceSupport, IsGivenByBumps) {
 }
 
 TEST(SurfaceSupport, IsNotGivenByErrorsOfPosesThatSteepFacesEnlarge) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   touches::HiddenRig rig = PrintedRig();
   const auto tangent = [](double cosine) { return std::sqrt(1 / std::max(cosine * cosine, 0.04) - 1); };
   const auto alike = [](double) { return 1.0; };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "server/base/test_tier.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::touches {
@@ -39,6 +40,7 @@ TEST(FindNoise, MeasuresPlainNoiseAndClaimsNothingElse) {
 }
 
 TEST(FindNoise, MeasuresHeavyTails) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   std::mt19937_64 random(2);
   std::student_t_distribution<double> student(3);
   const inference::NoiseFindings found = FindIn([&](double) { return kSigma * student(random); });
@@ -57,6 +59,7 @@ TEST(FindNoise, MeasuresNoiseThatGrowsOnSlopes) {
 }
 
 TEST(FindNoise, TellsOutliersFromHeavyTails) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal(0, kSigma);
   int drawn = 0;
@@ -156,6 +159,7 @@ TEST(FindNoise, OneLoudFingerIsNoHeavyTail) {
 }
 
 TEST(FindNoise, HeavyTailsAreNoLoudFinger) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   for (const uint64_t seed : {10, 11, 12}) {
     std::mt19937_64 random(seed);
     std::student_t_distribution<double> student(2.5);
@@ -230,6 +234,7 @@ TEST(FindNoise, CannotSayThatTicksFinerThanTheFileAreNotThere) {
 
 // A sigma from a part of the readings with the error of all of them refits models that are right.
 TEST(FindNoise, TheErrorOfSigmaIsThatOfTheReadingsItComesFrom) {
+  TOUCHSTONE_SECOND_TIER("statistical: several sets");
   double squares = 0;
   constexpr int kSets = 12;
   for (int j = 0; j < kSets; ++j) {

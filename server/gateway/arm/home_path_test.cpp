@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "server/base/test_tier.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/motion_planner.h"
 
@@ -106,6 +107,7 @@ constexpr int kSpots = 1, kSides = 2;
 #endif
 
 TEST(HomePath, LeadsHomeFromEveryTouchEveryStopAndEveryFace) {
+  TOUCHSTONE_SECOND_TIER("repeated: both arms, all faces, every stop");
   for (const std::string model : {"ur3", "ur3e"}) {
     Tally tally;
     int touches = 0, possible = 0;
@@ -150,6 +152,7 @@ TEST(HomePath, LeadsHomeFromEveryTouchEveryStopAndEveryFace) {
 
 // Photographs from all round, one after the other, as `rig photos --turns` takes them.
 TEST(HomePath, LeadsHomeFromEveryPhotograph) {
+  TOUCHSTONE_SECOND_TIER("repeated: both arms, all views");
   for (const std::string model : {"ur3", "ur3e"}) {
     Tally tally;
     int possible = 0;

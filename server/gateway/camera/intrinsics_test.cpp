@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/test_paths.h"
+#include "server/base/test_tier.h"
 #include "server/gateway/camera/camera.h"
 
 namespace touchstone::gateway::camera {
@@ -163,6 +164,7 @@ bool FindCorners(const cv::Mat& grey, const cv::Size& board, std::vector<cv::Poi
 }
 
 TEST(Rectify, StraightensTheRowsOfARealChessboard) {
+  TOUCHSTONE_SECOND_TIER("long: corners of large pictures");
   const std::string folder = SharedData() + "/camera/opencv_chessboard";
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << folder << " is missing";
   const cv::Size board(9, 6);

@@ -10,6 +10,7 @@
 
 #include "server/base/random.h"
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 
 namespace touchstone::gateway::timing {
 namespace {
@@ -68,6 +69,7 @@ TEST(ClockSync, KnowsNothingBeforeTheFirstMessage) {
 }
 
 TEST(ClockSync, FindsTheOffsetUnderFiveMillisecondsOfJitter) {
+  TOUCHSTONE_SECOND_TIER("statistical: many runs of an hour of heartbeats");
   for (const double drift_ppm : {-200.0, -100.0, 0.0, 100.0, 200.0}) {
     if (kUnderSanitizers && drift_ppm != 100) continue;
     for (const double jitter_s : {0.0, 0.001, 0.005}) {
@@ -146,6 +148,7 @@ TEST(ClockSync, TellsItsUncertaintyHonestly) {
 }
 
 TEST(ClockSync, FollowsAClockThatWarms) {
+  TOUCHSTONE_SECOND_TIER("long: hours of heartbeats");
   if (kUnderSanitizers) GTEST_SKIP() << "statistics; other builds look at them";
   for (const double change : {-1.0, 1.0}) {
     Line line;
