@@ -150,7 +150,8 @@ TEST_F(Safety, AProgramThatWasJustSentDoesNotBeginAfterAStop) {
     WaitForRest();
     WaitForRigTime(2);
     EXPECT_FALSE(emulator_->controller().Moving()) << "it began after the stop, try " << k;
-    ASSERT_TRUE(Reset().ok());
+    // Refused while a stop is still being carried out; a person asks again.
+    WaitUntil([&] { return Reset().ok(); }, "the stop is released");
   }
   ExpectEveryResultIsItsOwnTouch();
 }
