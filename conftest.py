@@ -40,6 +40,9 @@ def pytest_configure(config):
     # Of pytest-xdist, which may not be there.
     config.addinivalue_line("markers", "xdist_group(name): tests that run in the same process")
     config.stash[_COUNTS] = collections.Counter()
+    if hasattr(config, "workerinput"):
+        # Each worker has a core, and programs that it starts; threads of matrix products that wait for one another do not fit.
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
     # For programs that tests start, and for touchstone.connect() without an address.
     os.environ.setdefault("TOUCHSTONE_SERVER", str(config.rootpath / "build/release/bin/touchstone-server"))
     path = os.environ.get("TOUCHSTONE_TEST_TIMES")

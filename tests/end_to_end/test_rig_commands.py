@@ -160,7 +160,7 @@ def session(rig, plan, tmp_path_factory):
             process.send_signal(signal.SIGCONT)
             if interrupt:
                 break
-            time.sleep(0.005)
+            time.sleep(0.05)  # a fifth of a touch
         process.communicate(timeout=PATIENCE_S)
         assert process.returncode != 0, "it was done before it could be interrupted"
         if signal_number == signal.SIGINT:  # Ctrl-C stops the rig, which holds

@@ -1,6 +1,6 @@
 // A graphics device that is reset or gone while a program draws: preloaded into it (LD_PRELOAD), this answers for the driver
 // where OpenGL and EGL tell of it. The driver is a real one. A file of two 32-bit numbers, which TOUCHSTONE_LOST_DEVICE names, says how many resets are
-// still to be told, and whether the device is gone (no new context).
+// still to be told, and whether the device is gone (no new context). A context that is refused tells of all resets.
 #include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
@@ -53,7 +53,9 @@ GLenum ResetStatus() {
 }
 
 EGLContext CreateContext(EGLDisplay display, EGLConfig config, EGLContext share, const EGLint* attributes) {
-  return device->gone != 0 ? EGL_NO_CONTEXT : create_context.Call(display, config, share, attributes);
+  if (device->gone == 0) return create_context.Call(display, config, share, attributes);
+  device->resets = 0;
+  return EGL_NO_CONTEXT;
 }
 
 __attribute__((constructor)) void Begin() {
