@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/diagnosis/checks/sampled_set.h"
 #include "server/base/test_tier.h"
+#include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"

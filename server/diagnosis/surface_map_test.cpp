@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "server/diagnosis/diagnose.h"
 #include "server/base/test_tier.h"
+#include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 #include "server/effects/surface_map.h"
 
