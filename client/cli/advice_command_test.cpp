@@ -12,6 +12,7 @@
 
 #include "client/cli/real_binary_test.h"
 #include "server/base/test_paths.h"
+#include "server/base/test_tier.h"
 
 namespace touchstone::cli {
 namespace {
@@ -36,6 +37,7 @@ class AdviceCommand : public RealBinaryTest {
 };
 
 TEST_F(AdviceCommand, ACurveOrFormulaIsAddedAndItsErrorFoundAgain) {
+  TOUCHSTONE_SECOND_TIER("long: whole diagnoses of three sets");
   for (const std::string name : {"outside_periodic", "outside_incidence_wave", "unlisted"}) {
     SCOPED_TRACE(name);
     const std::string set = absl::StrCat(kMeasurements, "/", name, ".csv");
@@ -62,6 +64,7 @@ TEST_F(AdviceCommand, WithFormulaNeedsAModelToWrite) {
 }
 
 TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
+  TOUCHSTONE_SECOND_TIER("repeated: a diagnosis per mistake");
   for (const std::string name : {"outside_fingers_permuted", "outside_objects_swapped"}) {
     SCOPED_TRACE(name);
     const nlohmann::json before = Diagnose(absl::StrCat(kMeasurements, "/", name, ".csv"));

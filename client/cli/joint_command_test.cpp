@@ -12,6 +12,7 @@
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/joint/joint_test_set.h"
 #include "server/geometry/mesh_file.h"
 #include "server/session/image_set_file.h"
@@ -82,6 +83,7 @@ const nlohmann::json& StepOf(const nlohmann::json& report, const std::string& ef
 }
 
 TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
+  TOUCHSTONE_SECOND_TIER("long: whole diagnoses of pictures and touches");
   WriteSession("session", Askew());
   const nlohmann::json report = Report({"diagnose", "session", "--model", "nominal.yaml", "--save-model",
                                         "better.yaml", "--html", "report.html"});

@@ -10,6 +10,7 @@
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/images/photo_test_set.h"
 #include "server/geometry/mesh_file.h"
 #include "server/session/image_set_file.h"
@@ -97,6 +98,7 @@ TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
 }
 
 TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
+  TOUCHSTONE_SECOND_TIER("repeated: a diagnosis per mistake");
   if (kUnderSanitizers) GTEST_SKIP() << "dozens of starts of a program";
   WriteSet("photos", Small());
   int number = 0;
