@@ -7,6 +7,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/service/access_options.h"
 #include "server/service/gateway_options.h"
 #include "server/service/option_table.h"
 #include "server/service/resources.h"
@@ -155,6 +156,11 @@ absl::Status Resolve(const RawGatewayFlags& raw, GatewayFlags* flags) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.spacing_mm, 1, 1000, "effector.spacing_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.max_overtravel_mm, 0.1, 1000, "effector.max_overtravel_mm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.time_scale, 1e-3, 1e5, "time_scale"));
+  // Limits of time before a real arm are those of a clock that nothing holds up.
+  if (!o.emulated_clock.empty() && !IsLocalAddress(absl::StrCat(o.arm.address, ":1")))
+    return absl::InvalidArgumentError(
+        absl::StrCat("emulated_clock is for an emulated rig on this machine, but arm.address is '",
+                     o.arm.address, "': leave emulated_clock out before a real arm"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.silence_s, 0.05, 60, "arm.silence_s"));
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(o.arm.watchdog_hz, 0.1, 50, "arm.watchdog_hz"));
   if (raw.sensor.size() > 1 && static_cast<int>(raw.sensor.size()) != raw.fingers)

@@ -40,6 +40,17 @@ class RigAccess : public PhysicalTest {
   std::map<Role, std::string> tokens_;
 };
 
+TEST(GatewayOptions, AnEmulatedClockIsRefusedBeforeAnArmOnAnotherMachine) {
+  const auto parse = [](const char* address) {
+    const char* argv[] = {"touchstone-gateway", "--emulated-clock", "clock", "--arm-address", address};
+    return service::ParseGatewayFlags(sizeof argv / sizeof *argv, argv).status();
+  };
+  EXPECT_TRUE(parse("127.0.0.1").ok()) << parse("127.0.0.1");
+  EXPECT_EQ(parse("192.168.0.10").code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(parse("192.168.0.10").message(),
+              testing::HasSubstr("'192.168.0.10': leave emulated_clock out"));
+}
+
 TEST_F(RigAccess, EveryMethodTakesItsRoleAndRefusesEachLowerOne) {
   StartAsking();
   for (const service::MethodRole& row : service::MethodRoles()) {
