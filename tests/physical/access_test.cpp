@@ -42,7 +42,8 @@ class RigAccess : public PhysicalTest {
 
 TEST(GatewayOptions, AnEmulatedClockIsRefusedBeforeAnArmOnAnotherMachine) {
   const auto parse = [](const char* address) {
-    const char* argv[] = {"touchstone-gateway", "--emulated-clock", "clock", "--arm-address", address};
+    const char* argv[] = {"touchstone-gateway", "--emulated-clock", "clock", "--arm-address", address,
+                          "--effector-port",    "/dev/ttyACM0"};
     return service::ParseGatewayFlags(sizeof argv / sizeof *argv, argv).status();
   };
   EXPECT_TRUE(parse("127.0.0.1").ok()) << parse("127.0.0.1");
