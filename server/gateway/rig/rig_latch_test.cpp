@@ -1,5 +1,6 @@
 // What closes the latch of Stop, and what goes out while it is closed, with an arm and an end effector that a test
 // moves by hand.
+#include <absl/cleanup/cleanup.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -304,9 +305,15 @@ TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
       return absl::OkStatus();
     });
   });
+  // The motion ends with the test, also where an assertion ends it.
+  const absl::Cleanup end = [&] {
+    hang = false;
+    rig_->Stop("the test is over", "ana");
+  };
   ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
   // They come while it moves, for longer than one permit.
   for (double passed_s = 0; passed_s < 2 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS) {
+    AwaitThreads();
     const int heartbeats = arm_->heartbeats;
     clock_.Advance(Heartbeats::kPeriodS);
     ASSERT_TRUE(WaitFor([&] { return arm_->heartbeats > heartbeats; })) << passed_s << " s later";
