@@ -22,6 +22,7 @@ class GatewayPhotographs : public PhysicalTest {
   void StartEmulator() {
     StartRig([](rig::EmulatorOptions* options) {
       options->camera_width = kWidth, options->camera_height = kHeight;
+      options->speedup = kSpeedupWithCamera;
     });
   }
   struct Picture {
@@ -148,7 +149,8 @@ TEST_F(GatewayPhotographs, AreNotTakenOnAFullDiskAndStandBesideTheTouchesOfTheir
   }
   EXPECT_EQ(emulator_->controller().Count("programs"), programs) << "nothing moves that cannot be kept";
   EXPECT_EQ(Kept(), 1u);
-  ASSERT_TRUE(Capture(lease.token(), 0.02).status.ok());
+  const Picture after = Capture(lease.token(), 0.02);
+  ASSERT_TRUE(after.status.ok()) << after.status.error_message();
 
   // A touch of the same session: one export, for a joint diagnosis, on one clock.
   v1::TouchRequest request;
