@@ -177,10 +177,13 @@ def find(tree):
     for test in json.loads(listed)["tests"]:
         properties = {entry["name"]: entry["value"] for entry in test.get("properties", [])}
         more = dict(pair.split("=", 1) for pair in properties.get("ENVIRONMENT", []) if pair and not pair.startswith("GTEST_"))
-        command, second_tier = test["command"], "second_tier" in properties.get("LABELS", [])
+        # What is not built has no command.
+        command, second_tier = test.get("command"), "second_tier" in properties.get("LABELS", [])
+        if command is None:
+            continue
         # Shards are one suite.
         key = (*command, *sorted(more.items()))
-        if key in known or not pathlib.Path(command[0]).exists():
+        if key in known:
             continue
         known.add(key)
         name = test["name"]
