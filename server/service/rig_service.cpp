@@ -12,6 +12,7 @@
 #include "server/service/call_guard.h"
 #include "server/service/convert.h"
 #include "server/session/base_pose.h"
+#include "server/source/request_checks.h"
 
 namespace touchstone::service {
 namespace {
