@@ -18,7 +18,9 @@ TEST(Pieces, HoldEveryNumberOnce) {
     });
     EXPECT_EQ(std::count(times.begin(), times.end(), 1), static_cast<int64_t>(count));
     EXPECT_LE(calls, 8);
-    if (count < 65536) EXPECT_EQ(calls, 1) << "a small mesh is not worth a thread";
+    if (count < 65536) {
+      EXPECT_EQ(calls, 1) << "a small mesh is not worth a thread";
+    }
   }
 }
 

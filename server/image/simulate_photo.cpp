@@ -21,6 +21,13 @@
 #include "server/image/shading_mesh.h"
 
 namespace touchstone::image {
+// Where the pixels look, which costs a few Newton steps each where the lens distorts: photographs through one lens
+// share it, also those of other threads.
+struct LensView {
+  PixelSlopes slopes;
+  bool sees = false;
+};
+
 namespace {
 
 std::shared_ptr<const ShadingMesh> SharedShadingMesh(
@@ -48,13 +55,6 @@ StageKey KeyOfPoints(const PhotoCamera& camera, const StageKey& lens) {
   key.insert(key.end(), {camera.near_m, camera.far_m, camera.scale});
   return key;
 }
-
-// Where the pixels look, which costs a few Newton steps each where the lens distorts: photographs through one lens
-// share it, also those of other threads.
-struct LensView {
-  PixelSlopes slopes;
-  bool sees = false;
-};
 
 class LensViewCache {
  public:

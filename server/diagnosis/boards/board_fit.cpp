@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 
 #include <absl/strings/str_cat.h>
+
+#include "server/base/decompositions.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
@@ -83,29 +86,30 @@ void Step(const std::vector<PictureEquations>& equations, const std::vector<doub
   const int count = static_cast<int>(free.size());
   Eigen::MatrixXd left = Eigen::MatrixXd::Zero(count, count);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(count), diagonal = Eigen::VectorXd::Zero(count);
-  std::vector<Eigen::LDLT<Matrix6>> solvers(equations.size());
+  std::vector<std::optional<SymmetricSolver>> solvers(equations.size());
   for (size_t i = 0; i < equations.size(); ++i) {
     if (weights[i] == 0) continue;
     Matrix6 damped = equations[i].pose;
     damped.diagonal() *= 1 + damping;
-    solvers[i].compute(damped);
+    solvers[i].emplace(damped);
     if (count == 0) continue;  // poses alone
-    left += weights[i] * (equations[i].lens -
-                          equations[i].lens_pose * solvers[i].solve(equations[i].lens_pose.transpose()));
+    left +=
+        weights[i] * (equations[i].lens -
+                      equations[i].lens_pose * solvers[i]->SolveColumns(equations[i].lens_pose.transpose()));
     right += weights[i] *
-             (equations[i].lens_right - equations[i].lens_pose * solvers[i].solve(equations[i].pose_right));
+             (equations[i].lens_right - equations[i].lens_pose * solvers[i]->Solve(equations[i].pose_right));
     diagonal += weights[i] * equations[i].lens.diagonal();
   }
   Eigen::VectorXd step = Eigen::VectorXd::Zero(count);
   if (count > 0) {
     left.diagonal() += damping * diagonal;
-    step = left.ldlt().solve(right);
+    step = SymmetricSolver(left).Solve(right);
   }
   for (int k = 0; k < count; ++k) fit->lens[free[k]] += step[k];
   for (size_t i = 0; i < equations.size(); ++i) {
     if (weights[i] == 0) continue;
     const Vector6 pose_right = equations[i].pose_right - equations[i].lens_pose.transpose() * step;
-    fit->poses[i] = Moved(fit->poses[i], solvers[i].solve(pose_right));
+    fit->poses[i] = Moved(fit->poses[i], solvers[i]->Solve(pose_right));
   }
 }
 
@@ -159,16 +163,16 @@ bool Homography(const BoardSet& set, int picture, Eigen::Matrix3d* homography) {
     rows.row(2 * corner) << from.x(), from.y(), 1, 0, 0, 0, -x * from.x(), -x * from.y(), -x;
     rows.row(2 * corner + 1) << 0, 0, 0, from.x(), from.y(), 1, -y * from.x(), -y * from.y(), -y;
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullV);
-  if (!(svd.singularValues()[7] > 1e-9 * svd.singularValues()[0])) return false;
-  const Eigen::VectorXd h = svd.matrixV().col(8);
+  const SingularValues svd = SingularValuesOf(rows);
+  if (!(svd.values[7] > 1e-9 * svd.values[0])) return false;
+  const Eigen::VectorXd h = svd.v.col(8);
   Eigen::Matrix3d scaled, back;
   scaled << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8];
   back << 1 / size, 0, -middle.x() / size, 0, 1 / size, -middle.y() / size, 0, 0, 1;
   *homography = scaled * back;
   // A board that is seen as a line, or a picture of nothing.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> shape(scaled);
-  return shape.singularValues()[2] > 1e-6 * shape.singularValues()[0];
+  const Eigen::VectorXd shape = SingularValuesOf(scaled).values;
+  return shape[2] > 1e-6 * shape[0];
 }
 
 }  // namespace
@@ -185,9 +189,9 @@ absl::StatusOr<BoardFit> StartFit(const BoardSet& set) {
     if (h(2, 2) < 0) scale = -scale;  // before the camera
     Eigen::Matrix3d axes;
     axes << scale * h.col(0), scale * h.col(1), (scale * h.col(0)).cross(scale * h.col(1));
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const SingularValues svd = SingularValuesOf(axes);
     BoardPose pose;
-    pose.rotation = svd.matrixU() * svd.matrixV().transpose();
+    pose.rotation = svd.u * svd.v.transpose();
     pose.translation_m = scale * h.col(2);
     fit.poses.push_back(pose);
   }

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
@@ -216,7 +217,7 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
                                                      "gamma"};
   if (kUnderSanitizers && kOfEachStage.count(GetParam().effect) == 0)
     GTEST_SKIP() << "under sanitizers one effect of each stage is enough";
-  if (GetParam().effect != "exposure" && GetParam().effect != "gamma")
+  if (const std::string_view effect = GetParam().effect; effect != "exposure" && effect != "gamma")
     TOUCHSTONE_SECOND_TIER("repeated: every effect of photographs, hidden one at a time");
   HiddenCamera rig;
   rig.hidden = {{GetParam().effect, GetParam().values}};

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/symmetric_eigen.h"
+#include "server/base/decompositions.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,11 +1,10 @@
 #include "server/diagnosis/inference/held_out.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "server/base/decompositions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::inference {
@@ -144,7 +143,7 @@ Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& inner, const Eigen::VectorXd&
       b[i] = left[free[i]];
       for (int j = 0; j < n; ++j) a(i, j) = inner(free[i], free[j]);
     }
-    const Eigen::VectorXd x = a.ldlt().solve(b);
+    const Eigen::VectorXd x = SymmetricSolver(a).Solve(b);
     int out = -1;
     for (int i = 0; i < n && out < 0; ++i) {
       const FreeParameter& c = fit.model.parameters()[free[i]];

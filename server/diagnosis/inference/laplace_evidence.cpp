@@ -1,11 +1,9 @@
 #include "server/diagnosis/inference/laplace_evidence.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/symmetric_eigen.h"
+#include "server/base/decompositions.h"
 
 namespace touchstone::diagnosis::inference {
 namespace {
@@ -46,7 +44,7 @@ Minimum Minimise(const Eigen::MatrixXd& gram, const std::vector<int>& members,
       const double scale = parameters[m.free[i]].scale;
       a(i, i) += kRidge * sigma_squared / (scale * scale) + 1e-300;
     }
-    const Eigen::VectorXd x = a.ldlt().solve(b);
+    const Eigen::VectorXd x = SymmetricSolver(a).Solve(b);
     int out = -1;
     double bound_step = 0;
     for (int i = 0; i < n && out < 0; ++i) {
@@ -107,7 +105,7 @@ Eigen::MatrixXd CovarianceOf(const Eigen::MatrixXd& information, const std::vect
   Eigen::MatrixXd ridged(n, n);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) ridged(i, j) = information(i, j) + (i == j ? kRidge : 0);
-  const Eigen::MatrixXd inverse = ridged.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd inverse = SymmetricSolver(ridged).SolveColumns(Eigen::MatrixXd::Identity(n, n));
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
       covariance(free[i], free[j]) = inverse(i, j) * parameters[free[i]].scale * parameters[free[j]].scale;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/decompositions.h"
 #include "server/base/matern.h"
-#include "server/base/symmetric_eigen.h"
 #include "server/diagnosis/inference/support_points.h"
 
 namespace touchstone::diagnosis::inference {
@@ -269,7 +269,7 @@ Eigen::MatrixXd Likelihood::FieldLeftOut(const Eigen::MatrixXd& columns, int s,
       Eigen::MatrixXd rest = -left_out.transpose() * left_out;
       rest.diagonal().array() += energies.array() + precision;
       const Eigen::MatrixXd kept = all - left_out.transpose() * values;
-      const Eigen::MatrixXd weights = rest.ldlt().solve(kept);
+      const Eigen::MatrixXd weights = SymmetricSolver(rest).SolveColumns(kept);
       own_grams[fold] -= kept.transpose() * weights;
       const Eigen::MatrixXd field = left_out * weights;
       for (int m = 0; m < count; ++m) expected.row(first + members[m]) = field.row(m);

@@ -1,10 +1,10 @@
 #include "server/diagnosis/selection/held_out_curve.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "server/base/decompositions.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -44,7 +44,7 @@ double HeldOutBeside(const inference::Experiment& experiment, const touches::Tou
     for (size_t j = 0; j < out.size(); ++j) xo.row(j) = x.row(out[j]), ro[j] = r[out[j]];
     if (p + m > 0) {
       const Eigen::MatrixXd kept = whole - xo.transpose() * xo;
-      ro -= xo * kept.ldlt().solve(whole_r - xo.transpose() * ro);
+      ro -= xo * SymmetricSolver(kept).Solve(whole_r - xo.transpose() * ro);
     }
     squares += ro.squaredNorm();
   }

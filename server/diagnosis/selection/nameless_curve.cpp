@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/base/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/inference/laplace_evidence.h"
 #include "server/diagnosis/selection/held_out_curve.h"
@@ -195,12 +196,12 @@ class CurveScorer {
     if (p > 0) {
       Eigen::MatrixXd jj = gram.block(1, 1, p, p);
       for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
-      const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
-      const Eigen::VectorXd own = solver.solve(gram.block(1, 0, p, 1));
+      const SymmetricSolver solver(jj);
+      const Eigen::VectorXd own = solver.SolveColumns(gram.block(1, 0, p, 1));
       q -= gram.block(1, 0, p, 1).col(0).dot(own);
       if (m > 0) {
         const Eigen::MatrixXd cross = gram.block(1, 1 + p, p, m);
-        a -= cross.transpose() * solver.solve(cross);
+        a -= cross.transpose() * solver.SolveColumns(cross);
         b -= cross.transpose() * own;
       }
     }

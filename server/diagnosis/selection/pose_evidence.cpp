@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/symmetric_eigen.h"
+#include "server/base/decompositions.h"
 #include "server/effects/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {

@@ -1,12 +1,12 @@
 #include "server/diagnosis/selection/round_structure.h"
 
 #include <absl/strings/str_format.h>
-#include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/decompositions.h"
 #include "server/base/distributions.h"
 #include "server/base/random.h"
 #include "server/base/readable_time.h"
@@ -111,16 +111,16 @@ void AddObject(const touches::Observations& o, const touches::Prediction& d,
         PoseColumns(o, d, k);
   }
   const int repeats = CentrePoses(object, o.fingers, &rows);
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(rows.rightCols(values));
+  const ColumnSpan span(rows.rightCols(values));
   const double dof = static_cast<double>(repeats) * (o.fingers - 1);
-  if (dof < static_cast<double>(solver.rank()) + kMinRoundDegrees) return;
-  const Eigen::VectorXd moved = solver.solve(rows.col(0));  // the least: about the mean of the rounds
-  const Eigen::MatrixXd basis = solver.householderQ() * Eigen::MatrixXd::Identity(n, solver.rank());
+  if (dof < static_cast<double>(span.rank()) + kMinRoundDegrees) return;
+  const Eigen::VectorXd moved = span.Solve(rows.col(0));  // the least: about the mean of the rounds
+  const Eigen::MatrixXd basis = span.Basis();
   squares->fits.push_back({&object, basis, rows.col(0)});
   squares->all += rows.col(0).squaredNorm();
   squares->explained += (basis.transpose() * rows.col(0)).squaredNorm();
   squares->all_dof += dof;
-  squares->explained_dof += static_cast<double>(solver.rank());
+  squares->explained_dof += static_cast<double>(span.rank());
   for (int round = 0; round < object.rounds; ++round)
     squares->translation_m2 += moved.segment<3>(round * kPoseValues).squaredNorm();
   squares->translations += 3 * object.rounds;

@@ -1,11 +1,11 @@
 #include "server/diagnosis/selection/selection.h"
 
 #include <absl/strings/str_cat.h>
-#include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/decompositions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/inference/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
@@ -140,7 +140,7 @@ Eigen::MatrixXd ColumnsOf(const inference::Fit& fit, int effect) {
 bool ActsAlike(const inference::Fit& fit, int effect, const inference::Fit& other_fit, int other) {
   const Eigen::MatrixXd own = ColumnsOf(fit, effect), span = ColumnsOf(other_fit, other);
   if (own.cols() == 0 || span.cols() == 0 || own.rows() != span.rows()) return false;
-  const Eigen::MatrixXd outside = own - span * span.colPivHouseholderQr().solve(own);
+  const Eigen::MatrixXd outside = own - span * SolveLeastSquaresColumns(span, own);
   return outside.norm() < kAlike * own.norm();
 }
 

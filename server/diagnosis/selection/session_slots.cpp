@@ -1,11 +1,10 @@
 #include "server/diagnosis/selection/session_slots.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "server/base/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/inference/laplace_evidence.h"
 
@@ -76,11 +75,11 @@ SessionSlots::Form SessionSlots::MakeForm(const Eigen::MatrixXd& gram, int s) co
   if (p > 0) {
     Eigen::MatrixXd jj = gram.block(1, 1, p, p);
     for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
-    const Eigen::VectorXd own = solver.solve(gram.block(1, 0, p, 1));
+    const SymmetricSolver solver(jj);
+    const Eigen::VectorXd own = solver.SolveColumns(gram.block(1, 0, p, 1));
     const Eigen::MatrixXd cross = gram.block(1, 1 + p, p, m);
     form.q -= gram.block(1, 0, p, 1).col(0).dot(own);
-    form.a -= cross.transpose() * solver.solve(cross);
+    form.a -= cross.transpose() * solver.SolveColumns(cross);
     form.b -= cross.transpose() * own;
   }
   AddSums(&form);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/decompositions.h"
 #include "server/base/readable_time.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
@@ -95,7 +96,7 @@ void PredictPoses(const PoseEvidence& evidence, const inference::Fit& fit,
     // What the other poses leave open stays where it is.
     for (int i = 0; i < p; ++i)
       gram(1 + i, 1 + i) += std::pow(support->sigma_s / fit.model.parameters()[i].scale, 2);
-    if (p > 0) steps.emplace_back(gram.bottomRightCorner(p, p).ldlt().solve(gram.col(0).tail(p)));
+    if (p > 0) steps.emplace_back(SymmetricSolver(gram.bottomRightCorner(p, p)).Solve(gram.col(0).tail(p)));
   }
   double scatter_s2 = 0, scatter_dof = 0;
   for (const PoseMean& mean : evidence.means()) {

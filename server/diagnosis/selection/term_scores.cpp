@@ -1,10 +1,10 @@
 #include "server/diagnosis/selection/term_scores.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "server/base/decompositions.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -56,9 +56,9 @@ TermScorer::Projection TermScorer::Project(const inference::Likelihood::Columns&
   if (p > 0) {
     Eigen::MatrixXd jj = own.bottomRightCorner(p, p);
     for (int i = 0; i < p; ++i) jj(i, i) *= 1 + 1e-9, jj(i, i) += 1e-300;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(jj);
-    projection.own_step = solver.solve(own.col(0).tail(p));
-    projection.own_cross = solver.solve(projection.cross.bottomRows(p));
+    const SymmetricSolver solver(jj);
+    projection.own_step = solver.Solve(own.col(0).tail(p));
+    projection.own_cross = solver.SolveColumns(projection.cross.bottomRows(p));
     projection.q -= own.col(0).tail(p).dot(projection.own_step);
   }
   if (width == 2) {
@@ -89,7 +89,7 @@ TermScorer::BlockFit TermScorer::FitBlock(const Projection& projection, int b, i
   block.determined = a.allFinite();
   if (!block.determined) return block;
   for (int i = 0; i < width; ++i) a(i, i) *= 1 + 1e-9;
-  block.step = a.ldlt().solve(g);
+  block.step = SymmetricSolver(a).Solve(g);
   const double left = std::max(projection.q - g.dot(block.step), 0.0);
   const double sigma = likelihood_.Sigma(left, p + width);
   double occam = 0;

@@ -1,12 +1,11 @@
 #include "server/diagnosis/selection/time_course.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 
+#include "server/base/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/inference/laplace_evidence.h"
 #include "server/diagnosis/selection/candidate_course.h"
@@ -218,7 +217,7 @@ class CourseScorer {
       } else if (of.a.trace() > kVisibleShare * of.plain) {
         Eigen::MatrixXd ridged = of.a;
         ridged.diagonal().array() += 1e-9 * of.a.trace();
-        const Eigen::VectorXd solved = ridged.ldlt().solve(of.b);
+        const Eigen::VectorXd solved = SymmetricSolver(ridged).Solve(of.b);
         drop = of.b.dot(solved);
         values.tail(f) = solved;
         values.array() -= values.mean();

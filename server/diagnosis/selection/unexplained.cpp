@@ -1,10 +1,10 @@
 // What is left when no cause of the catalogue explains it.
-#include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "server/base/decompositions.h"
 #include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
@@ -23,12 +23,12 @@ constexpr int kMaxSpan = 8;  // columns: effects with more of them look like any
 double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const Eigen::MatrixXd& span) {
   const auto without = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
     if (own.cols() == 0) return values;
-    return values - own * own.colPivHouseholderQr().solve(values);
+    return values - own * SolveLeastSquaresColumns(own, values);
   };
   const Eigen::VectorXd c = without(column);
   const Eigen::MatrixXd s = without(span);
   if (!(c.norm() > 0) || !(s.norm() > 0)) return 0;
-  return (s * s.colPivHouseholderQr().solve(c)).norm() / c.norm();
+  return (s * SolveLeastSquares(s, c)).norm() / c.norm();
 }
 
 // The formula as it stands in a model file.

@@ -3,13 +3,12 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/decompositions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/geometry/pose.h"
@@ -176,7 +175,7 @@ class Registration {
     }
     const double ridge = damping * std::max(1e-9, normal.trace() / 6);
     normal.diagonal().array() += ridge;
-    return normal.ldlt().solve(right);
+    return SymmetricSolver(normal).Solve(right);
   }
 
   // A shift, and a turn about the pivot, in the base frame.
@@ -203,7 +202,7 @@ class Registration {
       Vector6d right = Vector6d::Zero();
       for (size_t i = 0; i < used.size(); ++i)
         if (used[i]) right -= fit.gradient[i] * fit.rest_m[i];
-      const Vector6d change = normal.ldlt().solve(right);
+      const Vector6d change = SymmetricSolver(normal).Solve(right);
       pose = Moved(pose, change);
       fit = Evaluate(pose, kMinScaleM);
       if (change.norm() < 1e-10) break;
@@ -236,14 +235,15 @@ class Registration {
                           shift_m * kMillimetresPerMetre, turn_rad / kRadiansPerDegree));
     result.base_from_object = pose;
     const Matrix6d normal = Normal(fit, used);
-    Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(normal / static_cast<double>(result.contacts));
-    for (int k = 0; k < 6; ++k)
-      result.singular_values[k] = std::sqrt(std::max(0.0, eigen.eigenvalues()[5 - k]));
+    const Eigen::VectorXd eigenvalues = EigenvaluesOfSymmetric(normal / static_cast<double>(result.contacts));
+    for (int k = 0; k < 6; ++k) result.singular_values[k] = std::sqrt(std::max(0.0, eigenvalues[5 - k]));
     // From a shift of the pivot and a scaled turn to the origin's shift and the turn.
     Matrix6d to_origin = Matrix6d::Identity();
     to_origin.topRightCorner<3, 3>() = -Cross(pose.translation() - pivot_m_) / length_m_;
     to_origin.bottomRightCorner<3, 3>() = Matrix3d::Identity() / length_m_;
-    const Matrix6d covariance = to_origin * (variance * normal.inverse()) * to_origin.transpose();
+    const Matrix6d covariance = to_origin *
+                                (variance * SymmetricSolver(normal).SolveColumns(Matrix6d::Identity())) *
+                                to_origin.transpose();
     for (int k = 0; k < 3; ++k) {
       result.translation_std_error_m[k] = std::sqrt(covariance(k, k));
       result.rotation_std_error_rad[k] = std::sqrt(covariance(3 + k, 3 + k));
@@ -264,11 +264,11 @@ class Registration {
       return absl::FailedPreconditionError(absl::StrCat("only ", count, " of ", used.size(),
                                                         " contacts meet '", surface_.name(),
                                                         "' near the start; check the object and the start"));
-    Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(normal / count);
+    const SymmetricEigen eigen = EigenOfSymmetric(normal / count);
     std::vector<std::string> unknown;
     for (int k = 0; k < 6; ++k)
-      if (std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) < kUndetermined)
-        unknown.push_back(InWords(eigen.eigenvectors().col(k)));
+      if (std::sqrt(std::max(0.0, eigen.values[k])) < kUndetermined)
+        unknown.push_back(InWords(eigen.vectors.col(k)));
     if (unknown.empty()) return absl::OkStatus();
     return absl::FailedPreconditionError(absl::StrCat(
         "the contacts with '", surface_.name(), "' cannot determine ", unknown.size(),

@@ -2,9 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <Eigen/SVD>
 
 #include <cmath>
+
+#include "server/base/decompositions.h"
 
 namespace touchstone::gateway::calibration {
 namespace {
@@ -30,17 +31,17 @@ absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3
     lines.block<3, 3>(3 * k, 3) = -Eigen::Matrix3d::Identity();
     right.segment<3>(3 * k) = -base_from_flange[k].translation();
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(lines, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const double spread = svd.singularValues()[5] / std::sqrt(static_cast<double>(poses));
+  const SingularValues svd = SingularValuesOf(lines);
+  const double spread = svd.values[5] / std::sqrt(static_cast<double>(poses));
   if (!(spread >= kMinSpread)) {
-    const Eigen::Vector3d unknown = svd.matrixV().col(5).head<3>().normalized();
+    const Eigen::Vector3d unknown = svd.v.col(5).head<3>().normalized();
     return absl::InvalidArgumentError(
         absl::StrFormat("the %d flange poses turn too little to tell where the tip stands along (%.2f, %.2f, "
                         "%.2f) of the flange; turn "
                         "the tool by 20 degrees and more about two axes across that direction",
                         poses, unknown.x(), unknown.y(), unknown.z()));
   }
-  const Eigen::VectorXd solution = svd.solve(right);
+  const Eigen::VectorXd solution = svd.Solve(right);
   const Eigen::VectorXd rest = lines * solution - right;
 
   ToolCalibration tool;
@@ -48,9 +49,8 @@ absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3
   tool.pivot_m = solution.tail<3>();
   const double variance = rest.squaredNorm() / static_cast<double>(3 * poses - 6);
   tool.rms_m = std::sqrt(variance);
-  const Eigen::VectorXd inverse = svd.singularValues().array().square().inverse();
-  const Eigen::MatrixXd covariance =
-      variance * svd.matrixV() * inverse.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::VectorXd inverse = svd.values.array().square().inverse();
+  const Eigen::MatrixXd covariance = variance * svd.v * inverse.asDiagonal() * svd.v.transpose();
   tool.flange_from_tip_std_error_m = covariance.diagonal().head<3>().array().sqrt();
   tool.pivot_std_error_m = covariance.diagonal().tail<3>().array().sqrt();
   for (size_t k = 0; k < poses; ++k) {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "server/base/decompositions.h"
 #include "server/base/status.h"
-#include "server/base/symmetric_eigen.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
