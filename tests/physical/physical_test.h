@@ -23,10 +23,6 @@
 
 namespace touchstone {
 
-// For tests that take pictures. The rig's clock does not wait for the emulated camera, whose pictures take time of the host:
-// at this pace a picture that comes late was still taken where the arm is.
-constexpr double kSpeedupWithCamera = 5;
-
 // A lease that is renewed until it is dropped.
 class KeptLease {
  public:
