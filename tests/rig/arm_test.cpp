@@ -228,6 +228,21 @@ TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
   }
 }
 
+TEST_F(EmulatedArm, ProgramThatIsStoppedAfterItsGuardHasAnsweredDoesNotRun) {
+  Heart heart(arm_.get(), &clock_);
+  const gateway::arm::ArmTouch touch = SomeTouch(31);
+  // The thread that sends it was held up between the two, for longer than a stop waits.
+  const auto guard = [&] {
+    std::thread([&] { EXPECT_TRUE(arm_->Stop().ok()); }).join();
+    return absl::OkStatus();
+  };
+  EXPECT_EQ(arm_->StartTouch(touch, guard).code(), absl::StatusCode::kAborted);
+  ExpectAtRestSoon();
+  // Nor does the arm wait for it to begin.
+  PassRigTime(1.2 * arm_options_.program_start_s * clock_.speedup());
+  EXPECT_TRUE(arm_->State().ok()) << arm_->State().status();
+}
+
 TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
   Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(12)).ok());
